@@ -1,0 +1,1 @@
+"""Loading, statistics, tables, figures and the report."""

@@ -1,0 +1,384 @@
+"""Figures of the study; each draws what it is given and computes nothing (PAPER fig. 6, 9–11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from analysis.comparison import LayerCourse, SpectrumComparison, SpectrumPanel
+from analysis.load import MODELS, SCALES
+from analysis.statistics import ALL_TEXTURES, ConfusionMatrix
+
+# Okabe and Ito's palette, told apart by people with any colour vision.
+BLUE, VERMILLION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
+PURPLE, SKY_BLUE, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6E6E6E"
+MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
+MODEL_HATCHES = {"full": "", "simplified": "///"}
+LAYER_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
+LAYER_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+LEVELS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
+BAR_WIDTH = 0.38
+LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side on a log axis
+AMPLITUDE_LABELS = {
+    "energy": "amplitude of the sinusoid of equal power",
+    "paper-fft": "single-sided FFT amplitude of the peak",
+    "paper-gain": "gain G read as an amplitude",
+}
+
+
+def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
+    """Recording, both models and the threshold (PAPER fig. 6): spectra above, layers below."""
+    figure = Figure(figsize=(10.5, 7), layout="constrained")
+    axes = figure.subplots(2, 2, sharex=True, sharey="row")
+    for column, model in enumerate(MODELS):
+        plot_model_spectrum(comparison, model=model, ax=axes[0, column])
+        plot_layers_and_threshold(comparison, model=model, ax=axes[1, column])
+        axes[0, column].set_xlabel("")
+    for ax in axes[:, 1]:
+        ax.set_ylabel("")
+    figure.suptitle(
+        f"{comparison.texture}, {comparison.speed_mm_s:g} mm/s, {comparison.force_n:g} N"
+    )
+    return figure
+
+
+def plot_model_spectrum(
+    comparison: SpectrumComparison, *, model: str, ax: Axes | None = None
+) -> Axes:
+    """Smoothed magnitude of the recording and of one model (full or simplified)."""
+    ax = _axes_or_new(ax)
+    response = comparison.full if model == "full" else comparison.simplified
+    ax.plot(comparison.frequency_hz, comparison.recording, color=GREY, lw=2.5, label="recording")
+    ax.plot(comparison.frequency_hz, response, color=BLUE, lw=1.5, ls="--", label=f"{model} model")
+    _log_frequency(ax, comparison.frequency_hz[-1])
+    ax.set_yscale("log")
+    ax.set_ylabel("magnitude, smoothed by 30 Hz\n(g per unit noise)")
+    ax.set_title(f"({'a' if model == 'full' else 'b'}) {model} model", loc="left")
+    ax.legend(frameon=False, fontsize=9)
+    _stamp(ax, comparison.simulated)
+    return ax
+
+
+def plot_layers_and_threshold(
+    comparison: SpectrumComparison, *, model: str, ax: Axes | None = None
+) -> Axes:
+    """Each layer's sinusoid of equal power (stems at f) against the detection threshold."""
+    ax = _axes_or_new(ax)
+    threshold = comparison.threshold
+    ax.plot(
+        threshold.frequency_hz,
+        threshold.acceleration_g,
+        color=BLACK,
+        label=f"detection threshold ({threshold.name})",
+    )
+    levels = np.concatenate([threshold.acceleration_g, comparison.layer_amplitude_g])
+    bottom = float(levels[levels > 0].min()) / 3
+    gone = "dropped" if model == "simplified" else "to be dropped"
+    for dropped, label in ((False, "layer, kept"), (True, f"layer, {gone}")):
+        colour = VERMILLION if dropped else BLUE
+        chosen = comparison.dropped == dropped
+        if not chosen.any():
+            continue
+        frequency, top = comparison.layer_frequency_hz[chosen], comparison.layer_amplitude_g[chosen]
+        ax.vlines(frequency, bottom, top, color=colour, ls=":" if dropped else "-")
+        ax.plot(
+            frequency,
+            top,
+            ls="",
+            color=colour,
+            marker="X" if dropped else "o",
+            mfc="white" if dropped else colour,
+            ms=8,
+            label=label,
+        )
+        for number, at in zip(
+            np.flatnonzero(chosen) + 1, zip(frequency, top, strict=True), strict=True
+        ):
+            ax.annotate(str(number), at, xytext=(0, 7), textcoords="offset points", ha="center")
+    ax.axvspan(threshold.frequency_hz[-1], comparison.frequency_hz[-1], color=GREY, alpha=0.12)
+    ax.text(
+        0.985, 0.8, "no threshold known", transform=ax.transAxes, fontsize=8, color=GREY, ha="right"
+    )
+    _log_frequency(ax, comparison.frequency_hz[-1])
+    ax.set_yscale("log")
+    ax.set_ylim(bottom, float(levels.max()) * 6)
+    ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
+    ax.legend(frameon=False, fontsize=9, loc="upper center", ncols=2)
+    _stamp(ax, comparison.simulated)
+    return ax
+
+
+def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
+    """Rated similarity, both scales, before and after simplification (PAPER fig. 9).
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `statistics.rating_tests`.
+    simulated : bool
+        Written into the figure.
+    """
+    figure = Figure(figsize=(10.5, 4.6), layout="constrained")
+    for panel, ax, scale in zip("ab", figure.subplots(1, 2), SCALES.values(), strict=True):
+        chosen = tests[tests["scale"] == scale]
+        plot_paired_bars(chosen, simulated=simulated, ax=ax)
+        ax.set_title(f"({panel}) {scale}", loc="left")
+        ax.set_ylabel(f"rated similarity of {scale} (0–100)")
+        ax.set_ylim(0, 115)
+        ax.set_yticks(range(0, 101, 20))
+    _shared_legend(figure)
+    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    return figure
+
+
+def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float = 1 / 7) -> Figure:
+    """Correct rates before and after simplification against chance (PAPER fig. 11).
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `statistics.rate_tests`; the row over all textures is left out.
+    simulated : bool
+        Written into the figure.
+    chance : float
+        Rate of a guessing participant, drawn as a line.
+    """
+    figure = Figure(figsize=(8, 4.6), layout="constrained")
+    ax = figure.subplots()
+    plot_paired_bars(tests[tests["texture"] != ALL_TEXTURES], simulated=simulated, ax=ax)
+    ax.axhline(chance, color=BLACK, ls="--", lw=1)
+    ax.text(1.0, chance, f" chance\n {chance:.1%}", transform=ax.get_yaxis_transform(), va="center")
+    ax.set_ylabel("correct rate (share of trials, 0–1)")
+    ax.set_ylim(0, 1.15)
+    ax.set_yticks(np.arange(0, 1.01, 0.2))
+    _shared_legend(figure)
+    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    return figure
+
+
+def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """Mean ± standard error per texture, full beside simplified, with significance marks."""
+    ax = _axes_or_new(ax)
+    place = np.arange(len(tests))
+    for side, model in zip((-0.5, 0.5), MODELS, strict=True):
+        ax.bar(
+            place + side * BAR_WIDTH,
+            tests[f"mean_{model}"],
+            BAR_WIDTH,
+            yerr=tests[f"se_{model}"].fillna(0.0),
+            capsize=3,
+            color=MODEL_COLOURS[model],
+            hatch=MODEL_HATCHES[model],
+            edgecolor="white",
+            label=f"{model} model",
+        )
+    columns = zip(MODELS, ("se_full", "se_simplified"), strict=True)
+    tops = [tests[f"mean_{model}"] + tests[se].fillna(0.0) for model, se in columns]
+    for x, top, p in zip(place, np.nanmax(tops, axis=0), tests["p_holm"], strict=True):
+        _significance_bracket(ax, float(x), top=float(top), p=float(p))
+    ax.set_xticks(place, list(tests["texture"]), rotation=30, ha="right")
+    ax.set_xlabel("texture")
+    _finish(ax)
+    _stamp(ax, simulated)
+    return ax
+
+
+def _significance_bracket(ax: Axes, x: float, *, top: float, p: float) -> None:
+    mark = next((mark for level, mark in LEVELS if p < level), "")
+    if mark:
+        ax.annotate(
+            "",
+            (x - BAR_WIDTH / 2, top),
+            (x + BAR_WIDTH / 2, top),
+            arrowprops={
+                "arrowstyle": "-",
+                "connectionstyle": "bar,fraction=0.25",
+                "shrinkB": 3,
+                "shrinkA": 3,
+            },
+        )
+        ax.annotate(
+            mark, (x, top), xytext=(0, 8), textcoords="offset points", ha="center", va="bottom"
+        )
+
+
+def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool) -> Figure:
+    """Who was taken for whom, full beside simplified (PAPER fig. 10)."""
+    figure = Figure(figsize=(12.5, 6.2), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for panel, ax, model in zip("ab", axes, MODELS, strict=True):
+        plot_confusion(matrices[model], simulated=simulated, ax=ax)
+        ax.set_title(f"({panel}) {model} model", loc="left")
+    axes[1].set_ylabel("")
+    bar = figure.colorbar(axes[1].images[0], ax=axes, shrink=0.8, pad=0.01)
+    bar.set_label("share of the row's answers (%)")
+    chance = 1 / len(matrices["full"].textures)
+    figure.supxlabel(
+        f"rows: real surface presented; columns: virtual surface answered; each row adds up to "
+        f"100 %; chance {chance:.1%}; in brackets: number of answers",
+        fontsize=9,
+        color=GREY,
+    )
+    return figure
+
+
+def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """One confusion matrix: row shares in per cent with counts."""
+    ax = _axes_or_new(ax)
+    shares = 100 * matrix.row_shares
+    ax.imshow(shares, vmin=0, vmax=100, cmap="cividis", aspect="auto")
+    for (row, column), share in np.ndenumerate(shares):
+        text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
+        shade = "white" if not share > 55 else "black"
+        shade = shade if np.isfinite(share) else GREY
+        ax.text(column, row, text, ha="center", va="center", fontsize=9, color=shade)
+    names = list(matrix.textures)
+    ax.set_xticks(range(len(names)), names, rotation=30, ha="right")
+    ax.set_yticks(range(len(names)), names)
+    ax.set_xlabel("virtual surface answered")
+    ax.set_ylabel("real surface presented")
+    _stamp(ax, simulated)
+    return ax
+
+
+def figure_layer_courses(courses: Sequence[LayerCourse]) -> Figure:
+    """Frequency and amplitude of each layer over speed at one force.
+
+    Parameters
+    ----------
+    courses : sequence of LayerCourse
+        The first is drawn with markers, a second one (such as the planted truth) as thin lines.
+    """
+    figure = Figure(figsize=(10.5, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    plot_layer_course(courses, quantity="frequency_hz", ax=axes[0])
+    plot_layer_course(courses, quantity="amplitude", ax=axes[1])
+    _shared_legend(figure, loc="outside right center", ncols=1)
+    figure.suptitle(f"{courses[0].texture}, {courses[0].force_n:g} N")
+    return figure
+
+
+def plot_layer_course(
+    courses: Sequence[LayerCourse], *, quantity: str, ax: Axes | None = None
+) -> Axes:
+    """One quantity (frequency_hz or amplitude) of each layer over speed."""
+    ax = _axes_or_new(ax)
+    for course, solid in zip(courses, (True, False), strict=False):
+        values: NDArray[np.float64] = getattr(course, quantity)
+        for layer in range(values.shape[1]):
+            ax.plot(
+                course.speeds_mm_s,
+                values[:, layer],
+                color=LAYER_COLOURS[layer % 7] if solid else BLACK,
+                marker=LAYER_MARKERS[layer % 7] if solid else "",
+                ls="-" if solid else "--",
+                lw=1.6 if solid else 0.9,
+                label=f"{course.label}, layer {layer + 1}" if solid or layer == 0 else None,
+            )
+            if not solid and layer == 0:
+                ax.lines[-1].set_label(course.label)
+    frequency = quantity == "frequency_hz"
+    unit = courses[0].unit if courses[0].unit == "arbitrary" else "g peak"
+    ax.set_ylabel("frequency (Hz)" if frequency else f"amplitude, sinusoid of equal power ({unit})")
+    ax.set_xlabel("speed (mm/s)")
+    ax.set_ylim(bottom=0)
+    _finish(ax)
+    _stamp(ax, any(course.simulated for course in courses))
+    return ax
+
+
+def figure_spectra(panels: Sequence[SpectrumPanel]) -> Figure:
+    """Small multiples: each condition's smoothed spectrum with its layers marked."""
+    columns = min(4, len(panels))
+    rows = -(-len(panels) // columns)
+    figure = Figure(figsize=(max(3.4 * columns, 5), 2.6 * rows + 0.4), layout="constrained")
+    first = None
+    for number, panel in enumerate(panels):
+        ax = figure.add_subplot(rows, columns, number + 1, sharex=first, sharey=first)
+        first = first or ax
+        plot_spectrum_panel(panel, ax=ax)
+        lowest_of_its_column = number + columns >= len(panels)
+        ax.tick_params(labelleft=number % columns == 0, labelbottom=lowest_of_its_column)
+        if number % columns:
+            ax.set_ylabel("")
+        if not lowest_of_its_column:
+            ax.set_xlabel("")
+    return figure
+
+
+def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes:
+    """Smoothed spectrum of one condition; triangles mark its layers, numbers are their Hz."""
+    ax = _axes_or_new(ax)
+    ax.plot(panel.frequency_hz, panel.magnitude, color=GREY, lw=1.5)
+    ax.plot(
+        panel.layer_frequency_hz, panel.layer_height * 1.25, ls="", marker="v", color=VERMILLION
+    )
+    labelled = 0.0
+    for x, y in zip(panel.layer_frequency_hz, panel.layer_height, strict=True):
+        if x > LEAST_LABEL_RATIO * labelled:
+            labelled = x
+            ax.annotate(
+                f"{x:.0f}",
+                (x, y * 1.25),
+                xytext=(0, 6),
+                textcoords="offset points",
+                ha="center",
+                fontsize=8,
+            )
+    count = panel.layer_frequency_hz.size
+    ax.text(0.98, 0.9, f"{count} layer{'s' * (count != 1)}", transform=ax.transAxes, ha="right")
+    _log_frequency(ax, panel.frequency_hz[-1])
+    ax.set_yscale("log")
+    ax.margins(y=0.25)
+    ax.set_ylabel(f"magnitude\n({panel.unit} per unit noise)")
+    ax.set_title(panel.title, loc="left", fontsize=9)
+    _stamp(ax, panel.simulated)
+    return ax
+
+
+def _shared_legend(figure: Figure, *, loc: Any = "outside upper center", ncols: int = 2) -> None:
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc=loc, ncols=ncols, frameon=False, fontsize=9)
+
+
+def _axes_or_new(ax: Axes | None) -> Axes:
+    return Figure(layout="constrained").subplots() if ax is None else ax
+
+
+def _log_frequency(ax: Axes, highest_hz: float) -> None:
+    ax.set_xscale("log")
+    ax.set_xlim(10, highest_hz)
+    ax.set_xlabel("frequency (Hz)")
+    ticks = [f for f in (10, 30, 100, 300, 1000) if f < highest_hz]
+    ax.set_xticks(ticks, [str(f) for f in ticks])
+    ax.set_xticks([], minor=True)
+    _finish(ax)
+
+
+def _finish(ax: Axes) -> None:
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.grid(axis="y", color=GREY, alpha=0.2)
+    ax.set_axisbelow(True)
+
+
+def _stamp(ax: Axes, simulated: bool) -> None:
+    """Nobody may take a simulated result for a measured one, wherever the picture ends up."""
+    if simulated:
+        ax.text(
+            1.0,
+            1.01,
+            "SIMULATED",
+            transform=ax.transAxes,
+            ha="right",
+            va="bottom",
+            color=VERMILLION,
+            weight="bold",
+            fontsize=9,
+        )

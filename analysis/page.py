@@ -1,0 +1,229 @@
+"""One HTML page that needs nothing but itself: style, tables and pictures inline, all escaped."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+PICTURE_DPI = 130
+_P_VALUES = ("p", "p_holm", "shapiro_p", "wilcoxon_p", "flip_probability")
+_LABELS = {
+    "mean_full": "mean, full",
+    "se_full": "SE, full",
+    "mean_simplified": "mean, simplified",
+    "se_simplified": "SE, simplified",
+    "mean_difference": "difference",
+    "ci_low": "95 % CI from",
+    "ci_high": "to",
+    "p_holm": "p (Holm)",
+    "d_z": "d_z",
+    "d_z_low": "d_z CI from",
+    "d_z_high": "to",
+    "shapiro_p": "Shapiro p",
+    "wilcoxon_w": "Wilcoxon W",
+    "wilcoxon_p": "Wilcoxon p",
+    "se": "SE",
+    "gfc30_mean": "GFC30 mean",
+    "gfc30_min": "GFC30 min",
+    "gfc30_floor": "GFC30 floor",
+    "gfc30_ceiling": "GFC30 ceiling",
+    "gfc5_mean": "GFC5 mean",
+    "gfc5_floor": "GFC5 floor",
+    "gfc5_ceiling": "GFC5 ceiling",
+}
+_UNITS = {"hz": "Hz", "db": "dB", "n": "N", "mm_s": "mm/s", "s": "s"}
+
+STYLE = """
+:root { --ink: #1b1f24; --soft: #59636e; --line: #d8dee4; --paper: #fff; --tint: #f4f7fa;
+        --blue: #0072b2; --warn: #d55e00; }
+* { box-sizing: border-box; }
+body { margin: 0; background: var(--tint); color: var(--ink);
+       font: 16px/1.55 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
+main, header > div { max-width: 1180px; margin: 0 auto; padding: 0 28px; }
+header { background: var(--paper); border-bottom: 1px solid var(--line); padding: 34px 0 22px; }
+h1 { margin: 0 0 6px; font-size: 30px; line-height: 1.2; }
+h2 { margin: 0 0 12px; font-size: 22px; }
+h3 { margin: 30px 0 8px; font-size: 17px; }
+.lead { color: var(--soft); margin: 0; max-width: 75ch; }
+.banner { background: var(--warn); color: #fff; font-weight: 600; padding: 10px 0; }
+.banner div { max-width: 1180px; margin: 0 auto; padding: 0 28px; }
+nav { margin-top: 16px; font-size: 15px; }
+nav a { color: var(--blue); text-decoration: none; margin-right: 22px; }
+nav a:hover { text-decoration: underline; }
+section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
+          padding: 26px 30px; margin: 26px 0; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(165px, 1fr)); gap: 14px; }
+.tile { border: 1px solid var(--line); border-radius: 8px; padding: 14px 16px; }
+.tile b { display: block; font-size: 25px; line-height: 1.25; color: var(--blue); }
+.tile span { color: var(--soft); font-size: 14px; }
+ul { margin: 8px 0 0; padding-left: 22px; max-width: 95ch; } li { margin: 7px 0; }
+p { max-width: 95ch; }
+.caution { border-left: 4px solid var(--warn); padding: 2px 0 2px 18px; margin-top: 22px; }
+figure { margin: 18px 0 26px; } figure img { max-width: 100%; height: auto; display: block; }
+figcaption, caption { color: var(--soft); font-size: 14.5px; text-align: left; max-width: 100ch; }
+caption { padding-bottom: 8px; } figcaption b, caption b { color: var(--ink); }
+.scroll { overflow-x: auto; margin: 18px 0 26px; }
+table { border-collapse: collapse; font-size: 13.5px; font-variant-numeric: tabular-nums; }
+th { text-align: left; vertical-align: bottom; font-weight: 600; color: var(--soft);
+     border-bottom: 2px solid var(--line); }
+th, td { padding: 5px 12px 5px 0; } td { border-bottom: 1px solid var(--line); }
+td.number, th.number { text-align: right; white-space: nowrap; }
+tr.total td { font-weight: 600; }
+details { border-top: 1px solid var(--line); padding: 10px 0; }
+summary { cursor: pointer; font-weight: 600; }
+footer { max-width: 1180px; margin: 0 auto 40px; padding: 0 28px; color: var(--soft);
+         font-size: 14px; }
+@media print { body { background: none; } section { border: 0; break-inside: avoid-page; } }
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of the report: `name` is its file's stem, `title` and `note` its caption."""
+
+    name: str
+    title: str
+    note: str
+    frame: pd.DataFrame
+    simulated: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A figure of the report: `name` is its file's stem, `title` and `note` its caption."""
+
+    name: str
+    title: str
+    note: str
+    figure: Figure
+    simulated: bool
+
+
+def paragraph(text: str) -> str:
+    """A paragraph of plain text."""
+    return f"<p>{escape(text)}</p>"
+
+
+def bullets(sentences: Sequence[str]) -> str:
+    """A list of plain sentences; nothing where there are none."""
+    items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)
+    return f"<ul>{items}</ul>" if items else ""
+
+
+def tiles(figures: Sequence[tuple[str, str]]) -> str:
+    """Key figures as (value, what it is)."""
+    cells = (
+        f'<div class="tile"><b>{escape(value)}</b><span>{escape(label)}</span></div>'
+        for value, label in figures
+    )
+    return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def folded(summary: str, content: str, *, opened: bool = False) -> str:
+    """A part that opens on a click; `content` is HTML."""
+    state = " open" if opened else ""
+    return f"<details{state}><summary>{escape(summary)}</summary>{content}</details>"
+
+
+def section(anchor: str, heading: str, content: str) -> str:
+    """A part of the page with its heading; `content` is HTML."""
+    return f'<section id="{escape(anchor)}"><h2>{escape(heading)}</h2>{content}</section>'
+
+
+def picture_png(figure: Figure) -> bytes:
+    """The figure as PNG."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=PICTURE_DPI)
+    return buffer.getvalue()
+
+
+def picture_html(picture: Picture, png: bytes) -> str:
+    """The figure inline, with its caption."""
+    data = base64.b64encode(png).decode("ascii")
+    return (
+        f'<figure id="{escape(picture.name)}">'
+        f'<img alt="{escape(_full_title(picture))}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{_caption(picture)}</figcaption></figure>"
+    )
+
+
+def table_html(table: Table) -> str:
+    """The table with its caption; numbers are rounded, the file beside the report is exact."""
+    frame = table.frame
+    numeric = [pd.api.types.is_numeric_dtype(frame[name]) for name in frame]
+    css = ['class="number"' if number else "" for number in numeric]
+    head = "".join(
+        f"<th {c}>{escape(label(str(name)))}</th>" for name, c in zip(frame, css, strict=True)
+    )
+    rows = []
+    for values in frame.itertuples(index=False, name=None):
+        cells = "".join(
+            f"<td {c}>{escape(cell(str(name), value))}</td>"
+            for name, value, c in zip(frame, values, css, strict=True)
+        )
+        total = any(isinstance(value, str) and value.startswith("all ") for value in values)
+        rows.append(f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>")
+    return (
+        f'<div class="scroll" id="{escape(table.name)}"><table><caption>{_caption(table)}'
+        f"</caption><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+    )
+
+
+def label(column: str) -> str:
+    """A column's name for people: `worst_speed_mm_s` becomes `worst speed (mm/s)`."""
+    if column in _LABELS:
+        return _LABELS[column]
+    for ending, unit in _UNITS.items():
+        if column.endswith(f"_{ending}"):
+            return f"{column.removesuffix(f'_{ending}').replace('_', ' ')} ({unit})"
+    return column.replace("_", " ")
+
+
+def cell(column: str, value: object) -> str:
+    """A value as it is read in a table: three significant digits, `n/a` where there is none."""
+    if not isinstance(value, float):
+        return str(value)
+    if math.isnan(value):
+        return "n/a"
+    if column in _P_VALUES:
+        return p_value(value)
+    if column.startswith(("gfc", "oracle")):
+        return f"{value:.4f}"
+    size = abs(value)
+    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
+    tiny = 0 < size < 0.0005
+    return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
+
+
+def p_value(p: float) -> str:
+    """A probability with three decimals, `< .001` below."""
+    return "< .001" if p < 0.001 else f"{p:.3f}".replace("0.", ".", 1)
+
+
+def page(*, title: str, lead: str, banner: str, sections: Sequence[tuple[str, str, str]]) -> str:
+    """The whole page from (anchor, heading, HTML) sections; no banner where its text is empty."""
+    links = "".join(f'<a href="#{escape(a)}">{escape(heading)}</a>' for a, heading, _ in sections)
+    warning = f'<div class="banner"><div>{escape(banner)}</div></div>' if banner else ""
+    body = "".join(section(*part) for part in sections)
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{STYLE}</style></head><body>{warning}<header><div><h1>{escape(title)}</h1>"
+        f'<p class="lead">{escape(lead)}</p><nav>{links}</nav></div></header>'
+        f"<main>{body}</main></body></html>\n"
+    )
+
+
+def _full_title(item: Table | Picture) -> str:
+    return f"{item.title} (SIMULATED)" if item.simulated else item.title
+
+
+def _caption(item: Table | Picture) -> str:
+    return f"<b>{escape(_full_title(item))}.</b> {escape(item.note)}"

@@ -1,0 +1,153 @@
+"""Tables of the modeling half: simplification rate and quality (PAPER table 3, METHOD 7, 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from modeling import InputError, Recording, RecordingSet, Simplification, TextureModel, similarity
+
+
+@dataclass(frozen=True, eq=False)
+class TextureResult:
+    """What the modeling half says about one texture.
+
+    Parameters
+    ----------
+    recordings : RecordingSet
+        Of this texture.
+    model : TextureModel
+        The full model, fitted to the recordings.
+    simplification : Simplification
+        Its simplified model and the verdict on every layer.
+    truth : TextureModel, optional
+        What was planted, where the recordings are simulated from a known model.
+    other_estimates : tuple of TextureModel
+        Models of other estimators, to be held against the truth beside `model`.
+    """
+
+    recordings: RecordingSet
+    model: TextureModel
+    simplification: Simplification
+    truth: TextureModel | None = None
+    other_estimates: tuple[TextureModel, ...] = ()
+
+    @property
+    def texture(self) -> str:
+        """Name of the surface."""
+        return self.model.texture
+
+    @property
+    def simulated(self) -> bool:
+        """True where no real surface was touched."""
+        return self.model.simulated or any(r.simulated for r in self.recordings.recordings)
+
+    def recording_at(self, speed_mm_s: float, force_n: float) -> Recording:
+        """The first recording of a condition.
+
+        Raises
+        ------
+        InputError
+            Where there is none.
+        """
+        for recording in self.recordings.recordings:
+            if recording.condition == (speed_mm_s, force_n):
+                return recording
+        raise InputError(
+            f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and {force_n:g} N, "
+            "got none; choose a recorded condition."
+        )
+
+
+def gfc_table(
+    recordings: RecordingSet,
+    full: TextureModel,
+    simplified: TextureModel,
+    *,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Simplification rate and quality of one texture (PAPER table 3).
+
+    Parameters
+    ----------
+    recordings : RecordingSet
+        What both models are held against, condition by condition.
+    full, simplified : TextureModel
+        Before and after simplification.
+    rng : Generator
+        Draws behind the ceiling (METHOD 8).
+
+    Returns
+    -------
+    DataFrame
+        Two rows (model = full, simplified): texture, layers, parameters, conditions, then means
+        over the conditions: gfc30_mean (and gfc30_min), gfc30_floor (white noise of equal RMS),
+        gfc30_ceiling (draws of the recording's own spectrum), gfc5_mean, gfc5_floor,
+        gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of |error|),
+        band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
+    """
+    rows = []
+    contact = [recording for recording in recordings.recordings if recording.force_n > 0]
+    for name, model in (("full", full), ("simplified", simplified)):
+        reports = [similarity.report(recording, model, rng=rng) for recording in contact]
+
+        def mean_of(field: str, reports: Sequence[similarity.SimilarityReport] = reports) -> float:
+            return float(np.mean([getattr(report, field) for report in reports]))
+
+        rows.append(
+            {
+                "texture": full.texture,
+                "model": name,
+                "layers": model.n_layers,
+                "parameters": model.n_parameters,
+                "conditions": len(reports),
+                "gfc30_mean": mean_of("gfc30"),
+                "gfc30_min": min(report.gfc30 for report in reports),
+                "gfc30_floor": mean_of("floor_gfc30"),
+                "gfc30_ceiling": mean_of("ceiling_gfc30"),
+                "gfc5_mean": mean_of("gfc5"),
+                "gfc5_floor": mean_of("floor_gfc5"),
+                "gfc5_ceiling": mean_of("ceiling_gfc5"),
+                "log_spectral_distance_db": mean_of("log_spectral_distance_db"),
+                "rms_error_db": float(np.mean([abs(r.rms_error_db) for r in reports])),
+                "band_energy_error_db": float(np.mean([_band_error_db(r) for r in reports])),
+                "oracle_gap": mean_of("oracle_gap"),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
+def _band_error_db(report: similarity.SimilarityReport) -> float:
+    """RMS over the bands that hold energy; a short record leaves narrow bands empty."""
+    errors = report.band_energy_error_db[np.isfinite(report.band_energy_error_db)]
+    return float(np.sqrt(np.mean(errors**2))) if errors.size else float("nan")
+
+
+def simplification_table(simplification: Simplification) -> pd.DataFrame:
+    """The verdict on every layer and its reason (METHOD 7).
+
+    Returns
+    -------
+    DataFrame
+        texture, layer (1-based), verdict (kept|dropped), distance_db (to the threshold in the
+        worst condition, + above), worst_speed_mm_s, worst_force_n, worst_frequency_hz,
+        flip_probability (0–1), reason.
+    """
+    rows = [
+        {
+            "texture": simplification.model.texture,
+            "layer": verdict.layer,
+            "verdict": verdict.verdict,
+            "distance_db": verdict.distance_db,
+            "worst_speed_mm_s": verdict.worst_speed_mm_s,
+            "worst_force_n": verdict.worst_force_n,
+            "worst_frequency_hz": verdict.worst_frequency_hz,
+            "flip_probability": verdict.flip_probability,
+            "reason": verdict.reason,
+        }
+        for verdict in simplification.layers
+    ]
+    return pd.DataFrame(rows)

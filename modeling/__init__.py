@@ -1,0 +1,35 @@
+"""Texture models: from recordings to parameters, to fewer parameters, to vibration."""
+
+from modeling import similarity
+from modeling.errors import InputError
+from modeling.estimators import ESTIMATORS, Layers, find_layers
+from modeling.fitting import fit_texture, missing_conditions
+from modeling.model import TextureModel
+from modeling.peq import PEQ
+from modeling.recording import Recording, RecordingSet
+from modeling.renderer import Renderer
+from modeling.simplification import CRITERIA, LayerVerdict, Simplification, simplify
+from modeling.spectra import Spectrum, spectrum
+from modeling.thresholds import Threshold
+
+__all__ = [
+    "CRITERIA",
+    "ESTIMATORS",
+    "PEQ",
+    "InputError",
+    "LayerVerdict",
+    "Layers",
+    "Recording",
+    "RecordingSet",
+    "Renderer",
+    "Simplification",
+    "Spectrum",
+    "TextureModel",
+    "Threshold",
+    "find_layers",
+    "fit_texture",
+    "missing_conditions",
+    "similarity",
+    "simplify",
+    "spectrum",
+]

@@ -1,0 +1,225 @@
+"""From a spectrum to noise gain and layers: the paper's recipe, as printed and made consistent.
+
+`paper` reads the recipe plainly: B is the full width at half maximum of the smoothed peak and G its
+height. That counts the noise floor twice and the smoothing as width. `paper-consistent` fits the
+peak above the floor, takes the smoothing out of its width, and chooses gains such that the model,
+smoothed alike, has the measured heights (METHOD 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import curve_fit
+from scipy.signal import find_peaks
+
+from modeling.errors import InputError
+from modeling.peq import (
+    HIGHEST_BANDWIDTH_SHARE,
+    HIGHEST_FREQUENCY_SHARE,
+    LOWEST_BANDWIDTH_HZ,
+    LOWEST_FREQUENCY_HZ,
+    Floats,
+    band_response,
+)
+from modeling.spectra import SMOOTHING_HZ, Spectrum, smooth
+
+EstimatorName = Literal["paper", "paper-consistent"]
+ESTIMATORS: tuple[EstimatorName, ...] = ("paper", "paper-consistent")
+
+NOISE_BAND = (0.8, 1.0)  # of the Nyquist frequency (2.0–2.5 kHz at 5 kHz)
+# A hill counts as a peak where it rises above its saddle by more than the smoothed spectrum's own
+# scatter: the paper names no limit, and with none every ripple of the floor would be a layer.
+PROMINENCE_SD = 1.0
+RAYLEIGH_VARIATION = np.sqrt(4 / np.pi - 1)
+WINDOW_WIDTHS = 1.5
+UNRESOLVED_S_HZ = 5.0
+FWHM_PER_S = 2 * np.sqrt(2 * np.log(2))
+BANDWIDTH_PER_S = 1.36
+GAIN_STEPS = 12
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Noise gain and m layers of one spectrum, by rising frequency.
+
+    Parameters
+    ----------
+    noise_gain : float
+        G_w, in g per unit noise.
+    frequencies_hz, bandwidths_hz, gains : (m,) ndarray
+        As in `PEQ`.
+    level_sd_db : (m,) ndarray
+        Standard deviation of each layer's level, 4.34/√(πBT) dB.
+    unresolved : (m,) ndarray of bool
+        Width below what the smoothing resolves.
+    """
+
+    noise_gain: float
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    gains: Floats
+    level_sd_db: Floats
+    unresolved: NDArray[np.bool_]
+
+
+def check_estimator(estimator: str) -> EstimatorName:
+    """The name itself, or InputError where there is no such estimator."""
+    for name in ESTIMATORS:
+        if name == estimator:
+            return name
+    raise InputError(
+        f"expected an estimator among {', '.join(ESTIMATORS)}, got {estimator!r}; choose one."
+    )
+
+
+def find_layers(spectrum: Spectrum, *, estimator: str = "paper-consistent") -> Layers:
+    """Noise gain and layers of one spectrum alone, without a grid to track them over.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    estimator : {"paper", "paper-consistent"}
+    """
+    frequencies = find_peak_frequencies(spectrum)
+    nothing = np.full(frequencies.shape, np.nan)
+    return fit_layers(
+        spectrum, frequencies, fallback_bandwidths_hz=nothing, estimator=check_estimator(estimator)
+    )
+
+
+def find_peak_frequencies(spectrum: Spectrum) -> Floats:
+    """Frequencies (Hz, rising) of the peaks of the 30 Hz smoothed spectrum.
+
+    A peak is a local maximum above the noise amount whose prominence exceeds the smoothed
+    spectrum's standard deviation there (0.52/√(2√π·30 Hz·T), relative).
+    """
+    smoothed = spectrum.smoothed()
+    relative_sd = RAYLEIGH_VARIATION / np.sqrt(
+        2 * np.sqrt(np.pi) * SMOOTHING_HZ * spectrum.duration_s
+    )
+    peaks, found = find_peaks(smoothed, height=noise_amount(spectrum), prominence=0.0)
+    clear = found["prominences"] > PROMINENCE_SD * relative_sd * smoothed[peaks]
+    frequency = spectrum.frequency_hz[peaks[clear]]
+    legal = frequency >= LOWEST_FREQUENCY_HZ
+    legal &= frequency <= HIGHEST_FREQUENCY_SHARE * spectrum.rate_hz
+    peak_frequency: Floats = frequency[legal]
+    return peak_frequency
+
+
+def noise_amount(spectrum: Spectrum) -> float:
+    """A_w: mean magnitude between 0.8 and 1.0 of the Nyquist frequency, in g per unit noise."""
+    low, high = (share * spectrum.rate_hz / 2 for share in NOISE_BAND)
+    band = (spectrum.frequency_hz >= low) & (spectrum.frequency_hz <= high)
+    return float(spectrum.magnitude[band].mean())
+
+
+def fit_layers(
+    spectrum: Spectrum,
+    frequencies_hz: Floats,
+    *,
+    fallback_bandwidths_hz: Floats,
+    estimator: EstimatorName,
+) -> Layers:
+    """Widths and gains of layers whose frequencies are known.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    frequencies_hz : (m,) ndarray
+    fallback_bandwidths_hz : (m,) ndarray
+        Taken where the width's fit fails; NaN where there is none (then the smoothing's own).
+    estimator : {"paper", "paper-consistent"}
+    """
+    consistent = estimator == "paper-consistent"
+    smoothed, floor = spectrum.smoothed(), noise_amount(spectrum)
+    heights = smoothed - floor if consistent else smoothed
+    fits = [_peak_width(spectrum.frequency_hz, heights, f) for f in frequencies_hz]
+    bandwidth, unresolved = _bandwidths(np.array(fits, dtype=np.float64), consistent)
+    failed = ~np.isfinite(bandwidth)
+    instead = np.where(
+        np.isfinite(fallback_bandwidths_hz), fallback_bandwidths_hz, FWHM_PER_S * SMOOTHING_HZ
+    )
+    bandwidth = np.where(failed, instead, bandwidth)
+    bandwidth = np.clip(bandwidth, LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * spectrum.rate_hz)
+    at_peak = np.interp(frequencies_hz, spectrum.frequency_hz, smoothed)
+    if consistent:
+        gains = _consistent_gains(spectrum, frequencies_hz, bandwidth, at_peak - floor, floor)
+    else:
+        gains = at_peak
+    level_sd_db = 10 / np.log(10) / np.sqrt(np.pi * bandwidth * spectrum.duration_s)
+    return Layers(floor, frequencies_hz, bandwidth, gains, level_sd_db, unresolved & ~failed)
+
+
+def _gaussian(offset: Floats, height: float, s: float) -> Floats:
+    curve: Floats = height * np.exp(-0.5 * (offset / s) ** 2)
+    return curve
+
+
+def _gaussian_jacobian(offset: Floats, height: float, s: float) -> Floats:
+    bell = np.exp(-0.5 * (offset / s) ** 2)
+    return np.column_stack([bell, height * bell * offset**2 / s**3])
+
+
+def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> float:
+    """Standard deviation s (Hz) of a Gaussian fitted within ±1.5·max(30 Hz, s); NaN on failure."""
+    s = SMOOTHING_HZ
+    for _ in range(2):
+        reach = WINDOW_WIDTHS * max(SMOOTHING_HZ, s)
+        near = np.abs(frequency_hz - centre_hz) <= reach
+        offset, values = frequency_hz[near] - centre_hz, heights[near]
+        if values.size < 4 or not (values > 0).any():
+            return np.nan
+        try:
+            found, _ = curve_fit(
+                _gaussian,
+                offset,
+                values,
+                p0=(max(values.max(), 1e-300), s),
+                jac=_gaussian_jacobian,
+                maxfev=200,
+            )
+        except RuntimeError:
+            return np.nan
+        s = abs(float(found[1]))
+        if not (found[0] > 0 and 0 < s < frequency_hz[-1]):
+            return np.nan
+    return s
+
+
+def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, NDArray[np.bool_]]:
+    """−3 dB widths from fitted s, and which of them the smoothing hides (METHOD 4)."""
+    if not consistent:
+        return FWHM_PER_S * fitted_s_hz, np.zeros(fitted_s_hz.shape, dtype=bool)
+    excess = fitted_s_hz**2 - SMOOTHING_HZ**2
+    unresolved = excess < UNRESOLVED_S_HZ**2
+    s = np.sqrt(np.where(unresolved, UNRESOLVED_S_HZ**2, excess))
+    return BANDWIDTH_PER_S * s, unresolved
+
+
+def _consistent_gains(
+    spectrum: Spectrum, frequencies_hz: Floats, bandwidths_hz: Floats, targets: Floats, floor: float
+) -> Floats:
+    """Gains ≥ 0 that give the smoothed coherent model its measured heights above the floor.
+
+    A multiplicative fixed point; each step is held to a factor of 2.
+    """
+    step_hz = spectrum.rate_hz / spectrum.n_samples
+    bins = np.rint(frequencies_hz / step_hz).astype(int)
+    bands = band_response(
+        spectrum.frequency_hz,
+        centres_hz=frequencies_hz,
+        bandwidths_hz=bandwidths_hz,
+        rate_hz=spectrum.rate_hz,
+    )
+    targets = np.maximum(targets, 0.0)
+    gains = targets.copy()
+    for _ in range(GAIN_STEPS):
+        response = np.abs(floor + gains @ bands)
+        reached = smooth(response, SMOOTHING_HZ, step_hz=step_hz)[bins] - floor
+        factor = np.divide(targets, reached, out=np.full(targets.shape, 2.0), where=reached > 0)
+        gains = gains * np.clip(factor, 0.5, 2.0)
+    return gains

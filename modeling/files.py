@@ -1,0 +1,96 @@
+"""Reading and writing small tables and whole files so that nothing half-written remains."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from modeling.errors import InputError
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text file so that it is there whole or not at all."""
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise
+
+
+@contextmanager
+def replace_folder(path: str | Path) -> Iterator[Path]:
+    """A fresh folder to fill, which takes the place of `path` when the block ends well.
+
+    After an exception nothing has changed at `path`.
+    """
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}."))
+    try:
+        yield fresh
+        fresh.chmod(0o755)
+        if target.exists():
+            shutil.rmtree(target)
+        fresh.rename(target)
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise
+
+
+def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a TSV with a header line; cells must not hold tabs or line ends."""
+    lines = ["\t".join(columns)]
+    for row in rows:
+        cells = [str(cell) for cell in row]
+        if any(c in cell for cell in cells for c in "\t\r\n"):
+            raise InputError(f"expected cells without tabs and line ends, got {cells}; rename.")
+        lines.append("\t".join(cells))
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]]:
+    """Rows of a TSV as dictionaries by column name; lines that begin with # are comments.
+
+    Raises
+    ------
+    InputError
+        If the file is not there, is empty, lacks a required column, or a row has another number
+        of cells than the header.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise InputError(f"expected a table at {source}, got no file there; give its path.")
+    try:
+        text = source.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(
+            f"expected a text table, got other bytes in {source}; save it as UTF-8."
+        ) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    header = lines[0].split("\t") if lines else []
+    missing = [name for name in required if name not in header]
+    if missing:
+        raise InputError(
+            f"expected the columns {', '.join(required)} in {source}, got "
+            f"{', '.join(header) or 'an empty file'}; add {', '.join(missing)} (tab-separated)."
+        )
+    rows = []
+    for line in lines[1:]:
+        cells = line.split("\t")
+        if len(cells) != len(header):
+            raise InputError(
+                f"expected {len(header)} cells in each row of {source}, got {len(cells)} in "
+                f"{line!r}; the table is damaged or not tab-separated."
+            )
+        rows.append(dict(zip(header, cells, strict=True)))
+    return rows

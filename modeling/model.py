@@ -1,0 +1,303 @@
+"""The texture model: PEQ parameters over a grid of speeds and forces."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from modeling.errors import InputError
+from modeling.files import write_text
+from modeling.peq import PEQ, Floats, check_bands
+from modeling.recording import UNITS
+
+Bools = NDArray[np.bool_]
+FORMAT = "tactileq.texture-model"
+VERSION = 1
+
+
+def _no_marks() -> Bools:
+    return np.zeros(0, dtype=bool)
+
+
+class Parameters(NamedTuple):
+    """PEQ parameters at n points: noise gain (n,), frequency, bandwidth and gain (n, m)."""
+
+    noise_gain: Floats
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    gains: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TextureModel:
+    """PEQ parameters of one texture over a rectangular grid of S speeds × F forces, m layers.
+
+    Parameters
+    ----------
+    texture : str
+        Name of the surface.
+    rate_hz : float
+        The rate at which the driving noise has unit variance.
+    speeds_mm_s : (S,) array_like
+        Rising, > 0, S ≥ 2.
+    forces_n : (F,) array_like
+        Rising, > 0, F ≥ 2.
+    noise_gains : (S, F) array_like
+        G_w ≥ 0, in `unit` per unit noise.
+    frequencies_hz, bandwidths_hz, gains : (S, F, m) array_like
+        As in `PEQ`; gains are signed.
+    level_sd_db : (S, F, m) array_like
+        Standard deviation of each layer's level in dB, from the estimator (0: known exactly).
+    estimator : str
+        What made the model ("paper", "paper-consistent", "planted", …).
+    unit : {"g", "arbitrary"}
+    simulated : bool
+        True where the recordings behind it were simulated.
+    inherited, unresolved : (S, F, m) array_like of bool, optional
+        Frequency taken over from the reference condition; width below what smoothing resolves.
+    interpolated : (S, F) array_like of bool, optional
+        Condition without a recording, filled from its neighbours.
+
+    Raises
+    ------
+    InputError
+        For a grid smaller than 2 × 2, wrong shapes or values out of range.
+    """
+
+    texture: str
+    rate_hz: float
+    speeds_mm_s: Floats
+    forces_n: Floats
+    noise_gains: Floats
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    gains: Floats
+    level_sd_db: Floats
+    estimator: str
+    unit: str = "g"
+    simulated: bool = False
+    inherited: Bools = field(default_factory=_no_marks)
+    unresolved: Bools = field(default_factory=_no_marks)
+    interpolated: Bools = field(default_factory=_no_marks)
+
+    def __post_init__(self) -> None:
+        shape = np.shape(self.gains)
+        for name in _BOOLEAN_ARRAYS:
+            if np.size(getattr(self, name)) == 0:
+                unmarked = np.zeros(shape[:2] if name == "interpolated" else shape, dtype=bool)
+                object.__setattr__(self, name, unmarked)
+        for name in _ARRAYS:
+            kind = np.bool_ if name in _BOOLEAN_ARRAYS else np.float64
+            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        self._check_axes()
+        self._check_values()
+
+    def _check_axes(self) -> None:
+        for name in ("speeds_mm_s", "forces_n"):
+            axis = getattr(self, name)
+            rising = axis.ndim == 1 and axis.size >= 2 and bool((np.diff(axis) > 0).all())
+            if not rising or not (axis[0] > 0 and np.isfinite(axis).all()):
+                raise InputError(
+                    f"expected at least two rising values above 0 in {name}, got "
+                    f"{axis.tolist()}; a model needs a grid of at least 2 × 2."
+                )
+        grid = (self.speeds_mm_s.size, self.forces_n.size)
+        wanted = grid + np.shape(self.gains)[2:3]
+        for name in _ARRAYS[2:]:
+            shape = grid if name in ("noise_gains", "interpolated") else wanted
+            if getattr(self, name).shape != shape or len(wanted) != 3:
+                raise InputError(
+                    f"expected {name} of shape {shape}, got {getattr(self, name).shape}; "
+                    "the arrays of a model share one grid and one number of layers."
+                )
+
+    def _check_values(self) -> None:
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(f"expected a rate above 0 Hz, got {self.rate_hz}; give the rate.")
+        if self.unit not in UNITS:
+            raise InputError(f"expected a unit among {', '.join(UNITS)}, got {self.unit!r}; fix.")
+        for name in ("noise_gains", "gains", "level_sd_db"):
+            if not np.isfinite(getattr(self, name)).all():
+                raise InputError(f"expected finite {name}, got NaN or inf; fit the model again.")
+        if (self.noise_gains < 0).any() or (self.level_sd_db < 0).any():
+            raise InputError(
+                "expected noise gains and level deviations of at least 0, got a negative one; "
+                "fit the model again."
+            )
+        check_bands(self.frequencies_hz, self.bandwidths_hz, self.rate_hz)
+
+    @property
+    def n_layers(self) -> int:
+        """Number of layers, m."""
+        return int(self.gains.shape[2])
+
+    @property
+    def n_parameters(self) -> int:
+        """Numbers per condition: 1 + 3m (METHOD 9)."""
+        return 1 + 3 * self.n_layers
+
+    def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
+        """Bilinear interpolation over the grid, with the edges of METHOD 9.
+
+        Above the grid: clamped. Below the lowest speed or force all gains fall linearly to 0 at
+        rest or lift-off (in the corner by the product of both ramps). NaN and infinite values
+        count as lift-off.
+
+        Parameters
+        ----------
+        speed_mm_s : (n,) array_like
+            Tangential speed; its sign (direction) does not matter.
+        force_n : (n,) array_like
+            Normal force; negative values count as lift-off.
+        """
+        speed = np.abs(np.atleast_1d(np.asarray(speed_mm_s, dtype=np.float64)))
+        force = np.atleast_1d(np.asarray(force_n, dtype=np.float64))
+        contact = np.isfinite(speed) & np.isfinite(force)
+        speed, force = np.where(contact, speed, 0.0), np.where(contact, force, 0.0)
+        ramp = np.minimum(speed / self.speeds_mm_s[0], 1.0)
+        ramp = ramp * np.clip(force / self.forces_n[0], 0.0, 1.0)
+        row, row_share = _cell(self.speeds_mm_s, speed)
+        column, column_share = _cell(self.forces_n, force)
+
+        def blend(grid: Floats) -> Floats:
+            tail = (slice(None),) + (None,) * (grid.ndim - 2)
+            x, y = row_share[tail], column_share[tail]
+            low = grid[row, column] * (1 - x) + grid[row + 1, column] * x
+            high = grid[row, column + 1] * (1 - x) + grid[row + 1, column + 1] * x
+            blended: Floats = low * (1 - y) + high * y
+            return blended
+
+        return Parameters(
+            blend(self.noise_gains) * ramp,
+            blend(self.frequencies_hz),
+            blend(self.bandwidths_hz),
+            blend(self.gains) * ramp[:, None],
+        )
+
+    def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
+        """The PEQ at one speed (mm/s) and force (N), interpolated as in `parameters`."""
+        at = self.parameters(speed_mm_s, force_n)
+        return PEQ(
+            noise_gain=float(at.noise_gain[0]),
+            frequencies_hz=at.frequencies_hz[0],
+            bandwidths_hz=at.bandwidths_hz[0],
+            gains=at.gains[0],
+            rate_hz=self.rate_hz,
+        )
+
+    def at_rate(self, rate_hz: float) -> TextureModel:
+        """The same output spectrum written for noise of unit variance at another rate.
+
+        The density of unit-variance noise falls as 1/rate, so gains grow as √(rate/old rate).
+        The noise floor then reaches to the new Nyquist frequency.
+        """
+        scale = np.sqrt(rate_hz / self.rate_hz)
+        return replace(
+            self,
+            rate_hz=float(rate_hz),
+            noise_gains=self.noise_gains * scale,
+            gains=self.gains * scale,
+        )
+
+    def with_layers(self, keep: list[int]) -> TextureModel:
+        """The model with only the layers of these indices (0-based), in that order."""
+        return replace(self, **{name: getattr(self, name)[:, :, keep] for name in _LAYER_ARRAYS})
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as versioned JSON; the file is there whole or not at all."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        for name in _ARRAYS:
+            values[name] = values[name].tolist()
+        write_text(path, dump_json({"format": FORMAT, "version": VERSION, **values}))
+
+    @staticmethod
+    def load(path: str | Path) -> TextureModel:
+        """Read a model written by `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is no such model, or has a newer version.
+        """
+        values = _load_json(Path(path))
+        names = {f.name for f in fields(TextureModel)}
+        if set(values) != names:
+            wrong = ", ".join(sorted(names ^ set(values)))
+            raise InputError(
+                f"expected the fields of a texture model in {path}, got too few or too many "
+                f"({wrong}); fit the model again."
+            )
+        try:
+            return TextureModel(**values)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}: {error}") from None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, TextureModel):
+            return NotImplemented
+        return all(
+            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+_LAYER_ARRAYS = (
+    "frequencies_hz",
+    "bandwidths_hz",
+    "gains",
+    "level_sd_db",
+    "inherited",
+    "unresolved",
+)
+_ARRAYS = ("speeds_mm_s", "forces_n", "noise_gains", "interpolated", *_LAYER_ARRAYS)
+_BOOLEAN_ARRAYS = ("inherited", "unresolved", "interpolated")
+
+
+def _cell(axis: Floats, value: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Index of the grid cell that holds each value, and the position within it (0 … 1)."""
+    inside = np.clip(value, axis[0], axis[-1])
+    index = np.clip(np.searchsorted(axis, inside, side="right") - 1, 0, axis.size - 2)
+    return index, (inside - axis[index]) / (axis[index + 1] - axis[index])
+
+
+def dump_json(values: dict[str, Any]) -> str:
+    """JSON with one line per field and, in nested arrays, one line per row of the grid."""
+    lines = [f"  {json.dumps(key)}: {_rows(value)}" for key, value in values.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _rows(value: Any) -> str:
+    encode: Callable[[Any], str] = lambda v: json.dumps(v, allow_nan=False)  # noqa: E731
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n    " + ",\n    ".join(map(encode, value)) + "\n  ]"
+    return encode(value)
+
+
+def _load_json(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise InputError(f"expected a model file at {path}, got no file there; give its path.")
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        raise InputError(f"expected JSON in {path}, got something else; fit it again.") from None
+    if not isinstance(values, dict) or values.pop("format", None) != FORMAT:
+        raise InputError(
+            f"expected the format {FORMAT} in {path}, got another; give a model made by "
+            "tactileq model."
+        )
+    version = values.pop("version", None)
+    if version != VERSION:
+        raise InputError(
+            f"expected a model of version {VERSION} in {path}, got version {version}; "
+            "update tactileq or fit the model again."
+        )
+    return values

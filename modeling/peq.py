@@ -1,0 +1,227 @@
+"""The parametric equalizer: white noise plus band-passed white noise (eq. 1–2, METHOD 3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from modeling.errors import InputError
+
+Floats = NDArray[np.float64]
+
+LOWEST_FREQUENCY_HZ = 1.0
+HIGHEST_FREQUENCY_SHARE = 0.49
+LOWEST_BANDWIDTH_HZ = 0.1
+HIGHEST_BANDWIDTH_SHARE = 0.45
+
+
+def rational_tan(angle: ArrayLike) -> Floats:
+    """Tangent by one rational formula, the same in every implementation of the filter.
+
+    The [9/8] Padé approximant (Lambert's continued fraction) of tan(angle/2), then the
+    double-angle formula.
+
+    Parameters
+    ----------
+    angle : array_like
+        Radians, 0 … 0.49 π.
+
+    Returns
+    -------
+    ndarray
+        Relative error at most 2e-14 over that range.
+    """
+    half = np.asarray(angle, dtype=np.float64) * 0.5
+    z = half * half
+    numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))))
+    denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)))
+    tangent = numerator / denominator
+    result: Floats = 2 * tangent / ((1 - tangent) * (1 + tangent))
+    return result
+
+
+class BandCoefficients(NamedTuple):
+    """Coefficients of the unit-covariance state-variable filter (METHOD 3), one per band."""
+
+    a1: Floats
+    a2: Floats
+    a3: Floats
+    drive: Floats
+    tap: Floats
+
+
+def band_coefficients(
+    frequency_hz: ArrayLike, bandwidth_hz: ArrayLike, *, rate_hz: float
+) -> BandCoefficients:
+    """Coefficients of unit-gain band-passes with peak at f and −3 dB width B.
+
+    Parameters
+    ----------
+    frequency_hz, bandwidth_hz : array_like of one shape
+        1 Hz ≤ f ≤ 0.49 rate, 0.1 Hz ≤ B ≤ 0.45 rate; see `clamp_bands`.
+    rate_hz : float
+        Rate at which the filter runs.
+
+    Notes
+    -----
+    With g = tan(πf/fs) and k = tan(πB/fs), METHOD's K = 2k/sin(2πf/fs) is k(1+g²)/g, hence
+    √(Kg) = √(k(1+g²)) (`tap`) and √(K/g) = tap/g (`drive`). The per-sample update is
+    v3 = drive·w − s2; v1 = a1·s1 + a2·v3; v2 = s2 + a2·s1 + a3·v3; s1 ← 2v1 − s1;
+    s2 ← 2v2 − s2; band = tap·v1.
+    """
+    g = rational_tan(np.pi / rate_hz * np.asarray(frequency_hz, dtype=np.float64))
+    k = rational_tan(np.pi / rate_hz * np.asarray(bandwidth_hz, dtype=np.float64))
+    tap = np.sqrt(k * (1 + g * g))
+    a1 = 1 / (1 + g * g + tap * tap)
+    a2 = g * a1
+    return BandCoefficients(a1, a2, g * a2, tap / g, tap)
+
+
+def clamp_bands(
+    frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
+) -> tuple[Floats, Floats, int]:
+    """Frequencies and widths moved into the legal range, and how many values had to move."""
+    frequency = np.clip(frequency_hz, LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz)
+    bandwidth = np.clip(bandwidth_hz, LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * rate_hz)
+    moved = np.count_nonzero(frequency != frequency_hz)
+    moved += np.count_nonzero(bandwidth != bandwidth_hz)
+    return frequency, bandwidth, int(moved)
+
+
+def band_response(
+    frequency_hz: ArrayLike, *, centres_hz: ArrayLike, bandwidths_hz: ArrayLike, rate_hz: float
+) -> NDArray[np.complex128]:
+    """Complex response H_i(f) of unit-gain bands.
+
+    Parameters
+    ----------
+    frequency_hz : (n,) array_like
+        Where, 0 … rate/2.
+    centres_hz, bandwidths_hz : (m,) array_like
+        Peak frequency and −3 dB width of each band.
+
+    Returns
+    -------
+    (m, n) complex ndarray
+        1 at the band's centre; 0 at 0 Hz and at the Nyquist frequency.
+    """
+    angle = np.pi / rate_hz * np.asarray(frequency_hz, dtype=np.float64)
+    sine, cosine = np.sin(angle), np.cos(angle)
+    g = rational_tan(np.pi / rate_hz * np.asarray(centres_hz, dtype=np.float64))[:, None]
+    k = rational_tan(np.pi / rate_hz * np.asarray(bandwidths_hz, dtype=np.float64))[:, None]
+    through = 1j * k * (1 + g * g) * sine * cosine
+    response: NDArray[np.complex128] = through / ((g * cosine) ** 2 - sine**2 + through)
+    return response
+
+
+def check_bands(frequencies_hz: Floats, bandwidths_hz: Floats, rate_hz: float) -> None:
+    """Refuse frequencies and widths outside the legal range (METHOD 3).
+
+    Raises
+    ------
+    InputError
+        Naming the first value that is out of range or not finite.
+    """
+    limits = (
+        ("frequency", frequencies_hz, LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz),
+        ("bandwidth", bandwidths_hz, LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * rate_hz),
+    )
+    for name, values, low, high in limits:
+        wrong = values[~((values >= low) & (values <= high))]
+        if wrong.size:
+            raise InputError(
+                f"expected each layer's {name} within {low:g}…{high:g} Hz at a rate of "
+                f"{rate_hz:g} Hz, got {wrong.flat[0]:g}; correct the layer or raise the rate."
+            )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PEQ:
+    """A parametric equalizer: ŷ = G_w·w + Σ G_i·H_i(w) (eq. 1–2).
+
+    Parameters
+    ----------
+    noise_gain : float
+        G_w ≥ 0, in g per unit noise.
+    frequencies_hz, bandwidths_hz, gains : (m,) array_like
+        Peak frequency (1 Hz … 0.49 rate), −3 dB width (0.1 Hz … 0.45 rate) and signed peak gain
+        (g per unit noise) of each layer; m ≥ 0.
+    rate_hz : float
+        The rate at which w has unit variance. At another rate fs the same spectrum needs w of
+        variance fs/rate.
+
+    Raises
+    ------
+    InputError
+        For values out of range, not finite, or of different lengths.
+    """
+
+    noise_gain: float
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    gains: Floats
+    rate_hz: float
+
+    def __post_init__(self) -> None:
+        for name in ("frequencies_hz", "bandwidths_hz", "gains"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        shapes = {self.frequencies_hz.shape, self.bandwidths_hz.shape, self.gains.shape}
+        if len(shapes) != 1 or self.gains.ndim != 1:
+            raise InputError(
+                "expected one frequency, bandwidth and gain per layer, got shapes "
+                f"{sorted(shapes)}; give three arrays of one length."
+            )
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(f"expected a rate above 0 Hz, got {self.rate_hz}; give the rate.")
+        if not (np.isfinite(self.noise_gain) and self.noise_gain >= 0):
+            raise InputError(f"expected a noise gain of at least 0, got {self.noise_gain}; fix it.")
+        if not np.isfinite(self.gains).all():
+            raise InputError(f"expected finite gains, got {self.gains.tolist()}; fix them.")
+        check_bands(self.frequencies_hz, self.bandwidths_hz, self.rate_hz)
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        """Coherent magnitude response |G_w + Σ G_i H_i(f)|.
+
+        Parameters
+        ----------
+        frequency_hz : (n,) array_like
+            0 … rate/2.
+
+        Returns
+        -------
+        (n,) ndarray
+            In g per unit noise; the one-sided power spectral density of the output is
+            response² · 2/rate_hz (g²/Hz).
+        """
+        return np.abs(self.complex_response(frequency_hz))
+
+    def complex_response(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
+        """G_w + Σ G_i H_i(f) with its phase, (n,) complex, in g per unit noise."""
+        bands = band_response(
+            frequency_hz,
+            centres_hz=self.frequencies_hz,
+            bandwidths_hz=self.bandwidths_hz,
+            rate_hz=self.rate_hz,
+        )
+        response: NDArray[np.complex128] = self.noise_gain + self.gains @ bands
+        return response
+
+    @property
+    def band_rms(self) -> Floats:
+        """RMS of each layer's output alone, (m,), in g: |G|·√(k/(1+k)), k = tan(πB/rate)."""
+        return band_rms(self.gains, self.bandwidths_hz, rate_hz=self.rate_hz)
+
+
+def band_rms(gains: ArrayLike, bandwidths_hz: ArrayLike, *, rate_hz: float) -> Floats:
+    """RMS (g) of unit white noise through bands of peak gain G and width B (METHOD 3).
+
+    Any shape; `gains` may be signed. Variance is G²·k/(1+k) with k = tan(πB/rate).
+    """
+    k = rational_tan(np.pi / rate_hz * np.asarray(bandwidths_hz, dtype=np.float64))
+    rms: Floats = np.abs(gains) * np.sqrt(k / (1 + k))
+    return rms

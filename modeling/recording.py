@@ -1,0 +1,390 @@
+"""Recordings: what an accelerometer on a tool measured in one condition, and sets of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from modeling.errors import InputError
+from modeling.files import read_table, replace_folder, write_table
+
+UNITS = ("g", "arbitrary")
+MIN_SAMPLES = 64
+INDEX_NAME = "recordings.tsv"
+INDEX_COLUMNS = (
+    "file",
+    "texture",
+    "speed_mm_s",
+    "force_n",
+    "rate_hz",
+    "unit",
+    "repeat",
+    "simulated",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One record of tool vibration at one speed and one force.
+
+    Parameters
+    ----------
+    samples : (n,) array_like
+        Acceleration in `unit`; n ≥ 64, finite, not constant.
+    rate_hz : float
+        Sampling rate, > 0.
+    speed_mm_s, force_n : float
+        Tangential speed (mm/s) and normal force (N), ≥ 0. A force of 0 marks a no-contact
+        recording, which gives the sensor's floor (METHOD 2).
+    texture : str
+        Name of the surface.
+    unit : {"g", "arbitrary"}
+        `arbitrary` where the g per full scale is unknown; such records are never compared with
+        a detection threshold.
+    simulated : bool
+        True where no real surface was touched.
+    repeat : int
+        1 for the first record of a condition, 2 for the second, …
+
+    Raises
+    ------
+    InputError
+        For anything outside these ranges.
+    """
+
+    samples: NDArray[np.float64]
+    rate_hz: float
+    speed_mm_s: float
+    force_n: float
+    texture: str
+    unit: str = "g"
+    simulated: bool = False
+    repeat: int = 1
+
+    def __post_init__(self) -> None:
+        where = f"recording of {self.texture!r}"
+        object.__setattr__(self, "samples", _checked_samples(self.samples, where))
+        for name in ("rate_hz", "speed_mm_s", "force_n"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(
+                f"{where}: expected a sampling rate above 0 Hz, got {self.rate_hz}; give the rate."
+            )
+        for name, unit in (("speed_mm_s", "mm/s"), ("force_n", "N")):
+            value = getattr(self, name)
+            if not (np.isfinite(value) and value >= 0):
+                raise InputError(
+                    f"{where}: expected {name} of at least 0 {unit}, got {value}; correct it."
+                )
+        if self.unit not in UNITS:
+            raise InputError(
+                f"{where}: expected a unit among {', '.join(UNITS)}, got {self.unit!r}; "
+                "convert the data to g or call them arbitrary."
+            )
+        if not self.texture.strip() or any(c in self.texture for c in "\t\r\n"):
+            raise InputError(
+                f"expected a texture name of one line without tabs, got {self.texture!r}; name it."
+            )
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record in seconds."""
+        return self.samples.size / self.rate_hz
+
+    @property
+    def condition(self) -> tuple[float, float]:
+        """(speed in mm/s, force in N)."""
+        return self.speed_mm_s, self.force_n
+
+    @property
+    def clipped_share(self) -> float:
+        """Share (0–1) of samples stuck at the extremes, 0 where the record does not clip.
+
+        A run of at least three equal samples at the maximum or the minimum counts as clipped;
+        noise that is merely quantised reaches its extreme in shorter runs.
+        """
+        clipped = 0
+        for extreme in (self.samples.max(), self.samples.min()):
+            clipped += _samples_in_long_runs(self.samples == extreme)
+        return clipped / self.samples.size
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Recording):
+            return NotImplemented
+        return self._labels() == other._labels() and np.array_equal(self.samples, other.samples)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _labels(self) -> tuple[Any, ...]:
+        return (
+            self.rate_hz,
+            *self.condition,
+            self.texture,
+            self.unit,
+            self.simulated,
+            self.repeat,
+        )
+
+    def describe(self) -> str:
+        """One phrase that names the record, for messages."""
+        repeat = f", repeat {self.repeat}" if self.repeat != 1 else ""
+        return f"{self.texture} at {self.speed_mm_s:g} mm/s, {self.force_n:g} N{repeat}"
+
+
+def _checked_samples(samples: ArrayLike, where: str) -> NDArray[np.float64]:
+    array = np.array(samples, dtype=np.float64)
+    if array.ndim != 1:
+        raise InputError(
+            f"{where}: expected one axis of samples, got an array of shape {array.shape}; "
+            "choose an axis or combine them with DFT321."
+        )
+    if array.size < MIN_SAMPLES:
+        raise InputError(
+            f"{where}: expected at least {MIN_SAMPLES} samples, got {array.size}; record again."
+        )
+    bad = np.flatnonzero(~np.isfinite(array))
+    if bad.size:
+        raise InputError(
+            f"{where}: expected finite samples, got {bad.size} NaN or infinite ones, the first "
+            f"at sample {bad[0]}; repair or record again."
+        )
+    if np.ptp(array) == 0:
+        raise InputError(
+            f"{where}: expected a vibration, got the constant value {array[0]:g}; "
+            "check the sensor and its cable."
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _samples_in_long_runs(mask: NDArray[np.bool_], shortest: int = 3) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    lengths = edges[1::2] - edges[::2]
+    return int(lengths[lengths >= shortest].sum())
+
+
+class RecordingSet:
+    """The recordings of one or more textures; at most one per texture, condition and repeat.
+
+    Parameters
+    ----------
+    recordings : iterable of Recording
+        At least one.
+
+    Raises
+    ------
+    InputError
+        If there is none, or if two stand for the same condition.
+    """
+
+    def __init__(self, recordings: Iterable[Recording]) -> None:
+        self.recordings = tuple(recordings)
+        if not self.recordings:
+            raise InputError("expected at least one recording, got none; record or import some.")
+        seen: set[tuple[Any, ...]] = set()
+        for recording in self.recordings:
+            key = (recording.texture, *recording.condition, recording.repeat)
+            if key in seen:
+                raise InputError(
+                    f"expected one recording per condition, got two of {recording.describe()}; "
+                    "remove one, or number real repetitions in the column 'repeat'."
+                )
+            seen.add(key)
+
+    def __len__(self) -> int:
+        return len(self.recordings)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RecordingSet):
+            return NotImplemented
+        return self.recordings == other.recordings
+
+    __hash__ = None  # type: ignore[assignment]
+
+    @property
+    def textures(self) -> tuple[str, ...]:
+        """Names of the textures, in the order of their first recording."""
+        return tuple(dict.fromkeys(r.texture for r in self.recordings))
+
+    @property
+    def texture(self) -> str:
+        """The name of the only texture; InputError where there are several."""
+        if len(self.textures) > 1:
+            raise InputError(
+                f"expected recordings of one texture, got {', '.join(self.textures)}; "
+                "choose one with .of_texture(name)."
+            )
+        return self.textures[0]
+
+    def of_texture(self, texture: str) -> RecordingSet:
+        """The recordings of one texture."""
+        return RecordingSet(r for r in self.recordings if r.texture == texture)
+
+    def save(self, folder: str | Path) -> None:
+        """Write `recordings.tsv` and one CSV per condition; the folder appears whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If the folder exists and holds something else than a recording set.
+        """
+        target = Path(folder)
+        if target.exists() and not (target / INDEX_NAME).is_file() and any(target.iterdir()):
+            raise InputError(
+                f"expected a new folder or a recording set, got {target} with other files in it; "
+                "choose another folder."
+            )
+        with replace_folder(target) as fresh:
+            rows = []
+            for number, recording in enumerate(self.recordings, start=1):
+                name = f"{number:04d}.csv"
+                _write_samples(fresh / name, recording)
+                rows.append((name, *_index_cells(recording)))
+            write_table(fresh / INDEX_NAME, INDEX_COLUMNS, rows)
+
+    @staticmethod
+    def load(folder: str | Path) -> RecordingSet:
+        """Read a folder with `recordings.tsv` (CSV or WAV files), or WAV files with JSON sidecars.
+
+        Raises
+        ------
+        InputError
+            With the file's name, for a folder that is not one and for any unusable record.
+        """
+        source = Path(folder)
+        if not source.is_dir():
+            raise InputError(
+                f"expected a folder of recordings, got {source}; give a folder that holds "
+                f"{INDEX_NAME}."
+            )
+        if (source / INDEX_NAME).is_file():
+            rows = read_table(source / INDEX_NAME, ("file", "texture", "speed_mm_s", "force_n"))
+            return RecordingSet(_load_row(source, row) for row in rows)
+        sidecars = sorted(p for p in source.glob("*.wav") if p.with_suffix(".json").is_file())
+        if not sidecars:
+            raise InputError(
+                f"expected {INDEX_NAME} (or WAV files with JSON sidecars) in {source}, got "
+                "neither; import the files first (tactileq import wav|csv)."
+            )
+        return RecordingSet(_load_row(source, _sidecar_row(path)) for path in sidecars)
+
+
+def _index_cells(recording: Recording) -> tuple[str, ...]:
+    return (
+        recording.texture,
+        repr(recording.speed_mm_s),
+        repr(recording.force_n),
+        repr(recording.rate_hz),
+        recording.unit,
+        str(recording.repeat),
+        str(recording.simulated).lower(),
+    )
+
+
+def _write_samples(path: Path, recording: Recording) -> None:
+    # repr of a float is its shortest exact text: the file loads back equal.
+    header = f"acceleration_{recording.unit}\n"
+    lines = "\n".join(map(repr, recording.samples.tolist()))
+    path.write_text(header + lines + "\n", encoding="utf-8")
+
+
+def _sidecar_row(path: Path) -> dict[str, str]:
+    sidecar = path.with_suffix(".json")
+    try:
+        values = json.loads(sidecar.read_text(encoding="utf-8"))
+        assert isinstance(values, dict)
+    except (ValueError, AssertionError):
+        raise InputError(
+            f"expected a JSON object in {sidecar}, got something else; rewrite it."
+        ) from None
+    return {"file": path.name, **{key: str(value) for key, value in values.items()}}
+
+
+def _load_row(folder: Path, row: dict[str, str]) -> Recording:
+    path = folder / row["file"]
+    if not path.is_file():
+        raise InputError(f"expected the file {path}, got nothing there; restore or unlist it.")
+    unit = row.get("unit", "arbitrary")
+    if path.suffix.lower() == ".wav":
+        samples, rate_hz = read_wav(path)
+        if row.get("g_per_fullscale"):
+            samples = samples * number(row["g_per_fullscale"], f"g_per_fullscale of {path.name}")
+            unit = "g"
+    else:
+        samples = _read_samples(path)
+        rate_hz = number(row.get("rate_hz", ""), f"rate_hz of {path.name}")
+    try:
+        return Recording(
+            samples,
+            rate_hz,
+            number(row.get("speed_mm_s", ""), f"speed_mm_s of {path.name}"),
+            number(row.get("force_n", ""), f"force_n of {path.name}"),
+            row.get("texture") or folder.name,
+            unit=unit,
+            simulated=row.get("simulated", "false").lower() == "true",
+            repeat=int(number(row.get("repeat") or "1", f"repeat of {path.name}")),
+        )
+    except InputError as error:
+        raise InputError(f"{path.name}: {error}") from None
+
+
+def number(text: str, name: str) -> float:
+    """A number from a table's cell.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, where the cell is empty or no number.
+    """
+    try:
+        return float(text)
+    except ValueError:
+        got = repr(text) if text.strip() else "nothing"
+        raise InputError(f"expected a number for {name}, got {got}; fill it in.") from None
+
+
+def _read_samples(path: Path) -> NDArray[np.float64]:
+    """One column of numbers below a header; a last line without its end counts as truncated."""
+    text = path.read_text(encoding="utf-8")
+    lines = text.split("\n")
+    if len(lines) < 2 or not text.strip():
+        raise InputError(f"expected a header and samples in {path}, got an empty file; re-record.")
+    if lines[-1] != "":
+        raise InputError(
+            f"expected {path} to end with a whole line, got {lines[-1]!r} at its end: "
+            "the file is truncated; copy or record it again."
+        )
+    try:
+        return np.array(lines[1:-1], dtype=np.float64)
+    except ValueError as error:
+        raise InputError(
+            f"expected one number per line in {path}, got a line that is none ({error}); "
+            "import files of another layout with tactileq import csv."
+        ) from None
+
+
+def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
+    """Samples (1 = full scale) and rate (Hz) of a mono WAV file.
+
+    Raises
+    ------
+    InputError
+        If the file is no readable WAV or has several channels.
+    """
+    import soundfile  # late: loads a shared library that most uses never need
+
+    try:
+        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
+    except (soundfile.LibsndfileError, OSError) as error:
+        raise InputError(f"expected a WAV file, got {path} ({error}); convert it.") from None
+    if samples.shape[1] != 1:
+        raise InputError(
+            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
+        )
+    return samples[:, 0], float(rate_hz)

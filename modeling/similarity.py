@@ -1,0 +1,189 @@
+"""How alike two spectra are (eq. 6, METHOD 8)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modeling.errors import InputError
+from modeling.model import TextureModel
+from modeling.peq import PEQ, Floats
+from modeling.recording import Recording
+from modeling.spectra import Spectrum, smooth, spectrum
+
+LOWEST_HZ = 10.0
+HIGHEST_SHARE = 0.98
+SIGMAS_HZ = (30.0, 5.0)
+BAND_EDGES_HZ = (10, 20, 35, 60, 90, 130, 180, 250, 350, 480, 800, 1300, 2500)
+CEILING_DRAWS = 8
+
+
+@dataclass(frozen=True)
+class SimilarityReport:
+    """Likeness of a model's response (not of a rendering) and a recording's spectrum.
+
+    Every GFC stands between its floor (white noise of equal RMS) and its ceiling (the recording's
+    smoothed spectrum against random draws shaped by it). `oracle_gap` is 1 − GFC30/ceiling.
+    `band_energy_error_db` has one value per band of `BAND_EDGES_HZ` that the data reach, in dB,
+    model over recording; `band_edges_hz` holds those bands' edges.
+    """
+
+    gfc30: float
+    gfc5: float
+    floor_gfc30: float
+    floor_gfc5: float
+    ceiling_gfc30: float
+    ceiling_gfc5: float
+    log_spectral_distance_db: float
+    rms_error_db: float
+    band_edges_hz: Floats
+    band_energy_error_db: Floats
+    oracle_gap: float
+
+
+def gfc(a: ArrayLike, b: ArrayLike) -> float:
+    """Goodness-of-fit coefficient |Σ ab| / √(Σa²·Σb²) of two (n,) magnitude spectra (eq. 6).
+
+    0 … 1; both spectra smoothed alike. 1 only for proportional spectra: the level is not judged.
+
+    Raises
+    ------
+    InputError
+        For different shapes, values that are not finite, or a spectrum that is all zero.
+    """
+    first, second = _pair(a, b)
+    # Scaled by the maxima first, so that squares neither overflow nor vanish.
+    first, second = first / np.abs(first).max(), second / np.abs(second).max()
+    product = abs(float(first @ second))
+    return min(1.0, product / float(np.sqrt((first @ first) * (second @ second))))
+
+
+def log_spectral_distance_db(a: ArrayLike, b: ArrayLike) -> float:
+    """RMS of 20·log10 of the ratio of two (n,) magnitude spectra > 0, in dB."""
+    first, second = _pair(a, b)
+    if (first <= 0).any() or (second <= 0).any():
+        raise InputError(
+            "expected magnitudes above 0 for a log-spectral distance, got 0 or less; smooth the "
+            "spectra or choose a band that holds signal."
+        )
+    return float(np.sqrt(np.mean((20 * np.log10(first / second)) ** 2)))
+
+
+def band_energy_error_db(
+    frequency_hz: ArrayLike, a: ArrayLike, b: ArrayLike
+) -> tuple[Floats, Floats]:
+    """Edges (k+1,) in Hz and 10·log10 of the energy ratio a over b in each of the k bands, dB.
+
+    Bands of `BAND_EDGES_HZ` that hold no frequency of the data are left out at the upper end.
+    """
+    first, second = _pair(a, b)
+    frequency = np.asarray(frequency_hz, dtype=np.float64)
+    reached = sum(edge < frequency[-1] for edge in BAND_EDGES_HZ[:-1])
+    edges = np.array(BAND_EDGES_HZ[: reached + 1], dtype=np.float64)
+    inside = [(frequency >= low) & (frequency < high) for low, high in pairwise(edges)]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        errors = [10 * np.log10((first[i] ** 2).sum() / (second[i] ** 2).sum()) for i in inside]
+    return edges, np.array(errors)
+
+
+def report(
+    recording: Recording | Spectrum,
+    model: TextureModel | PEQ,
+    *,
+    rng: np.random.Generator | None = None,
+) -> SimilarityReport:
+    """All measures of METHOD 8 for one condition, over 10 Hz … 0.98 of the Nyquist frequency.
+
+    Parameters
+    ----------
+    recording : Recording or Spectrum
+        A Spectrum names no condition, so it goes with a PEQ.
+    model : TextureModel or PEQ
+        A TextureModel is taken at the recording's speed and force.
+    rng : Generator, optional
+        Draws for the ceiling; by default a generator of fixed seed, so that a table repeats.
+    """
+    peq, measured = _at_condition(recording, model)
+    rng = np.random.default_rng(0) if rng is None else rng
+    frequency = measured.frequency_hz
+    band = (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
+    step_hz = measured.rate_hz / measured.n_samples
+    response = peq.response(frequency)
+    draws = _draws(measured.smoothed(), rng)
+    scores, floors, ceilings = [], [], []
+    for sigma_hz in SIGMAS_HZ:
+        truth = measured.smoothed(sigma_hz)
+        scores.append(gfc(smooth(response, sigma_hz, step_hz=step_hz)[band], truth[band]))
+        floors.append(gfc(np.ones(int(band.sum())), truth[band]))
+        shape = smooth(measured.smoothed(), sigma_hz, step_hz=step_hz)[band]
+        drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
+        ceilings.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
+    smoothed = smooth(response, SIGMAS_HZ[0], step_hz=step_hz)[band]
+    edges, band_errors = band_energy_error_db(
+        frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2
+    )
+    return SimilarityReport(
+        gfc30=scores[0],
+        gfc5=scores[1],
+        floor_gfc30=floors[0],
+        floor_gfc5=floors[1],
+        ceiling_gfc30=ceilings[0],
+        ceiling_gfc5=ceilings[1],
+        log_spectral_distance_db=log_spectral_distance_db(smoothed, measured.smoothed()[band]),
+        rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
+        band_edges_hz=edges,
+        band_energy_error_db=band_errors,
+        oracle_gap=1 - scores[0] / ceilings[0],
+    )
+
+
+def _rms_error_db(response: Floats, magnitude: Floats) -> float:
+    """Level of the model over the recording, dB: its expected power over the measured one.
+
+    A Rayleigh-distributed bin of mean r has the mean square (4/π)r², and a response is that mean.
+    """
+    power = 4 / np.pi * float(np.sum(response**2))
+    return 10 * float(np.log10(power / float(np.sum(magnitude**2))))
+
+
+def _draws(shape: Floats, rng: np.random.Generator) -> list[Floats]:
+    """Magnitudes of Gaussian noise whose mean magnitude is `shape`."""
+    return [shape * rng.rayleigh(np.sqrt(2 / np.pi), shape.size) for _ in range(CEILING_DRAWS)]
+
+
+def _at_condition(
+    recording: Recording | Spectrum, model: TextureModel | PEQ
+) -> tuple[PEQ, Spectrum]:
+    if isinstance(model, TextureModel):
+        if isinstance(recording, Spectrum):
+            raise InputError(
+                "expected a recording or a PEQ, got a spectrum (which names no speed and force) "
+                "and a whole model; take model.peq(speed_mm_s, force_n)."
+            )
+        model = model.peq(*recording.condition)
+    if isinstance(recording, Spectrum):
+        measured = recording
+    else:
+        measured = spectrum(recording, rate_hz=model.rate_hz)
+    if measured.rate_hz != model.rate_hz:
+        raise InputError(
+            f"expected data that reach the model's rate of {model.rate_hz:g} Hz, got "
+            f"{measured.rate_hz:g} Hz; fit a model at the data's rate."
+        )
+    return model, measured
+
+
+def _pair(a: ArrayLike, b: ArrayLike) -> tuple[Floats, Floats]:
+    first = np.asarray(a, dtype=np.float64)
+    second = np.asarray(b, dtype=np.float64)
+    good = first.ndim == 1 and first.shape == second.shape and first.size > 0
+    good = good and bool(np.isfinite(first).all() and np.isfinite(second).all())
+    if not (good and first.any() and second.any()):
+        raise InputError(
+            "expected two finite spectra of one length that are not all zero, got shapes "
+            f"{first.shape} and {second.shape}; compare spectra on the same frequencies."
+        )
+    return first, second

@@ -1,0 +1,204 @@
+"""Dropping the layers that nobody can feel (PAPER V, METHOD 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.special import ndtr
+
+from modeling.errors import InputError
+from modeling.model import TextureModel
+from modeling.peq import Floats, band_rms
+from modeling.thresholds import Threshold
+
+CriterionName = Literal["energy", "paper-fft", "paper-gain"]
+CRITERIA: tuple[CriterionName, ...] = ("energy", "paper-fft", "paper-gain")
+HIGHEST_FLIP_PROBABILITY = 0.05
+PAPER_RECORD_S = 1.0
+
+
+@dataclass(frozen=True)
+class LayerVerdict:
+    """What became of one layer, and why.
+
+    Parameters
+    ----------
+    layer : int
+        1-based, in the order of the full model.
+    verdict : {"kept", "dropped"}
+    reason : str
+        One phrase.
+    worst_speed_mm_s, worst_force_n, worst_frequency_hz : float
+        The condition in which the layer stands highest against the threshold.
+    distance_db : float
+        Its level there, in dB relative to the threshold; NaN where no threshold is known.
+    flip_probability : float
+        Chance that other records of the same length would have put the layer on the other side
+        of the all-conditions rule, from the levels' standard deviations (errors taken as normal
+        and independent between conditions); NaN where no threshold is known.
+    """
+
+    layer: int
+    verdict: Literal["kept", "dropped"]
+    reason: str
+    worst_speed_mm_s: float
+    worst_force_n: float
+    worst_frequency_hz: float
+    distance_db: float
+    flip_probability: float
+
+
+@dataclass(frozen=True, eq=False)
+class Simplification:
+    """A simplified model and the verdict on every layer of the full one."""
+
+    model: TextureModel
+    layers: tuple[LayerVerdict, ...]
+    criterion: CriterionName
+    threshold: Threshold
+    margin_db: float
+
+
+def layer_amplitudes_g(model: TextureModel, *, criterion: CriterionName) -> Floats:
+    """The amplitude of each layer that is compared with a threshold, (S, F, m), in g peak.
+
+    `energy`: the sinusoid of equal power, √2·G·√(k/(1+k)). `paper-fft`: the single-sided FFT
+    amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself (METHOD 7).
+    """
+    gains = np.abs(model.gains)
+    if criterion == "paper-gain":
+        return gains
+    if criterion == "paper-fft":
+        return gains * float(np.sqrt(np.pi / (PAPER_RECORD_S * model.rate_hz)))
+    rms = band_rms(gains, model.bandwidths_hz, rate_hz=model.rate_hz)
+    return rms * float(np.sqrt(2))
+
+
+def distances_db(
+    model: TextureModel, threshold: Threshold, *, criterion: CriterionName = "energy"
+) -> Floats:
+    """Level of every layer relative to the threshold, (S, F, m), in dB; NaN where none is known."""
+    amplitude = layer_amplitudes_g(model, criterion=criterion)
+    with np.errstate(divide="ignore"):
+        distance: Floats = 20 * np.log10(amplitude / threshold.at(model.frequencies_hz))
+    return distance
+
+
+def simplify(
+    model: TextureModel,
+    threshold: Threshold,
+    *,
+    criterion: CriterionName = "energy",
+    margin_db: float = 0.0,
+) -> Simplification:
+    """Drop every layer that is below threshold in every condition, stably and in sum.
+
+    A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
+    grid, the chance that this verdict flips is below 5 %, and all dropped layers together (powers
+    weighted by the threshold) stay below threshold too; else the loudest of them are kept. The
+    noise and at least one layer always stay.
+
+    Parameters
+    ----------
+    model : TextureModel
+        In g.
+    threshold : Threshold
+    criterion : {"energy", "paper-fft", "paper-gain"}
+    margin_db : float
+        ≥ 0; how far below the threshold a layer has to be.
+
+    Raises
+    ------
+    InputError
+        For a model in arbitrary units, an unknown criterion or a negative margin.
+    """
+    if model.unit != "g":
+        raise InputError(
+            f"{model.texture}: expected a model in g, got the unit {model.unit!r}; thresholds are "
+            "in g, so calibrate the recordings (g per full scale) first."
+        )
+    if criterion not in CRITERIA:
+        raise InputError(
+            f"expected a criterion among {', '.join(CRITERIA)}, got {criterion!r}; choose one."
+        )
+    if not (np.isfinite(margin_db) and margin_db >= 0):
+        raise InputError(f"expected a margin of at least 0 dB, got {margin_db}; correct it.")
+    distances = distances_db(model, threshold, criterion=criterion) + margin_db
+    distances = distances.reshape(-1, model.n_layers)
+    flips = _flip_probabilities(distances, model.level_sd_db.reshape(-1, model.n_layers))
+    reasons = _reasons(distances, flips)
+    keep = [layer for layer, (kept, _) in enumerate(reasons) if kept]
+    verdicts = tuple(
+        _verdict(model, layer, distances[:, layer] - margin_db, reasons[layer], float(flips[layer]))
+        for layer in range(model.n_layers)
+    )
+    return Simplification(model.with_layers(keep), verdicts, criterion, threshold, margin_db)
+
+
+def _reasons(distances: Floats, flips: Floats) -> list[tuple[bool, str]]:
+    """(kept?, reason) per layer, from (conditions, m) distances that include the margin."""
+    decided: list[tuple[bool, str]] = []
+    for level, flip in zip(distances.T, flips, strict=True):
+        if np.isnan(level).any():
+            outside = int(np.isnan(level).sum())
+            decided.append((True, f"no threshold known in {outside} of {level.size} conditions"))
+        elif (level >= 0).any():
+            above = int((level >= 0).sum())
+            decided.append((True, f"above threshold in {above} of {level.size} conditions"))
+        elif flip >= HIGHEST_FLIP_PROBABILITY:
+            decided.append((True, "below threshold, but the records are too short to be sure"))
+        else:
+            decided.append((False, "below threshold in every condition"))
+    _keep_summed(distances, decided)
+    if decided and not any(kept for kept, _ in decided):
+        loudest = int(np.argmax(distances.max(axis=0)))
+        decided[loudest] = (True, "below threshold, kept as the last layer")
+    return decided
+
+
+def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:
+    """Take back the loudest dropped layers until the rest stay below threshold together."""
+    while True:
+        dropped = [layer for layer, (kept, _) in enumerate(decided) if not kept]
+        powers = 10 ** (distances[:, dropped] / 10)
+        if len(dropped) < 2 or powers.sum(axis=1).max() < 1:
+            return
+        worst = int(np.argmax(powers.sum(axis=1)))
+        loudest = dropped[int(np.argmax(powers[worst]))]
+        decided[loudest] = (True, "below threshold alone, but not together with the other dropped")
+
+
+def _flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
+    """P(the all-conditions verdict differs in another record), (m,); NaN with no threshold."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        z = np.where(level_sd_db > 0, -distances / level_sd_db, np.copysign(np.inf, -distances))
+    below = np.prod(ndtr(z), axis=0)
+    dropped = (distances < 0).all(axis=0)
+    flips: Floats = np.where(
+        np.isnan(distances).any(axis=0), np.nan, np.where(dropped, 1 - below, below)
+    )
+    return flips
+
+
+def _verdict(
+    model: TextureModel,
+    layer: int,
+    distances: Floats,
+    reason: tuple[bool, str],
+    flip_probability: float,
+) -> LayerVerdict:
+    known = np.where(np.isnan(distances), -np.inf, distances)
+    nothing_known = bool(np.isnan(distances).all())
+    speed, force = np.unravel_index(int(np.argmax(known)), model.noise_gains.shape)
+    return LayerVerdict(
+        layer=layer + 1,
+        verdict="kept" if reason[0] else "dropped",
+        reason=reason[1],
+        worst_speed_mm_s=float(model.speeds_mm_s[speed]),
+        worst_force_n=float(model.forces_n[force]),
+        worst_frequency_hz=float(model.frequencies_hz[speed, force, layer]),
+        distance_db=float("nan") if nothing_known else float(known.max()),
+        flip_probability=flip_probability,
+    )

@@ -1,0 +1,168 @@
+"""From a recording to a spectrum (METHOD 2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+from scipy.signal import butter, resample, sosfilt
+
+from modeling.errors import InputError
+from modeling.peq import Floats
+from modeling.recording import Recording
+
+MODEL_RATE_HZ = 5000.0
+HIGH_PASS_HZ = 10.0
+SMOOTHING_HZ = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """Magnitude spectrum in g per unit noise.
+
+    Parameters
+    ----------
+    frequency_hz : (n,) ndarray
+        0 … rate/2, evenly spaced by rate/n_samples.
+    magnitude : (n,) ndarray
+        |FFT| divided by the mean |FFT| of unit white noise of the same length, √(πN)/2: white noise
+        of RMS r has a magnitude of mean r, whatever the record's length.
+    rate_hz : float
+    n_samples : int
+        N, the number of samples behind it.
+    """
+
+    frequency_hz: Floats
+    magnitude: Floats
+    rate_hz: float
+    n_samples: int
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the record behind the spectrum, in seconds."""
+        return self.n_samples / self.rate_hz
+
+    def smoothed(self, sigma_hz: float = SMOOTHING_HZ) -> Floats:
+        """Gaussian-smoothed magnitude, reflected at the edges; `sigma_hz` in Hz, > 0."""
+        return smooth(self.magnitude, sigma_hz, step_hz=self.rate_hz / self.n_samples)
+
+
+def smooth(magnitude: Floats, sigma_hz: float, *, step_hz: float) -> Floats:
+    """Gaussian smoothing of (n,) magnitudes spaced by `step_hz`, reflected at the edges."""
+    smoothed: Floats = gaussian_filter1d(magnitude, sigma_hz / step_hz, mode="reflect")
+    return smoothed
+
+
+def model_rate_hz(recording_rate_hz: float) -> float:
+    """The rate a model takes from data of this rate: 5 kHz, or the data's own where lower."""
+    return min(MODEL_RATE_HZ, recording_rate_hz)
+
+
+def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
+    """Mean removed, resampled by FFT, 10 Hz high-pass (4th-order Butterworth, one direction).
+
+    Parameters
+    ----------
+    recording : Recording
+    rate_hz : float
+        Target rate; data of a lower rate keep their own.
+
+    Returns
+    -------
+    (n,) ndarray
+        In the recording's unit, at min(rate_hz, recording.rate_hz).
+    """
+    target_hz = min(rate_hz, recording.rate_hz)
+    if target_hz <= 2 * HIGH_PASS_HZ:
+        raise InputError(
+            f"{recording.describe()}: expected a rate above {2 * HIGH_PASS_HZ:g} Hz, got "
+            f"{target_hz:g} Hz; record faster."
+        )
+    samples = recording.samples - recording.samples.mean()
+    if target_hz != recording.rate_hz:
+        samples = resample(samples, round(samples.size * target_hz / recording.rate_hz))
+    sections = butter(4, HIGH_PASS_HZ, btype="highpass", fs=target_hz, output="sos")
+    filtered: Floats = sosfilt(sections, samples)
+    return filtered
+
+
+def spectrum(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Spectrum:
+    """The recording's magnitude spectrum at the model rate (rectangular window).
+
+    Parameters
+    ----------
+    recording : Recording
+        At least 0.02 s after resampling (64 samples).
+    rate_hz : float
+        Model rate; data of a lower rate keep their own.
+    """
+    samples = prepare(recording, rate_hz=rate_hz)
+    target_hz = min(rate_hz, recording.rate_hz)
+    if samples.size < 64:
+        raise InputError(
+            f"{recording.describe()}: expected at least 64 samples at {target_hz:g} Hz, got "
+            f"{samples.size}; record longer."
+        )
+    return spectrum_of_samples(samples, target_hz)
+
+
+def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectrum:
+    """Spectrum of (n,) samples as they are, in their unit per unit noise."""
+    scale = np.sqrt(np.pi * samples.size) / 2
+    return Spectrum(
+        np.fft.rfftfreq(samples.size, 1 / rate_hz),
+        np.asarray(np.abs(np.fft.rfft(samples)) / scale, dtype=np.float64),
+        float(rate_hz),
+        samples.size,
+    )
+
+
+def dft321(axes: NDArray[np.float64]) -> Floats:
+    """Three axes as one signal of the same spectral energy (METHOD 2).
+
+    Parameters
+    ----------
+    axes : (3, n) ndarray
+        Acceleration along x, y and z in one unit.
+
+    Returns
+    -------
+    (n,) ndarray
+        Its magnitude spectrum is √(|X|² + |Y|² + |Z|²), its phase that of X + Y + Z (Landin,
+        Romano, McMahan and Kuchenbecker 2010, "Dimensional reduction of high-frequency
+        accelerations for haptic rendering").
+    """
+    spectra = np.fft.rfft(axes, axis=1)
+    magnitude = np.sqrt((np.abs(spectra) ** 2).sum(axis=0))
+    combined: Floats = np.fft.irfft(
+        magnitude * np.exp(1j * np.angle(spectra.sum(axis=0))), n=axes.shape[1]
+    )
+    return combined
+
+
+def mean_spectrum(spectra: list[Spectrum]) -> Spectrum:
+    """Average of repeats of one condition, weighted by length, on the longest one's frequencies.
+
+    The averaged magnitudes keep their mean, so gains are unbiased; `n_samples` stays that of the
+    longest record, since it sets the spacing of the frequencies.
+    """
+    longest = max(spectra, key=lambda s: s.n_samples)
+    if len(spectra) == 1:
+        return longest
+    magnitudes = [np.interp(longest.frequency_hz, s.frequency_hz, s.magnitude) for s in spectra]
+    lengths = [s.n_samples for s in spectra]
+    average = np.asarray(np.average(magnitudes, axis=0, weights=lengths), dtype=np.float64)
+    return Spectrum(longest.frequency_hz, average, longest.rate_hz, longest.n_samples)
+
+
+def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
+    """The spectrum less a no-contact recording's smoothed floor, in power, at least 0."""
+    level = np.interp(spectrum.frequency_hz, floor.frequency_hz, floor.smoothed())
+    # Rayleigh-distributed bins: E|X|² = (4/π)(E|X|)², alike in both, so means subtract in power.
+    smoothed = np.maximum(spectrum.smoothed(), 1e-300)
+    kept = np.sqrt(np.maximum(1 - (level / smoothed) ** 2, 0.0))
+    return Spectrum(
+        spectrum.frequency_hz, spectrum.magnitude * kept, spectrum.rate_hz, spectrum.n_samples
+    )

@@ -1,0 +1,1 @@
+"""Surfaces with known truth, and the stimulus sets rendered from models."""

@@ -1,0 +1,132 @@
+"""A small study, its truths and models, and a rig that remembers what it presented."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from experiments.design import AbsoluteTrial, RelativeTrial
+from experiments.models import ModelSets
+from experiments.study import Study, TaskPlan
+from experiments.trial_loop import Choice, Rating, Surfaces
+from modeling import TextureModel, Threshold, simplify
+from rig.interface import RigReading
+from stimuli.planted import planted_texture
+
+TEXTURES = ("canvas", "MDF", "PVC")
+
+
+class NotingRig:
+    """Notes every command; may be told to fail at presenting."""
+
+    simulated = True
+
+    def __init__(self) -> None:
+        self.notes: list[tuple[str, object]] = []
+        self.presses = 0
+        self.broken = False
+
+    def present_model(self, model: TextureModel) -> None:
+        if self.broken:
+            raise RuntimeError("the vibrator is gone")
+        self.notes.append(("virtual", model))
+
+    def present_real(self, texture: str) -> None:
+        if self.broken:
+            raise RuntimeError("the vibrator is gone")
+        self.notes.append(("real", texture))
+
+    def silence(self) -> None:
+        self.notes.append(("silence", None))
+
+    def read(self) -> RigReading:
+        pressed, self.presses = self.presses > 0, max(self.presses - 1, 0)
+        return RigReading(0.0, 0.0, 0.0, pressed, simulated=True)
+
+
+class Script:
+    """A respondent that answers by rote; subclasses misbehave."""
+
+    simulated = True
+
+    def __init__(self) -> None:
+        self.heard: list[str] = []
+        self.trays: list[str] = []
+        self.answered = 0
+
+    def announce(self, title: str, text: str) -> None:
+        self.heard.append(title)
+
+    def confirm_mount(self, tray: str) -> None:
+        self.trays.append(tray)
+
+    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
+        surfaces.toggle()
+        surfaces.toggle()
+        self.answered += 1
+        return Rating(magnitude_similarity=70.0, frequency_similarity=30.5, response_time_s=2.5)
+
+    def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
+        for button in (0, 1, 1):
+            surfaces.present_virtual(button)
+        self.answered += 1
+        return Choice(button=1, response_time_s=3.25)
+
+
+@pytest.fixture
+def study() -> Study:
+    return Study(
+        name="Three textures",
+        seed=11,
+        textures=TEXTURES,
+        trays={"canvas": "C", "MDF": "A", "PVC": "B"},
+        repeats=2,
+        training_trials=1,
+        absolute=TaskPlan(participants=3, schedule="interleaved"),
+        relative=TaskPlan(participants=4, schedule="by-day"),
+    )
+
+
+@pytest.fixture(scope="session")
+def threshold() -> Threshold:
+    return Threshold.shipped("codec")
+
+
+@pytest.fixture(scope="session")
+def truths() -> dict[str, TextureModel]:
+    return {texture: planted_texture(texture) for texture in TEXTURES}
+
+
+@pytest.fixture(scope="session")
+def models(truths: dict[str, TextureModel], threshold: Threshold) -> ModelSets:
+    simplified = {name: simplify(model, threshold).model for name, model in truths.items()}
+    return ModelSets(full=truths, simplified=simplified)
+
+
+@pytest.fixture
+def rig() -> NotingRig:
+    return NotingRig()
+
+
+@pytest.fixture
+def respondent() -> Script:
+    return Script()
+
+
+@pytest.fixture
+def misbehaving() -> type[Script]:
+    """The class to derive misbehaving respondents from."""
+    return Script
+
+
+@pytest.fixture
+def rows() -> object:
+    """Reads a table: a list of dictionaries, after checking that every line is whole."""
+
+    def read(path: Path) -> list[dict[str, str]]:
+        text = path.read_bytes().decode("utf-8")
+        assert text.endswith("\n")
+        header, *lines = [line.split("\t") for line in text[:-1].split("\n")]
+        return [dict(zip(header, line, strict=True)) for line in lines]
+
+    return read
