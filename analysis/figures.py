@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,10 +39,11 @@ def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
     axes = figure.subplots(2, 2, sharex=True, sharey="row")
     for column, model in enumerate(MODELS):
         plot_model_spectrum(comparison, model=model, ax=axes[0, column])
-        plot_layers_and_threshold(comparison, model=model, ax=axes[1, column])
+        plot_layers_and_threshold(comparison, ax=axes[1, column])
         axes[0, column].set_xlabel("")
     for ax in axes[:, 1]:
         ax.set_ylabel("")
+    _shared_legend(figure, axes[:, 0], loc="outside lower center", ncols=6)
     figure.suptitle(
         f"{comparison.texture}, {comparison.speed_mm_s:g} mm/s, {comparison.force_n:g} N"
     )
@@ -56,20 +57,17 @@ def plot_model_spectrum(
     ax = _axes_or_new(ax)
     response = comparison.full if model == "full" else comparison.simplified
     ax.plot(comparison.frequency_hz, comparison.recording, color=GREY, lw=2.5, label="recording")
-    ax.plot(comparison.frequency_hz, response, color=BLUE, lw=1.5, ls="--", label=f"{model} model")
+    ax.plot(comparison.frequency_hz, response, color=BLUE, lw=1.5, ls="--", label="model")
     _log_frequency(ax, comparison.frequency_hz[-1])
     ax.set_yscale("log")
     ax.set_ylabel("magnitude, smoothed by 30 Hz\n(g per unit noise)")
     ax.set_title(f"({'a' if model == 'full' else 'b'}) {model} model", loc="left")
-    ax.legend(frameon=False, fontsize=9)
     _stamp(ax, comparison.simulated)
     return ax
 
 
-def plot_layers_and_threshold(
-    comparison: SpectrumComparison, *, model: str, ax: Axes | None = None
-) -> Axes:
-    """Each layer's sinusoid of equal power (stems at f) against the detection threshold."""
+def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None = None) -> Axes:
+    """Each layer's amplitude by the criterion (stems at f) against the detection threshold."""
     ax = _axes_or_new(ax)
     threshold = comparison.threshold
     ax.plot(
@@ -80,8 +78,7 @@ def plot_layers_and_threshold(
     )
     levels = np.concatenate([threshold.acceleration_g, comparison.layer_amplitude_g])
     bottom = float(levels[levels > 0].min()) / 3
-    gone = "dropped" if model == "simplified" else "to be dropped"
-    for dropped, label in ((False, "layer, kept"), (True, f"layer, {gone}")):
+    for dropped, label in ((False, "layer, kept"), (True, "layer, dropped by simplification")):
         colour = VERMILLION if dropped else BLUE
         chosen = comparison.dropped == dropped
         if not chosen.any():
@@ -101,16 +98,25 @@ def plot_layers_and_threshold(
         for number, at in zip(
             np.flatnonzero(chosen) + 1, zip(frequency, top, strict=True), strict=True
         ):
-            ax.annotate(str(number), at, xytext=(0, 7), textcoords="offset points", ha="center")
-    ax.axvspan(threshold.frequency_hz[-1], comparison.frequency_hz[-1], color=GREY, alpha=0.12)
-    ax.text(
-        0.985, 0.8, "no threshold known", transform=ax.transAxes, fontsize=8, color=GREY, ha="right"
+            ax.annotate(
+                str(number),
+                at,
+                xytext=(0, 8),
+                textcoords="offset points",
+                ha="center",
+                bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.6},
+            )
+    ax.axvspan(
+        threshold.frequency_hz[-1],
+        comparison.frequency_hz[-1],
+        color=GREY,
+        alpha=0.12,
+        label="no threshold known",
     )
     _log_frequency(ax, comparison.frequency_hz[-1])
     ax.set_yscale("log")
-    ax.set_ylim(bottom, float(levels.max()) * 6)
+    ax.set_ylim(bottom, float(levels.max()) * 3)
     ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
-    ax.legend(frameon=False, fontsize=9, loc="upper center", ncols=2)
     _stamp(ax, comparison.simulated)
     return ax
 
@@ -133,7 +139,7 @@ def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
         ax.set_ylabel(f"rated similarity of {scale} (0–100)")
         ax.set_ylim(0, 115)
         ax.set_yticks(range(0, 101, 20))
-    _shared_legend(figure)
+    _shared_legend(figure, figure.axes[:1])
     figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
     return figure
 
@@ -158,7 +164,7 @@ def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float 
     ax.set_ylabel("correct rate (share of trials, 0–1)")
     ax.set_ylim(0, 1.15)
     ax.set_yticks(np.arange(0, 1.01, 0.2))
-    _shared_legend(figure)
+    _shared_legend(figure, figure.axes[:1])
     figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
     return figure
 
@@ -222,7 +228,7 @@ def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool
     chance = 1 / len(matrices["full"].textures)
     figure.supxlabel(
         f"rows: real surface presented; columns: virtual surface answered; each row adds up to "
-        f"100 %; chance {chance:.1%}; in brackets: number of answers",
+        f"100%; chance {chance:.1%}; in brackets: number of answers",
         fontsize=9,
         color=GREY,
     )
@@ -260,7 +266,7 @@ def figure_layer_courses(courses: Sequence[LayerCourse]) -> Figure:
     axes = figure.subplots(1, 2)
     plot_layer_course(courses, quantity="frequency_hz", ax=axes[0])
     plot_layer_course(courses, quantity="amplitude", ax=axes[1])
-    _shared_legend(figure, loc="outside right center", ncols=1)
+    _shared_legend(figure, axes[:1], loc="outside right center", ncols=1)
     figure.suptitle(f"{courses[0].texture}, {courses[0].force_n:g} N")
     return figure
 
@@ -277,7 +283,7 @@ def plot_layer_course(
                 course.speeds_mm_s,
                 values[:, layer],
                 color=LAYER_COLOURS[layer % 7] if solid else BLACK,
-                marker=LAYER_MARKERS[layer % 7] if solid else "",
+                marker=LAYER_MARKERS[(layer + layer // 7) % 7] if solid else "",
                 ls="-" if solid else "--",
                 lw=1.6 if solid else 0.9,
                 label=f"{course.label}, layer {layer + 1}" if solid or layer == 0 else None,
@@ -343,9 +349,11 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
     return ax
 
 
-def _shared_legend(figure: Figure, *, loc: Any = "outside upper center", ncols: int = 2) -> None:
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc=loc, ncols=ncols, frameon=False, fontsize=9)
+def _shared_legend(
+    figure: Figure, axes: Iterable[Axes], *, loc: Any = "outside upper center", ncols: int = 2
+) -> None:
+    handles = [handle for ax in axes for handle in ax.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc=loc, ncols=ncols, frameon=False, fontsize=9)
 
 
 def _axes_or_new(ax: Axes | None) -> Axes:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import chain
 
 import numpy as np
 import pandas as pd
@@ -60,11 +59,10 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
         f"spectra {full['gfc30_ceiling'].mean():.4f} against draws of themselves.",
     ]
     if (dropped > 0).any():
-        worst = loss[dropped > 0].idxmax()
+        change = -loss[dropped > 0].sort_values(ascending=False)
         sentences.append(
-            f"Dropping layers changed GFC30 most for {worst}, by {-loss[worst]:+.4f}.".replace(
-                "-", "−"
-            )
+            f"Where layers were dropped, GFC30 changed by {_signed(change.iloc[0], 4)} "
+            f"({change.index[0]}) to {_signed(change.iloc[-1], 4)} ({change.index[-1]})."
         )
     return sentences
 
@@ -73,7 +71,7 @@ def planted_outcomes(planted: pd.DataFrame) -> list[str]:
     """One sentence per estimator, from `planted.planted_truth_table` rows; means over textures."""
     overall = planted[planted["layer"] == ALL_LAYERS]
     return [
-        f"{estimator} found {rows['recall'].mean():.0%} of the planted layers, and "
+        f"The estimator {estimator} found {rows['recall'].mean():.0%} of the planted layers, and "
         f"{rows['precision'].mean():.0%} of the layers it reports were planted; median errors: "
         f"{rows['median_frequency_error_hz'].mean():.1f} Hz in frequency, a factor of "
         f"{rows['median_bandwidth_ratio'].mean():.2f} in bandwidth, "
@@ -84,35 +82,43 @@ def planted_outcomes(planted: pd.DataFrame) -> list[str]:
     ]
 
 
-def cautions(
-    rating: pd.DataFrame | None, rate: pd.DataFrame | None, *, simulated: bool
-) -> list[str]:
-    """What may not be concluded from these numbers."""
+def cautions(families: Sequence[pd.DataFrame], *, simulated: bool, models: bool) -> list[str]:
+    """What may not be concluded.
+
+    Parameters
+    ----------
+    families : sequence of DataFrame
+        Paired tests that the report shows, from `statistics`.
+    simulated : bool
+        Whether the answers are simulated.
+    models : bool
+        Whether the report shows likeness of spectra.
+    """
     sentences = []
-    if simulated:
+    if families and simulated:
         sentences.append(
             "Simulated participants follow a model that was written down beforehand: their "
             "answers test the procedure and say nothing about what people feel."
         )
-    families = [tests for tests in (rating, rate) if tests is not None]
-    unshown = sum(int((tests["p_holm"] >= ALPHA).sum()) for tests in families)
     if families:
+        unshown = sum(int((tests["p_holm"] >= ALPHA).sum()) for tests in families)
         sentences.append(
             f"A t-test that is not significant ({unshown} here) does not show that full and "
             "simplified models are equal; showing that takes an equivalence test with a bound "
             "fixed before the data, which is not part of this version."
         )
-        excluded = sorted(set(chain.from_iterable(t["excluded"].str.split(", ") for t in families)))
-        excluded = sorted({name for names in excluded for name in [names] if name})
-        if excluded:
-            sentences.append(
-                f"Some pairs are incomplete; these participants are missing from at least one "
-                f"comparison: {', '.join(excluded)}."
-            )
-    sentences.append(
-        "GFC judges the shape of a spectrum, not its level, and even white noise scores high: "
-        "read it between its floor and its ceiling, beside the distances in dB."
-    )
+    named = {name for tests in families for cell in tests["excluded"] for name in cell.split(", ")}
+    missing = sorted(named - {""})
+    if missing:
+        sentences.append(
+            "Some pairs are incomplete; these participants are left out of at least one "
+            f"comparison: {', '.join(missing)}."
+        )
+    if models:
+        sentences.append(
+            "GFC judges the shape of a spectrum, not its level, and even white noise scores high: "
+            "read it between its floor and its ceiling, beside the distances in dB."
+        )
     return sentences
 
 
@@ -126,11 +132,11 @@ def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
         text = f"no difference between the models was shown in any of {count} textures"
     else:
         shown = "; ".join(
-            f"{row.texture} {_signed(factor * row.mean_difference, 1)} {unit} (95 % CI "
-            f"{_signed(factor * row.ci_low, 1)} to {_signed(factor * row.ci_high, 1)}, "
-            f"t({row.df}) = {_signed(row.t, 2)}, Holm p {_p(row.p_holm)}, "
-            f"d_z = {_signed(row.d_z, 2)})"
-            for row in different.itertuples()
+            f"{row['texture']} {_signed(factor * row['mean_difference'], 1)} {unit} (95% CI "
+            f"{_signed(factor * row['ci_low'], 1)} to {_signed(factor * row['ci_high'], 1)}, "
+            f"t({row['df']}) = {_signed(row['t'], 2)}, Holm p {_p(row['p_holm'])}, "
+            f"d_z = {_signed(row['d_z'], 2)})"
+            for row in different.to_dict("records")
         )
         text = f"simplified and full models differ in {len(different)} of {count} textures: {shown}"
         if rest:
@@ -147,7 +153,7 @@ def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
     above = family[significant & (family["mean"] > chance)]
     below = family[significant & (family["mean"] < chance)]
     text = (
-        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right (95 % "
+        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right (95% "
         f"bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}, "
         f"{overall['participants']} participants, chance {chance:.1%}); above chance after Holm: "
         f"{_names(above['texture'])}"

@@ -12,24 +12,28 @@ from html import escape
 import pandas as pd
 from matplotlib.figure import Figure
 
-PICTURE_DPI = 130
+from analysis.planted import ALL_LAYERS
+from analysis.statistics import ALL_TEXTURES
+
+PICTURE_DPI = 150
+PIXELS_PER_INCH = 92
 _P_VALUES = ("p", "p_holm", "shapiro_p", "wilcoxon_p", "flip_probability")
+_NAMES = ("scale", "texture", "model", "estimator", "layer", "verdict", "presented", "answered")
+_GRID_AXES = ("_mm_s", "force_n")
 _LABELS = {
-    "mean_full": "mean, full",
-    "se_full": "SE, full",
-    "mean_simplified": "mean, simplified",
-    "se_simplified": "SE, simplified",
+    "mean_full": "mean full",
+    "mean_simplified": "mean simplified",
     "mean_difference": "difference",
-    "ci_low": "95 % CI from",
+    "ci_low": "CI from",
     "ci_high": "to",
     "p_holm": "p (Holm)",
     "d_z": "d_z",
-    "d_z_low": "d_z CI from",
+    "d_z_low": "CI from",
     "d_z_high": "to",
-    "shapiro_p": "Shapiro p",
-    "wilcoxon_w": "Wilcoxon W",
     "wilcoxon_p": "Wilcoxon p",
     "se": "SE",
+    "rms_error_db": "RMS error (dB)",
+    "log_spectral_distance_db": "log-spectral distance (dB)",
     "gfc30_mean": "GFC30 mean",
     "gfc30_min": "GFC30 min",
     "gfc30_floor": "GFC30 floor",
@@ -46,22 +50,22 @@ STYLE = """
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--tint); color: var(--ink);
        font: 16px/1.55 system-ui, "Segoe UI", Roboto, "Helvetica Neue", Arial, sans-serif; }
-main, header > div { max-width: 1180px; margin: 0 auto; padding: 0 28px; }
+main, header > div { max-width: 1240px; margin: 0 auto; padding: 0 28px; }
 header { background: var(--paper); border-bottom: 1px solid var(--line); padding: 34px 0 22px; }
 h1 { margin: 0 0 6px; font-size: 30px; line-height: 1.2; }
 h2 { margin: 0 0 12px; font-size: 22px; }
 h3 { margin: 30px 0 8px; font-size: 17px; }
 .lead { color: var(--soft); margin: 0; max-width: 75ch; }
 .banner { background: var(--warn); color: #fff; font-weight: 600; padding: 10px 0; }
-.banner div { max-width: 1180px; margin: 0 auto; padding: 0 28px; }
+.banner div { max-width: 1240px; margin: 0 auto; padding: 0 28px; }
 nav { margin-top: 16px; font-size: 15px; }
 nav a { color: var(--blue); text-decoration: none; margin-right: 22px; }
 nav a:hover { text-decoration: underline; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
           padding: 26px 30px; margin: 26px 0; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(165px, 1fr)); gap: 14px; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 14px; }
 .tile { border: 1px solid var(--line); border-radius: 8px; padding: 14px 16px; }
-.tile b { display: block; font-size: 25px; line-height: 1.25; color: var(--blue); }
+.tile b { display: block; font-size: 23px; line-height: 1.25; color: var(--blue); }
 .tile span { color: var(--soft); font-size: 14px; }
 ul { margin: 8px 0 0; padding-left: 22px; max-width: 95ch; } li { margin: 7px 0; }
 p { max-width: 95ch; }
@@ -70,15 +74,15 @@ figure { margin: 18px 0 26px; } figure img { max-width: 100%; height: auto; disp
 figcaption, caption { color: var(--soft); font-size: 14.5px; text-align: left; max-width: 100ch; }
 caption { padding-bottom: 8px; } figcaption b, caption b { color: var(--ink); }
 .scroll { overflow-x: auto; margin: 18px 0 26px; }
-table { border-collapse: collapse; font-size: 13.5px; font-variant-numeric: tabular-nums; }
+table { border-collapse: collapse; font-size: 13px; font-variant-numeric: tabular-nums; }
 th { text-align: left; vertical-align: bottom; font-weight: 600; color: var(--soft);
      border-bottom: 2px solid var(--line); }
-th, td { padding: 5px 12px 5px 0; } td { border-bottom: 1px solid var(--line); }
-td.number, th.number { text-align: right; white-space: nowrap; }
+th, td { padding: 5px 11px 5px 0; } td { border-bottom: 1px solid var(--line); }
+td.number, th.number { text-align: right; } td.number, td.name { white-space: nowrap; }
 tr.total td { font-weight: 600; }
 details { border-top: 1px solid var(--line); padding: 10px 0; }
 summary { cursor: pointer; font-weight: 600; }
-footer { max-width: 1180px; margin: 0 auto 40px; padding: 0 28px; color: var(--soft);
+footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--soft);
          font-size: 14px; }
 @media print { body { background: none; } section { border: 0; break-inside: avoid-page; } }
 """
@@ -86,13 +90,17 @@ footer { max-width: 1180px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """A table of the report: `name` is its file's stem, `title` and `note` its caption."""
+    """A table of the report: `name` is its file's stem, `title` and `note` its caption.
+
+    The page shows the columns in `shown` (all where there are none); the file holds all.
+    """
 
     name: str
     title: str
     note: str
     frame: pd.DataFrame
     simulated: bool
+    shown: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +114,16 @@ class Picture:
     simulated: bool
 
 
-def paragraph(text: str) -> str:
-    """A paragraph of plain text."""
-    return f"<p>{escape(text)}</p>"
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """Tables and figures that open on a click."""
+
+    summary: str
+    items: tuple[Table | Picture, ...]
+    opened: bool = False
+
+
+Item = Table | Picture | Fold
 
 
 def bullets(sentences: Sequence[str]) -> str:
@@ -126,10 +141,10 @@ def tiles(figures: Sequence[tuple[str, str]]) -> str:
     return f'<div class="tiles">{"".join(cells)}</div>'
 
 
-def folded(summary: str, content: str, *, opened: bool = False) -> str:
+def folded(fold: Fold, content: str) -> str:
     """A part that opens on a click; `content` is HTML."""
-    state = " open" if opened else ""
-    return f"<details{state}><summary>{escape(summary)}</summary>{content}</details>"
+    state = " open" if fold.opened else ""
+    return f"<details{state}><summary>{escape(fold.summary)}</summary>{content}</details>"
 
 
 def section(anchor: str, heading: str, content: str) -> str:
@@ -147,18 +162,25 @@ def picture_png(figure: Figure) -> bytes:
 def picture_html(picture: Picture, png: bytes) -> str:
     """The figure inline, with its caption."""
     data = base64.b64encode(png).decode("ascii")
+    # One scale for all pictures, so that their text has one size.
+    width = round(picture.figure.get_figwidth() * PIXELS_PER_INCH)
     return (
         f'<figure id="{escape(picture.name)}">'
-        f'<img alt="{escape(_full_title(picture))}" src="data:image/png;base64,{data}">'
+        f'<img alt="{escape(_full_title(picture))}" width="{width}" '
+        f'src="data:image/png;base64,{data}">'
         f"<figcaption>{_caption(picture)}</figcaption></figure>"
     )
 
 
 def table_html(table: Table) -> str:
     """The table with its caption; numbers are rounded, the file beside the report is exact."""
-    frame = table.frame
+    frame = table.frame[list(table.shown)] if table.shown else table.frame
+    frame = frame.loc[:, ~(frame == "").all()]  # a column of notes that nobody wrote
     numeric = [pd.api.types.is_numeric_dtype(frame[name]) for name in frame]
-    css = ['class="number"' if number else "" for number in numeric]
+    css = [
+        'class="number"' if number else 'class="name"' if name in _NAMES else ""
+        for number, name in zip(numeric, frame, strict=True)
+    ]
     head = "".join(
         f"<th {c}>{escape(label(str(name)))}</th>" for name, c in zip(frame, css, strict=True)
     )
@@ -168,7 +190,7 @@ def table_html(table: Table) -> str:
             f"<td {c}>{escape(cell(str(name), value))}</td>"
             for name, value, c in zip(frame, values, css, strict=True)
         )
-        total = any(isinstance(value, str) and value.startswith("all ") for value in values)
+        total = ALL_TEXTURES in values or ALL_LAYERS in values
         rows.append(f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>")
     return (
         f'<div class="scroll" id="{escape(table.name)}"><table><caption>{_caption(table)}'
@@ -187,7 +209,7 @@ def label(column: str) -> str:
 
 
 def cell(column: str, value: object) -> str:
-    """A value as it is read in a table: three significant digits, `n/a` where there is none."""
+    """A value as a table shows it: about three significant digits, `n/a` where there is none."""
     if not isinstance(value, float):
         return str(value)
     if math.isnan(value):
@@ -196,6 +218,8 @@ def cell(column: str, value: object) -> str:
         return p_value(value)
     if column.startswith(("gfc", "oracle")):
         return f"{value:.4f}"
+    if column.endswith(_GRID_AXES):
+        return f"{value:g}"
     size = abs(value)
     digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
     tiny = 0 < size < 0.0005

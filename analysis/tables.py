@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 import pandas as pd
@@ -132,22 +132,13 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        texture, layer (1-based), verdict (kept|dropped), distance_db (to the threshold in the
-        worst condition, + above), worst_speed_mm_s, worst_force_n, worst_frequency_hz,
-        flip_probability (0–1), reason.
+        texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
+        worst_frequency_hz (the condition where the layer stands highest against the threshold),
+        distance_db (to the threshold there, + above), flip_probability (0–1).
     """
-    rows = [
-        {
-            "texture": simplification.model.texture,
-            "layer": verdict.layer,
-            "verdict": verdict.verdict,
-            "distance_db": verdict.distance_db,
-            "worst_speed_mm_s": verdict.worst_speed_mm_s,
-            "worst_force_n": verdict.worst_force_n,
-            "worst_frequency_hz": verdict.worst_frequency_hz,
-            "flip_probability": verdict.flip_probability,
-            "reason": verdict.reason,
-        }
-        for verdict in simplification.layers
-    ]
-    return pd.DataFrame(rows)
+    table = pd.DataFrame([asdict(verdict) for verdict in simplification.layers])
+    worst = ["worst_speed_mm_s", "worst_force_n", "worst_frequency_hz"]
+    # No condition is the worst one where no threshold is known in any.
+    table.loc[table["distance_db"].isna(), worst] = np.nan
+    table.insert(0, "texture", simplification.model.texture)
+    return table

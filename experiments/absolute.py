@@ -10,14 +10,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rig.interface import TextureRig
-
 from experiments.design import AbsoluteTrial, Phase, plan_session
 from experiments.models import ModelSets
 from experiments.store import SessionStore
 from experiments.study import Study
 from experiments.trial_loop import Respondent, Script, SessionResult, Surfaces, run_trials
 from modeling import TextureModel
+from rig.interface import TextureRig
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -90,7 +89,7 @@ def run_absolute(
     ----------
     study : Study
     subject, session : int
-        From 1; the order of the trials follows from them and the study's seed.
+        From 1; with the study's seed they fix the order of the trials.
     models : ModelSets
         Full and simplified model of every texture of the study.
     rig : TextureRig
@@ -114,6 +113,19 @@ def run_absolute(
     """
     models.require(study.textures)
     plan = plan_session(study, task="absolute", subject=subject, session=session)
+    with SessionStore.create(
+        data_folder,
+        plan=plan,
+        columns=COLUMNS,
+        description=TASK_DESCRIPTION,
+        simulated=respondent.simulated or rig.simulated,
+    ) as store:
+        script = _script(models, respondent)
+        return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)
+
+
+def _script(models: ModelSets, respondent: Respondent) -> Script:
+    """What is presented and asked in a trial."""
 
     def virtual(trial: AbsoluteTrial) -> list[TextureModel]:
         return [models.of(trial.texture, trial.model)]
@@ -134,14 +146,6 @@ def run_absolute(
             "response_time_s": rating.response_time_s,
         }
 
-    script = Script(
+    return Script(
         announcements=ANNOUNCEMENTS, closing=CLOSING, virtual=virtual, begin=begin, ask=ask
     )
-    with SessionStore.create(
-        data_folder,
-        plan=plan,
-        columns=COLUMNS,
-        description=TASK_DESCRIPTION,
-        simulated=respondent.simulated or rig.simulated,
-    ) as store:
-        return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)

@@ -33,6 +33,7 @@ from experiments.widgets import (
 # --- Parameters -----------------------------------------------------------------------------
 
 SCALE_ENDS = ("completely different", "identical")
+MOUNT_NOTE = "For the experimenter: the rig is silent now.\nConfirm once the sample sits firmly."
 MAGNITUDE_LABEL = "Vibration magnitude"
 FREQUENCY_LABEL = "Frequency pattern"
 FRAME_PAUSE_S = 0.004  # keeps a display without vertical synchronisation from spinning
@@ -124,7 +125,7 @@ class Console:
         self._message(
             "mount",
             title=f"Put the sample from tray {tray} in place",
-            body="For the experimenter: the rig is silent now.\nConfirm once the sample sits firmly.",
+            body=MOUNT_NOTE,
             label="Sample is in place",
         )
 
@@ -148,7 +149,7 @@ class Console:
 
         def update() -> None:
             real.lit, virtual.lit = surfaces.shows_real, not surfaces.shows_real
-            proceed.enabled = None not in (magnitude.rating, frequency.rating)
+            proceed.enabled = magnitude.rated and frequency.rated
 
         page = Page(
             "rate",
@@ -160,7 +161,6 @@ class Console:
             ),
         )
         seconds = self._show(page, surfaces=surfaces, update=update)
-        assert magnitude.rating is not None and frequency.rating is not None
         return Rating(
             magnitude_similarity=magnitude.rating,
             frequency_similarity=frequency.rating,

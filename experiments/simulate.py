@@ -9,7 +9,7 @@ from experiments.absolute import run_absolute
 from experiments.models import ModelSets
 from experiments.participants import Perception, Psychometrics, SimulatedParticipant
 from experiments.relative import run_relative
-from experiments.study import TASKS, Study, require_whole
+from experiments.study import TASKS, Study, Task, require_whole
 from experiments.trial_loop import SessionResult
 from modeling import TextureModel, Threshold
 from rig.interface import TextureRig
@@ -68,12 +68,7 @@ def simulate_study(
     require_whole("seed", seed, 0, 2**63)
     models = ModelSets(full=full, simplified=simplified)
     perception = Perception(study, real=real, models=models, threshold=threshold)
-    agenda = [
-        (task, subject, session)
-        for task in TASKS
-        for session in range(1, study.plan(task).sessions + 1)
-        for subject in range(1, study.plan(task).participants + 1)
-    ]
+    agenda = _agenda(study)
     results = []
     for done, (task, subject, session) in enumerate(agenda, start=1):
         participant = SimulatedParticipant(
@@ -96,3 +91,13 @@ def simulate_study(
         if progress is not None:
             progress(done, len(agenda), result.path.stem)
     return tuple(results)
+
+
+def _agenda(study: Study) -> list[tuple[Task, int, int]]:
+    """Task, subject and session of every session, day by day."""
+    return [
+        (task, subject, session)
+        for task in TASKS
+        for session in range(1, study.plan(task).sessions + 1)
+        for subject in range(1, study.plan(task).participants + 1)
+    ]

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from rig.interface import TextureRig
-
 from experiments.design import AbsoluteTrial, Phase, RelativeTrial, Trial
 from experiments.store import SessionStore
 from modeling import InputError, TextureModel
+from rig.interface import TextureRig
 
 HIGHEST_RATING = 100.0
 

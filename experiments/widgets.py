@@ -228,10 +228,14 @@ class RatingScale:
         ]
 
     @property
-    def rating(self) -> float | None:
-        """0 … 100, None before the first rating."""
-        rating = self._slider.getRating()
-        return None if rating is None else float(rating)
+    def rated(self) -> bool:
+        """Whether there is a rating yet."""
+        return self._slider.getRating() is not None
+
+    @property
+    def rating(self) -> float:
+        """0 … 100; NaN before the first rating."""
+        return float(self._slider.getRating()) if self.rated else float("nan")
 
     def contains(self, point: Point) -> bool:
         """Whether the point lies on the line or near it."""

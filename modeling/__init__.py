@@ -1,7 +1,7 @@
 """Texture models: from recordings to parameters, to fewer parameters, to vibration."""
 
 from modeling import similarity
-from modeling.errors import InputError
+from modeling.errors import GridError, InputError
 from modeling.estimators import ESTIMATORS, Layers, find_layers
 from modeling.fitting import fit_texture, missing_conditions
 from modeling.model import TextureModel
@@ -16,6 +16,7 @@ __all__ = [
     "CRITERIA",
     "ESTIMATORS",
     "PEQ",
+    "GridError",
     "InputError",
     "LayerVerdict",
     "Layers",

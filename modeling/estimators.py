@@ -19,7 +19,6 @@ from scipy.signal import find_peaks
 from modeling.errors import InputError
 from modeling.peq import (
     HIGHEST_BANDWIDTH_SHARE,
-    HIGHEST_FREQUENCY_SHARE,
     LOWEST_BANDWIDTH_HZ,
     LOWEST_FREQUENCY_HZ,
     Floats,
@@ -94,8 +93,9 @@ def find_layers(spectrum: Spectrum, *, estimator: str = "paper-consistent") -> L
 def find_peak_frequencies(spectrum: Spectrum) -> Floats:
     """Frequencies (Hz, rising) of the peaks of the 30 Hz smoothed spectrum.
 
-    A peak is a local maximum above the noise amount whose prominence exceeds the smoothed
-    spectrum's standard deviation there (0.52/√(2√π·30 Hz·T), relative).
+    A peak is a local maximum above the noise amount, below 0.8 of the Nyquist frequency, whose
+    prominence exceeds the smoothed spectrum's standard deviation there (0.52/√(2√π·30 Hz·T),
+    relative).
     """
     smoothed = spectrum.smoothed()
     relative_sd = RAYLEIGH_VARIATION / np.sqrt(
@@ -105,7 +105,8 @@ def find_peak_frequencies(spectrum: Spectrum) -> Floats:
     clear = found["prominences"] > PROMINENCE_SD * relative_sd * smoothed[peaks]
     frequency = spectrum.frequency_hz[peaks[clear]]
     legal = frequency >= LOWEST_FREQUENCY_HZ
-    legal &= frequency <= HIGHEST_FREQUENCY_SHARE * spectrum.rate_hz
+    # The noise amount is taken where there are no peaks, so none is looked for there.
+    legal &= frequency < NOISE_BAND[0] * spectrum.rate_hz / 2
     peak_frequency: Floats = frequency[legal]
     return peak_frequency
 

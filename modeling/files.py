@@ -39,12 +39,42 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
     try:
         yield fresh
         fresh.chmod(0o755)
-        if target.exists():
-            shutil.rmtree(target)
-        fresh.rename(target)
+        _swap(fresh, target)
     except BaseException:
         shutil.rmtree(fresh, ignore_errors=True)
         raise
+
+
+def _swap(fresh: Path, target: Path) -> None:
+    """Put `fresh` at `target`; what was there is deleted only once that has worked."""
+    if not target.exists():
+        fresh.rename(target)
+        return
+    old = fresh.with_name(fresh.name + ".old")
+    target.rename(old)
+    try:
+        fresh.rename(target)
+    except BaseException:
+        old.rename(target)
+        raise
+    shutil.rmtree(old)
+
+
+def check_replaceable(target: Path, *, index_name: str, what: str) -> None:
+    """Refuse to replace anything but an empty folder or a set that holds `index_name`.
+
+    Raises
+    ------
+    InputError
+        If `target` is a file, or a folder with other contents.
+    """
+    if target.is_file():
+        raise InputError(f"expected a folder, got the file {target}; choose another name.")
+    if target.exists() and any(target.iterdir()) and not (target / index_name).is_file():
+        raise InputError(
+            f"expected a new folder or {what}, got {target} with other files in it; "
+            "choose another folder."
+        )
 
 
 def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -76,7 +106,8 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
         raise InputError(
             f"expected a text table, got other bytes in {source}; save it as UTF-8."
         ) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    # Not splitlines(): that would also break cells at characters that `write_table` allows.
+    lines = [line for line in text.split("\n") if line.strip() and not line.startswith("#")]
     header = lines[0].split("\t") if lines else []
     missing = [name for name in required if name not in header]
     if missing:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import griddata
 from scipy.spatial import QhullError
 
-from modeling.errors import InputError
+from modeling.errors import GridError, InputError
 from modeling.estimators import (
     EstimatorName,
     Layers,
@@ -55,8 +55,10 @@ def fit_texture(
 
     Raises
     ------
+    GridError
+        Where the recordings do not span such a grid.
     InputError
-        Where the recordings do not span such a grid, or mix textures or units.
+        Where they mix textures or units, or have contact without speed.
     """
     chosen = check_estimator(estimator)
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
@@ -65,7 +67,7 @@ def fit_texture(
     speeds = sorted({speed for speed, _ in spectra})
     forces = sorted({force for _, force in spectra})
     if len(speeds) < 2 or len(forces) < 2:
-        raise InputError(
+        raise GridError(
             f"{texture}: expected recordings at 2 or more speeds and 2 or more forces for a full "
             f"model, got {_count(speeds, 'speed')} and {_count(forces, 'force')}; "
             f"record more {'force' if len(forces) < 2 else 'speed'} levels."
@@ -207,10 +209,12 @@ def _fill(
     try:
         linear = griddata(points, values, holes, method="linear", rescale=True)
     except (QhullError, ValueError):
-        raise InputError(
+        raise GridError(
             f"{texture}: expected recordings that span the grid, got {len(points)} of "
             f"{len(points) + len(holes)} conditions on one line; record more of them."
         ) from None
     nearest = griddata(points, values, holes, method="nearest", rescale=True)
-    filled: NDArray[np.float64] = np.where(np.isnan(linear), nearest, linear)
-    return filled
+    filled = np.where(np.isnan(linear), nearest, linear)
+    # Rounding must not carry a value beyond its neighbours, and so out of the legal range.
+    bounded: NDArray[np.float64] = np.clip(filled, values.min(axis=0), values.max(axis=0))
+    return bounded

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError
 from modeling.files import write_text
-from modeling.peq import PEQ, Floats, check_bands
+from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
 
 Bools = NDArray[np.bool_]
@@ -120,8 +120,7 @@ class TextureModel:
                 )
 
     def _check_values(self) -> None:
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(f"expected a rate above 0 Hz, got {self.rate_hz}; give the rate.")
+        _check_rate(self.rate_hz)
         if self.unit not in UNITS:
             raise InputError(f"expected a unit among {', '.join(UNITS)}, got {self.unit!r}; fix.")
         for name in ("noise_gains", "gains", "level_sd_db"):
@@ -183,12 +182,18 @@ class TextureModel:
         )
 
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
-        """The PEQ at one speed (mm/s) and force (N), interpolated as in `parameters`."""
+        """The PEQ at one speed (mm/s) and force (N), interpolated as in `parameters`.
+
+        Interpolation between legal values may leave the legal range by rounding; it is clamped.
+        """
         at = self.parameters(speed_mm_s, force_n)
+        frequency, bandwidth, _ = clamp_bands(
+            at.frequencies_hz[0], at.bandwidths_hz[0], rate_hz=self.rate_hz
+        )
         return PEQ(
             noise_gain=float(at.noise_gain[0]),
-            frequencies_hz=at.frequencies_hz[0],
-            bandwidths_hz=at.bandwidths_hz[0],
+            frequencies_hz=frequency,
+            bandwidths_hz=bandwidth,
             gains=at.gains[0],
             rate_hz=self.rate_hz,
         )
@@ -199,6 +204,7 @@ class TextureModel:
         The density of unit-variance noise falls as 1/rate, so gains grow as √(rate/old rate).
         The noise floor then reaches to the new Nyquist frequency.
         """
+        _check_rate(rate_hz)
         scale = np.sqrt(rate_hz / self.rate_hz)
         return replace(
             self,
@@ -260,6 +266,11 @@ _LAYER_ARRAYS = (
 )
 _ARRAYS = ("speeds_mm_s", "forces_n", "noise_gains", "interpolated", *_LAYER_ARRAYS)
 _BOOLEAN_ARRAYS = ("inherited", "unresolved", "interpolated")
+
+
+def _check_rate(rate_hz: float) -> None:
+    if not (np.isfinite(rate_hz) and rate_hz > 0):
+        raise InputError(f"expected a rate above 0 Hz, got {rate_hz}; give the rate.")
 
 
 def _cell(axis: Floats, value: Floats) -> tuple[NDArray[np.intp], Floats]:

@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from modeling.errors import InputError
+
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX_2 = np.uint64(0x94D049BB133111EB)
@@ -24,7 +26,10 @@ def _mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
 
 
 def stream_key(seed: int, stream: int = 0) -> np.uint64:
-    """The key of one noise stream; `seed` and `stream` are 0 … 2⁶⁴ − 1."""
+    """The key of one noise stream; `seed` and `stream` are 0 … 2⁶⁴ − 1, else InputError."""
+    for name, value in (("seed", seed), ("stream", stream)):
+        if not 0 <= value < 2**64:
+            raise InputError(f"expected a {name} of 0 … 2⁶⁴ − 1, got {value}; choose another.")
     pair = np.array([seed, stream], dtype=np.uint64)
     first = _mix(pair[:1] + _GOLDEN)
     return np.uint64(_mix((first ^ pair[1:]) + _GOLDEN)[0])

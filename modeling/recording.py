@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError
-from modeling.files import read_table, replace_folder, write_table
+from modeling.files import check_replaceable, read_table, replace_folder, write_table
 
 UNITS = ("g", "arbitrary")
 MIN_SAMPLES = 64
@@ -86,6 +86,10 @@ class Recording:
             raise InputError(
                 f"{where}: expected a unit among {', '.join(UNITS)}, got {self.unit!r}; "
                 "convert the data to g or call them arbitrary."
+            )
+        if self.repeat < 1:
+            raise InputError(
+                f"{where}: expected a repeat of at least 1, got {self.repeat}; fix it."
             )
         if not self.texture.strip() or any(c in self.texture for c in "\t\r\n"):
             raise InputError(
@@ -235,11 +239,7 @@ class RecordingSet:
             If the folder exists and holds something else than a recording set.
         """
         target = Path(folder)
-        if target.exists() and not (target / INDEX_NAME).is_file() and any(target.iterdir()):
-            raise InputError(
-                f"expected a new folder or a recording set, got {target} with other files in it; "
-                "choose another folder."
-            )
+        check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
         with replace_folder(target) as fresh:
             rows = []
             for number, recording in enumerate(self.recordings, start=1):
@@ -327,8 +327,8 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
             number(row.get("force_n", ""), f"force_n of {path.name}"),
             row.get("texture") or folder.name,
             unit=unit,
-            simulated=row.get("simulated", "false").lower() == "true",
-            repeat=int(number(row.get("repeat") or "1", f"repeat of {path.name}")),
+            simulated=_flag(row.get("simulated") or "false", f"simulated of {path.name}"),
+            repeat=_whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
@@ -349,12 +349,45 @@ def number(text: str, name: str) -> float:
         raise InputError(f"expected a number for {name}, got {got}; fill it in.") from None
 
 
+def _whole_number(text: str, name: str) -> int:
+    value = number(text, name)
+    if not value.is_integer():
+        raise InputError(f"expected a whole number for {name}, got {text}; correct it.")
+    return int(value)
+
+
+def _flag(text: str, name: str) -> bool:
+    # A typing error must not turn simulated data into measured ones.
+    if text.lower() not in ("true", "false"):
+        raise InputError(f"expected true or false for {name}, got {text!r}; correct it.")
+    return text.lower() == "true"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _read_samples(path: Path) -> NDArray[np.float64]:
     """One column of numbers below a header; a last line without its end counts as truncated."""
-    text = path.read_text(encoding="utf-8")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise InputError(
+            f"expected one number per line in {path}, got other bytes; import files of another "
+            "layout with tactileq import csv."
+        ) from None
     lines = text.split("\n")
     if len(lines) < 2 or not text.strip():
         raise InputError(f"expected a header and samples in {path}, got an empty file; re-record.")
+    if _is_number(lines[0]):
+        raise InputError(
+            f"expected a header such as acceleration_g as the first line of {path}, got the number "
+            f"{lines[0]}; add one, or the first sample would be lost."
+        )
     if lines[-1] != "":
         raise InputError(
             f"expected {path} to end with a whole line, got {lines[-1]!r} at its end: "

@@ -126,8 +126,9 @@ def simplify(
     if not (np.isfinite(margin_db) and margin_db >= 0):
         raise InputError(f"expected a margin of at least 0 dB, got {margin_db}; correct it.")
     distances = distances_db(model, threshold, criterion=criterion) + margin_db
-    distances = distances.reshape(-1, model.n_layers)
-    flips = _flip_probabilities(distances, model.level_sd_db.reshape(-1, model.n_layers))
+    by_condition = (model.noise_gains.size, model.n_layers)
+    distances = distances.reshape(by_condition)
+    flips = _flip_probabilities(distances, model.level_sd_db.reshape(by_condition))
     reasons = _reasons(distances, flips)
     keep = [layer for layer, (kept, _) in enumerate(reasons) if kept]
     verdicts = tuple(

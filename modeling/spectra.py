@@ -112,8 +112,8 @@ def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectru
     """Spectrum of (n,) samples as they are, in their unit per unit noise."""
     scale = np.sqrt(np.pi * samples.size) / 2
     return Spectrum(
-        np.fft.rfftfreq(samples.size, 1 / rate_hz),
-        np.asarray(np.abs(np.fft.rfft(samples)) / scale, dtype=np.float64),
+        np.asarray(np.fft.rfftfreq(samples.size, 1 / rate_hz), dtype=np.float64),
+        np.abs(np.fft.rfft(samples)) / scale,
         float(rate_hz),
         samples.size,
     )

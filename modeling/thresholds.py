@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +16,6 @@ from modeling.recording import number
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold")
-ShippedName = Literal["codec", "pen-hold"]
 
 
 def displacement_to_acceleration_g(frequency_hz: ArrayLike, displacement_um: ArrayLike) -> Floats:
@@ -52,6 +50,7 @@ class Threshold:
         frequency, level = self.frequency_hz, self.acceleration_g
         good = frequency.size >= 2 and frequency.shape == level.shape
         good = good and bool((np.diff(frequency) > 0).all() and (frequency > 0).all())
+        good = good and bool(np.isfinite(frequency).all())
         if not (good and np.isfinite(level).all() and (level > 0).all()):
             raise InputError(
                 f"expected at least two rising frequencies with levels above 0 in the threshold "
@@ -106,7 +105,7 @@ class Threshold:
         )
 
     @staticmethod
-    def shipped(name: ShippedName) -> Threshold:
+    def shipped(name: str) -> Threshold:
         """One of the thresholds that come along: "codec" or "pen-hold" (METHOD 7)."""
         if name not in SHIPPED:
             raise InputError(

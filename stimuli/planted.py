@@ -65,69 +65,69 @@ class PlantedTexture:
 
 CATALOGUE = {
     "aluminum": PlantedTexture(
-        0.012,
+        0.020,
         (
-            PlantedLayer(80, 1.0, 25, 0.030, 1, 0.7, 0.2),
-            PlantedLayer(300, 0.05, 40, 0.016, -1, 0.6, 0.1),
-            PlantedLayer(700, 0.05, 110, 0.030, 1, 0.8, 0.2),
+            PlantedLayer(80, 1.0, 30, 0.036, 1, 0.5, 0.2),
+            PlantedLayer(290, 0.05, 30, 0.015, 1, 0.5, 0.1),
+            PlantedLayer(700, 0.05, 110, 0.035, -1, 0.5, 0.2),
         ),
     ),
     "canvas": PlantedTexture(
-        0.012,
+        0.030,
         (
-            PlantedLayer(52, 1.0, 20, 0.040, 1, 0.7, 0.35),
-            PlantedLayer(230, 0.1, 35, 0.035, -1, 0.7, 0.2),
-            PlantedLayer(382, 0.03, 40, 0.020, -1, 0.7, 0.1),
-            PlantedLayer(760, 0.05, 120, 0.040, 1, 0.8, 0.2),
+            PlantedLayer(52, 1.0, 25, 0.060, 1, 0.5, 0.35),
+            PlantedLayer(215, 0.1, 35, 0.050, -1, 0.5, 0.2),
+            PlantedLayer(345, 0.03, 35, 0.022, -1, 0.5, 0.1),
+            PlantedLayer(760, 0.05, 120, 0.050, 1, 0.5, 0.2),
         ),
     ),
     "leather": PlantedTexture(
-        0.008,
+        0.016,
         (
-            PlantedLayer(42, 1.0, 16, 0.026, 1, 0.6, 0.3),
-            PlantedLayer(165, 0.05, 25, 0.020, 1, 0.6, 0.2),
-            PlantedLayer(275, 0.04, 30, 0.010, 1, 0.6, 0.1),
-            PlantedLayer(385, 0.03, 35, 0.014, -1, 0.6, 0.1),
+            PlantedLayer(42, 1.0, 20, 0.036, 1, 0.4, 0.3),
+            PlantedLayer(150, 0.05, 25, 0.026, 1, 0.4, 0.2),
+            PlantedLayer(255, 0.04, 30, 0.012, 1, 0.4, 0.1),
+            PlantedLayer(365, 0.03, 35, 0.017, 1, 0.4, 0.1),
         ),
     ),
     "MDF": PlantedTexture(
-        0.010,
+        0.020,
         (
-            PlantedLayer(75, 1.0, 30, 0.040, 1, 0.6, 0.2),
-            PlantedLayer(330, 0.05, 40, 0.018, -1, 0.7, 0.1),
-            PlantedLayer(900, 0.05, 150, 0.035, 1, 0.7, 0.2),
+            PlantedLayer(75, 1.0, 35, 0.045, 1, 0.5, 0.2),
+            PlantedLayer(320, 0.05, 40, 0.019, -1, 0.5, 0.1),
+            PlantedLayer(900, 0.05, 150, 0.045, 1, 0.5, 0.2),
         ),
     ),
     "polyester": PlantedTexture(
-        0.012,
+        0.030,
         (
-            PlantedLayer(57, 1.0, 20, 0.038, 1, 0.7, 0.35),
-            PlantedLayer(242, 0.1, 35, 0.034, -1, 0.7, 0.2),
-            PlantedLayer(386, 0.03, 40, 0.020, -1, 0.7, 0.1),
-            PlantedLayer(800, 0.05, 120, 0.040, 1, 0.8, 0.2),
+            PlantedLayer(57, 1.0, 25, 0.056, 1, 0.5, 0.35),
+            PlantedLayer(226, 0.1, 35, 0.048, -1, 0.5, 0.2),
+            PlantedLayer(354, 0.03, 35, 0.022, -1, 0.5, 0.1),
+            PlantedLayer(800, 0.05, 120, 0.050, 1, 0.5, 0.2),
         ),
     ),
     "PVC": PlantedTexture(
-        0.008,
+        0.014,
         (
-            PlantedLayer(40, 1.0, 14, 0.020, 1, 0.6, 0.2),
-            PlantedLayer(180, 0.05, 25, 0.016, 1, 0.6, 0.2),
-            PlantedLayer(285, 0.04, 30, 0.009, -1, 0.6, 0.1),
-            PlantedLayer(388, 0.02, 35, 0.012, -1, 0.6, 0.1),
+            PlantedLayer(40, 1.0, 18, 0.028, 1, 0.4, 0.2),
+            PlantedLayer(160, 0.05, 25, 0.022, 1, 0.4, 0.2),
+            PlantedLayer(265, 0.04, 30, 0.011, 1, 0.4, 0.1),
+            PlantedLayer(372, 0.02, 35, 0.015, 1, 0.4, 0.1),
         ),
     ),
     "wall paper": PlantedTexture(
-        0.010,
+        0.020,
         (
-            PlantedLayer(44, 1.0, 16, 0.030, 1, 0.5, 0.4),
-            PlantedLayer(160, 0.1, 25, 0.022, 1, 0.6, 0.2),
-            PlantedLayer(310, 0.05, 50, 0.016, -1, 0.6, 0.1),
+            PlantedLayer(44, 1.0, 20, 0.040, 1, 0.4, 0.4),
+            PlantedLayer(160, 0.1, 30, 0.032, 1, 0.4, 0.2),
+            PlantedLayer(300, 0.05, 40, 0.016, 1, 0.4, 0.1),
         ),
     ),
 }
 TEXTURES: tuple[str, ...] = tuple(CATALOGUE)
 # The published noise gain falls with speed (PAPER table 2, negative alpha 1).
-NOISE_GROWTH_SPEED = -0.2
+NOISE_GROWTH_SPEED = -0.1
 
 
 def planted_texture(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from modeling import InputError, Renderer, TextureModel
-from modeling.files import replace_folder, write_table
+from modeling.files import check_replaceable, replace_folder, write_table
 
 SETTLING_S = 0.5
 FADE_S = 0.01
@@ -85,27 +86,30 @@ def write_set(
         The label ("full", "simplified", …) goes into the manifest's column `model`.
     conditions : sequence of (speed_mm_s, force_n)
     rate_hz, duration_s : float
-        Rate at least every model's; duration above 0.
+        Rate a whole number and at least every model's; duration at least one sample.
     seed : int
     progress : callable, optional
         Called with the file's name after each file.
     """
     target = Path(folder)
-    if not (np.isfinite(duration_s) and duration_s > 0):
+    if not (np.isfinite(rate_hz) and rate_hz > 0 and float(rate_hz).is_integer()):
+        raise InputError(f"expected a whole rate in Hz for WAV files, got {rate_hz}; round it.")
+    if not (np.isfinite(duration_s) and round(duration_s * rate_hz) >= 1):
         raise InputError(f"expected a duration above 0 s, got {duration_s}; give a longer one.")
-    if target.exists() and any(target.iterdir()) and not (target / "manifest.tsv").is_file():
-        raise InputError(
-            f"expected a new folder or a stimulus set, got {target} with other files in it; "
-            "choose another folder."
-        )
-    manifest = []
+    check_replaceable(target, index_name="manifest.tsv", what="a stimulus set")
+    manifest: list[Stimulus] = []
     with replace_folder(target) as fresh:
         for label, model in models:
             for speed, force in conditions:
                 vibration = render_stimulus(
                     model, speed, force_n=force, rate_hz=rate_hz, duration_s=duration_s, seed=seed
                 )
-                name = f"{model.texture}_{label}_{speed:g}mms_{force:g}N.wav".replace(" ", "-")
+                name = _file_name(f"{model.texture}_{label}", speed, force)
+                if (fresh / name).exists():
+                    raise InputError(
+                        f"expected each texture, model and condition once, got {name} twice; "
+                        "remove one or rename it."
+                    )
                 wavfile.write(fresh / name, round(rate_hz), vibration.astype(np.float32))
                 manifest.append(
                     _row(fresh / name, model, label, (speed, force), rate_hz, seed, vibration)
@@ -116,6 +120,11 @@ def write_set(
         rows = [[getattr(stimulus, c) for c in columns] for stimulus in manifest]
         write_table(fresh / "manifest.tsv", columns, rows)
     return tuple(manifest)
+
+
+def _file_name(title: str, speed_mm_s: float, force_n: float) -> str:
+    # Names may hold anything; a file's must not lead into another folder.
+    return re.sub(r"[^\w.+-]+", "-", f"{title}_{speed_mm_s:g}mms_{force_n:g}N") + ".wav"
 
 
 def _row(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from experiments.design import AbsoluteTrial, RelativeTrial
 from experiments.models import ModelSets
 from experiments.study import Study, TaskPlan

@@ -9,12 +9,13 @@ from itertools import permutations, product
 
 import numpy as np
 import pytest
-from experiments.design import fisher_yates, models_of_session, plan_session
-from experiments.study import Study, TaskPlan
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from modeling import InputError
 from scipy import stats
+
+from experiments.design import fisher_yates, models_of_session, plan_session
+from experiments.study import Study, TaskPlan
+from modeling import InputError
 
 
 class Draws:
@@ -25,7 +26,8 @@ class Draws:
 
     def integers(self, low: int, high: int) -> int:
         number = self.numbers.pop(0)
-        assert low == 0 and 0 <= number < high == len(self.numbers) + 2
+        assert low == 0
+        assert 0 <= number < high == len(self.numbers) + 2
         return number
 
 
@@ -60,7 +62,8 @@ def shipped(**changes: object) -> Study:
 
 def test_shipped_study_is_the_papers() -> None:
     study = Study.load()
-    assert len(study.textures) == 7 and study.repeats == 3
+    assert len(study.textures) == 7
+    assert study.repeats == 3
     assert study.absolute == TaskPlan(participants=20, schedule="interleaved")
     assert study.relative == TaskPlan(participants=24, schedule="by-day")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from experiments.study import SHIPPED_STUDY, Study
 from modeling import InputError
 
@@ -55,7 +56,8 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told
     path = edited(tmp_path, old, new)
     with pytest.raises(InputError, match=told) as refusal:
         Study.load(path)
-    assert str(path) in str(refusal.value) and "\n" not in str(refusal.value)
+    assert str(path) in str(refusal.value)
+    assert "\n" not in str(refusal.value)
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

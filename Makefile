@@ -1,0 +1,41 @@
+# make demo    the whole study in silico, ends with the path of its report
+# make test    style, types, import rules and every test
+# make install what both begin with: .venv/ from requirements.lock
+# make lock    renew requirements.lock from pyproject.toml (needs uv)
+
+SHELL := /bin/sh
+PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
+	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+PYTEST_FLAGS ?=
+
+.PHONY: install demo test lint lock clean
+
+install: .venv/installed
+
+.venv/installed: requirements.lock pyproject.toml
+	@test -n "$(PYTHON)" || { echo "error: expected Python 3.11 or 3.12, got neither; install python3.11 and python3-venv (or make PYTHON=/path/to/python)." >&2; exit 1; }
+	@echo "Setting up .venv with $(PYTHON) (about 1.5 GB, a minute or two) ..."
+	@$(PYTHON) -m venv .venv || { echo "error: expected the venv module, got none; install python3-venv." >&2; exit 1; }
+	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@touch $@
+
+demo: install
+	@$(BIN)/tactileq demo
+
+lint: install
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+test: lint
+	@sh tools/system-packages
+	$(BIN)/pytest $(PYTEST_FLAGS)
+
+lock:
+	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
+
+clean:
+	rm -rf .venv demo build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,356 @@
+"""What the report holds: for every part of the study its figures, tables and sentences."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis import figures, outcomes, statistics
+from analysis.comparison import compare_spectra, layer_course
+from analysis.load import MODELS, Responses
+from analysis.page import Fold, Item, Picture, Table
+from analysis.planted import planted_layers_table, planted_truth_table
+from analysis.tables import TextureResult, gfc_table, simplification_table
+
+Progress = Callable[[float, str], None]
+
+GFC_COLUMNS = (
+    *("texture", "model", "layers", "parameters", "gfc30_mean", "gfc30_min", "gfc30_floor"),
+    *("gfc30_ceiling", "gfc5_mean", "gfc5_floor", "gfc5_ceiling", "log_spectral_distance_db"),
+    *("rms_error_db", "band_energy_error_db"),
+)
+TEST_COLUMNS = (
+    *("texture", "n", "mean_full", "mean_simplified", "mean_difference", "ci_low", "ci_high", "t"),
+    *("df", "p", "p_holm", "d_z", "d_z_low", "d_z_high", "wilcoxon_p", "note", "excluded"),
+)
+RATE_COLUMNS = (
+    *("texture", "model", "participants", "trials", "mean", "se", "ci_low", "ci_high", "t", "df"),
+    *("p", "p_holm", "note"),
+)
+VERDICT_COLUMNS = (
+    *("layer", "verdict", "reason", "distance_db", "worst_speed_mm_s", "worst_force_n"),
+    *("worst_frequency_hz", "flip_probability"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """One part of the report.
+
+    Parameters
+    ----------
+    anchor, heading : str
+    items : tuple of Table, Picture or Fold
+        In the order of the page.
+    outcomes : tuple of str
+        What came out, one sentence each, computed from the numbers.
+    done : tuple of str
+        What was done.
+    tiles : tuple of (str, str)
+        Key figures: value, and what it is.
+    tests : DataFrame, optional
+        The paired tests shown here.
+    """
+
+    anchor: str
+    heading: str
+    items: tuple[Item, ...]
+    outcomes: tuple[str, ...] = ()
+    done: tuple[str, ...] = ()
+    tiles: tuple[tuple[str, str], ...] = ()
+    tests: pd.DataFrame | None = None
+
+
+def model_section(
+    textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
+) -> Section:
+    """Models, what was dropped, and how alike the spectra stay (PAPER V).
+
+    Parameters
+    ----------
+    textures : sequence of TextureResult
+        At least one.
+    rng : Generator
+        Draws behind the GFC ceilings.
+    progress : callable
+        Called with a share (0–1) and what comes next.
+    """
+    rows, folds = [], []
+    for number, result in enumerate(textures):
+        progress(number / len(textures), f"comparing models of {result.texture}")
+        simplified = result.simplification.model
+        rows.append(gfc_table(result.recordings, result.model, simplified, rng=rng))
+        folds.append(_texture_fold(result, number=number))
+    gfc = pd.concat(rows, ignore_index=True)
+    table = Table(
+        "gfc",
+        "Simplification rate and quality",
+        "Means over the recorded conditions. GFC30, GFC5: likeness of the model's response and the "
+        "recording's spectrum, both smoothed with σ = 30 or 5 Hz; floor: white noise of equal RMS; "
+        "ceiling: draws of the recording's own smoothed spectrum. "
+        "RMS error and band energy error: means of absolute values. Cf. the paper's table 3.",
+        gfc,
+        any(result.simulated for result in textures),
+        GFC_COLUMNS,
+    )
+    return Section(
+        "models",
+        "Models and their simplification",
+        (table, *folds),
+        outcomes=tuple(outcomes.simplification_outcomes(gfc)),
+        done=_models_done(textures),
+        tiles=_model_tiles(gfc),
+    )
+
+
+def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
+    simplification = textures[0].simplification
+    threshold = simplification.threshold
+    recorded = sum(len(result.recordings) for result in textures)
+    estimators = ", ".join(sorted({result.model.estimator for result in textures}))
+    simulated = "simulated " if any(result.simulated for result in textures) else ""
+    return (
+        f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to {recorded} "
+        f"{simulated}recordings (estimator {estimators}). A layer was dropped only where it lies "
+        f"below the threshold “{threshold.name}” in every condition (criterion "
+        f"“{simplification.criterion}”, margin {simplification.margin_db:g} dB).",
+        f"Source of the threshold “{threshold.name}”: {threshold.source.rstrip('.')}. Caveat: "
+        f"{threshold.caveat.rstrip('.')}.",
+    )
+
+
+def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
+    full, simple = (gfc[gfc["model"] == model] for model in MODELS)
+    floor, ceiling = full["gfc30_floor"].mean(), full["gfc30_ceiling"].mean()
+    return (
+        (f"{full['layers'].sum()} → {simple['layers'].sum()}", "layers, full → simplified"),
+        (
+            f"{full['gfc30_mean'].mean():.3f} → {simple['gfc30_mean'].mean():.3f}",
+            f"mean GFC30, full → simplified (floor {floor:.3f}, ceiling {ceiling:.3f})",
+        ),
+    )
+
+
+def _texture_fold(result: TextureResult, *, number: int) -> Fold:
+    stem = f"{number + 1}_{_file_name(result.texture)}"
+    verdicts = Table(
+        f"verdicts_{stem}",
+        f"{result.texture}: verdict on each layer",
+        "Distance to the threshold in the condition where the layer stands highest against it "
+        "(+ above); flip probability: chance that other records of the same length would turn the "
+        "verdict.",
+        simplification_table(result.simplification),
+        result.simulated,
+        VERDICT_COLUMNS,
+    )
+    kept, all_layers = result.simplification.model.n_layers, result.model.n_layers
+    return Fold(
+        f"{result.texture}: {kept} of {all_layers} layers kept",
+        (verdicts, _threshold_picture(result, stem), _course_picture(result, stem)),
+        opened=number == 0,
+    )
+
+
+def _threshold_picture(result: TextureResult, stem: str) -> Picture:
+    speed_mm_s, force_n = reference_condition(result)
+    comparison = compare_spectra(result, speed_mm_s=speed_mm_s, force_n=force_n)
+    return Picture(
+        f"threshold_{stem}",
+        f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
+        "Above: smoothed spectrum of the recording and of each model. Below: each layer's "
+        "amplitude by the criterion against the threshold; open crosses mark dropped layers. A "
+        "layer may lie below the threshold here and yet be kept, because another condition, its "
+        "uncertainty or the sum of the dropped layers decides. Cf. the paper's figure 6.",
+        figures.figure_spectra_and_threshold(comparison),
+        result.simulated,
+    )
+
+
+def _course_picture(result: TextureResult, stem: str) -> Picture:
+    force_n = reference_condition(result)[1]
+    courses = [layer_course(result.model, force_n=force_n)]
+    note = "Frequency and amplitude of each layer."
+    if result.truth is not None and force_n in result.truth.forces_n:
+        courses.append(layer_course(result.truth, force_n=force_n))
+        note += " Dashed: what was planted."
+    return Picture(
+        f"layers_{stem}",
+        f"{result.texture}: layers over speed at {force_n:g} N",
+        note,
+        figures.figure_layer_courses(courses),
+        result.simulated,
+    )
+
+
+def planted_section(textures: Sequence[TextureResult]) -> Section:
+    """How well the estimators find what was planted; every texture has a truth."""
+    scores, layers = [], []
+    for result in textures:
+        assert result.truth is not None
+        estimates = (result.model, *result.other_estimates)
+        scores.append(planted_truth_table(result.truth, estimates))
+        speed_mm_s, force_n = reference_condition(result)
+        layers += [
+            planted_layers_table(result.truth, model, speed_mm_s=speed_mm_s, force_n=force_n)
+            for model in estimates
+        ]
+    score = pd.concat(scores, ignore_index=True)
+    found = Table(
+        "planted_truth",
+        "Planted layers found",
+        "Planted and estimated layers are paired one to one within max(B/2, 10 Hz) in every "
+        "condition. Precision: share of the estimated layers nearest to this planted layer that "
+        "have a partner; recall: share of the conditions in which it was found; median errors over "
+        "the pairs. Levels compare |G| at one rate.",
+        score,
+        simulated=True,
+    )
+    detail = Table(
+        "planted_layers",
+        "Planted and estimated parameters, layer by layer",
+        "At the strongest force and highest speed of each texture; gains are |G| at the planted "
+        "model's rate; surplus: estimated where nothing was planted.",
+        pd.concat(layers, ignore_index=True),
+        simulated=True,
+    )
+    return Section(
+        "planted",
+        "Planted truth",
+        (Fold("Scores by estimator and layer", (found,)), Fold("Layer by layer", (detail,))),
+        outcomes=tuple(outcomes.planted_outcomes(score)),
+    )
+
+
+def rating_section(responses: Responses) -> Section:
+    """Absolute evaluation (PAPER VIII-A)."""
+    tests = statistics.rating_tests(responses.absolute)
+    done, tile = _participants(responses.absolute, "absolute evaluation", responses.simulated)
+    picture = Picture(
+        "ratings",
+        "Rated similarity of virtual and real surface",
+        "Means over participants ± standard error. Cf. the paper's figure 9.",
+        figures.figure_ratings(tests, simulated=responses.simulated),
+        responses.simulated,
+    )
+    table = Table(
+        "rating_tests",
+        "Paired tests of the ratings",
+        "Differences are simplified − full, in points of the scale. Holm over the textures of one "
+        "scale. d_z: mean difference over the standard deviation of the differences. Intervals: "
+        "95%.",
+        tests,
+        responses.simulated,
+        ("scale", *TEST_COLUMNS),
+    )
+    return Section(
+        "ratings",
+        "Absolute evaluation: ratings",
+        (picture, table),
+        outcomes=tuple(outcomes.rating_outcomes(tests)),
+        done=(done,),
+        tiles=(tile,),
+        tests=tests,
+    )
+
+
+def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section:
+    """Relative evaluation (PAPER VIII-B); `rng` draws the bootstrap."""
+    relative, simulated = responses.relative, responses.simulated
+    matrices = statistics.confusion_matrices(relative)
+    chance = 1 / len(matrices["full"].textures)
+    rates = statistics.correct_rates(relative, rng=rng, chance=chance)
+    tests = statistics.rate_tests(relative)
+    done, tile = _participants(relative, "forced choice", simulated)
+    overall = rates[rates["texture"] == statistics.ALL_TEXTURES].set_index("model")["mean"]
+    shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)
+    rate_tile = (shown, f"right answers, full → simplified (chance {chance:.0%})")
+    rates_picture = Picture(
+        "correct_rates",
+        "Correct rates of the forced choice",
+        "Means over participants ± standard error; dashed: chance. Cf. the paper's figure 11.",
+        figures.figure_correct_rates(tests, simulated=simulated, chance=chance),
+        simulated,
+    )
+    confusion_picture = Picture(
+        "confusion",
+        "Who was taken for whom",
+        "Rows: real surface presented; columns: virtual surface answered. Per cent of the row, in "
+        f"brackets the number of answers; chance is {chance:.1%}. Cf. the paper's figure 10.",
+        figures.figure_confusion(matrices, simulated=simulated),
+        simulated,
+    )
+    counts = Fold(
+        "Confusion matrices as tables",
+        tuple(_confusion_table(matrix, simulated=simulated) for matrix in matrices.values()),
+    )
+    return Section(
+        "choices",
+        "Relative evaluation: forced choice",
+        (rates_picture, confusion_picture, *_rate_tables(rates, tests, simulated), counts),
+        outcomes=tuple(outcomes.rate_outcomes(rates, tests, matrices)),
+        done=(done,),
+        tiles=(tile, rate_tile),
+        tests=tests,
+    )
+
+
+def _rate_tables(rates: pd.DataFrame, tests: pd.DataFrame, simulated: bool) -> tuple[Table, Table]:
+    against_chance = Table(
+        "correct_rates",
+        "Correct rates against chance",
+        "Participants are the units: mean of their rates with a 95% interval (bias-corrected and "
+        "accelerated bootstrap over participants), and a one-sample t-test against chance with "
+        "Holm over the textures of one model.",
+        rates,
+        simulated,
+        RATE_COLUMNS,
+    )
+    paired = Table(
+        "rate_tests",
+        "Paired tests of the correct rates",
+        "Differences are simplified − full, as shares. Holm over the textures; the row over all "
+        "textures stands outside the family. Intervals: 95%.",
+        tests,
+        simulated,
+        TEST_COLUMNS,
+    )
+    return against_chance, paired
+
+
+def _participants(trials: pd.DataFrame, where: str, simulated: bool) -> tuple[str, tuple[str, str]]:
+    """The sentence and the tile that say how many took part."""
+    people = trials["participant_id"].nunique()
+    who = "simulated participants" if simulated else "participants"
+    sentence = f"{where.capitalize()}: {people} {who}, {len(trials)} trials (training left out)."
+    return sentence, (str(people), f"{who}, {where}")
+
+
+def _confusion_table(matrix: statistics.ConfusionMatrix, *, simulated: bool) -> Table:
+    shares = matrix.row_shares
+    rows = [
+        {
+            "presented": real,
+            "answered": virtual,
+            "count": int(matrix.counts[i, j]),
+            "row_share": shares[i, j],
+        }
+        for i, real in enumerate(matrix.textures)
+        for j, virtual in enumerate(matrix.textures)
+    ]
+    title = f"Confusion matrix, {matrix.model} model"
+    note = "Counts and shares of the row (0–1)."
+    return Table(f"confusion_{matrix.model}", title, note, pd.DataFrame(rows), simulated)
+
+
+def reference_condition(result: TextureResult) -> tuple[float, float]:
+    """(speed, force): the strongest force and the highest speed recorded at it."""
+    conditions = [recording.condition for recording in result.recordings.recordings]
+    return max(conditions, key=lambda condition: (condition[1], condition[0]))
+
+
+def _file_name(texture: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "_", texture.lower()).strip("_") or "texture"

@@ -1,0 +1,175 @@
+"""Answers of a small study on disk, and two modelled textures with known truth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.tables import TextureResult
+from modeling import TextureModel, Threshold, fit_texture, simplify
+from stimuli.planted import planted_texture, record_texture
+
+TEXTURES = ("aluminum", "canvas", "leather", "MDF", "polyester", "PVC", "wall paper")
+ABSOLUTE = (
+    *("trial", "phase", "texture", "model", "tray", "first_surface", "magnitude_similarity"),
+    *("frequency_similarity", "toggles", "response_time_s", "simulated"),
+)
+RELATIVE = (
+    *("trial", "phase", "texture", "model", "tray", "layout", "answer", "correct", "presses"),
+    *("response_time_s", "simulated"),
+)
+Rows = list[list[str]]
+WriteTask = Callable[..., Path]
+
+
+@pytest.fixture
+def study_folder(tmp_path: Path) -> Path:
+    """An empty data set of real people."""
+    folder = tmp_path / "data"
+    folder.mkdir()
+    description = {"Name": "Seven surfaces", "BIDSVersion": "1.10.0", "Simulated": False}
+    (folder / "dataset_description.json").write_text(json.dumps(description))
+    (folder / "participants.tsv").write_text("participant_id\tsimulated\nsub-01\tfalse\n")
+    return folder
+
+
+@pytest.fixture
+def absolute_rows() -> Rows:
+    """One training trial and the fourteen main ones."""
+    rows = [["1", "training", "canvas", "full", "B", "real", "40", "60", "2", "9.5", "false"]]
+    for number, (texture, model) in enumerate(
+        [(texture, model) for texture in TEXTURES for model in ("full", "simplified")], start=1
+    ):
+        ratings = [str(50 + number), str(100 - number)]
+        rows.append(
+            [str(number), "main", texture, model, "A", "virtual", *ratings, "4", "12.25", "false"]
+        )
+    return rows
+
+
+@pytest.fixture
+def relative_rows() -> Rows:
+    """Seven main trials, every second one answered with the next texture."""
+    rows = []
+    for number, texture in enumerate(TEXTURES, start=1):
+        answer = texture if number % 2 else TEXTURES[number % 7]
+        cells = [str(number), "main", texture, "full", "A", "|".join(TEXTURES), answer]
+        rows.append([*cells, str(int(answer == texture)), "5", "20.5", "false"])
+    return rows
+
+
+@pytest.fixture
+def write_task(study_folder: Path) -> WriteTask:
+    """Write one session's file; `tail` stands after its last whole line."""
+
+    def write(
+        task: str,
+        rows: Rows,
+        *,
+        participant: str = "sub-01",
+        columns: Sequence[str] | None = None,
+        tail: str = "",
+    ) -> Path:
+        header = columns or (ABSOLUTE if task == "absolute" else RELATIVE)
+        path = study_folder / participant / "ses-01" / "beh"
+        path.mkdir(parents=True, exist_ok=True)
+        path /= f"{participant}_ses-01_task-{task}_beh.tsv"
+        lines = ["\t".join(header), *("\t".join(row) for row in rows)]
+        path.write_bytes(("\n".join(lines) + "\n" + tail).encode())
+        return path
+
+    return write
+
+
+def choice_table(
+    rng: np.random.Generator, *, people: int = 12, repeats: int = 3, rate: float = 0.5
+) -> pd.DataFrame:
+    """Answers of a forced choice in which the right one is known with probability `rate`."""
+    rows = []
+    for person in range(1, people + 1):
+        for model in ("full", "simplified"):
+            for texture in TEXTURES:
+                for _ in range(repeats):
+                    knows = rng.random() < rate
+                    answer = texture if knows else TEXTURES[rng.integers(7)]
+                    rows.append(
+                        {
+                            "participant_id": f"sub-{person:02d}",
+                            "texture": texture,
+                            "model": model,
+                            "layout": "|".join(TEXTURES),
+                            "answer": answer,
+                            "correct": float(answer == texture),
+                        }
+                    )
+    return pd.DataFrame(rows)
+
+
+def rating_table(
+    rng: np.random.Generator, *, people: int = 12, effect: float = 0.0
+) -> pd.DataFrame:
+    """Ratings in which the simplified PVC scores lower by `effect` on both scales."""
+    rows = []
+    for person in range(1, people + 1):
+        for texture in TEXTURES:
+            for model in ("full", "simplified"):
+                lower = effect * (model == "simplified" and texture == "PVC")
+                ratings = np.clip(60 - lower + rng.normal(0, 8, 2), 0, 100)
+                rows.append(
+                    {
+                        "participant_id": f"sub-{person:02d}",
+                        "texture": texture,
+                        "model": model,
+                        "magnitude_similarity": ratings[0],
+                        "frequency_similarity": ratings[1],
+                    }
+                )
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture(scope="session")
+def choices() -> pd.DataFrame:
+    return choice_table(np.random.default_rng(1))
+
+
+@pytest.fixture(scope="session")
+def ratings() -> pd.DataFrame:
+    return rating_table(np.random.default_rng(2), effect=30.0)
+
+
+def _small_truth(name: str, texture: str) -> TextureModel:
+    truth = planted_texture(
+        name, speeds_mm_s=np.array([200.0, 350.0]), forces_n=np.array([1.0, 3.0])
+    )
+    return replace(truth, texture=texture)
+
+
+def _result(name: str, texture: str) -> TextureResult:
+    truth = _small_truth(name, texture)
+    recordings = record_texture(truth, rate_hz=5000.0, duration_s=0.5, seed=3)
+    full = fit_texture(recordings)
+    return TextureResult(
+        recordings=recordings,
+        model=full,
+        simplification=simplify(full, Threshold.shipped("codec")),
+        truth=truth,
+        other_estimates=(fit_texture(recordings, estimator="paper"),),
+    )
+
+
+@pytest.fixture(scope="session")
+def results() -> tuple[TextureResult, ...]:
+    """Two textures over 2 × 2 conditions, one of them named like a piece of HTML."""
+    return (_result("leather", "leather"), _result("PVC", "<b>bold</b> & co"))
+
+
+@pytest.fixture(scope="session")
+def truth() -> TextureModel:
+    """Four planted layers over 2 × 2 conditions."""
+    return _small_truth("canvas", "canvas")

@@ -1,0 +1,60 @@
+"""The format that both rooms share: what the experiments write, the analysis reads."""
+
+from __future__ import annotations
+
+import pytest
+
+from analysis.load import Responses, load_responses
+from analysis.statistics import confusion_matrices, rate_tests, rating_tests
+from experiments.simulate import simulate_study
+from experiments.study import Study, TaskPlan
+from modeling import Threshold, simplify
+from rig.twin import SimulatedRig
+from stimuli.planted import planted_texture
+
+TEXTURES = ("leather", "MDF", "PVC")
+
+
+@pytest.fixture(scope="module")
+def responses(tmp_path_factory) -> Responses:
+    truths = {texture: planted_texture(texture) for texture in TEXTURES}
+    threshold = Threshold.shipped("codec")
+    folder = tmp_path_factory.mktemp("study") / "data"
+    simulate_study(
+        Study(
+            name="Three surfaces",
+            seed=3,
+            textures=TEXTURES,
+            trays={"leather": "A", "MDF": "B", "PVC": "C"},
+            repeats=2,
+            training_trials=1,
+            absolute=TaskPlan(participants=3, schedule="interleaved"),
+            relative=TaskPlan(participants=4, schedule="by-day"),
+        ),
+        real=truths,
+        full=truths,
+        simplified={name: simplify(truth, threshold).model for name, truth in truths.items()},
+        rig=SimulatedRig(seed=1),
+        data_folder=folder,
+        seed=7,
+        threshold=threshold,
+    )
+    return load_responses(folder)
+
+
+def test_every_answer_arrives(responses):
+    assert responses.simulated
+    assert responses.warnings == ()
+    assert len(responses.absolute) == 3 * 3 * 2
+    assert len(responses.relative) == 4 * 3 * 2 * 2
+    assert len(responses.absolute_training) == 3
+    assert len(responses.relative_training) == 4 * 2
+    assert set(responses.absolute["texture"]) == set(TEXTURES)
+    assert responses.absolute["magnitude_similarity"].between(0, 100).all()
+
+
+def test_no_pair_is_missing(responses):
+    assert (rating_tests(responses.absolute)["excluded"] == "").all()
+    assert (rate_tests(responses.relative)["n"] == 4).all()
+    for matrix in confusion_matrices(responses.relative).values():
+        assert matrix.counts.sum(axis=1).tolist() == [4 * 2] * 3

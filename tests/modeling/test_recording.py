@@ -1,0 +1,391 @@
+"""Recordings, sets of them, and what their folders refuse."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from modeling import InputError, Recording, RecordingSet
+
+RecordingMaker = Callable[..., Recording]
+NOISE = np.random.default_rng(1).standard_normal(100)
+
+
+# --- one recording
+
+
+@pytest.mark.parametrize(
+    ("samples", "sentence"),
+    [
+        ([], "at least 64 samples"),
+        (NOISE[:63], "at least 64 samples"),
+        (np.zeros(100), "constant value 0"),
+        (np.full(100, 0.3), "constant value 0.3"),
+        (np.where(np.arange(100) == 7, np.nan, NOISE), "1 NaN .* at sample 7"),
+        (np.where(np.arange(100) > 97, np.inf, NOISE), "2 NaN or infinite ones, .* sample 98"),
+        (NOISE.reshape(2, 50), "one axis"),
+    ],
+)
+def test_unusable_samples_are_refused(
+    make_recording: RecordingMaker, samples: np.ndarray, sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        make_recording(np.asarray(samples))
+
+
+@pytest.mark.parametrize(
+    ("labels", "sentence"),
+    [
+        ({"rate_hz": 0.0}, "rate above 0"),
+        ({"rate_hz": np.nan}, "rate above 0"),
+        ({"rate_hz": np.inf}, "rate above 0"),
+        ({"speed_mm_s": -1.0}, "speed_mm_s of at least 0"),
+        ({"speed_mm_s": np.nan}, "speed_mm_s of at least 0"),
+        ({"force_n": -0.1}, "force_n of at least 0"),
+        ({"force_n": np.inf}, "force_n of at least 0"),
+        ({"unit": "m/s2"}, "unit among g, arbitrary"),
+        ({"texture": "  "}, "texture name"),
+        ({"texture": "a\tb"}, "texture name"),
+        ({"texture": "a\nb"}, "texture name"),
+        ({"repeat": 0}, "repeat of at least 1"),
+    ],
+)
+def test_wrong_labels_are_refused(
+    make_recording: RecordingMaker, labels: dict[str, object], sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        make_recording(NOISE, **labels)
+
+
+def test_samples_are_copied_and_frozen(make_recording: RecordingMaker) -> None:
+    samples = NOISE.copy()
+    recording = make_recording(samples, rate_hz=1000.0)
+    samples[0] = 99.0
+    assert recording.samples[0] == NOISE[0]
+    with pytest.raises(ValueError, match="read-only"):
+        recording.samples[0] = 1.0
+    assert recording.duration_s == pytest.approx(0.1)
+    assert recording.condition == (100.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"rate_hz": 1.0},
+        {"speed_mm_s": 2.0},
+        {"force_n": 2.0},
+        {"texture": "x"},
+        {"unit": "arbitrary"},
+        {"simulated": True},
+        {"repeat": 2},
+    ],
+)
+def test_recordings_differ_in_every_label(
+    make_recording: RecordingMaker, change: dict[str, object]
+) -> None:
+    assert make_recording(NOISE) == make_recording(NOISE)
+    assert make_recording(NOISE) != make_recording(NOISE, **change)
+    assert make_recording(NOISE) != make_recording(-NOISE)
+
+
+def test_clipped_share_of_known_clipping(make_recording: RecordingMaker) -> None:
+    t = np.arange(22704) / 22704
+    sine = np.sin(2 * np.pi * 50 * t)
+    clipped = np.clip(sine, -0.8, 0.8)
+    expected = np.mean(np.abs(sine) >= 0.8)
+    assert expected == pytest.approx(1 - 2 / np.pi * np.arcsin(0.8), abs=1e-3)
+    assert make_recording(clipped).clipped_share == pytest.approx(expected, abs=1e-3)
+    one_sided = np.minimum(sine, 0.8)
+    assert make_recording(one_sided).clipped_share == pytest.approx(expected / 2, abs=1e-3)
+
+
+@pytest.mark.parametrize("step_g", [0.001907349, 0.05, 0.3])
+def test_quantised_noise_is_not_clipped(make_recording: RecordingMaker, step_g: float) -> None:
+    for seed in range(5):
+        noise = 0.2 * np.random.default_rng(seed).standard_normal(22704)
+        assert make_recording(np.rint(noise / step_g) * step_g).clipped_share == 0.0
+
+
+# --- sets
+
+
+def test_set_needs_a_recording() -> None:
+    with pytest.raises(InputError, match="at least one recording"):
+        RecordingSet([])
+
+
+def test_two_files_for_a_condition_are_refused(make_recording: RecordingMaker) -> None:
+    with pytest.raises(InputError, match="got two of planted at 100 mm/s, 1 N"):
+        RecordingSet([make_recording(seed=0), make_recording(seed=1)])
+    assert len(RecordingSet([make_recording(), make_recording(repeat=2)])) == 2
+    assert len(RecordingSet([make_recording(), make_recording(texture="other")])) == 2
+
+
+def test_only_texture(make_recording: RecordingMaker) -> None:
+    both = RecordingSet([make_recording(texture="b"), make_recording(texture="a")])
+    assert both.textures == ("b", "a")
+    with pytest.raises(InputError, match="one texture, got b, a"):
+        _ = both.texture
+    assert both.of_texture("a").texture == "a"
+
+
+@st.composite
+def recording_sets(draw: st.DrawFn) -> RecordingSet:
+    names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=6).filter(
+        lambda name: name.strip() and not set(name) & set("\t\r\n")
+    )
+    recordings = []
+    for number in range(draw(st.integers(1, 3))):
+        samples = draw(
+            hnp.arrays(float, 64, elements=st.floats(allow_nan=False, allow_infinity=False))
+        )
+        samples[:2] = 0.1, -0.2
+        recordings.append(
+            Recording(
+                np.clip(samples, -1e150, 1e150),
+                draw(st.floats(1e-3, 1e6)),
+                draw(st.floats(0, 1e4)),
+                draw(st.floats(0, 1e4)),
+                draw(names),
+                unit=draw(st.sampled_from(["g", "arbitrary"])),
+                simulated=draw(st.booleans()),
+                repeat=number + 1,
+            )
+        )
+    return RecordingSet(recordings)
+
+
+@settings(deadline=None, max_examples=50)
+@given(recordings=recording_sets())
+def test_folder_loads_back_equal(
+    recordings: RecordingSet, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.mktemp("set") / "recordings"
+    recordings.save(folder)
+    assert RecordingSet.load(folder) == recordings
+    assert len(list(folder.iterdir())) == len(recordings) + 1
+
+
+# --- folders
+
+
+@pytest.fixture
+def folder(tmp_path: Path, make_recording: RecordingMaker) -> Path:
+    """A sound folder of two recordings, to be damaged."""
+    target = tmp_path / "recordings"
+    RecordingSet([make_recording(NOISE), make_recording(-NOISE, force_n=2.0)]).save(target)
+    return target
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def header_and(lines: list[str]) -> str:
+    return "\n".join(["acceleration_g", *lines]) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        ("", "empty file"),
+        ("acceleration_g\n", "at least 64 samples, got 0"),
+        (header_and([repr(x) for x in NOISE.tolist()])[:-5], "truncated"),
+        (header_and(["0.1"] * 100), "constant value 0.1"),
+        (header_and(["nan", *map(str, NOISE)]), "1 NaN or infinite ones"),
+        (header_and([*map(str, NOISE), "inf"]), "at sample 100"),
+        (header_and([*map(str, NOISE), ""]), "one number per line"),
+        (header_and([f"{x},{x}" for x in NOISE]), "one number per line"),
+        (header_and(["loud"] * 100), "one number per line"),
+        ("\n".join(map(str, NOISE)) + "\n", "header"),
+    ],
+)
+def test_damaged_csv_is_refused_by_name(folder: Path, content: str, sentence: str) -> None:
+    (folder / "0002.csv").write_text(content, encoding="utf-8")
+    with pytest.raises(InputError, match=sentence) as caught:
+        RecordingSet.load(folder)
+    assert "0002.csv" in str(caught.value)
+
+
+def test_csv_of_other_bytes_is_refused(folder: Path) -> None:
+    (folder / "0002.csv").write_bytes(bytes(range(128, 256)) * 10)
+    with pytest.raises(InputError, match=r"0002\.csv"):
+        RecordingSet.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("\t100.0\t2.0", "\t-100.0\t2.0", "speed_mm_s of at least 0"),
+        ("\t100.0\t2.0", "\tfast\t2.0", "number for speed_mm_s of 0002.csv, got 'fast'"),
+        ("\t100.0\t2.0", "\t100.0\t", "number for force_n of 0002.csv, got nothing"),
+        ("\t100.0\t2.0", "\t100.0\t1.0", "one recording per condition"),
+        ("\t100.0\t2.0", "\t100.0\t2.0\t3", "8 cells"),
+        ("\t2.0\t5000.0\tg", "\t2.0\t5000.0\tm/s2", "unit among g, arbitrary"),
+        ("\t2.0\t5000.0\tg", "\t2.0\t\tg", "rate_hz of 0002.csv, got nothing"),
+        ("\t2.0\t5000.0\tg", "\t2.0\t0\tg", "rate above 0"),
+        ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\tnan", "whole number for repeat"),
+        ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\t1.5", "whole number for repeat"),
+        ("\t2.0\t5000.0\tg\t1\tfalse", "\t2.0\t5000.0\tg\t1\tyes", "true or false"),
+        ("0002.csv", "0003.csv", "0003.csv"),
+        ("file\ttexture", "name\ttexture", "add file"),
+        ("force_n", "force", "add force_n"),
+        ("rate_hz", "rate", "rate_hz of 0001.csv, got nothing"),
+    ],
+)
+def test_damaged_index_is_refused(folder: Path, old: str, new: str, sentence: str) -> None:
+    edit(folder / "recordings.tsv", old, new)
+    with pytest.raises(InputError, match=sentence):
+        RecordingSet.load(folder)
+
+
+@pytest.mark.parametrize("content", [b"", b"\n\n", b"\xff\xfe\xff", b"# only a comment\n"])
+def test_index_that_is_none_is_refused(folder: Path, content: bytes) -> None:
+    (folder / "recordings.tsv").write_bytes(content)
+    with pytest.raises(InputError, match="expected"):
+        RecordingSet.load(folder)
+
+
+def test_index_without_rows_is_refused(folder: Path) -> None:
+    index = folder / "recordings.tsv"
+    index.write_text(index.read_text().split("\n")[0] + "\n")
+    with pytest.raises(InputError, match="at least one recording"):
+        RecordingSet.load(folder)
+
+
+def test_unit_left_out_means_arbitrary(folder: Path) -> None:
+    edit(folder / "recordings.tsv", "unit", "remark")
+    assert {r.unit for r in RecordingSet.load(folder).recordings} == {"arbitrary"}
+
+
+def test_folders_that_are_none_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="expected a folder"):
+        RecordingSet.load(tmp_path / "nowhere")
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="expected a folder"):
+        RecordingSet.load(tmp_path / "file")
+    with pytest.raises(InputError, match=r"expected recordings\.tsv"):
+        RecordingSet.load(tmp_path)
+
+
+# --- saving
+
+
+def snapshot(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("broken", ["modeling.recording._write_samples", "pathlib.Path.rename"])
+def test_failed_save_leaves_the_old_folder(
+    folder: Path,
+    make_recording: RecordingMaker,
+    monkeypatch: pytest.MonkeyPatch,
+    broken: str,
+) -> None:
+    before = snapshot(folder.parent)
+
+    def fail(*_: object) -> None:
+        raise OSError("disk full")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(broken, fail)
+        with pytest.raises(OSError, match="disk full"):
+            RecordingSet([make_recording()]).save(folder)
+    assert snapshot(folder.parent) == before
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_failed_swap_puts_the_old_folder_back(
+    folder: Path, make_recording: RecordingMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before, rename = snapshot(folder.parent), Path.rename
+
+    def fail_for_the_new_one(self: Path, target: Path) -> Path:
+        if target == folder and self.suffix != ".old":
+            raise OSError("disk full")
+        return rename(self, target)
+
+    monkeypatch.setattr(Path, "rename", fail_for_the_new_one)
+    with pytest.raises(OSError, match="disk full"):
+        RecordingSet([make_recording()]).save(folder)
+    assert snapshot(folder.parent) == before
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_save_replaces_an_older_set_whole(folder: Path, make_recording: RecordingMaker) -> None:
+    fewer = RecordingSet([make_recording(texture="new")])
+    fewer.save(folder)
+    assert RecordingSet.load(folder) == fewer
+    assert sorted(p.name for p in folder.iterdir()) == ["0001.csv", "recordings.tsv"]
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_foreign_folders_are_not_replaced(tmp_path: Path, make_recording: RecordingMaker) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    with pytest.raises(InputError, match="other files in it"):
+        RecordingSet([make_recording()]).save(tmp_path)
+    with pytest.raises(InputError, match="expected a folder"):
+        RecordingSet([make_recording()]).save(tmp_path / "notes.txt")
+    assert snapshot(tmp_path) == {"notes.txt": b"mine"}
+
+
+# --- WAV
+
+
+def write_wav(path: Path, samples: np.ndarray, rate_hz: int = 8000) -> None:
+    soundfile.write(path, samples, rate_hz, subtype="FLOAT")
+
+
+def test_wav_listed_in_an_index(tmp_path: Path) -> None:
+    samples = (0.1 * NOISE).astype(np.float32)
+    write_wav(tmp_path / "a.wav", samples)
+    (tmp_path / "recordings.tsv").write_text(
+        "file\ttexture\tspeed_mm_s\tforce_n\tg_per_fullscale\na.wav\tfelt\t80\t1.5\t50\n"
+    )
+    recording = RecordingSet.load(tmp_path).recordings[0]
+    assert (recording.rate_hz, recording.unit) == (8000.0, "g")
+    assert (recording.texture, recording.condition) == ("felt", (80.0, 1.5))
+    assert np.array_equal(recording.samples, samples.astype(float) * 50)
+
+
+def test_wav_with_a_json_sidecar(tmp_path: Path) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    sidecar = {"texture": "felt", "speed_mm_s": 80, "force_n": 1.5, "simulated": True}
+    (tmp_path / "a.json").write_text(json.dumps(sidecar))
+    write_wav(tmp_path / "unlisted.wav", NOISE / 10)
+    (recording,) = RecordingSet.load(tmp_path).recordings
+    assert recording.unit == "arbitrary"
+    assert recording.simulated
+    assert recording.condition == (80.0, 1.5)
+    assert recording.samples == pytest.approx(NOISE / 10, rel=1e-6)
+
+
+@pytest.mark.parametrize("sidecar", ["", "[]", "{", '{"texture": "felt", "speed_mm_s": 80}'])
+def test_damaged_sidecars_are_refused(tmp_path: Path, sidecar: str) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    (tmp_path / "a.json").write_text(sidecar)
+    with pytest.raises(InputError, match="expected"):
+        RecordingSet.load(tmp_path)
+
+
+def test_unusable_wav_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text('{"texture": "felt", "speed_mm_s": 80, "force_n": 1}')
+    write_wav(tmp_path / "a.wav", np.stack([NOISE, NOISE], axis=1) / 10)
+    with pytest.raises(InputError, match=r"one channel .*, got 2"):
+        RecordingSet.load(tmp_path)
+    (tmp_path / "a.wav").write_bytes(b"RIFF nothing")
+    with pytest.raises(InputError, match="expected a WAV file"):
+        RecordingSet.load(tmp_path)
+    (tmp_path / "a.wav").write_bytes(b"")
+    with pytest.raises(InputError, match="expected a WAV file"):
+        RecordingSet.load(tmp_path)

@@ -1,0 +1,275 @@
+"""Rendering: block sizes, rates, lift-off, ramps and the spectrum that comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modeling import PEQ, InputError, Renderer, TextureModel
+
+ModelMaker = Callable[..., TextureModel]
+LAYERS = [(80.0, 25.0, 0.5), (300.0, 40.0, -0.3), (900.0, 120.0, 0.4)]
+
+
+def moving_model(rate_hz: float = 5000.0) -> TextureModel:
+    """Three layers whose parameters all depend on speed and force."""
+    v = np.array([50.0, 150.0, 350.0])[:, None]
+    f = np.array([0.5, 2.0])[None, :]
+    one = np.ones((3, 2))
+    return TextureModel(
+        texture="moving",
+        rate_hz=rate_hz,
+        speeds_mm_s=v[:, 0],
+        forces_n=f[0],
+        noise_gains=0.02 + 1e-4 * v * f,
+        frequencies_hz=np.stack([0.5 * v * one, 300 + v * f, 900 - 10 * f * one], axis=-1),
+        bandwidths_hz=np.stack([20 + 5 * f * one, 40 + 0.1 * v * one, 100 * one], axis=-1),
+        gains=np.stack([1e-3 * v * f, -0.2 * f * one, 0.3 * one], axis=-1),
+        level_sd_db=np.zeros((3, 2, 3)),
+        estimator="planted",
+    )
+
+
+def trajectory(count: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-500, 500, count), rng.uniform(-1, 5, count)
+
+
+def in_blocks(renderer: Renderer, speed: np.ndarray, force: np.ndarray, size: int) -> np.ndarray:
+    starts = range(0, speed.size, size)
+    return np.concatenate(
+        [renderer.render(speed[i : i + size], force[i : i + size]) for i in starts]
+    )
+
+
+@pytest.mark.parametrize("rate_hz", [5000.0, 44100.0, 48000.0])
+@pytest.mark.parametrize("size", [1, 7, 256])
+def test_blocks_of_any_size_are_bit_identical(rate_hz: float, size: int) -> None:
+    speed, force = trajectory(1500)
+    whole = Renderer(moving_model(), rate_hz=rate_hz, seed=5).render(speed, force)
+    parts = in_blocks(Renderer(moving_model(), rate_hz=rate_hz, seed=5), speed, force, size)
+    assert np.array_equal(whole, parts)
+    assert np.ptp(whole) > 0
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.lists(st.integers(0, 90), min_size=1, max_size=8))
+def test_ragged_blocks_are_bit_identical(sizes: list[int]) -> None:
+    speed, force = trajectory(sum(sizes), seed=1)
+    whole = Renderer(moving_model(), seed=1).render(speed, force)
+    renderer, parts, at = Renderer(moving_model(), seed=1), [np.zeros(0)], 0
+    for size in sizes:
+        parts.append(renderer.render(speed[at : at + size], force[at : at + size]))
+        at += size
+    assert np.array_equal(whole, np.concatenate(parts))
+
+
+def test_scalars_equal_constant_arrays() -> None:
+    by_scalar = Renderer(moving_model()).render(120.0, 1.1, samples=333)
+    by_array = Renderer(moving_model()).render(np.full(333, 120.0), np.full(333, 1.1))
+    assert np.array_equal(by_scalar, by_array)
+
+
+def test_seed_and_stream_choose_the_noise() -> None:
+    def render(**which: int) -> np.ndarray:
+        return Renderer(moving_model(), **which).render(200.0, 1.0, samples=400)
+
+    assert np.array_equal(render(seed=3, stream=2), render(seed=3, stream=2))
+    assert not np.array_equal(render(seed=3), render(seed=4))
+    assert not np.array_equal(render(seed=3), render(seed=3, stream=1))
+
+
+def test_rendering_follows_the_written_recursion() -> None:
+    """METHOD 3 step by step with numpy's tangent, constant parameters."""
+    from modeling.noise import stream_key, white_noise
+
+    model, count = moving_model(), 600
+    w = white_noise(stream_key(8), 0, count)
+    peq = model.peq(150.0, 2.0)
+    expected = peq.noise_gain * w
+    for f, b, gain in zip(peq.frequencies_hz, peq.bandwidths_hz, peq.gains, strict=True):
+        g = np.tan(np.pi * f / 5000)
+        K = 2 * np.tan(np.pi * b / 5000) / np.sin(2 * np.pi * f / 5000)
+        a1 = 1 / (1 + g * (g + K))
+        s1 = s2 = 0.0
+        for n in range(count):
+            v3 = np.sqrt(K / g) * w[n] - s2
+            v1 = a1 * s1 + g * a1 * v3
+            v2 = s2 + g * a1 * s1 + g * g * a1 * v3
+            s1, s2 = 2 * v1 - s1, 2 * v2 - s2
+            expected[n] += gain * np.sqrt(K * g) * v1
+    assert Renderer(model, seed=8).render(150.0, 2.0, samples=count) == pytest.approx(
+        expected, abs=1e-11
+    )
+
+
+def mean_spectrum(signal: np.ndarray, size: int) -> np.ndarray:
+    """Mean |FFT| over (√(πN)/2) of consecutive pieces."""
+    pieces = signal[: signal.size // size * size].reshape(-1, size)
+    return np.abs(np.fft.rfft(pieces, axis=1)).mean(axis=0) / (np.sqrt(np.pi * size) / 2)
+
+
+def test_mean_spectrum_is_the_response(make_model: ModelMaker) -> None:
+    model = make_model(0.05, LAYERS)
+    signal = Renderer(model, seed=2).render(200.0, 2.0, samples=305_000)[5000:]
+    measured = mean_spectrum(signal, 5000)[10:2450].reshape(-1, 20).mean(axis=1)
+    expected = model.peq(200.0, 2.0).response(np.arange(10.0, 2450.0)).reshape(-1, 20).mean(axis=1)
+    # 60 pieces × 20 bins of Rayleigh spread 0.52: standard error 1.5 %.
+    assert measured == pytest.approx(expected, rel=0.07)
+    assert np.mean(measured / expected) == pytest.approx(1, abs=0.005)
+
+
+@pytest.mark.parametrize("rate_hz", [44100.0, 48000.0])
+def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: float) -> None:
+    model = make_model(0.05, LAYERS)
+    peq = model.peq(200.0, 2.0)
+    skipped, size = round(rate_hz / 5), round(rate_hz / 2)
+    signal = Renderer(model, rate_hz=rate_hz, seed=2).render(
+        200.0, 2.0, samples=skipped + 12 * size
+    )
+    pieces = signal[skipped:].reshape(12, size)
+    density = 2 / rate_hz / size * (np.abs(np.fft.rfft(pieces, axis=1)) ** 2).mean(axis=0)
+    frequency = np.arange(density.size) * 2.0
+
+    def level_db(low: float, high: float, response: np.ndarray) -> float:
+        inside = (frequency >= low) & (frequency < high)
+        expected = response[inside] ** 2 * 2 / 5000
+        return float(10 * np.log10(density[inside].sum() / expected.sum()))
+
+    at_model_rate = peq.response(np.minimum(frequency, 2500.0))
+    here = PEQ(
+        noise_gain=peq.noise_gain,
+        frequencies_hz=peq.frequencies_hz,
+        bandwidths_hz=peq.bandwidths_hz,
+        gains=peq.gains,
+        rate_hz=rate_hz,
+    ).response(frequency)
+    # Standard error 4.34/√(bins · pieces): 0.3 dB in the narrowest band, 0.1 dB in the widest.
+    for low, high in ((60, 100), (250, 350), (400, 700), (800, 1000), (1200, 1800), (1900, 2300)):
+        assert abs(level_db(low, high, here)) < 0.8
+    # Against the model's own rate the peaks agree too; only far skirts are less warped (METHOD 3
+    # keeps f, B and the peak, not the distance to the Nyquist zero).
+    for low, high in ((60, 100), (280, 320), (840, 960)):
+        assert abs(level_db(low, high, at_model_rate)) < 0.8
+    assert abs(level_db(10, 2400, at_model_rate)) < 0.3
+    # Above the model's Nyquist frequency nothing but the bands' skirts is left.
+    assert level_db(3000, 10000, here) < -10
+
+
+@pytest.mark.parametrize("rate_hz", [5000.0, 44100.0, 48000.0])
+def test_noise_alone_keeps_its_rms_at_any_rate(make_model: ModelMaker, rate_hz: float) -> None:
+    signal = Renderer(make_model(0.1, []), rate_hz=rate_hz).render(
+        200.0, 2.0, samples=round(4 * rate_hz)
+    )
+    assert np.sqrt(np.mean(signal**2)) == pytest.approx(0.1, rel=0.02)
+
+
+def test_band_level_is_right_while_parameters_jump() -> None:
+    """20 ↔ 1500 Hz each millisecond: still G²·k/(1+k), where plain filters gain 10 to 33 dB."""
+    model = TextureModel(
+        texture="jumping",
+        rate_hz=5000.0,
+        speeds_mm_s=[100.0, 300.0],
+        forces_n=[1.0, 3.0],
+        noise_gains=np.zeros((2, 2)),
+        frequencies_hz=np.broadcast_to(np.array([20.0, 1500.0])[:, None, None], (2, 2, 1)),
+        bandwidths_hz=np.full((2, 2, 1), 50.0),
+        gains=np.ones((2, 2, 1)),
+        level_sd_db=np.zeros((2, 2, 1)),
+        estimator="planted",
+    )
+    count = 150_000
+    speed = np.where(np.arange(count) // 5 % 2, 300.0, 100.0)
+    signal = Renderer(model, seed=1).render(speed, np.full(count, 2.0))
+    k = np.tan(np.pi * 50 / 5000)
+    assert 10 * np.log10(np.mean(signal**2) / (k / (1 + k))) == pytest.approx(0, abs=0.3)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_lift_off_is_counted_and_harmless(bad: float) -> None:
+    speed, force = np.full(2000, 150.0), np.full(2000, 2.0)
+    clean = Renderer(moving_model(), seed=6).render(speed, force)
+    speed[500:520], force[515:530] = bad, bad
+    renderer = Renderer(moving_model(), seed=6)
+    signal = renderer.render(speed, force)
+    assert renderer.counters.lift_offs == 30
+    assert np.array_equal(signal[:500], clean[:500])
+    assert not signal[500:530].any()
+    assert np.isfinite(signal).all()
+    # The poles forget within a fraction of a second; the state was never poisoned.
+    assert signal[-200:] == pytest.approx(clean[-200:], abs=1e-6)
+
+
+def test_clamped_values_are_counted() -> None:
+    model = moving_model(rate_hz=5000.0)
+    renderer = Renderer(model)
+    renderer.render(150.0, 2.0, samples=50)
+    assert renderer.counters.clamped == 0
+    assert renderer.counters.lift_offs == 0
+
+
+def test_direction_of_motion_does_not_matter() -> None:
+    speed, force = trajectory(700)
+    forth = Renderer(moving_model()).render(speed, force)
+    assert np.array_equal(forth, Renderer(moving_model()).render(-speed, force))
+
+
+@pytest.mark.parametrize(("speed", "force"), [(0.0, 2.0), (200.0, 0.0), (200.0, -1.0), (0, 0)])
+def test_silence_at_rest_and_off_the_surface(speed: float, force: float) -> None:
+    assert not Renderer(moving_model()).render(speed, force, samples=200).any()
+
+
+@pytest.mark.parametrize(
+    ("rate_hz", "period"), [(5000.0, 5), (48000.0, 48)], ids=["5 kHz", "48 kHz"]
+)
+def test_parameters_are_read_once_a_millisecond(rate_hz: float, period: int) -> None:
+    speed, force = trajectory(10 * period)
+    held = np.arange(speed.size) // period * period
+    whole = Renderer(moving_model(), rate_hz=rate_hz).render(speed, force)
+    assert np.array_equal(
+        whole, Renderer(moving_model(), rate_hz=rate_hz).render(speed[held], force[held])
+    )
+    speed[7 * period] += 40.0
+    changed = Renderer(moving_model(), rate_hz=rate_hz).render(speed, force)
+    assert np.flatnonzero(changed != whole)[0] >= 7 * period
+    assert np.flatnonzero(changed != whole)[0] <= 7 * period + 1
+
+
+def test_no_layers_renders_the_noise_alone(make_model: ModelMaker) -> None:
+    from modeling.noise import stream_key, white_noise
+
+    signal = Renderer(make_model(0.3, []), seed=4).render(200.0, 2.0, samples=100)
+    assert signal == pytest.approx(0.3 * white_noise(stream_key(4), 0, 100), rel=1e-14)
+
+
+def test_zero_samples_give_an_empty_signal() -> None:
+    assert Renderer(moving_model()).render([], []).shape == (0,)
+    assert Renderer(moving_model()).render(1.0, 1.0, samples=0).shape == (0,)
+
+
+@pytest.mark.parametrize("rate_hz", [4999.0, 0.0, np.nan, np.inf])
+def test_rates_below_the_models_are_refused(rate_hz: float) -> None:
+    with pytest.raises(InputError, match="at least the model's 5000 Hz"):
+        Renderer(moving_model(), rate_hz=rate_hz)
+
+
+@pytest.mark.parametrize(
+    ("speed", "force", "samples"),
+    [
+        (1.0, 1.0, None),
+        (1.0, 1.0, -1),
+        ([1.0, 2.0], [1.0], None),
+        ([1.0], 1.0, None),
+        ([1.0], [1.0], 1),
+        ([[1.0]], [[1.0]], None),
+    ],
+)
+def test_mismatched_trajectories_are_refused(
+    speed: float | Sequence[float], force: float | Sequence[float], samples: int | None
+) -> None:
+    with pytest.raises(InputError, match="two arrays of one length"):
+        Renderer(moving_model()).render(speed, force, samples=samples)
