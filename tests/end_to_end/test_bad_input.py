@@ -1,0 +1,126 @@
+"""Bad input ends with one sentence and an exit code, and nothing is written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modeling import Recording, RecordingSet
+from stimuli.planted import planted_texture
+
+NOISE = np.random.default_rng(3).normal(0, 0.1, 3000)
+
+
+def make_set(folder: Path, damage: Callable[[Path], object]) -> None:
+    RecordingSet(
+        Recording(NOISE, 5000.0, speed, force, "oak") for speed in (50, 100) for force in (1, 2)
+    ).save(folder)
+    damage(folder)
+
+
+def edit(name: str, old: str, new: str) -> Callable[[Path], object]:
+    def change(folder: Path) -> None:
+        text = (folder / name).read_text()
+        assert old in text
+        (folder / name).write_text(text.replace(old, new, 1))
+
+    return change
+
+
+def fill(name: str, lines: list[str]) -> Callable[[Path], object]:
+    return lambda folder: (folder / name).write_text("\n".join(["acceleration_g", *lines, ""]))
+
+
+def truncate(folder: Path) -> None:
+    data = (folder / "0002.csv").read_bytes()
+    (folder / "0002.csv").write_bytes(data[:-7])
+
+
+DAMAGES = {
+    "empty": (lambda f: (f / "0002.csv").write_text(""), "got an empty file"),
+    "truncated": (truncate, "the file is truncated"),
+    "nan": (fill("0002.csv", ["0.1", "nan"] * 50), "expected finite samples"),
+    "inf": (fill("0002.csv", ["0.1", "-inf"] * 50), "expected finite samples"),
+    "constant": (fill("0002.csv", ["0.25"] * 100), "got the constant value 0.25"),
+    "twice": (edit("recordings.tsv", "50.0\t2.0", "50.0\t1.0"), "one recording per condition"),
+    "unit": (edit("recordings.tsv", "\tg\t", "\tfurlong\t"), "got 'furlong'"),
+    "rate": (edit("recordings.tsv", "\t5000.0\t", "\t\t"), "expected a number for rate_hz"),
+    "zero rate": (edit("recordings.tsv", "\t5000.0\t", "\t0\t"), "rate above 0 Hz"),
+    "speed": (edit("recordings.tsv", "\t50.0\t", "\t-50.0\t"), "speed_mm_s of at least 0"),
+    "missing file": (lambda f: (f / "0003.csv").unlink(), "got nothing there"),
+    "text": (fill("0002.csv", ["0.1", "o.2"] * 50), "one number per line"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_recordings(run, tmp_path: Path, name: str) -> None:
+    damage, sentence = DAMAGES[name]
+    make_set(tmp_path / "set", damage)
+    assert_refused(run("model", "set", "--out", "models"), sentence)
+    assert not (tmp_path / "models").exists()
+
+
+def assert_refused(result, sentence: str) -> None:
+    assert result.returncode != 0
+    assert sentence in result.stderr
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stderr.startswith("error: ")
+
+
+def test_a_folder_that_is_not_one(run, tmp_path: Path) -> None:
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes/a.txt").write_text("hello")
+    assert_refused(run("model", "nowhere"), "expected a folder of recordings")
+    assert_refused(run("model", "notes"), "import the files first")
+    assert_refused(run("model", "notes/a.txt"), "expected a folder of recordings")
+    assert_refused(run("analyze", "notes"), "expected")
+    assert not (tmp_path / "models").exists()
+
+
+def test_a_model_of_a_newer_version(run, tmp_path: Path) -> None:
+    path = tmp_path / "new.json"
+    planted_texture("canvas").save(path)
+    values = json.loads(path.read_text())
+    values["version"] = 2
+    path.write_text(json.dumps(values))
+    for command in (["simplify", "new.json"], ["stimuli", "new.json"]):
+        assert_refused(run(*command), "got version 2; update tactileq")
+    path.write_text("{")
+    assert_refused(run("simplify", "new.json"), "expected JSON")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["new.json"]
+
+
+def test_options_without_meaning(run, tmp_path: Path) -> None:
+    planted_texture("canvas").save(tmp_path / "m.json")
+    cases = {
+        ("simplify", "m.json", "--margin-db", "-1"): "margin of at least 0 dB",
+        ("simplify", "m.json", "--threshold", "tongue"): "codec, pen-hold or a TSV file",
+        ("simplify", "m.json", "--threshold", "my.tsv"): "expected a table at my.tsv",
+        ("stimuli", "m.json", "--rate", "1000"): "rendering rate of at least the model's",
+        ("stimuli", "m.json", "--duration", "0"): "duration above 0 s",
+        ("record", "new", "--texture", "silk"): "expected a planted texture among",
+        ("record", "new", "--texture", "canvas", "--duration", "-1"): "expected",
+        ("import", "wav", "a.wav"): "give both, or --labels",
+        ("import", "wav", "a.wav", "--speed", "1", "--force", "1"): "expected a WAV file",
+    }
+    for command, sentence in cases.items():
+        assert_refused(run(*command), sentence)
+    assert [p.name for p in tmp_path.iterdir()] == ["m.json"]
+
+
+def test_results_do_not_overwrite_foreign_folders(run, tmp_path: Path) -> None:
+    planted_texture("canvas").save(tmp_path / "m.json")
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine/thesis.txt").write_text("years of work")
+    for command in (
+        ["stimuli", "m.json", "--out", "mine"],
+        ["record", "mine", "--texture", "canvas"],
+        ["demo", "--out", "mine"],
+    ):
+        assert_refused(run(*command), "mine")
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.txt"]

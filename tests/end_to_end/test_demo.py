@@ -1,0 +1,63 @@
+"""The whole road in one command, and what is left behind."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pandas as pd
+
+from modeling import RecordingSet, TextureModel
+from stimuli.planted import TEXTURES
+
+
+def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
+    result = run("demo")
+    assert result.returncode == 0, result.stderr
+    report = Path(result.stdout.strip().splitlines()[-1])
+    assert report == tmp_path / "demo/report.html"
+    demo = report.parent
+    page = report.read_text(encoding="utf-8")
+    assert "SIMULATED" in page
+    assert not re.search(r"""(src|href)=["'](?!data:|#)""", page)
+    for texture in TEXTURES:
+        assert texture in page
+
+    sets = [RecordingSet.load(folder) for folder in (demo / "recordings").iterdir()]
+    assert sorted(records.texture for records in sets) == sorted(TEXTURES)
+    assert all(len(records) == 49 for records in sets)
+    assert all(r.simulated and r.rate_hz == 22704 for s in sets for r in s.recordings)
+
+    full = {p.name: TextureModel.load(p) for p in (demo / "models").glob("*.json")}
+    fewer = {p.name: TextureModel.load(p) for p in (demo / "simplified").glob("*.json")}
+    assert full.keys() == fewer.keys()
+    assert all(m.simulated for m in [*full.values(), *fewer.values()])
+    assert sum(m.n_layers for m in fewer.values()) < sum(m.n_layers for m in full.values())
+
+    manifest = pd.read_csv(demo / "stimuli/manifest.tsv", sep="\t")
+    assert len(manifest) == 14
+    assert manifest.simulated.all()
+
+    answers = {task: answers_of(demo / "data", task) for task in ("absolute", "relative")}
+    assert answers["absolute"].participant.nunique() == 20
+    assert answers["relative"].participant.nunique() == 24
+    # 7 textures × 2 models; 7 textures × 3 repeats on each of two days.
+    assert (answers["absolute"].groupby("participant").size() == 14).all()
+    assert (answers["relative"].groupby("participant").size() == 42).all()
+    assert all(table.simulated.all() for table in answers.values())
+    assert json.loads((demo / "provenance.json").read_text())["seed"] == 1
+
+    for name in ("gfc", "rating_tests", "rate_tests", "correct_rates", "planted_truth"):
+        table = pd.read_csv(demo / "tables" / f"{name}.tsv", sep="\t")
+        assert len(table) > 0
+        assert table.simulated.all()
+
+
+def answers_of(data: Path, task: str) -> pd.DataFrame:
+    """All main trials of a task, straight from the files."""
+    parts = []
+    for path in data.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv"):
+        parts.append(pd.read_csv(path, sep="\t").assign(participant=path.name[:6]))
+    table = pd.concat(parts)
+    return table[table.phase == "main"]

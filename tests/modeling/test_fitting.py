@@ -1,0 +1,288 @@
+"""From recordings to the model over the grid: tracking, holes, refusals, recovery."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from modeling import (
+    ESTIMATORS,
+    InputError,
+    Recording,
+    Renderer,
+    TextureModel,
+    fit_texture,
+    missing_conditions,
+)
+from modeling.fitting import _fill, condition_spectra
+from modeling.recording import RecordingSet
+
+ModelMaker = Callable[..., TextureModel]
+RecordingMaker = Callable[..., Recording]
+LAYERS = [(150.0, 30.0, 0.5), (600.0, 60.0, 0.5), (1300.0, 100.0, 0.5)]
+
+
+def record(
+    model: TextureModel,
+    *,
+    duration_s: float = 1.0,
+    seed: int = 0,
+    without: tuple[tuple[float, float], ...] = (),
+) -> list[Recording]:
+    """Renderings of every condition at the model's rate, settled for 0.2 s."""
+    recordings = []
+    conditions = [(v, f) for v in model.speeds_mm_s for f in model.forces_n]
+    for stream, (v, f) in enumerate(conditions):
+        if (v, f) in without:
+            continue
+        renderer = Renderer(model, seed=seed, stream=stream)
+        renderer.render(v, f, samples=1000)
+        samples = renderer.render(v, f, samples=round(duration_s * model.rate_hz))
+        recordings.append(Recording(samples, model.rate_hz, v, f, "planted", simulated=True))
+    return recordings
+
+
+def test_well_separated_layers_are_recovered(make_model: ModelMaker) -> None:
+    """Honest tolerances: 30 Hz smoothing widens the narrowest band by half and lowers its gain."""
+    fits = [
+        fit_texture(record(make_model(0.05, LAYERS), duration_s=4.0, seed=seed))
+        for seed in range(2)
+    ]
+    for model in fits:
+        assert model.n_layers == 3
+        assert not model.inherited.any()
+        assert not model.interpolated.any()
+        assert np.abs(model.frequencies_hz - [150, 600, 1300]).max() < 15
+        assert (np.abs(model.bandwidths_hz / [30, 60, 100] - 1) < [0.75, 0.35, 0.2]).all()
+        assert (np.abs(model.gains / 0.5 - 1) < [0.35, 0.2, 0.15]).all()
+        assert model.noise_gains == pytest.approx(0.05, rel=0.12)
+    average = np.mean([model.frequencies_hz for model in fits], axis=(0, 1, 2))
+    assert average == pytest.approx([150, 600, 1300], abs=8)
+    # What the hand feels, the band's level, is right though width and gain trade places.
+    level = [20 * np.log10(model.peq(100.0, 1.0).band_rms) for model in fits]
+    k = np.tan(np.pi * np.array([30, 60, 100]) / 5000)
+    assert np.mean(level, axis=0) == pytest.approx(20 * np.log10(0.5 * np.sqrt(k / (1 + k))), abs=1)
+
+
+def test_layers_keep_their_names_while_they_move() -> None:
+    """A layer at v/λ passes from 80 to 240 Hz below one that stays; the first row stays it."""
+    v = np.array([100.0, 150.0, 200.0, 250.0, 300.0])
+    shape = (5, 2, 2)
+    truth = TextureModel(
+        texture="planted",
+        rate_hz=5000.0,
+        speeds_mm_s=v,
+        forces_n=[1.0, 3.0],
+        noise_gains=np.full((5, 2), 0.03),
+        frequencies_hz=np.stack(np.broadcast_arrays(0.8 * v[:, None], 700 + np.zeros((1, 2))), -1),
+        bandwidths_hz=np.full(shape, 40.0),
+        gains=np.full(shape, 0.5),
+        level_sd_db=np.zeros(shape),
+        estimator="planted",
+    )
+    model = fit_texture(record(truth, duration_s=2.0))
+    assert model.n_layers == 2
+    assert np.abs(model.frequencies_hz - truth.frequencies_hz).max() < 12
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_result_is_described(make_model: ModelMaker, estimator: str) -> None:
+    model = fit_texture(record(make_model(0.05, LAYERS)), estimator=estimator)
+    assert (model.texture, model.unit, model.estimator) == ("planted", "g", estimator)
+    assert (model.simulated, model.rate_hz) == (True, 5000.0)
+    assert model.speeds_mm_s.tolist() == [100.0, 300.0]
+    assert model.forces_n.tolist() == [1.0, 3.0]
+    assert (model.gains > 0).all()  # both readings of the paper keep all signs positive
+    expected = 4.342945 / np.sqrt(np.pi * model.bandwidths_hz)
+    assert model.level_sd_db == pytest.approx(expected, rel=1e-6)
+
+
+def faded(make_model: ModelMaker, strength: dict[tuple[float, float], float]) -> list[Recording]:
+    """Layers at 200 and 800 Hz; the upper one has this gain in these conditions, else 0.5."""
+    recordings = []
+    for v in (100.0, 200.0, 300.0):
+        for f in (1.0, 3.0):
+            upper = strength.get((v, f), 0.5)
+            model = make_model(
+                0.05,
+                [(200.0 + v / 10, 50.0, 0.5), (800.0, 60.0, upper)],
+                speeds_mm_s=(v, v + 1),
+                forces_n=(f, f + 1),
+            )
+            recordings.append(record(model, duration_s=2.0, seed=int(v + f))[0])
+    return recordings
+
+
+def test_lost_peak_inherits_the_references_frequency(make_model: ModelMaker) -> None:
+    model = fit_texture(faded(make_model, {(100.0, 3.0): 0.0, (200.0, 1.0): 0.0}))
+    assert model.n_layers == 2
+    inherited = np.zeros((3, 2, 2), dtype=bool)
+    inherited[0, 1, 1] = inherited[1, 0, 1] = True
+    assert model.inherited.tolist() == inherited.tolist()
+    f = model.frequencies_hz[:, :, 1]
+    assert f[0, 1] == f[1, 1]  # from the next faster at that force
+    assert f[1, 0] == f[2, 0]
+    assert f[0, 0] != f[1, 0]  # found again, so no longer inherited
+    assert (model.gains[[0, 1], [1, 0], 1] < 0.1).all()
+
+
+def test_layers_missing_in_the_lead_are_not_added_later(make_model: ModelMaker) -> None:
+    model = fit_texture(faded(make_model, {(300.0, 3.0): 0.0}))
+    assert model.n_layers == 1
+    assert model.frequencies_hz[:, :, 0] == pytest.approx(220.0, abs=25)
+
+
+def test_next_condition_leads_where_the_first_has_no_peaks(
+    make_model: ModelMaker, make_recording: RecordingMaker
+) -> None:
+    recordings = record(make_model(0.05, LAYERS))
+    rng = np.random.default_rng(0)
+    recordings[-1] = make_recording(
+        flat_noise(rng, 5000), speed_mm_s=300.0, force_n=3.0, simulated=True
+    )
+    model = fit_texture(recordings)
+    assert model.n_layers == 3
+    assert model.inherited[1, 1].all()
+    assert (model.frequencies_hz[1, 1] == model.frequencies_hz[0, 1]).all()
+
+
+def flat_noise(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Noise whose spectrum falls gently and has no scatter, hence no peak at all."""
+    frequency = np.fft.rfftfreq(n, 1 / 5000)
+    phase = rng.uniform(0, 2 * np.pi, frequency.size)
+    return 0.1 * np.fft.irfft(np.exp(1j * phase) * np.sqrt(n) / (1 + frequency / 300), n)
+
+
+def test_no_layers_at_all(make_recording: RecordingMaker) -> None:
+    rng = np.random.default_rng(1)
+    recordings = [
+        make_recording(flat_noise(rng, 5000), speed_mm_s=v, force_n=f)
+        for v in (100.0, 200.0)
+        for f in (1.0, 2.0)
+    ]
+    model = fit_texture(recordings)
+    assert (model.n_layers, model.n_parameters) == (0, 1)
+    assert (model.noise_gains > 0).all()
+    # … also with a hole
+    assert missing_conditions(fit_texture(recordings[:3])) == [(200.0, 2.0)]
+
+
+def test_top_corner_may_be_missing(make_model: ModelMaker) -> None:
+    model = fit_texture(record(make_model(0.05, LAYERS), without=((300.0, 3.0),)))
+    assert model.n_layers == 3
+    assert missing_conditions(model) == [(300.0, 3.0)]
+    assert model.interpolated.tolist() == [[False, False], [False, True]]
+    assert not model.inherited[1, 1].any()
+
+
+def test_holes_are_named_marked_and_filled(make_model: ModelMaker) -> None:
+    truth = make_model(0.05, LAYERS, speeds_mm_s=(100.0, 200.0, 300.0), forces_n=(1.0, 2.0, 3.0))
+    holes = ((200.0, 2.0), (100.0, 3.0))
+    model = fit_texture(record(truth, without=holes))
+    assert sorted(missing_conditions(model)) == sorted(holes)
+    assert model.interpolated.sum() == 2
+    assert np.abs(model.frequencies_hz - [150, 600, 1300]).max() < 20
+    others = model.noise_gains[~model.interpolated]
+    assert others.min() <= model.noise_gains[1, 1] <= others.max()
+
+
+@pytest.mark.parametrize("hole", [(v, f) for v in range(5) for f in range(4)])
+def test_linear_truth_is_filled_exactly(hole: tuple[int, int]) -> None:
+    grid = np.array([(100.0 * (v + 1), f + 0.5) for v in range(5) for f in range(4)])
+    values = np.stack([3 + 0.2 * grid[:, 0] - 4 * grid[:, 1], -grid[:, 1]], axis=1)
+    missing = np.zeros(20, dtype=bool)
+    missing[hole[0] * 4 + hole[1]] = True
+    filled = _fill(grid[~missing], values[~missing], grid[missing], "planted")[0]
+    corner = hole[0] in (0, 4) and hole[1] in (0, 3)
+    if not corner:
+        assert filled == pytest.approx(values[missing][0], rel=1e-9)
+    else:  # nothing beyond: the nearest neighbour's value
+        steps = np.abs(grid[~missing] - grid[missing]) / [100.0, 1.0]
+        neighbours = values[~missing][steps.sum(axis=1) == 1]
+        assert any(filled == pytest.approx(row) for row in neighbours)
+
+
+@pytest.mark.parametrize("limit", [0.1, 2250.0, 2450.0])
+def test_filling_stays_within_the_legal_range(limit: float) -> None:
+    grid = np.array([(50.0 * (v + 1), 0.5 * (f + 1)) for v in range(7) for f in range(7)])
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        holes = rng.random(49) < 0.3
+        known = np.full(((~holes).sum(), 1), limit)
+        assert (_fill(grid[~holes], known, grid[holes], "planted") == limit).all()
+
+
+def test_recordings_on_a_line_are_refused(make_model: ModelMaker) -> None:
+    without = ((100.0, 3.0), (300.0, 1.0))
+    with pytest.raises(InputError, match="2 of 4 conditions on one line"):
+        fit_texture(record(make_model(0.05, LAYERS), without=without))
+
+
+def test_one_force_level_is_refused(make_model: ModelMaker) -> None:
+    recordings = record(make_model(0.05, LAYERS))
+    one_force = [r for r in recordings if r.force_n == 1.0]
+    with pytest.raises(InputError, match=r"2 speeds and 1 force; record more force levels\."):
+        fit_texture(one_force)
+    one_speed = [r for r in recordings if r.speed_mm_s == 100.0]
+    with pytest.raises(InputError, match=r"1 speed and 2 forces; record more speed levels\."):
+        fit_texture(one_speed)
+
+
+def test_mixed_textures_and_units_are_refused(
+    make_model: ModelMaker, make_recording: RecordingMaker
+) -> None:
+    recordings = record(make_model(0.05, LAYERS))
+    with pytest.raises(InputError, match="one texture, got planted, other"):
+        fit_texture([*recordings, make_recording(texture="other")])
+    with pytest.raises(InputError, match="one unit in all recordings, got arbitrary and g"):
+        fit_texture([*recordings, make_recording(unit="arbitrary", speed_mm_s=50.0)])
+    with pytest.raises(InputError, match="at least one recording"):
+        fit_texture([])
+    with pytest.raises(InputError, match="estimator among"):
+        fit_texture(recordings, estimator="magic")
+
+
+def test_contact_without_motion_is_refused(make_recording: RecordingMaker) -> None:
+    with pytest.raises(InputError, match="speed and a force above 0, got planted at 0 mm/s"):
+        fit_texture([make_recording(speed_mm_s=0.0)])
+    with pytest.raises(InputError, match="only recordings without contact"):
+        fit_texture([make_recording(force_n=0.0)])
+
+
+def test_no_contact_recording_is_the_floor(make_recording: RecordingMaker) -> None:
+    """Vibration of 0.4 under a sensor's noise of 0.3 counts as 0.4."""
+    rng = np.random.default_rng(3)
+    draws = rng.standard_normal((9, 20000))
+    recordings = [
+        make_recording(0.4 * draws[2 * n] + 0.3 * draws[2 * n + 1], speed_mm_s=v, force_n=f)
+        for n, (v, f) in enumerate([(100.0, 1.0), (100.0, 2.0), (200.0, 1.0), (200.0, 2.0)])
+    ]
+    floor = make_recording(0.3 * draws[8], speed_mm_s=0.0, force_n=0.0)
+    assert fit_texture(recordings).noise_gains == pytest.approx(0.5, rel=0.04)
+    assert fit_texture([*recordings, floor]).noise_gains == pytest.approx(0.4, rel=0.06)
+
+
+def test_repeats_are_averaged_per_condition(make_recording: RecordingMaker) -> None:
+    rng = np.random.default_rng(3)
+    recordings = [
+        make_recording(level * rng.standard_normal(20000), repeat=repeat)
+        for repeat, level in ((1, 0.2), (2, 0.6))
+    ]
+    spectra = condition_spectra(RecordingSet(recordings))
+    assert list(spectra) == [(100.0, 1.0)]
+    assert spectra[100.0, 1.0].magnitude[100:].mean() == pytest.approx(0.4, rel=0.03)
+
+
+def test_slow_data_give_a_model_at_their_rate(make_model: ModelMaker) -> None:
+    truth = make_model(0.05, [(120.0, 30.0, 0.5)], rate_hz=1000.0)
+    model = fit_texture(record(truth, duration_s=4.0))
+    assert model.rate_hz == 1000.0
+    assert model.frequencies_hz[:, :, 0] == pytest.approx(120.0, abs=12)
+
+
+def test_lowest_rate_counts(make_recording: RecordingMaker) -> None:
+    recordings = [make_recording(seed=1), make_recording(seed=2, rate_hz=1000.0, force_n=2.0)]
+    spectra = condition_spectra(RecordingSet(recordings))
+    assert {s.rate_hz for s in spectra.values()} == {1000.0}

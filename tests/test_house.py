@@ -1,0 +1,72 @@
+"""The house's own rules, as far as no tool checks them."""
+
+from __future__ import annotations
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis")
+FRONT = ("tactileq", "steps")
+
+
+def imported(path: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.add(node.module.split(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_room_imports_the_front_door_or_the_tests(room: str) -> None:
+    for path in (ROOT / room).rglob("*.py"):
+        assert not imported(path) & {*FRONT, "tests"}, path
+
+
+def test_modeling_is_pure_numerics() -> None:
+    for path in (ROOT / "modeling").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert not imported(path) & {"time", "datetime", "matplotlib", "random", "typer", "rich"}
+        assert not re.search(r"^\s*print\(", text, flags=re.MULTILINE), path
+
+
+def test_help_loads_no_numerics() -> None:
+    program = (
+        "import sys, tactileq\n"
+        "try: tactileq.app(['--help'])\n"
+        "except SystemExit: pass\n"
+        "print([m for m in ('numpy', 'scipy', 'pandas', 'matplotlib', 'psychopy') "
+        "if m in sys.modules])"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert result.stdout.splitlines()[-1] == "[]"
+
+
+def test_every_command_has_an_example() -> None:
+    import tactileq
+
+    commands = tactileq.app.registered_commands + tactileq.imports.registered_commands
+    assert len(commands) == 10
+    for command in commands:
+        assert command.callback is not None
+        assert "Example: tactileq " in (command.callback.__doc__ or ""), command.callback
+
+
+def test_the_lock_pins_hashes_and_names_no_address() -> None:
+    text = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    assert "://" not in text
+    requirements = re.split(r"\n(?=[a-z0-9])", text.split("\n", 2)[2])
+    pinned = [r for r in requirements if re.match(r"[a-z0-9._-]+==", r)]
+    assert len(pinned) > 100
+    for requirement in pinned:
+        assert "--hash=sha256:" in requirement, requirement.splitlines()[0]
