@@ -198,7 +198,7 @@ class Console:
             "choose",
             widgets=(real, *numbered, confirm),
             decoration=(
-                self._title("Which virtual surface is the real one?"),
+                self._title("Which virtual surface matches the real one?"),
                 self._note("The filled button is the surface that you feel now.", y=0.225),
                 *self._cards((0.0, 0.06 + BUTTON_PITCH * rows)),
                 picked,

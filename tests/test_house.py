@@ -70,3 +70,14 @@ def test_the_lock_pins_hashes_and_names_no_address() -> None:
     assert len(pinned) > 100
     for requirement in pinned:
         assert "--hash=sha256:" in requirement, requirement.splitlines()[0]
+
+
+def test_the_lines_of_the_readme_end_in_a_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    code = text.split("```python\n")[1].split("```")[0]
+    assert len([line for line in code.splitlines() if line.strip()]) <= 10
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "README.md", "exec"), {})
+    assert (tmp_path / "canvas.png").read_bytes().startswith(b"\x89PNG")
