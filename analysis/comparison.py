@@ -81,7 +81,7 @@ def compare_spectra(
         response = model.peq(speed_mm_s, force_n).response(frequency)
         return smooth(response, SMOOTHING_HZ, step_hz=measured.rate_hz / measured.n_samples)
 
-    at = _grid_index(full, speed_mm_s, force_n)
+    at = _grid_index(full, speed_mm_s, force_n=force_n)
     amplitudes_g = layer_amplitudes_g(full, criterion=simplification.criterion)
     return SpectrumComparison(
         texture=full.texture,
@@ -100,7 +100,7 @@ def compare_spectra(
     )
 
 
-def _grid_index(model: TextureModel, speed_mm_s: float, force_n: float) -> tuple[int, int]:
+def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tuple[int, int]:
     speed = np.flatnonzero(model.speeds_mm_s == speed_mm_s)
     force = np.flatnonzero(model.forces_n == force_n)
     if not (speed.size and force.size):
@@ -142,7 +142,7 @@ class LayerCourse:
 
 def layer_course(model: TextureModel, *, force_n: float) -> LayerCourse:
     """Follow the layers of a model over its speeds, at one force (N) of its grid."""
-    force = _grid_index(model, float(model.speeds_mm_s[0]), force_n)[1]
+    force = _grid_index(model, float(model.speeds_mm_s[0]), force_n=force_n)[1]
     return LayerCourse(
         label=model.estimator,
         texture=model.texture,

@@ -25,6 +25,7 @@ LAYER_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LEVELS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
 BAR_WIDTH = 0.38
+MOST_LARGE_PANELS = 16  # more small multiples than these stand seven in a row, as the paper's grid
 LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side on a log axis
 AMPLITUDE_LABELS = {
     "energy": "amplitude of the sinusoid of equal power",
@@ -78,6 +79,24 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
     )
     levels = np.concatenate([threshold.acceleration_g, comparison.layer_amplitude_g])
     bottom = float(levels[levels > 0].min()) / 3
+    _plot_stems(ax, comparison, bottom=bottom)
+    ax.axvspan(
+        threshold.frequency_hz[-1],
+        comparison.frequency_hz[-1],
+        color=GREY,
+        alpha=0.12,
+        label="no threshold known",
+    )
+    _log_frequency(ax, comparison.frequency_hz[-1])
+    ax.set_yscale("log")
+    ax.set_ylim(bottom, float(levels.max()) * 3)
+    ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
+    _stamp(ax, comparison.simulated)
+    return ax
+
+
+def _plot_stems(ax: Axes, comparison: SpectrumComparison, *, bottom: float) -> None:
+    """Numbered stems from the bottom of the axes up to each layer's amplitude."""
     for dropped, label in ((False, "layer, kept"), (True, "layer, dropped by simplification")):
         colour = VERMILLION if dropped else BLUE
         chosen = comparison.dropped == dropped
@@ -106,19 +125,6 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
                 ha="center",
                 bbox={"fc": "white", "ec": "none", "alpha": 0.7, "pad": 0.6},
             )
-    ax.axvspan(
-        threshold.frequency_hz[-1],
-        comparison.frequency_hz[-1],
-        color=GREY,
-        alpha=0.12,
-        label="no threshold known",
-    )
-    _log_frequency(ax, comparison.frequency_hz[-1])
-    ax.set_yscale("log")
-    ax.set_ylim(bottom, float(levels.max()) * 3)
-    ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
-    _stamp(ax, comparison.simulated)
-    return ax
 
 
 def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
@@ -187,8 +193,8 @@ def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = 
         )
     columns = zip(MODELS, ("se_full", "se_simplified"), strict=True)
     tops = [tests[f"mean_{model}"] + tests[se].fillna(0.0) for model, se in columns]
-    for x, top, p in zip(place, np.nanmax(tops, axis=0), tests["p_holm"], strict=True):
-        _significance_bracket(ax, float(x), top=float(top), p=float(p))
+    for x, full_top, top, p in zip(place, *tops, tests["p_holm"], strict=True):
+        _significance_bracket(ax, float(x), top=max(full_top, top), p=float(p))
     ax.set_xticks(place, list(tests["texture"]), rotation=30, ha="right")
     ax.set_xlabel("texture")
     _finish(ax)
@@ -302,7 +308,7 @@ def plot_layer_course(
 
 def figure_spectra(panels: Sequence[SpectrumPanel]) -> Figure:
     """Small multiples: each condition's smoothed spectrum with its layers marked."""
-    columns = min(4, len(panels))
+    columns = min(4 if len(panels) <= MOST_LARGE_PANELS else 7, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(max(3.4 * columns, 5), 2.6 * rows + 0.4), layout="constrained")
     first = None

@@ -102,8 +102,10 @@ def load_responses(data_folder: str | Path) -> Responses:
     description = _description(folder)
     simulated = bool(description["Simulated"])
     warnings: list[str] = []
-    _check_participants(folder / "participants.tsv", simulated, warnings)
-    tables = {task: _load_task(folder, task, simulated, warnings) for task in _TEXTS}
+    _check_participants(folder / "participants.tsv", simulated, warnings=warnings)
+    tables = {
+        task: _load_task(folder, task, simulated=simulated, warnings=warnings) for task in _TEXTS
+    }
     if all(table is None for table in tables.values()):
         raise InputError(
             f"expected answers such as sub-01/ses-01/beh/sub-01_ses-01_task-absolute_beh.tsv in "
@@ -148,16 +150,16 @@ def _description(folder: Path) -> Mapping[str, object]:
     return description
 
 
-def _check_participants(path: Path, simulated: bool, warnings: list[str]) -> None:
+def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> None:
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
     table = _read_lines(path, warnings)
-    _require_columns(table, ("participant_id", "simulated"), path)
-    _check_simulated(table, simulated, path)
+    _require_columns(table, ("participant_id", "simulated"), path=path)
+    _check_simulated(table, simulated, path=path)
 
 
 def _load_task(
-    folder: Path, task: str, simulated: bool, warnings: list[str]
+    folder: Path, task: str, *, simulated: bool, warnings: list[str]
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
     sessions = []
@@ -181,27 +183,31 @@ def _load_task(
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
     numbers = _NUMBERS[task]
-    _require_columns(table, (*numbers, *_TEXTS[task]), path)
+    _require_columns(table, (*numbers, *_TEXTS[task]), path=path)
     for column in _REQUIRED:
-        _refuse(table[column].isna(), f"a value in column {column}", path, table[column])
+        _refuse(
+            table[column].isna(), table[column], expected=f"a value in column {column}", path=path
+        )
     for column, allowed in _CHOICES.items():
         if column in table:
             known = table[column].isin(allowed) | table[column].isna()
-            _refuse(~known, f"{' or '.join(allowed)} in column {column}", path, table[column])
-    _check_simulated(table, simulated, path)
-    for column, (low, high) in numbers.items():
-        table[column] = _number_column(table[column], low, high, path=path)
+            expected = f"{' or '.join(allowed)} in column {column}"
+            _refuse(~known, table[column], expected=expected, path=path)
+    _check_simulated(table, simulated, path=path)
+    for column, limits in numbers.items():
+        table[column] = _number_column(table[column], limits, path=path)
     twice = table.duplicated(["phase", "trial"])
-    _refuse(twice, "every trial once", path, table["trial"])
+    _refuse(twice, table["trial"], expected="every trial once", path=path)
     if task == "relative":
         _check_answers(table, path)
 
 
-def _number_column(column: pd.Series, low: float, high: float, *, path: Path) -> pd.Series:
+def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:
+    low, high = limits
     values = pd.to_numeric(column, errors="coerce").astype(float)
     wrong = column.notna() & ~(np.isfinite(values) & (values >= low) & (values <= high))
-    limits = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}"
-    _refuse(wrong, f"a number {limits} in column {column.name}", path, column)
+    wanted = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}"
+    _refuse(wrong, column, expected=f"a number {wanted} in column {column.name}", path=path)
     return values
 
 
@@ -213,30 +219,30 @@ def _check_answers(table: pd.DataFrame, path: Path) -> None:
     ]
     _refuse(
         pd.Series(absent, index=answered.index, dtype=bool),
-        "an answer that stands in its trial's layout",
-        path,
         answered["answer"],
+        expected="an answer that stands in its trial's layout",
+        path=path,
     )
     right = (answered["answer"] == answered["texture"]).astype(float)
     _refuse(
         right != answered["correct"],
-        "correct = 1 exactly where answer and texture agree",
-        path,
         answered["correct"],
+        expected="correct = 1 exactly where answer and texture agree",
+        path=path,
     )
 
 
-def _check_simulated(table: pd.DataFrame, simulated: bool, path: Path) -> None:
+def _check_simulated(table: pd.DataFrame, simulated: bool, *, path: Path) -> None:
     expected = "true" if simulated else "false"
     _refuse(
         table["simulated"] != expected,
-        f"simulated = {expected}, as dataset_description.json says, never a mixture,",
-        path,
         table["simulated"],
+        expected=f"simulated = {expected}, as dataset_description.json says, never a mixture,",
+        path=path,
     )
 
 
-def _refuse(wrong: pd.Series, expected: str, path: Path, column: pd.Series) -> None:
+def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -> None:
     if wrong.any():
         row = int(np.flatnonzero(wrong.to_numpy())[0])
         value = column.loc[wrong[wrong].index[0]]
@@ -247,7 +253,7 @@ def _refuse(wrong: pd.Series, expected: str, path: Path, column: pd.Series) -> N
         )
 
 
-def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], path: Path) -> None:
+def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], *, path: Path) -> None:
     missing = [column for column in dict.fromkeys(columns) if column not in table]
     if missing:
         raise InputError(

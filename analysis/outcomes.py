@@ -25,7 +25,7 @@ def rating_outcomes(tests: pd.DataFrame) -> list[str]:
 
 
 def rate_outcomes(
-    rates: pd.DataFrame, tests: pd.DataFrame, matrices: Mapping[str, ConfusionMatrix]
+    rates: pd.DataFrame, tests: pd.DataFrame, *, matrices: Mapping[str, ConfusionMatrix]
 ) -> list[str]:
     """Sentences on the forced choice, from the three results of `statistics`."""
     sentences = []
@@ -71,15 +71,23 @@ def planted_outcomes(planted: pd.DataFrame) -> list[str]:
     """One sentence per estimator, from `planted.planted_truth_table` rows; means over textures."""
     overall = planted[planted["layer"] == ALL_LAYERS]
     return [
+        _planted_outcome(str(estimator), rows)
+        for estimator, rows in overall.groupby("estimator", sort=False)
+    ]
+
+
+def _planted_outcome(estimator: str, rows: pd.DataFrame) -> str:
+    if not rows["recall"].any():
+        return f"The estimator {estimator} found 0% of the planted layers."
+    return (
         f"The estimator {estimator} found {rows['recall'].mean():.0%} of the planted layers, and "
         f"{rows['precision'].mean():.0%} of the layers it reports were planted; median errors: "
         f"{rows['median_frequency_error_hz'].mean():.1f} Hz in frequency, a factor of "
         f"{rows['median_bandwidth_ratio'].mean():.2f} in bandwidth, "
         f"{_signed(rows['median_level_error_db'].mean(), 1)} dB in level, "
         f"{_signed(rows['median_noise_gain_error_db'].mean(), 1)} dB in noise gain (medians over "
-        f"the conditions, averaged over {len(rows)} textures)."
-        for estimator, rows in overall.groupby("estimator", sort=False)
-    ]
+        f"the conditions, averaged over {len(rows)} texture{'s' * (len(rows) != 1)})."
+    )
 
 
 def cautions(families: Sequence[pd.DataFrame], *, simulated: bool, models: bool) -> list[str]:
@@ -152,11 +160,13 @@ def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
     significant = family["p_holm"] < ALPHA
     above = family[significant & (family["mean"] > chance)]
     below = family[significant & (family["mean"] < chance)]
+    interval = "no interval, for want of variation between participants"
+    if not overall["note"]:
+        interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"
     text = (
-        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right (95% "
-        f"bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}, "
-        f"{overall['participants']} participants, chance {chance:.1%}); above chance after Holm: "
-        f"{_names(above['texture'])}"
+        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right "
+        f"({interval}; participants: {overall['participants']}; chance {chance:.1%}); above chance "
+        f"after Holm: {_names(above['texture'])}"
     )
     if not below.empty:
         text += f"; below chance: {_names(below['texture'])}"
@@ -165,7 +175,7 @@ def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
         text += f"; not told from chance: {_names(unclear['texture'])}"
     undefined = family[family["p_holm"].isna()]
     if not undefined.empty:
-        text += f"; same rate in every participant, test undefined: {_names(undefined['texture'])}"
+        text += f"; test undefined (see the notes): {_names(undefined['texture'])}"
     return text + "."
 
 

@@ -63,13 +63,15 @@ nav a { color: var(--blue); text-decoration: none; margin-right: 22px; }
 nav a:hover { text-decoration: underline; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
           padding: 26px 30px; margin: 26px 0; }
-.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(190px, 1fr)); gap: 14px; }
+.tiles { display: grid; grid-template-columns: repeat(auto-fit, minmax(205px, 1fr)); gap: 14px; }
 .tile { border: 1px solid var(--line); border-radius: 8px; padding: 14px 16px; }
-.tile b { display: block; font-size: 23px; line-height: 1.25; color: var(--blue); }
+.tile b { display: block; font-size: 23px; line-height: 1.25; white-space: nowrap;
+          color: var(--blue); }
 .tile span { color: var(--soft); font-size: 14px; }
 ul { margin: 8px 0 0; padding-left: 22px; max-width: 95ch; } li { margin: 7px 0; }
 p { max-width: 95ch; }
-.caution { border-left: 4px solid var(--warn); padding: 2px 0 2px 18px; margin-top: 22px; }
+.caution { border-left: 4px solid var(--warn); padding: 2px 0 2px 18px; margin-top: 26px; }
+.caution h3 { margin-top: 4px; }
 figure { margin: 18px 0 26px; } figure img { max-width: 100%; height: auto; display: block; }
 figcaption, caption { color: var(--soft); font-size: 14.5px; text-align: left; max-width: 100ch; }
 caption { padding-bottom: 8px; } figcaption b, caption b { color: var(--ink); }
@@ -147,7 +149,7 @@ def folded(fold: Fold, content: str) -> str:
     return f"<details{state}><summary>{escape(fold.summary)}</summary>{content}</details>"
 
 
-def section(anchor: str, heading: str, content: str) -> str:
+def section(anchor: str, heading: str, *, content: str) -> str:
     """A part of the page with its heading; `content` is HTML."""
     return f'<section id="{escape(anchor)}"><h2>{escape(heading)}</h2>{content}</section>'
 
@@ -165,7 +167,7 @@ def picture_html(picture: Picture, png: bytes) -> str:
     # One scale for all pictures, so that their text has one size.
     width = round(picture.figure.get_figwidth() * PIXELS_PER_INCH)
     return (
-        f'<figure id="{escape(picture.name)}">'
+        f'<figure id="figure-{escape(picture.name)}">'
         f'<img alt="{escape(_full_title(picture))}" width="{width}" '
         f'src="data:image/png;base64,{data}">'
         f"<figcaption>{_caption(picture)}</figcaption></figure>"
@@ -175,7 +177,8 @@ def picture_html(picture: Picture, png: bytes) -> str:
 def table_html(table: Table) -> str:
     """The table with its caption; numbers are rounded, the file beside the report is exact."""
     frame = table.frame[list(table.shown)] if table.shown else table.frame
-    frame = frame.loc[:, ~(frame == "").all()]  # a column of notes that nobody wrote
+    # A column of notes that nobody wrote only takes room.
+    frame = frame[[name for name in frame if frame.empty or (frame[name] != "").any()]]
     numeric = [pd.api.types.is_numeric_dtype(frame[name]) for name in frame]
     css = [
         'class="number"' if number else 'class="name"' if name in _NAMES else ""
@@ -193,7 +196,7 @@ def table_html(table: Table) -> str:
         total = ALL_TEXTURES in values or ALL_LAYERS in values
         rows.append(f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>")
     return (
-        f'<div class="scroll" id="{escape(table.name)}"><table><caption>{_caption(table)}'
+        f'<div class="scroll" id="table-{escape(table.name)}"><table><caption>{_caption(table)}'
         f"</caption><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
     )
 
@@ -235,7 +238,7 @@ def page(*, title: str, lead: str, banner: str, sections: Sequence[tuple[str, st
     """The whole page from (anchor, heading, HTML) sections; no banner where its text is empty."""
     links = "".join(f'<a href="#{escape(a)}">{escape(heading)}</a>' for a, heading, _ in sections)
     warning = f'<div class="banner"><div>{escape(banner)}</div></div>' if banner else ""
-    body = "".join(section(*part) for part in sections)
+    body = "".join(section(a, heading, content=html) for a, heading, html in sections)
     return (
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'

@@ -72,7 +72,6 @@ def write_report(
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
-    simulated_answers = responses is not None and responses.simulated
     tell(0.8, "writing the report")
     facts = {**(provenance or {}), "seed of this report": str(seed)}
     parts = [
@@ -80,11 +79,10 @@ def write_report(
         *((s.anchor, s.heading, _section_html(s, folder=target.parent)) for s in sections),
         ("origin", "Provenance", _item_html(_provenance(facts), folder=target.parent)),
     ]
-    simulated_surfaces = any(result.simulated for result in textures)
     html = page.page(
         title=title,
         lead="Surfaces recorded, modelled, simplified by what can be felt, and judged.",
-        banner=_banner(surfaces=simulated_surfaces, answers=simulated_answers),
+        banner=_banner(responses, textures),
         sections=parts,
     )
     write_text(target, html)
@@ -138,15 +136,12 @@ def _overview(sections: Sequence[Section], responses: Responses | None, *, model
     )
 
 
-def _banner(*, surfaces: bool, answers: bool) -> str:
-    reasons = [
-        reason
-        for reason, applies in (
-            ("no real surface was touched", surfaces),
-            ("no person took part", answers),
-        )
-        if applies
-    ]
+def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:
+    reasons = []
+    if any(result.simulated for result in textures):
+        reasons.append("no real surface was touched")
+    if responses is not None and responses.simulated:
+        reasons.append("no person took part")
     return f"SIMULATED: {' and '.join(reasons)}." if reasons else ""
 
 

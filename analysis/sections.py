@@ -13,7 +13,7 @@ from analysis import figures, outcomes, statistics
 from analysis.comparison import compare_spectra, layer_course
 from analysis.load import MODELS, Responses
 from analysis.page import Fold, Item, Picture, Table
-from analysis.planted import planted_layers_table, planted_truth_table
+from analysis.planted import ALL_LAYERS, planted_layers_table, planted_truth_table
 from analysis.tables import TextureResult, gfc_table, simplification_table
 
 Progress = Callable[[float, str], None]
@@ -209,6 +209,13 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
         score,
         simulated=True,
     )
+    overall = Table(
+        "planted_overall",
+        "Planted layers found, by texture",
+        "The rows for all layers of the table below; its caption explains the columns.",
+        score[score["layer"] == ALL_LAYERS].drop(columns="layer"),
+        simulated=True,
+    )
     detail = Table(
         "planted_layers",
         "Planted and estimated parameters, layer by layer",
@@ -220,7 +227,11 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
     return Section(
         "planted",
         "Planted truth",
-        (Fold("Scores by estimator and layer", (found,)), Fold("Layer by layer", (detail,))),
+        (
+            overall,
+            Fold("Scores by estimator and layer", (found,)),
+            Fold("Layer by layer", (detail,)),
+        ),
         outcomes=tuple(outcomes.planted_outcomes(score)),
     )
 
@@ -228,7 +239,9 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
 def rating_section(responses: Responses) -> Section:
     """Absolute evaluation (PAPER VIII-A)."""
     tests = statistics.rating_tests(responses.absolute)
-    done, tile = _participants(responses.absolute, "absolute evaluation", responses.simulated)
+    done, tile = _participants(
+        responses.absolute, "absolute evaluation", simulated=responses.simulated
+    )
     picture = Picture(
         "ratings",
         "Rated similarity of virtual and real surface",
@@ -264,10 +277,33 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
     chance = 1 / len(matrices["full"].textures)
     rates = statistics.correct_rates(relative, rng=rng, chance=chance)
     tests = statistics.rate_tests(relative)
-    done, tile = _participants(relative, "forced choice", simulated)
+    done, tile = _participants(relative, "forced choice", simulated=simulated)
     overall = rates[rates["texture"] == statistics.ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)
     rate_tile = (shown, f"right answers, full → simplified (chance {chance:.0%})")
+    counts = Fold(
+        "Confusion matrices as tables",
+        tuple(_confusion_table(matrix, simulated=simulated) for matrix in matrices.values()),
+    )
+    return Section(
+        "choices",
+        "Relative evaluation: forced choice",
+        (
+            *_choice_pictures(tests, matrices, simulated=simulated),
+            *_rate_tables(rates, tests, simulated=simulated),
+            counts,
+        ),
+        outcomes=tuple(outcomes.rate_outcomes(rates, tests, matrices=matrices)),
+        done=(done,),
+        tiles=(tile, rate_tile),
+        tests=tests,
+    )
+
+
+def _choice_pictures(
+    tests: pd.DataFrame, matrices: dict[str, statistics.ConfusionMatrix], *, simulated: bool
+) -> tuple[Picture, Picture]:
+    chance = 1 / len(matrices["full"].textures)
     rates_picture = Picture(
         "correct_rates",
         "Correct rates of the forced choice",
@@ -283,22 +319,12 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
         figures.figure_confusion(matrices, simulated=simulated),
         simulated,
     )
-    counts = Fold(
-        "Confusion matrices as tables",
-        tuple(_confusion_table(matrix, simulated=simulated) for matrix in matrices.values()),
-    )
-    return Section(
-        "choices",
-        "Relative evaluation: forced choice",
-        (rates_picture, confusion_picture, *_rate_tables(rates, tests, simulated), counts),
-        outcomes=tuple(outcomes.rate_outcomes(rates, tests, matrices)),
-        done=(done,),
-        tiles=(tile, rate_tile),
-        tests=tests,
-    )
+    return rates_picture, confusion_picture
 
 
-def _rate_tables(rates: pd.DataFrame, tests: pd.DataFrame, simulated: bool) -> tuple[Table, Table]:
+def _rate_tables(
+    rates: pd.DataFrame, tests: pd.DataFrame, *, simulated: bool
+) -> tuple[Table, Table]:
     against_chance = Table(
         "correct_rates",
         "Correct rates against chance",
@@ -321,7 +347,9 @@ def _rate_tables(rates: pd.DataFrame, tests: pd.DataFrame, simulated: bool) -> t
     return against_chance, paired
 
 
-def _participants(trials: pd.DataFrame, where: str, simulated: bool) -> tuple[str, tuple[str, str]]:
+def _participants(
+    trials: pd.DataFrame, where: str, *, simulated: bool
+) -> tuple[str, tuple[str, str]]:
     """The sentence and the tile that say how many took part."""
     people = trials["participant_id"].nunique()
     who = "simulated participants" if simulated else "participants"

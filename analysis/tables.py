@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 import pandas as pd
 
-from modeling import InputError, Recording, RecordingSet, Simplification, TextureModel, similarity
+from modeling import (
+    InputError,
+    LayerVerdict,
+    Recording,
+    RecordingSet,
+    Simplification,
+    TextureModel,
+    similarity,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,35 +97,40 @@ def gfc_table(
         gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of |error|),
         band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
     """
-    rows = []
     contact = [recording for recording in recordings.recordings if recording.force_n > 0]
+    rows = []
     for name, model in (("full", full), ("simplified", simplified)):
         reports = [similarity.report(recording, model, rng=rng) for recording in contact]
-
-        def mean_of(field: str, reports: Sequence[similarity.SimilarityReport] = reports) -> float:
-            return float(np.mean([getattr(report, field) for report in reports]))
-
-        rows.append(
-            {
-                "texture": full.texture,
-                "model": name,
-                "layers": model.n_layers,
-                "parameters": model.n_parameters,
-                "conditions": len(reports),
-                "gfc30_mean": mean_of("gfc30"),
-                "gfc30_min": min(report.gfc30 for report in reports),
-                "gfc30_floor": mean_of("floor_gfc30"),
-                "gfc30_ceiling": mean_of("ceiling_gfc30"),
-                "gfc5_mean": mean_of("gfc5"),
-                "gfc5_floor": mean_of("floor_gfc5"),
-                "gfc5_ceiling": mean_of("ceiling_gfc5"),
-                "log_spectral_distance_db": mean_of("log_spectral_distance_db"),
-                "rms_error_db": float(np.mean([abs(r.rms_error_db) for r in reports])),
-                "band_energy_error_db": float(np.mean([_band_error_db(r) for r in reports])),
-                "oracle_gap": mean_of("oracle_gap"),
-            }
-        )
+        labels = {
+            "texture": full.texture,
+            "model": name,
+            "layers": model.n_layers,
+            "parameters": model.n_parameters,
+            "conditions": len(reports),
+        }
+        rows.append(labels | _means(reports))
     return pd.DataFrame(rows)
+
+
+def _means(reports: Sequence[similarity.SimilarityReport]) -> dict[str, float]:
+    """Means over the conditions, and the lowest GFC30."""
+
+    def mean_of(field: str) -> float:
+        return float(np.mean([getattr(report, field) for report in reports]))
+
+    return {
+        "gfc30_mean": mean_of("gfc30"),
+        "gfc30_min": min(report.gfc30 for report in reports),
+        "gfc30_floor": mean_of("floor_gfc30"),
+        "gfc30_ceiling": mean_of("ceiling_gfc30"),
+        "gfc5_mean": mean_of("gfc5"),
+        "gfc5_floor": mean_of("floor_gfc5"),
+        "gfc5_ceiling": mean_of("ceiling_gfc5"),
+        "log_spectral_distance_db": mean_of("log_spectral_distance_db"),
+        "rms_error_db": float(np.mean([abs(report.rms_error_db) for report in reports])),
+        "band_energy_error_db": float(np.mean([_band_error_db(report) for report in reports])),
+        "oracle_gap": mean_of("oracle_gap"),
+    }
 
 
 def _band_error_db(report: similarity.SimilarityReport) -> float:
@@ -136,7 +149,8 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         worst_frequency_hz (the condition where the layer stands highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1).
     """
-    table = pd.DataFrame([asdict(verdict) for verdict in simplification.layers])
+    columns = [field.name for field in fields(LayerVerdict)]
+    table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
     worst = ["worst_speed_mm_s", "worst_force_n", "worst_frequency_hz"]
     # No condition is the worst one where no threshold is known in any.
     table.loc[table["distance_db"].isna(), worst] = np.nan

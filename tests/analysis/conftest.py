@@ -88,7 +88,7 @@ def write_task(study_folder: Path) -> WriteTask:
 
 
 def choice_table(
-    rng: np.random.Generator, *, people: int = 12, repeats: int = 3, rate: float = 0.5
+    rng: np.random.Generator, *, people: int = 16, repeats: int = 3, rate: float = 0.5
 ) -> pd.DataFrame:
     """Answers of a forced choice in which the right one is known with probability `rate`."""
     rows = []
@@ -112,7 +112,7 @@ def choice_table(
 
 
 def rating_table(
-    rng: np.random.Generator, *, people: int = 12, effect: float = 0.0
+    rng: np.random.Generator, *, people: int = 16, effect: float = 0.0
 ) -> pd.DataFrame:
     """Ratings in which the simplified PVC scores lower by `effect` on both scales."""
     rows = []

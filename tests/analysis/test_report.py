@@ -14,8 +14,10 @@ import pytest
 from analysis.load import Responses
 from analysis.page import cell, label
 from analysis.report import write_report
-from modeling import InputError
+from analysis.tables import TextureResult
+from modeling import InputError, Threshold, simplify
 
+pytestmark = pytest.mark.filterwarnings("error")
 WARNING = "sub-01_ses-01_task-absolute_beh.tsv: the last line was cut short & is left out."
 
 
@@ -131,7 +133,7 @@ def test_tables_beside_the_report_are_exact(folder, ratings):
 def test_simulated_results_are_called_so(shown):
     assert shown.text.count("SIMULATED") > 15
     assert "SIMULATED: no real surface was touched and no person took part." in shown.text
-    assert "12 simulated participants" in shown.text
+    assert "16 simulated participants" in shown.text
     assert "say nothing about what people feel" in shown.text
 
 
@@ -166,9 +168,7 @@ def test_a_report_of_real_answers_alone(tmp_path, ratings, choices):
     assert "simulated" not in shown.text
     assert "Forced choice" not in shown.text
     assert "GFC" not in shown.text
-    assert "12 participants, absolute evaluation" in shown.text.replace(
-        "12participants", "12 participants"
-    )
+    assert "16participants, absolute evaluation" in shown.text  # a tile: number, then words
 
 
 def test_a_report_of_models_alone(tmp_path, results):
@@ -176,6 +176,28 @@ def test_a_report_of_models_alone(tmp_path, results):
     shown = Page(path.read_text(encoding="utf-8"))
     assert "SIMULATED: no real surface was touched." in shown.text
     assert "t-test" not in shown.text
+
+
+@pytest.mark.parametrize("kept", ["participant_id == 'sub-01'", "model == 'full'"])
+def test_a_study_that_has_just_begun_is_reported(tmp_path, ratings, choices, kept):
+    begun = responses_of(ratings.query(kept), choices.query(kept), simulated=False)
+    path = write_report(tmp_path / "report.html", responses=begun)
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert "the test is undefined for aluminum, canvas" in shown.text
+    assert "t undefined" in shown.text
+    assert not re.search(r"\bnan\b", shown.text)
+
+
+def test_a_texture_without_layers_is_reported(tmp_path, results):
+    bare = results[0].model.with_layers([])
+    result = TextureResult(
+        results[0].recordings, bare, simplify(bare, Threshold.shipped("codec")), results[0].truth
+    )
+    path = write_report(tmp_path / "report.html", textures=[result])
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert "leather: 0 of 0 layers kept" in shown.text
+    assert "found 0% of the planted layers" in shown.text
+    assert not re.search(r"\bnan\b", shown.text)
 
 
 def test_a_second_report_takes_the_place_of_the_first(tmp_path, ratings, choices):

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pingouin
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
@@ -54,7 +54,8 @@ def test_paired_t_by_hand():
     assert_allclose([result.mean_full, result.mean_simplified], [30, 33])
 
 
-@given(st.lists(st.tuples(st.integers(0, 1000), st.integers(0, 1000)), min_size=2, max_size=30))
+@settings(deadline=None)  # with ties the signed-rank test counts permutations
+@given(st.lists(st.tuples(st.integers(0, 1000), st.integers(0, 1000)), min_size=2, max_size=8))
 def test_d_z_is_t_over_root_n_and_signs_turn_with_the_order(pairs):
     full, simplified = np.array(pairs, dtype=float).T
     result, turned = paired_test(full, simplified), paired_test(simplified, full)
@@ -158,16 +159,16 @@ def test_a_participant_without_one_rating_is_named_and_left_out_of_that_pair_onl
     )
     hit = (tests["scale"] == "vibration magnitude") & (tests["texture"] == "canvas")
     assert tests[hit]["excluded"].tolist() == ["sub-03"]
-    assert tests[hit]["n"].tolist() == [11]
+    assert tests[hit]["n"].tolist() == [15]
     assert (tests[~hit]["excluded"] == "").all()
-    assert (tests[~hit]["n"] == 12).all()
+    assert (tests[~hit]["n"] == 16).all()
 
 
 def test_a_participant_without_a_day_is_named_everywhere(choices):
     gone = (choices["participant_id"] == "sub-05") & (choices["model"] == "full")
     tests = rate_tests(choices[~gone])
     assert (tests["excluded"] == "sub-05").all()
-    assert (tests["n"] == 11).all()
+    assert (tests["n"] == 15).all()
 
 
 def test_no_answers_are_refused(choices, ratings):

@@ -204,7 +204,7 @@ def test_lift_off_is_counted_and_harmless(bad: float) -> None:
     assert signal[-200:] == pytest.approx(clean[-200:], abs=1e-6)
 
 
-def test_clamped_values_are_counted() -> None:
+def test_nothing_is_clamped_or_counted_in_a_legal_stroke() -> None:
     model = moving_model(rate_hz=5000.0)
     renderer = Renderer(model)
     renderer.render(150.0, 2.0, samples=50)

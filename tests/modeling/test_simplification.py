@@ -1,0 +1,275 @@
+"""Which layers go: the criteria and rules of METHOD 7."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
+from modeling.simplification import distances_db, layer_amplitudes_g
+
+ModelMaker = Callable[..., TextureModel]
+# 0.1 g from 10 to 1000 Hz: with `paper-gain` a layer's gain is its level.
+FLAT = Threshold("flat", np.array([10.0, 1000.0]), np.array([0.1, 0.1]), "planted", "none")
+
+
+def at_db(*levels_db: float) -> list[tuple[float, float, float]]:
+    """Layers that lie this far from FLAT under `paper-gain`."""
+    return [(100.0 * (n + 1), 50.0, 0.1 * 10 ** (db / 20)) for n, db in enumerate(levels_db)]
+
+
+def run(model: TextureModel, **options: object) -> Simplification:
+    return simplify(model, FLAT, **{"criterion": "paper-gain", **options})  # type: ignore[arg-type]
+
+
+def verdicts(simplification: Simplification) -> list[str]:
+    return [layer.verdict for layer in simplification.layers]
+
+
+# --- criteria
+
+
+def test_criteria_at_50_hz_and_1_s(make_model: ModelMaker) -> None:
+    """`paper-fft` 20 dB below `energy`, `paper-gain` 12 dB above, 32 dB apart."""
+    model = make_model(0.0, [(200.0, 50.0, 0.3)])
+    level = {
+        name: 20 * np.log10(layer_amplitudes_g(model, criterion=name)[0, 0, 0]) for name in CRITERIA
+    }
+    assert level["paper-fft"] - level["energy"] == pytest.approx(-19.87, abs=0.05)
+    assert level["paper-gain"] - level["energy"] == pytest.approx(12.15, abs=0.05)
+    assert level["paper-gain"] - level["paper-fft"] == pytest.approx(32.0, abs=0.05)
+
+
+@settings(deadline=None)
+@given(st.floats(2, 2000), st.floats(0.2, 2000), st.floats(-10, 10))
+def test_amplitudes_are_the_formulas(frequency: float, bandwidth: float, gain: float) -> None:
+    model = TextureModel(
+        texture="x",
+        rate_hz=5000.0,
+        speeds_mm_s=[1, 2],
+        forces_n=[1, 2],
+        noise_gains=np.zeros((2, 2)),
+        frequencies_hz=np.full((2, 2, 1), frequency),
+        bandwidths_hz=np.full((2, 2, 1), bandwidth),
+        gains=np.full((2, 2, 1), gain),
+        level_sd_db=np.zeros((2, 2, 1)),
+        estimator="planted",
+    )
+    k = np.tan(np.pi * bandwidth / 5000)
+    expected = {
+        "energy": np.sqrt(2 * k / (1 + k)) * abs(gain),
+        "paper-fft": abs(gain) * np.sqrt(np.pi / 5000),
+        "paper-gain": abs(gain),
+    }
+    for name in CRITERIA:
+        amplitude = layer_amplitudes_g(model, criterion=name)
+        assert amplitude == pytest.approx(np.full((2, 2, 1), expected[name]), rel=1e-12)
+
+
+def test_energy_and_fft_are_what_a_record_shows(make_model: ModelMaker) -> None:
+    """The mean |FFT|·2/N at the peak, and √2 × the RMS, of simulated noise through the layer."""
+    rng = np.random.default_rng(0)
+    model = make_model(0.0, [(200.0, 50.0, 0.3)])
+    response = model.peq(200.0, 2.0).complex_response(np.arange(2501.0))
+    spectra = [response * np.fft.rfft(rng.standard_normal(5000)) for _ in range(400)]
+    single_sided = np.mean([2 * np.abs(x[195:206]) / 5000 for x in spectra])
+    rms = np.sqrt(np.mean([2 * np.sum(np.abs(x) ** 2) / 5000**2 for x in spectra]))
+    amplitude = {n: layer_amplitudes_g(model, criterion=n)[0, 0, 0] for n in CRITERIA}
+    assert single_sided == pytest.approx(amplitude["paper-fft"], rel=0.04)
+    assert np.sqrt(2) * rms == pytest.approx(amplitude["energy"], rel=0.02)
+
+
+def test_distance_is_relative_to_the_threshold_at_the_layers_frequency(
+    make_model: ModelMaker,
+) -> None:
+    slope = Threshold("slope", np.array([10.0, 1000.0]), np.array([1e-3, 1e-1]), "", "")
+    model = make_model(0.0, [(100.0, 50.0, 0.1), (2000.0, 50.0, 0.1)])
+    distance = distances_db(model, slope, criterion="paper-gain")
+    assert distance[:, :, 0] == pytest.approx(20.0)  # threshold 0.01 g there
+    assert np.isnan(distance[:, :, 1]).all()
+
+
+# --- rules
+
+
+def test_layers_below_in_every_condition_go(make_model: ModelMaker) -> None:
+    model = make_model(0.07, at_db(6, -20, 0.5, -30))
+    result = run(model)
+    assert verdicts(result) == ["kept", "dropped", "kept", "dropped"]
+    assert [layer.layer for layer in result.layers] == [1, 2, 3, 4]
+    assert [layer.distance_db for layer in result.layers] == pytest.approx([6, -20, 0.5, -30])
+    assert result.model == model.with_layers([0, 2])
+    assert (result.model.noise_gains == 0.07).all()
+    assert result.layers[1].reason == "below threshold in every condition"
+
+
+@pytest.mark.parametrize("condition", [(0, 0), (1, 0), (2, 1)])
+def test_layer_above_in_one_condition_is_kept(
+    make_model: ModelMaker, condition: tuple[int, int]
+) -> None:
+    model = make_model(0.0, at_db(10, -20), speeds_mm_s=(50.0, 100.0, 200.0))
+    gains = model.gains.copy()
+    gains[(*condition, 1)] = -0.1 * 10 ** (1 / 20)
+    changed = TextureModel(**{**fields_of(model), "gains": gains})
+    layer = run(changed).layers[1]
+    assert layer.verdict == "kept"
+    assert layer.reason == "above threshold in 1 of 6 conditions"
+    assert layer.distance_db == pytest.approx(1.0)
+    assert layer.worst_speed_mm_s == model.speeds_mm_s[condition[0]]
+    assert layer.worst_force_n == model.forces_n[condition[1]]
+    assert layer.worst_frequency_hz == 200.0
+
+
+def fields_of(model: TextureModel) -> dict[str, object]:
+    return {name: getattr(model, name) for name in model.__dataclass_fields__}
+
+
+def test_dropped_layers_stay_below_in_sum(make_model: ModelMaker) -> None:
+    """Three layers at −1 dB sum to +3.8 dB: two come back, the loudest first."""
+    assert 10 * np.log10(3 * 10**-0.1) == pytest.approx(3.77, abs=0.01)
+    result = run(make_model(0.0, at_db(10, -1.0, -1.2, -1.1)))
+    assert verdicts(result) == ["kept", "kept", "dropped", "kept"]
+    assert "not together" in result.layers[1].reason
+    # −3.1 dB twice is −0.1 dB: both may go. −2.9 dB twice is +0.1 dB: one stays.
+    assert verdicts(run(make_model(0.0, at_db(10, -3.1, -3.1)))) == ["kept", "dropped", "dropped"]
+    assert verdicts(run(make_model(0.0, at_db(10, -2.9, -2.9)))).count("dropped") == 1
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.lists(st.floats(-30, 3), min_size=1, max_size=9))
+def test_whatever_is_dropped_is_below_alone_and_in_sum(levels_db: list[float]) -> None:
+    model = TextureModel(
+        texture="x",
+        rate_hz=5000.0,
+        speeds_mm_s=[1, 2],
+        forces_n=[1, 2],
+        noise_gains=np.zeros((2, 2)),
+        frequencies_hz=np.full((2, 2, len(levels_db)), 100.0),
+        bandwidths_hz=np.full((2, 2, len(levels_db)), 50.0),
+        gains=np.broadcast_to(0.1 * 10 ** (np.array(levels_db) / 20), (2, 2, len(levels_db))),
+        level_sd_db=np.zeros((2, 2, len(levels_db))),
+        estimator="planted",
+    )
+    result = run(model)
+    dropped = [db for db, v in zip(levels_db, verdicts(result), strict=True) if v == "dropped"]
+    assert all(db < 1e-9 for db in dropped)
+    assert sum(10 ** (db / 10) for db in dropped) < 1 + 1e-9
+    assert result.model.n_layers == len(levels_db) - len(dropped) >= 1
+
+
+def test_last_layer_is_kept(make_model: ModelMaker) -> None:
+    result = run(make_model(0.0, at_db(-40, -20, -30)))
+    assert verdicts(result) == ["dropped", "kept", "dropped"]
+    assert result.layers[1].reason == "below threshold, kept as the last layer"
+    assert result.model.n_parameters == 4
+
+
+def test_no_layers_to_begin_with(make_model: ModelMaker) -> None:
+    result = run(make_model(0.1, []))
+    assert result.layers == ()
+    assert result.model.n_layers == 0
+
+
+def test_no_threshold_known(make_model: ModelMaker) -> None:
+    quiet = (1500.0, 50.0, 1e-6)
+    result = run(make_model(0.0, [*at_db(10, -20), quiet]))
+    layer = result.layers[2]
+    assert verdicts(result) == ["kept", "dropped", "kept"]
+    assert layer.reason == "no threshold known in 4 of 4 conditions"
+    assert np.isnan(layer.distance_db)
+    assert np.isnan(layer.flip_probability)
+    assert layer.worst_frequency_hz == 1500.0
+
+
+def test_threshold_unknown_in_some_conditions_keeps_the_layer(make_model: ModelMaker) -> None:
+    model = make_model(0.0, at_db(10, -20))
+    frequencies = model.frequencies_hz.copy()
+    frequencies[1, 1, 1] = 1200.0
+    changed = TextureModel(**{**fields_of(model), "frequencies_hz": frequencies})
+    layer = run(changed).layers[1]
+    assert (layer.verdict, layer.reason) == ("kept", "no threshold known in 1 of 4 conditions")
+    assert layer.distance_db == pytest.approx(-20)
+
+
+def test_margin_lowers_the_bar(make_model: ModelMaker) -> None:
+    model = make_model(0.0, at_db(10, -5))
+    assert verdicts(run(model, margin_db=4.9)) == ["kept", "dropped"]
+    assert verdicts(run(model, margin_db=5.1)) == ["kept", "kept"]
+    assert run(model, margin_db=4.9).layers[1].distance_db == pytest.approx(-5)
+    assert run(model, margin_db=4.9).margin_db == 4.9
+
+
+def test_silent_layers_go(make_model: ModelMaker) -> None:
+    result = run(make_model(0.0, [*at_db(10), (200.0, 50.0, 0.0)], level_sd_db=0.3))
+    assert verdicts(result) == ["kept", "dropped"]
+    assert result.layers[1].distance_db == -np.inf
+    assert result.layers[1].flip_probability == 0
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_the_criterion_decides(make_model: ModelMaker, criterion: str) -> None:
+    """A 50 Hz layer 6 dB above under `energy` is 14 dB below under `paper-fft`."""
+    k = np.tan(np.pi * 50 / 5000)
+    gain = 0.2 / np.sqrt(2 * k / (1 + k))
+    model = make_model(0.0, [(100.0, 50.0, 100.0), (200.0, 50.0, gain)])
+    expected = {"energy": (6.02, "kept"), "paper-fft": (-13.85, "dropped")}
+    expected["paper-gain"] = (18.17, "kept")
+    layer = run(model, criterion=criterion).layers[1]
+    assert layer.distance_db == pytest.approx(expected[criterion][0], abs=0.05)
+    assert layer.verdict == expected[criterion][1]
+
+
+# --- stability
+
+
+def test_flip_probability_agrees_with_monte_carlo(make_model: ModelMaker) -> None:
+    model = make_model(0.0, at_db(10, -1.5, -4.0, 0.4), level_sd_db=1.2)
+    rng = np.random.default_rng(0)
+    measured = distances_db(model, FLAT, criterion="paper-gain").reshape(4, 4)
+    others = measured + 1.2 * rng.standard_normal((200_000, 4, 4))
+    below_again = (others < 0).all(axis=1).mean(axis=0)
+    below_now = (measured < 0).all(axis=0)
+    expected = np.where(below_now, 1 - below_again, below_again)
+    result = run(model)
+    assert [x.flip_probability for x in result.layers] == pytest.approx(expected, abs=0.004)
+    assert verdicts(result) == ["kept", "kept", "dropped", "kept"]
+    assert "too short to be sure" in result.layers[1].reason
+
+
+@pytest.mark.parametrize(("level_db", "verdict"), [(-2.2, "kept"), (-2.27, "dropped")])
+def test_flips_of_5_percent_are_the_limit(
+    make_model: ModelMaker, level_db: float, verdict: str
+) -> None:
+    """Four conditions at z: 1 − Φ(z)⁴ = 5 % at z = 2.234."""
+    result = run(make_model(0.0, at_db(10, level_db), level_sd_db=1.0))
+    assert result.layers[1].verdict == verdict
+    assert (result.layers[1].flip_probability < 0.05) == (verdict == "dropped")
+
+
+def test_known_levels_never_flip(make_model: ModelMaker) -> None:
+    result = run(make_model(0.0, at_db(10, -0.01)))
+    assert [layer.flip_probability for layer in result.layers] == [0, 0]
+    assert verdicts(result) == ["kept", "dropped"]
+
+
+# --- refusals
+
+
+def test_arbitrary_units_are_refused(make_model: ModelMaker) -> None:
+    with pytest.raises(InputError, match="expected a model in g, got the unit 'arbitrary'"):
+        run(make_model(0.0, at_db(1), unit="arbitrary"))
+
+
+@pytest.mark.parametrize("margin_db", [-0.1, np.nan, np.inf])
+def test_wrong_margins_are_refused(make_model: ModelMaker, margin_db: float) -> None:
+    with pytest.raises(InputError, match="margin of at least 0 dB"):
+        run(make_model(0.0, at_db(1)), margin_db=margin_db)
+
+
+def test_unknown_criteria_are_refused(make_model: ModelMaker) -> None:
+    with pytest.raises(InputError, match="energy, paper-fft, paper-gain, got 'loudness'"):
+        run(make_model(0.0, at_db(1)), criterion="loudness")
