@@ -77,8 +77,8 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
         color=BLACK,
         label=f"detection threshold ({threshold.name})",
     )
-    levels = np.concatenate([threshold.acceleration_g, comparison.layer_amplitude_g])
-    bottom = float(levels[levels > 0].min()) / 3
+    # A layer without power must not stretch the axis: weaker ones stand on its lower edge.
+    bottom = float(threshold.acceleration_g.min()) / 1000
     _plot_stems(ax, comparison, bottom=bottom)
     ax.axvspan(
         threshold.frequency_hz[-1],
@@ -89,7 +89,7 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
     )
     _log_frequency(ax, comparison.frequency_hz[-1])
     ax.set_yscale("log")
-    ax.set_ylim(bottom, float(levels.max()) * 3)
+    ax.set_ylim(bottom, 3 * max(threshold.acceleration_g.max(), *comparison.layer_amplitude_g, 0))
     ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
     _stamp(ax, comparison.simulated)
     return ax
@@ -102,7 +102,8 @@ def _plot_stems(ax: Axes, comparison: SpectrumComparison, *, bottom: float) -> N
         chosen = comparison.dropped == dropped
         if not chosen.any():
             continue
-        frequency, top = comparison.layer_frequency_hz[chosen], comparison.layer_amplitude_g[chosen]
+        frequency = comparison.layer_frequency_hz[chosen]
+        top = np.maximum(comparison.layer_amplitude_g[chosen], bottom)
         ax.vlines(frequency, bottom, top, color=colour, ls=":" if dropped else "-")
         ax.plot(
             frequency,

@@ -199,6 +199,16 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
             for model in estimates
         ]
     score = pd.concat(scores, ignore_index=True)
+    tables = _planted_tables(score, pd.concat(layers, ignore_index=True))
+    return Section(
+        "planted",
+        "Planted truth",
+        tables,
+        outcomes=tuple(outcomes.planted_outcomes(score)),
+    )
+
+
+def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ...]:
     found = Table(
         "planted_truth",
         "Planted layers found",
@@ -221,18 +231,13 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
         "Planted and estimated parameters, layer by layer",
         "At the strongest force and highest speed of each texture; gains are |G| at the planted "
         "model's rate; surplus: estimated where nothing was planted.",
-        pd.concat(layers, ignore_index=True),
+        layers,
         simulated=True,
     )
-    return Section(
-        "planted",
-        "Planted truth",
-        (
-            overall,
-            Fold("Scores by estimator and layer", (found,)),
-            Fold("Layer by layer", (detail,)),
-        ),
-        outcomes=tuple(outcomes.planted_outcomes(score)),
+    return (
+        overall,
+        Fold("Layer by layer", (detail,), opened=True),
+        Fold("Scores by estimator and layer", (found,)),
     )
 
 

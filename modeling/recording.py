@@ -110,12 +110,17 @@ class Recording:
     def clipped_share(self) -> float:
         """Share (0–1) of samples stuck at the extremes, 0 where the record does not clip.
 
-        A run of at least three equal samples at the maximum or the minimum counts as clipped;
-        noise that is merely quantised reaches its extreme in shorter runs.
+        Runs of at least three equal samples at the maximum or the minimum count as clipped where
+        samples pile up there: more than three times as many as at the next level inwards. Noise
+        that is merely quantised has shorter runs, and a smooth crest that is merely quantised
+        holds its highest level at most 1/(√2 − 1) = 2.4 times as long as the next one.
         """
+        levels = np.unique(self.samples)
         clipped = 0
-        for extreme in (self.samples.max(), self.samples.min()):
-            clipped += _samples_in_long_runs(self.samples == extreme)
+        for extreme, next_inwards in ((levels[-1], levels[-2]), (levels[0], levels[1])):
+            stuck = self.samples == extreme
+            if np.count_nonzero(stuck) > 3 * np.count_nonzero(self.samples == next_inwards):
+                clipped += _samples_in_long_runs(stuck)
         return clipped / self.samples.size
 
     def __eq__(self, other: object) -> bool:

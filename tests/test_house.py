@@ -80,4 +80,4 @@ def test_the_lines_of_the_readme_end_in_a_figure(
     assert len([line for line in code.splitlines() if line.strip()]) <= 10
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "README.md", "exec"), {})
-    assert (tmp_path / "canvas.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "polyester.png").read_bytes().startswith(b"\x89PNG")

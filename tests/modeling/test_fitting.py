@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 
 from modeling import (
     ESTIMATORS,
@@ -104,9 +105,22 @@ def test_layers_keep_their_names_while_they_move() -> None:
     assert model.n_layers == 2
     assert not model.inherited.any()
     assert model.frequencies_hz[:, :, 0] == pytest.approx(
-        np.array([[150.0] * 2, [300.0] * 2, [450.0] * 2]), abs=8
+        np.array([[150.0] * 2, [300.0] * 2, [450.0] * 2]), abs=4
     )
-    assert model.frequencies_hz[:, :, 1] == pytest.approx(800, abs=8)
+    # The upper one's skirts pull the smoothed maximum up by some Hz: that maximum is the answer.
+    for i, v in enumerate(model.speeds_mm_s):
+        for j, f in enumerate(model.forces_n):
+            response = PEQ(
+                noise_gain=0.05,
+                frequencies_hz=[1.5 * v, 800],
+                bandwidths_hz=[40, 60],
+                gains=[0.5, 0.2 * f],
+                rate_hz=5000.0,
+            ).response(np.arange(2501.0))
+            smoothed = gaussian_filter1d(response, 30.0, mode="reflect")
+            highest = 700 + int(np.argmax(smoothed[700:900]))
+            assert model.frequencies_hz[i, j, 1] == pytest.approx(highest, abs=1)
+            assert model.frequencies_hz[i, j, 1] == pytest.approx(800, abs=10)
     assert model.gains[:, :, 1] == pytest.approx(np.array([[0.2, 0.6]] * 3), rel=0.08)
 
 

@@ -12,6 +12,7 @@ import soundfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from scipy.signal import butter, sosfilt
 
 from modeling import InputError, Recording, RecordingSet
 
@@ -112,6 +113,27 @@ def test_quantised_noise_is_not_clipped(make_recording: RecordingMaker, step_g: 
     for seed in range(5):
         noise = 0.2 * np.random.default_rng(seed).standard_normal(22704)
         assert make_recording(np.rint(noise / step_g) * step_g).clipped_share == 0.0
+
+
+@pytest.mark.parametrize("amplitude_g", [0.0039, 0.01, 0.0488, 0.05, 0.5])
+def test_quantised_smooth_vibration_is_not_clipped(
+    make_recording: RecordingMaker, amplitude_g: float
+) -> None:
+    """A slow crest stays on its highest level for many samples without any clipping."""
+    t = np.arange(22704) / 22704
+    rng = np.random.default_rng(0)
+    tone = amplitude_g * np.sin(2 * np.pi * 40.3 * t)
+    sections = butter(2, [30, 50], "bandpass", fs=22704, output="sos")
+    narrow = sosfilt(sections, rng.standard_normal(22704))
+    narrow *= amplitude_g / np.abs(narrow).max()
+    for smooth in (tone, narrow):
+        quantised = np.rint(smooth / 0.001907349) * 0.001907349
+        assert make_recording(quantised).clipped_share == 0.0
+    if amplitude_g >= 0.5:
+        limited = np.clip(tone, -0.9 * amplitude_g, 0.9 * amplitude_g)
+        quantised = np.rint(limited / 0.001907349) * 0.001907349
+        expected = 1 - 2 / np.pi * np.arcsin(0.9)
+        assert make_recording(quantised).clipped_share == pytest.approx(expected, abs=0.01)
 
 
 # --- sets

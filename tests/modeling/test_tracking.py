@@ -24,6 +24,7 @@ from modeling.tracking import assign_peaks, reference_of, visiting_order
         pytest.param([199.0], [100.0, 300.0], [0, -1], id="just inside the lower half gap"),
         pytest.param([201.0], [100.0, 300.0], [-1, 0], id="just inside the upper half gap"),
         pytest.param([1.0], [100.0, 300.0], [0, -1], id="lowest uses its inner gap below"),
+        pytest.param([240.0], [300.0, 400.0], [-1, -1], id="beyond the lowest's inner gap"),
         pytest.param([399.0], [100.0, 300.0], [-1, 0], id="highest uses its inner gap above"),
         pytest.param([401.0], [100.0, 300.0], [-1, -1], id="beyond the highest's inner gap"),
         pytest.param([349.0, 351.0], [100.0, 200.0, 300.0], [-1, -1, 0], id="gap of 100 → 50"),
