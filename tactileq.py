@@ -60,6 +60,11 @@ Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")
 Simplified = Annotated[Path, typer.Option("--simplified", help="Folder of simplified models.")]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 
+DEMO_CONTENTS = {
+    *("recordings", "models", "simplified", "stimuli", "data", "tables", "figures"),
+    *("report.html", "provenance.json"),
+}
+
 
 def main() -> None:
     """Run the command line; bad input ends with one sentence and exit code 1."""
@@ -422,8 +427,11 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     from stimuli.planted import TEXTURES
     from stimuli.sets import write_set
 
-    if out.exists() and any(out.iterdir()) and not (out / "provenance.json").is_file():
-        raise ValueError(f"expected a new folder or an earlier demo at {out}; choose another one.")
+    if out.exists() and not {path.name for path in out.iterdir()} <= DEMO_CONTENTS:
+        raise ValueError(
+            f"expected a new folder or an earlier demo, got {out} with other files in it; "
+            "choose another one."
+        )
     plan = study_from(None)
     threshold = threshold_named("codec")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")

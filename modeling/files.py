@@ -61,7 +61,9 @@ def _swap(fresh: Path, target: Path) -> None:
 
 
 def check_replaceable(target: Path, *, index_name: str, what: str) -> None:
-    """Refuse to replace anything but an empty folder or a set that holds `index_name`.
+    """Refuse to replace anything but an empty folder or a set with nothing beside its own files.
+
+    Its own are the index, the files that the index lists, and `provenance.json`.
 
     Raises
     ------
@@ -70,10 +72,16 @@ def check_replaceable(target: Path, *, index_name: str, what: str) -> None:
     """
     if target.is_file():
         raise InputError(f"expected a folder, got the file {target}; choose another name.")
-    if target.exists() and any(target.iterdir()) and not (target / index_name).is_file():
+    if not target.exists():
+        return
+    own = {index_name, "provenance.json"}
+    if (target / index_name).is_file():
+        own |= {row["file"] for row in read_table(target / index_name, ("file",))}
+    foreign = sorted({path.name for path in target.iterdir()} - own)
+    if foreign:
         raise InputError(
-            f"expected a new folder or {what}, got {target} with other files in it; "
-            "choose another folder."
+            f"expected a new folder or {what}, got {target} with other files in it "
+            f"({foreign[0]}); choose another folder."
         )
 
 

@@ -26,6 +26,7 @@ INDEX_COLUMNS = (
     "unit",
     "repeat",
     "simulated",
+    "samples",
 )
 
 
@@ -289,6 +290,7 @@ def _index_cells(recording: Recording) -> tuple[str, ...]:
         recording.unit,
         str(recording.repeat),
         str(recording.simulated).lower(),
+        str(recording.samples.size),
     )
 
 
@@ -325,7 +327,7 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
         samples = _read_samples(path)
         rate_hz = number(row.get("rate_hz", ""), f"rate_hz of {path.name}")
     try:
-        return Recording(
+        recording = Recording(
             samples,
             rate_hz,
             number(row.get("speed_mm_s", ""), f"speed_mm_s of {path.name}"),
@@ -337,6 +339,13 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
+    expected = row.get("samples")
+    if expected and samples.size != number(expected, f"samples of {path.name}"):
+        raise InputError(
+            f"expected {expected} samples in {path.name}, got {samples.size}; the file is "
+            "truncated or was changed, copy or record it again."
+        )
+    return recording
 
 
 def number(text: str, name: str) -> float:

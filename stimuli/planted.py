@@ -119,8 +119,8 @@ CATALOGUE = {
     "wall paper": PlantedTexture(
         0.020,
         (
-            PlantedLayer(44, 1.0, 20, 0.040, 1, 0.4, 0.4),
-            PlantedLayer(160, 0.1, 30, 0.032, 1, 0.4, 0.2),
+            PlantedLayer(40, 1.0, 20, 0.090, 1, 0.4, 0.4),
+            PlantedLayer(175, 0.1, 30, 0.045, 1, 0.4, 0.2),
             PlantedLayer(300, 0.05, 40, 0.016, 1, 0.4, 0.1),
         ),
     ),

@@ -40,9 +40,15 @@ def truncate(folder: Path) -> None:
     (folder / "0002.csv").write_bytes(data[:-7])
 
 
+def cut_at_a_line(folder: Path) -> None:
+    lines = (folder / "0002.csv").read_text().splitlines(keepends=True)
+    (folder / "0002.csv").write_text("".join(lines[:-500]))
+
+
 DAMAGES = {
     "empty": (lambda f: (f / "0002.csv").write_text(""), "got an empty file"),
     "truncated": (truncate, "the file is truncated"),
+    "cut": (cut_at_a_line, "expected 3000 samples in 0002.csv, got 2500"),
     "nan": (fill("0002.csv", ["0.1", "nan"] * 50), "expected finite samples"),
     "inf": (fill("0002.csv", ["0.1", "-inf"] * 50), "expected finite samples"),
     "constant": (fill("0002.csv", ["0.25"] * 100), "got the constant value 0.25"),

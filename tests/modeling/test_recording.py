@@ -252,7 +252,7 @@ def test_csv_of_other_bytes_is_refused(folder: Path) -> None:
         ("\t100.0\t2.0", "\tfast\t2.0", "number for speed_mm_s of 0002.csv, got 'fast'"),
         ("\t100.0\t2.0", "\t100.0\t", "number for force_n of 0002.csv, got nothing"),
         ("\t100.0\t2.0", "\t100.0\t1.0", "one recording per condition"),
-        ("\t100.0\t2.0", "\t100.0\t2.0\t3", "8 cells"),
+        ("\t100.0\t2.0", "\t100.0\t2.0\t3", "9 cells"),
         ("\t2.0\t5000.0\tg", "\t2.0\t5000.0\tm/s2", "unit among g, arbitrary"),
         ("\t2.0\t5000.0\tg", "\t2.0\t\tg", "rate_hz of 0002.csv, got nothing"),
         ("\t2.0\t5000.0\tg", "\t2.0\t0\tg", "rate above 0"),
