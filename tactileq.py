@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from math import isnan
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -244,11 +245,13 @@ def simplify(
         out / f"{stem(full.texture)}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a")
     )
     for verdict in result.layers:
-        print(
-            f"layer {verdict.layer}: {verdict.verdict}, {verdict.distance_db:+.1f} dB at "
-            f"{verdict.worst_speed_mm_s:g} mm/s, {verdict.worst_force_n:g} N "
-            f"({verdict.worst_frequency_hz:.0f} Hz): {verdict.reason}"
-        )
+        line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"
+        if not isnan(verdict.distance_db):  # where a threshold is known
+            line += (
+                f"; {verdict.distance_db:+.1f} dB at {verdict.worst_speed_mm_s:g} mm/s, "
+                f"{verdict.worst_force_n:g} N ({verdict.worst_frequency_hz:.0f} Hz)"
+            )
+        print(line)
     print(f"threshold: {result.threshold.name} ({result.threshold.caveat})")
     settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
     write_provenance(

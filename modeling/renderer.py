@@ -35,9 +35,9 @@ class Renderer:
     model : TextureModel
         What to render.
     rate_hz : float, optional
-        Output rate, at least the model's (the default). Level and spectrum do not depend on it:
-        w gets the variance rate/model rate and the noise branch ends at the model's Nyquist
-        frequency.
+        Output rate, at least the model's (the default). Level and spectrum stay the same: w
+        gets the variance rate/model rate and the noise branch ends at the model's Nyquist
+        frequency (only a band's far skirts rise, by up to 1 dB, as the filter warps less).
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
 

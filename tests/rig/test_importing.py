@@ -105,7 +105,7 @@ def test_without_a_unit_it_is_arbitrary(tmp_path: Path, axes: NDArray[np.float64
         ("time,x,y,z", {"axis": "w"}, "expected an axis among"),
         ("time,x (furlong),y,z", {"axis": "x"}, "got 'furlong'"),
         ("time,x,y,z", {"axis": "x", "unit": "stone"}, "got 'stone'"),
-        ("time_h,x,y,z", {"axis": "x"}, ""),
+        ("time_h,x,y,z", {"axis": "x"}, "expected a time column or --rate"),
     ],
 )
 def test_refused_layouts(
