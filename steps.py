@@ -12,9 +12,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from analysis.load import Responses
     from analysis.tables import TextureResult
+    from experiments.console import Console
     from experiments.study import Study
-    from modeling import RecordingSet, TextureModel, Threshold
+    from modeling import RecordingSet, Simplification, TextureModel, Threshold
+    from modeling.simplification import CriterionName
     from rig.importing import Label
 
 
@@ -82,28 +85,94 @@ def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
         yield lambda share, what: bar.update(task, completed=share)
 
 
-def stem(texture: str) -> str:
-    """A texture's name as a file name."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in texture)
+def check_own_results(out: Path, command: str, *, contents: set[str]) -> None:
+    """Refuse to replace a folder unless an earlier run of the same command made all of it."""
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    foreign = "a file"
+    if out.is_dir():
+        marker = out / "provenance.json"
+        maker = _read_object(marker).get("command") if marker.is_file() else None
+        others = sorted({path.name for path in out.iterdir()} - contents)
+        if maker == f"tactileq {command}" and not others:
+            return
+        foreign = f"a folder with other files in it ({(others or ['not made by this command'])[0]})"
+    raise ValueError(
+        f"expected a new folder or earlier results of tactileq {command} at {out}, got {foreign}; "
+        "choose another folder with --out."
+    )
+
+
+def check_own_model(start: Path, command: str) -> None:
+    """Refuse to put one command's model in the place of another's (full beside simplified).
+
+    `start` is the model's path without its ending.
+    """
+    marker = Path(f"{start}_provenance.json")
+    made = Path(f"{start}.json").exists() and marker.is_file()
+    if made and _read_object(marker).get("command") != f"tactileq {command}":
+        raise ValueError(
+            f"expected a folder without models of another command, got {start}.json made by "
+            f"{_read_object(marker).get('command')}; choose another folder with --out."
+        )
+
+
+def tell_clamped(name: str, model: TextureModel, conditions: Sequence[tuple[float, float]]) -> None:
+    """Say where a stimulus asks for more than was recorded."""
+    fastest, strongest = float(model.speeds_mm_s[-1]), float(model.forces_n[-1])
+    for speed, force in conditions:
+        if speed > fastest or force > strongest:
+            print(
+                f"note: {name} was recorded up to {fastest:g} mm/s and {strongest:g} N; "
+                f"{speed:g} mm/s at {force:g} N is rendered as its nearest edge."
+            )
+
+
+def models_of_study(
+    models: Mapping[str, TextureModel], responses: Responses
+) -> dict[str, TextureModel]:
+    """The models of the textures that were asked about, all of them."""
+    asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
+    missing = [texture for texture in asked if texture not in models]
+    if missing:
+        raise ValueError(
+            f"expected a model of each texture in the answers, got none of {', '.join(missing)}; "
+            "give the folder of the models that were presented."
+        )
+    return {texture: models[texture] for texture in asked}
+
+
+def _read_object(path: Path) -> dict[str, Any]:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        values = None
+    if not isinstance(values, dict):
+        raise ValueError(f"expected a JSON object in {path}, got something else; remove the file.")
+    return values
 
 
 def labels_of(
     files: Sequence[Path],
     table: Path | None,
-    texture: str | None,
+    texture: str,
     speed: float | None,
     force: float | None,
 ) -> list[Label]:
     from rig.importing import Label, labels_from_table
 
     if table is not None:
+        if speed is not None or force is not None:
+            raise ValueError(
+                "expected labels from --labels or from --speed and --force, got both; give one."
+            )
         return labels_from_table(table, files, texture=texture)
     if speed is None or force is None:
         raise ValueError(
             "expected the speed and force of the files, got "
             f"--speed {speed} and --force {force}; give both, or --labels with a TSV."
         )
-    return [Label(texture or "unnamed", speed, force) for _ in files]
+    return [Label(texture, speed, force) for _ in files]
 
 
 def add_to_set(
@@ -121,13 +190,17 @@ def add_to_set(
     warn_of_clipping(new)
     known = RecordingSet.load(out).recordings if (out / INDEX_NAME).is_file() else ()
     earlier = out / "provenance.json"
-    before = json.loads(earlier.read_text(encoding="utf-8")) if earlier.is_file() else None
+    before = _read_object(earlier) if earlier.is_file() else None
     everything = RecordingSet([*known, *new.recordings])
     everything.save(out)
     write_provenance(earlier, command, {**settings, "added to": before}, inputs=files)
     if any(r.unit == "arbitrary" for r in new.recordings):
-        print("note: the unit is arbitrary (no g per full scale), so models cannot be simplified.")
-    print(f"{len(new)} recordings added, {len(everything)} in {out}")
+        print(
+            "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "
+            "(WAV) or --unit (CSV)."
+        )
+    rates = sorted({f"{r.rate_hz:g}" for r in new.recordings})
+    print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {len(everything)} in {out}")
 
 
 def warn_of_clipping(records: RecordingSet) -> None:
@@ -140,30 +213,37 @@ def warn_of_clipping(records: RecordingSet) -> None:
             )
 
 
-def fit_or_tell(records: RecordingSet, estimator: str, shortfalls: list[str]) -> list[TextureModel]:
-    """The texture's model; where the grid does not allow one, the reason goes to `shortfalls`."""
+def fit_or_why_not(records: RecordingSet, estimator: str) -> tuple[TextureModel | None, str | None]:
+    """The texture's model, or the reason where its recordings do not span a grid."""
     from modeling import GridError, fit_texture
 
     try:
-        return [fit_texture(records, estimator=estimator)]
+        return fit_texture(records, estimator=estimator), None
     except GridError as error:
-        shortfalls.append(str(error))
-        return []
+        return None, str(error)
 
 
 def save_and_tell(fitted: TextureModel, out: Path) -> None:
     from modeling import missing_conditions
+    from modeling.files import file_stem
 
-    path = out / f"{stem(fitted.texture)}.json"
+    path = out / f"{file_stem(fitted.texture)}.json"
     fitted.save(path)
+    conditions = fitted.noise_gains.size
     inherited = int(fitted.inherited.any(axis=2).sum())
+    unresolved = int(fitted.unresolved.any(axis=2).sum())
     print(
-        f"{fitted.texture}: {fitted.n_layers} layers, {fitted.n_parameters} numbers per condition, "
-        f"frequencies inherited in {inherited} of {fitted.noise_gains.size} conditions: {path}"
+        f"{fitted.texture}{simulated_note(fitted)}: {fitted.n_layers} layers, "
+        f"{fitted.n_parameters} numbers per condition; some layer inherited its frequency in "
+        f"{inherited} and was not resolved in {unresolved} of {conditions} conditions: {path}"
     )
     if missing := missing_conditions(fitted):
         names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
         print(f"{fitted.texture}: interpolated for want of a recording: {names}")
+
+
+def simulated_note(model: TextureModel) -> str:
+    return " (simulated)" if model.simulated else ""
 
 
 def threshold_named(name: str) -> Threshold:
@@ -185,8 +265,51 @@ def load_models(folder: Path) -> dict[str, TextureModel]:
     paths = sorted(p for p in folder.glob("*.json") if not p.name.endswith("provenance.json"))
     if not paths:
         raise ValueError(f"expected model files in {folder}, got none; fit or simplify some first.")
-    models = [TextureModel.load(path) for path in paths]
-    return {fitted.texture: fitted for fitted in models}
+    models: dict[str, TextureModel] = {}
+    for path in paths:
+        fitted = TextureModel.load(path)
+        if fitted.texture in models:
+            raise ValueError(
+                f"expected one model of each texture in {folder}, got two of {fitted.texture!r}; "
+                f"move {path.name} or the other one away."
+            )
+        models[fitted.texture] = fitted
+    return models
+
+
+def simplification_shown(
+    full: TextureModel,
+    shown: TextureModel | None,
+    threshold: Threshold,
+    *,
+    criterion: CriterionName,
+    margin_db: float,
+) -> Simplification:
+    """The verdicts behind the simplified model that people felt; refused where they differ."""
+    from modeling import simplify
+
+    verdicts = simplify(full, threshold, criterion=criterion, margin_db=margin_db)
+    if verdicts.model != shown:
+        raise ValueError(
+            f"expected the simplified model of {full.texture} to be the one that {threshold.name}, "
+            f"{criterion} and {margin_db:g} dB give, got "
+            f"{'another' if shown else 'none'}; give the --threshold, --criterion and --margin-db "
+            "that it was made with."
+        )
+    return verdicts
+
+
+def open_console(*, fullscreen: bool, screen: int) -> Console:
+    """The console's window; where there is no screen, one sentence instead of a traceback."""
+    from experiments.console import Console
+
+    try:
+        return Console(fullscreen=fullscreen, screen=screen)
+    except Exception as error:  # whatever the window system raises means the same to a user
+        raise ValueError(
+            f"expected a screen for the console, got {error or type(error).__name__}; start a "
+            "graphical session (or Xvfb) and set DISPLAY."
+        ) from error
 
 
 def run_study(
@@ -222,15 +345,16 @@ def demo_texture(name: str, folder: Path, seed: int) -> TextureResult:
     from analysis.tables import TextureResult
     from modeling import RecordingSet, Threshold, fit_texture
     from modeling import simplify as drop_layers
+    from modeling.files import file_stem
     from stimuli.planted import planted_texture, record_texture
 
     truth = planted_texture(name)
-    place = folder / "recordings" / stem(name)
+    place = folder / "recordings" / file_stem(name)
     record_texture(truth, seed=seed).save(place)
     records = RecordingSet.load(place)
     full = fit_texture(records)
     simplification = drop_layers(full, Threshold.shipped("codec"))
-    full.save(folder / "models" / f"{stem(name)}.json")
-    simplification.model.save(folder / "simplified" / f"{stem(name)}.json")
+    full.save(folder / "models" / f"{file_stem(name)}.json")
+    simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     others = (fit_texture(records, estimator="paper"),)
     return TextureResult(records, full, simplification, truth, others)

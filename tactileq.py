@@ -11,16 +11,22 @@ import typer
 
 from steps import (
     add_to_set,
+    check_own_model,
+    check_own_results,
     demo_texture,
-    fit_or_tell,
+    fit_or_why_not,
     labels_of,
     load_models,
+    models_of_study,
+    open_console,
     progress,
     run_study,
     save_and_tell,
     share_of,
-    stem,
+    simplification_shown,
+    simulated_note,
     study_from,
+    tell_clamped,
     threshold_named,
     warn_of_clipping,
     write_provenance,
@@ -61,20 +67,29 @@ Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")
 Simplified = Annotated[Path, typer.Option("--simplified", help="Folder of simplified models.")]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 
-DEMO_CONTENTS = {
-    *("recordings", "models", "simplified", "stimuli", "data", "tables", "figures"),
-    *("report.html", "provenance.json"),
-}
+REPORT_CONTENTS = {"report.html", "tables", "figures", "provenance.json"}
+DEMO_CONTENTS = REPORT_CONTENTS | {"recordings", "models", "simplified", "stimuli", "data"}
 
 
 def main() -> None:
     """Run the command line; bad input ends with one sentence and exit code 1."""
     try:
         app(standalone_mode=True)
-    except (ValueError, OSError) as error:
-        # InputError is a ValueError, StoreError an OSError; both carry their own sentence.
-        print(f"error: {error}", file=sys.stderr)
-        raise SystemExit(1) from None
+        return
+    except OSError as error:
+        # A StoreError carries its own sentence, the system's errors only a number and a word.
+        sentence = str(error)
+        if error.errno is not None and error.filename is not None:
+            sentence = (
+                f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
+                "path, its permissions and the space on the disk."
+            )
+    except ValueError as error:  # InputError is one
+        sentence = str(error)
+    except MemoryError:
+        sentence = "expected a task that fits the memory, got a larger one; ask for less at once."
+    print(f"error: {sentence}", file=sys.stderr)
+    raise SystemExit(1)
 
 
 # --- From recordings to models ----------------------------------------------------------------
@@ -94,13 +109,17 @@ def record(
     """
     from stimuli.planted import planted_texture, record_texture
 
-    records = record_texture(
-        planted_texture(texture), rate_hz=rate_hz, duration_s=duration_s, seed=seed
-    )
-    records.save(folder)
-    write_provenance(
-        folder / "provenance.json", "record", {"texture": texture, "rate_hz": rate_hz}, seed=seed
-    )
+    if not duration_s > 0:
+        raise ValueError(f"expected a duration above 0 s, got {duration_s:g}; give a longer one.")
+    if folder.exists() and (folder.is_file() or any(folder.iterdir())):
+        raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")
+    truth = planted_texture(texture)
+    with progress(f"Recording {texture} in silico", 1) as advance:
+        records = record_texture(truth, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
+        records.save(folder)
+        advance("")
+    settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
+    write_provenance(folder / "provenance.json", "record", settings, seed=seed)
     print(f"{len(records)} simulated recordings of {texture} in {folder}")
 
 
@@ -125,7 +144,9 @@ def import_wav(
     from rig.importing import import_wav as read
 
     records = read(
-        files, labels_of(files, labels, texture, speed, force), g_per_fullscale=g_per_fullscale
+        files,
+        labels_of(files, labels, texture or out.name, speed, force),
+        g_per_fullscale=g_per_fullscale,
     )
     settings = {"g_per_fullscale": g_per_fullscale, "labels": str(labels)}
     add_to_set(out, records, "import wav", settings=settings, files=files)
@@ -157,7 +178,7 @@ def import_csv(
 
     records = read(
         files,
-        labels_of(files, labels, texture, speed, force),
+        labels_of(files, labels, texture or out.name, speed, force),
         axis=axis,
         unit=unit,
         rate_hz=rate_hz,
@@ -174,18 +195,22 @@ def model(
 ) -> None:
     """Find the layers of every recording and fit a model of each texture over its grid.
 
-    Writes TEXTURE.json, layers.tsv, spectra.tsv and TEXTURE_spectra.png.
+    Writes TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv and TEXTURE_spectra.png.
 
     Example: tactileq model recordings/canvas --out models
     """
     from analysis.comparison import spectrum_panels
     from analysis.figures import figure_spectra
     from analysis.recordings import layers_table, spectra_table
-    from modeling import RecordingSet, TextureModel
-    from modeling.files import write_text
+    from modeling import RecordingSet
+    from modeling.files import file_stem, write_text
     from modeling.spectra import MODEL_RATE_HZ
 
     records = RecordingSet.load(folder)
+    if len({file_stem(texture) for texture in records.textures}) < len(records.textures):
+        raise ValueError(
+            f"expected textures that differ in letters or digits, got {records.textures}; rename."
+        )
     warn_of_clipping(records)
     rate_hz = min(r.rate_hz for r in records.recordings)
     if rate_hz < MODEL_RATE_HZ:
@@ -193,28 +218,34 @@ def model(
             f"note: the data's rate of {rate_hz:g} Hz becomes the model's; the band from "
             f"{rate_hz / 2:g} to {MODEL_RATE_HZ / 2:g} Hz is lost."
         )
-    layers = layers_table(records, estimator=estimator)
-    spectra = spectra_table(records)
-    models: list[TextureModel] = []
-    shortfalls: list[str] = []
-    with progress("Fitting", len(records.textures)) as advance:
+    for texture in records.textures:
+        check_own_model(out / file_stem(texture), "model")
+    results = []
+    with progress("Finding layers, fitting", len(records.textures)) as advance:
         for texture in records.textures:
-            models += fit_or_tell(records.of_texture(texture), estimator, shortfalls)
+            one = records.of_texture(texture)
+            tables = {
+                "layers": layers_table(one, estimator=estimator),
+                "spectra": spectra_table(one),
+            }
+            panels = figure_spectra(spectrum_panels(one, estimator=estimator))
+            results.append((texture, tables, panels, *fit_or_why_not(one, estimator)))
             advance(texture)
     out.mkdir(parents=True, exist_ok=True)
-    for name, table in (("layers", layers), ("spectra", spectra)):
-        write_text(out / f"{name}.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
-    for texture in records.textures:
-        picture = out / f"{stem(texture)}_spectra.png"
-        panels = spectrum_panels(records.of_texture(texture), estimator=estimator)
-        figure_spectra(panels).savefig(picture, dpi=110)
-        print(f"spectra of {texture}: {picture}")
-    for fitted in models:
-        save_and_tell(fitted, out)
-    print(f"layers of each recording: {out / 'layers.tsv'}")
-    for shortfall in shortfalls:
-        print(f"no full model of {shortfall}")
-    write_provenance(out / "provenance.json", "model", {"estimator": estimator}, inputs=[folder])
+    for texture, tables, panels, fitted, why_not in results:
+        start = out / file_stem(texture)
+        for name, table in tables.items():
+            text = table.to_csv(sep="\t", index=False, na_rep="n/a")
+            write_text(f"{start}_{name}.tsv", text)
+        panels.savefig(f"{start}_spectra.png", dpi=110)
+        write_provenance(
+            Path(f"{start}_provenance.json"), "model", {"estimator": estimator}, inputs=[folder]
+        )
+        print(f"{texture}: layers of each recording in {start}_layers.tsv, {start}_spectra.png")
+        if fitted is None:
+            print(f"no full model of {why_not}")
+        else:
+            save_and_tell(fitted, out)
 
 
 @app.command()
@@ -232,18 +263,15 @@ def simplify(
     from analysis.tables import simplification_table
     from modeling import TextureModel
     from modeling import simplify as drop_layers
-    from modeling.files import write_text
+    from modeling.files import file_stem, write_text
 
     full = TextureModel.load(model_file)
+    start = out / file_stem(full.texture)
+    check_own_model(start, "simplify")
     result = drop_layers(full, threshold_named(threshold), criterion=criterion, margin_db=margin_db)
-    path = out / f"{stem(full.texture)}.json"
-    if path.resolve() == model_file.resolve():
-        raise ValueError(f"expected --out to be another folder than {model_file.parent}; name one.")
-    result.model.save(path)
+    result.model.save(f"{start}.json")
     table = simplification_table(result)
-    write_text(
-        out / f"{stem(full.texture)}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a")
-    )
+    write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
     for verdict in result.layers:
         line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"
         if not isnan(verdict.distance_db):  # where a threshold is known
@@ -254,10 +282,9 @@ def simplify(
         print(line)
     print(f"threshold: {result.threshold.name} ({result.threshold.caveat})")
     settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
-    write_provenance(
-        out / f"{stem(full.texture)}_provenance.json", "simplify", settings, inputs=[model_file]
-    )
-    print(f"{full.n_layers} layers to {result.model.n_layers}: {path}")
+    provenance = Path(f"{start}_provenance.json")
+    write_provenance(provenance, "simplify", settings, inputs=[model_file])
+    print(f"{full.n_layers} layers to {result.model.n_layers}{simulated_note(full)}: {start}.json")
 
 
 @app.command()
@@ -279,8 +306,11 @@ def stimuli(
     from modeling import TextureModel
     from stimuli.sets import write_set
 
-    chosen = [(path.resolve().parent.name, TextureModel.load(path)) for path in models]
+    # models/*.json names what the models came from, too.
+    paths = [path for path in models if not path.name.endswith("provenance.json")]
+    chosen = [(path.resolve().parent.name, TextureModel.load(path)) for path in paths]
     conditions = [(v, f) for v in speed or [150.0] for f in force or [1.5]]
+    settings = {"conditions": conditions, "rate_hz": rate_hz, "duration_s": duration_s}
     with progress("Rendering", len(chosen) * len(conditions)) as advance:
         manifest = write_set(
             out,
@@ -291,9 +321,9 @@ def stimuli(
             seed=seed,
             progress=advance,
         )
-    write_provenance(
-        out / "provenance.json", "stimuli", {"rate_hz": rate_hz}, seed=seed, inputs=models
-    )
+    write_provenance(out / "provenance.json", "stimuli", settings, seed=seed, inputs=models)
+    for label, chosen_model in chosen:
+        tell_clamped(f"{chosen_model.texture} ({label})", chosen_model, conditions)
     print(f"{len(manifest)} files: {out / 'manifest.tsv'}")
 
 
@@ -316,7 +346,6 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --data data
     """
-    from experiments.console import Console
     from experiments.models import ModelSets
     from experiments.simulate import PROTOCOLS
     from rig.twin import SimulatedRig
@@ -325,7 +354,7 @@ def session(
     sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
     sets.require(plan.textures)
     print("note: the rig is the simulated one; its data are marked simulated.")
-    with Console(fullscreen=fullscreen, screen=screen) as console:
+    with open_console(fullscreen=fullscreen, screen=screen) as console:
         result = PROTOCOLS[task](
             plan,
             subject=subject,
@@ -335,6 +364,8 @@ def session(
             respondent=console,
             data_folder=data,
         )
+    note = data / "sourcedata" / f"{result.path.stem.removesuffix('_beh')}_provenance.json"
+    write_provenance(note, "session", {"task": task}, inputs=[models, simplified])
     print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
 
 
@@ -353,12 +384,20 @@ def simulate(
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
-    from stimuli.planted import planted_texture
+    from stimuli.planted import TEXTURES, planted_texture
 
     plan = study_from(study)
+    if unknown := [name for name in plan.textures if name not in TEXTURES]:
+        raise ValueError(
+            f"expected a study of the planted textures {', '.join(TEXTURES)}, which stand for the "
+            f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
+        )
     real = {name: planted_texture(name) for name in plan.textures}
     full, fewer = load_models(models), load_models(simplified)
     run_study(plan, real, full, fewer, data, threshold_named(threshold), seed)
+    note = data / "sourcedata" / "simulate_provenance.json"
+    settings = {"study": plan.to_dict(), "threshold": threshold}
+    write_provenance(note, "simulate", settings, seed=seed, inputs=[models, simplified])
     print(f"simulated answers: {data}")
 
 
@@ -370,6 +409,7 @@ def analyze(
         Path | None, typer.Option(help="Folder of recording sets, one folder per texture.")
     ] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
+    simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
     margin_db: Margin = 0.0,
@@ -377,34 +417,42 @@ def analyze(
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
-    With --recordings and --models the report also tells how good and how small the models are.
+    With --recordings, --models and --simplified the report also tells how good and how small the
+    models are; the threshold's options must be those of tactileq simplify.
 
-    Example: tactileq analyze data --recordings recordings --models models --out results
+    Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
     from analysis.load import load_responses
     from analysis.report import write_report
     from analysis.tables import TextureResult
     from modeling import RecordingSet
-    from modeling import simplify as drop_layers
+    from modeling.files import file_stem, replace_folder
 
-    if (recordings is None) != (models is None):
-        raise ValueError("expected --recordings and --models together, got one; give both.")
+    check_own_results(out, "analyze", contents=REPORT_CONTENTS)
     responses = load_responses(data)
+    folders = (recordings, models, simplified)
     results = []
-    if recordings is not None and models is not None:
-        level = threshold_named(threshold)
-        for full in load_models(models).values():
-            records = RecordingSet.load(recordings / stem(full.texture))
-            fewer = drop_layers(full, level, criterion=criterion, margin_db=margin_db)
-            results.append(TextureResult(records.of_texture(full.texture), full, fewer))
+    if recordings is not None and models is not None and simplified is not None:
+        level, shown = threshold_named(threshold), load_models(simplified)
+        for texture, full in models_of_study(load_models(models), responses).items():
+            verdicts = simplification_shown(
+                full, shown.get(texture), level, criterion=criterion, margin_db=margin_db
+            )
+            records = RecordingSet.load(recordings / file_stem(texture)).of_texture(texture)
+            results.append(TextureResult(records, full, verdicts))
+    elif folders != (None, None, None):
+        raise ValueError(
+            "expected --recordings, --models and --simplified together, got only some of them; "
+            "give all three or none."
+        )
     settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
-    inputs = [path for path in (data, recordings, models) if path is not None]
-    provenance = write_provenance(
-        out / "provenance.json", "analyze", settings, seed=seed, inputs=inputs
-    )
-    with share_of("Reporting") as tell:
-        path = write_report(
-            out / "report.html",
+    inputs = [path for path in (data, *folders) if path is not None]
+    with replace_folder(out) as fresh, share_of("Reporting") as tell:
+        provenance = write_provenance(
+            fresh / "provenance.json", "analyze", settings, seed=seed, inputs=inputs
+        )
+        write_report(
+            fresh / "report.html",
             responses=responses,
             textures=results,
             provenance=provenance,
@@ -413,7 +461,7 @@ def analyze(
         )
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    print(path.resolve())
+    print((out / "report.html").resolve())
 
 
 @app.command()
@@ -430,11 +478,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     from stimuli.planted import TEXTURES
     from stimuli.sets import write_set
 
-    if out.exists() and not {path.name for path in out.iterdir()} <= DEMO_CONTENTS:
-        raise ValueError(
-            f"expected a new folder or an earlier demo, got {out} with other files in it; "
-            "choose another one."
-        )
+    check_own_results(out, "demo", contents=DEMO_CONTENTS)
     plan = study_from(None)
     threshold = threshold_named("codec")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")

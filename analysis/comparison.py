@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.tables import TextureResult
-from modeling import InputError, RecordingSet, TextureModel, Threshold, find_layers, spectrum
+from modeling import InputError, RecordingSet, TextureModel, Threshold, find_layers
 from modeling.fitting import condition_spectra
 from modeling.simplification import CriterionName, layer_amplitudes_g
 from modeling.spectra import SMOOTHING_HZ, smooth
@@ -74,7 +74,7 @@ def compare_spectra(
         Where the condition was not recorded.
     """
     full, simplification = result.model, result.simplification
-    measured = spectrum(result.recording_at(speed_mm_s, force_n), rate_hz=full.rate_hz)
+    measured = result.spectrum_at(speed_mm_s, force_n)
     frequency = measured.frequency_hz
 
     def smoothed_response(model: TextureModel) -> Floats:

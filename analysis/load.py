@@ -43,6 +43,7 @@ _TEXTS = {
     "absolute": ("phase", "texture", "model", "tray", "first_surface", "simulated"),
     "relative": ("phase", "texture", "model", "tray", "layout", "answer", "simulated"),
 }
+_SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _REQUIRED = ("trial", "phase", "texture", "model", "simulated")
 
 
@@ -59,23 +60,31 @@ class Responses:
     relative : DataFrame
         Main trials of the seven-alternative forced choice: participant_id, session, trial,
         texture, model, tray, layout, answer, correct (0, 1 or NaN), presses, response_time_s (s).
-    simulated : bool
+    simulated_participants : bool
         True where no person took part.
+    simulated_rig : bool
+        True where no real rig was used, so that nobody felt a real surface.
     absolute_training, relative_training : DataFrame
         The training trials, same columns; no statistic uses them.
     name : str
         The study's name.
     warnings : tuple of str
-        What was dropped on reading and why, one sentence each.
+        What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
 
     absolute: pd.DataFrame
     relative: pd.DataFrame
-    simulated: bool
+    simulated_participants: bool
+    simulated_rig: bool
     absolute_training: pd.DataFrame
     relative_training: pd.DataFrame
     name: str = ""
     warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def simulated(self) -> bool:
+        """True where participants or rig were simulated."""
+        return self.simulated_participants or self.simulated_rig
 
 
 def load_responses(data_folder: str | Path) -> Responses:
@@ -85,24 +94,27 @@ def load_responses(data_folder: str | Path) -> Responses:
     ----------
     data_folder : str or Path
         Folder holding dataset_description.json, participants.tsv and
-        sub-*/ses-*/beh/sub-*_ses-*_task-(absolute|relative)_beh.tsv.
+        sub-*/ses-*/beh/sub-*_ses-*_task-(absolute|relative)_beh.tsv; beside each its sidecar, and
+        below sourcedata/ the order of its trials, where they are there.
 
     Returns
     -------
     Responses
-        A last line cut short by a killed process is dropped and named in `warnings`.
+        A last line cut short by a killed process is dropped and named in `warnings`; so is a
+        session with fewer answers than planned trials.
 
     Raises
     ------
     InputError
-        Where the folder is none, a file is malformed, a value is out of range, or simulated
-        and real answers are mixed.
+        Where the folder is none, a file is malformed, a value is out of range, or answers are
+        mixed that differ in whether participants or rig were simulated.
     """
     folder = Path(data_folder)
     description = _description(folder)
-    simulated = bool(description["Simulated"])
+    simulated = {key: bool(description.get(key)) for key in _SIMULATED}
     warnings: list[str] = []
-    _check_participants(folder / "participants.tsv", simulated, warnings=warnings)
+    participants = simulated["SimulatedParticipant"]
+    _check_participants(folder / "participants.tsv", participants, warnings=warnings)
     tables = {
         task: _load_task(folder, task, simulated=simulated, warnings=warnings) for task in _TEXTS
     }
@@ -116,7 +128,8 @@ def load_responses(data_folder: str | Path) -> Responses:
     return Responses(
         absolute=absolute,
         relative=relative,
-        simulated=simulated,
+        simulated_participants=participants,
+        simulated_rig=simulated["SimulatedRig"],
         absolute_training=absolute_training,
         relative_training=relative_training,
         name=str(description.get("Name", "")),
@@ -131,23 +144,34 @@ def _description(folder: Path) -> Mapping[str, object]:
             f"expected a data folder, but {folder} is not one; name the folder that holds "
             f"dataset_description.json."
         )
-    try:
-        description = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.is_file():
         raise InputError(
             f"expected {path}, which is not there; name the folder of a study, the one that "
             f"holds dataset_description.json."
-        ) from None
-    except (OSError, ValueError) as problem:
-        raise InputError(
-            f"expected JSON in {path}, but it cannot be read ({problem}); restore the file."
-        ) from None
-    if not isinstance(description, dict) or not isinstance(description.get("Simulated"), bool):
+        )
+    description = _json_object(path)
+    if not isinstance(description.get("Simulated"), bool):
         raise InputError(
             f'expected "Simulated": true or false in {path}; add it, so that no one takes '
             f"simulated answers for a person's."
         )
+    parts = [description.get(key, False) for key in _SIMULATED[1:]]
+    if any(parts) != description["Simulated"] or not all(isinstance(p, bool) for p in parts):
+        raise InputError(
+            f'expected "SimulatedParticipant" and "SimulatedRig" in {path}, one of them true '
+            f'exactly where "Simulated" is, got {parts[0]} and {parts[1]}; say what was simulated.'
+        )
     return description
+
+
+def _json_object(path: Path) -> Mapping[str, object]:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise InputError(
+            f"expected JSON in {path}, but it cannot be read ({problem}); restore the file."
+        ) from None
+    return values if isinstance(values, dict) else {}
 
 
 def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> None:
@@ -159,7 +183,7 @@ def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> 
 
 
 def _load_task(
-    folder: Path, task: str, *, simulated: bool, warnings: list[str]
+    folder: Path, task: str, *, simulated: Mapping[str, bool], warnings: list[str]
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
     sessions = []
@@ -170,14 +194,44 @@ def _load_task(
                 f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
                 f"move the file back to its own participant's folder."
             )
+        _check_sidecar(path.with_suffix(".json"), simulated)
         table = _read_lines(path, warnings)
+        order = folder / "sourcedata" / participant / session
+        order /= path.name.removesuffix("beh.tsv") + "order.json"
+        if len(table) < (planned := _planned_trials(order)):
+            warnings.append(
+                f"{participant} {task} {session} answered {len(table)} of {planned} trials "
+                "(ended early)."
+            )
         if table.columns.empty:
             continue
-        _check_session(table, task, path=path, simulated=simulated)
+        _check_session(table, task, path=path, simulated=simulated["Simulated"])
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)
     return pd.concat(sessions, ignore_index=True) if sessions else None
+
+
+def _check_sidecar(path: Path, simulated: Mapping[str, bool]) -> None:
+    """Refuse a session that says otherwise than the data set what was simulated."""
+    sidecar = _json_object(path) if path.is_file() else {}
+    for key, value in simulated.items():
+        if sidecar.get(key, value) is not value:
+            raise InputError(
+                f"expected {key} {json.dumps(value)} in {path}, as dataset_description.json says, "
+                f"never a mixture, but found {json.dumps(sidecar[key])}; correct the file or leave "
+                "its session out."
+            )
+
+
+def _planned_trials(order: Path) -> int:
+    """Number of trials in a session's stored order; 0 where there is none."""
+    if not order.is_file():
+        return 0
+    trials = _json_object(order).get("trials")
+    if not isinstance(trials, list):
+        raise InputError(f"expected a list of trials in {order}, found none; restore the file.")
+    return len(trials)
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:

@@ -90,23 +90,34 @@ def _planted_outcome(estimator: str, rows: pd.DataFrame) -> str:
     )
 
 
-def cautions(families: Sequence[pd.DataFrame], *, simulated: bool, models: bool) -> list[str]:
+def cautions(
+    families: Sequence[pd.DataFrame],
+    *,
+    simulated_participants: bool,
+    simulated_rig: bool,
+    models: bool,
+) -> list[str]:
     """What may not be concluded.
 
     Parameters
     ----------
     families : sequence of DataFrame
         Paired tests that the report shows, from `statistics`.
-    simulated : bool
-        Whether the answers are simulated.
+    simulated_participants, simulated_rig : bool
+        Whether the answers are simulated, and whether the rig was.
     models : bool
         Whether the report shows likeness of spectra.
     """
     sentences = []
-    if families and simulated:
+    if families and simulated_participants:
         sentences.append(
             "Simulated participants follow a model that was written down beforehand: their "
             "answers test the procedure and say nothing about what people feel."
+        )
+    elif families and simulated_rig:
+        sentences.append(
+            "The participants are people, but the rig was simulated and nobody felt a real "
+            "surface: their answers test the procedure and say nothing about what people feel."
         )
     if families:
         unshown = sum(int((tests["p_holm"] >= ALPHA).sum()) for tests in families)

@@ -7,13 +7,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from modeling import RecordingSet, find_layers, spectrum
+from modeling import Recording, RecordingSet, Spectrum, find_layers
+from modeling.fitting import recording_spectra
 
 SPECTRUM_STEP_HZ = 5.0
 
 
 def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent") -> pd.DataFrame:
     """The layers of each recording alone: one row per layer, or one with `layer` 0 where none is.
+
+    The sensor's floor (recordings at force 0) is subtracted and not listed.
 
     Parameters
     ----------
@@ -29,8 +32,8 @@ def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent
         unresolved.
     """
     rows: list[dict[str, Any]] = []
-    for recording in recordings.recordings:
-        found = find_layers(spectrum(recording), estimator=estimator)
+    for recording, measured in _spectra(recordings):
+        found = find_layers(measured, estimator=estimator)
         labels = {
             "texture": recording.texture,
             "speed_mm_s": recording.speed_mm_s,
@@ -60,14 +63,16 @@ def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent
 def spectra_table(recordings: RecordingSet) -> pd.DataFrame:
     """The smoothed spectrum (σ = 30 Hz) of each recording every 5 Hz, in long form.
 
+    The sensor's floor (recordings at force 0) is subtracted and not listed.
+
     Returns
     -------
     DataFrame
-        texture, speed_mm_s, force_n, repeat, frequency_hz, magnitude (unit per unit noise).
+        texture, speed_mm_s, force_n, repeat, simulated, frequency_hz, magnitude (unit per unit
+        noise).
     """
     parts = []
-    for recording in recordings.recordings:
-        measured = spectrum(recording)
+    for recording, measured in _spectra(recordings):
         frequency = np.arange(0.0, measured.rate_hz / 2, SPECTRUM_STEP_HZ)
         parts.append(
             pd.DataFrame(
@@ -76,9 +81,19 @@ def spectra_table(recordings: RecordingSet) -> pd.DataFrame:
                     "speed_mm_s": recording.speed_mm_s,
                     "force_n": recording.force_n,
                     "repeat": recording.repeat,
+                    "simulated": recording.simulated,
                     "frequency_hz": frequency,
                     "magnitude": np.interp(frequency, measured.frequency_hz, measured.smoothed()),
                 }
             )
         )
     return pd.concat(parts, ignore_index=True)
+
+
+def _spectra(recordings: RecordingSet) -> list[tuple[Recording, Spectrum]]:
+    """All recordings with contact; each texture has its own floor and rate."""
+    return [
+        pair
+        for texture in recordings.textures
+        for pair in recording_spectra(recordings.of_texture(texture))
+    ]

@@ -119,7 +119,8 @@ def _sections(
 def _overview(sections: Sequence[Section], responses: Responses | None, *, models: bool) -> str:
     cautions = outcomes.cautions(
         [section.tests for section in sections if section.tests is not None],
-        simulated=responses is not None and responses.simulated,
+        simulated_participants=responses is not None and responses.simulated_participants,
+        simulated_rig=responses is not None and responses.simulated_rig,
         models=models,
     )
     warnings = responses.warnings if responses is not None else ()
@@ -138,11 +139,15 @@ def _overview(sections: Sequence[Section], responses: Responses | None, *, model
 
 def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:
     reasons = []
-    if any(result.simulated for result in textures):
-        reasons.append("no real surface was touched")
-    if responses is not None and responses.simulated:
+    simulated = [result.simulated for result in textures]
+    if any(simulated):
+        whose = "" if all(simulated) else f" of {sum(simulated)} of {len(simulated)} textures"
+        reasons.append(f"the recordings{whose} come from no real surface")
+    if responses is not None and responses.simulated_participants:
         reasons.append("no person took part")
-    return f"SIMULATED: {' and '.join(reasons)}." if reasons else ""
+    elif responses is not None and responses.simulated_rig:
+        reasons.append("people took part, but at a simulated rig, where nobody felt a real surface")
+    return f"SIMULATED: {'; '.join(reasons)}." if reasons else ""
 
 
 def _provenance(facts: Mapping[str, str]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -15,6 +14,7 @@ from analysis.load import MODELS, Responses
 from analysis.page import Fold, Item, Picture, Table
 from analysis.planted import ALL_LAYERS, planted_layers_table, planted_truth_table
 from analysis.tables import TextureResult, gfc_table, simplification_table
+from modeling.files import file_stem
 
 Progress = Callable[[float, str], None]
 
@@ -110,14 +110,16 @@ def model_section(
 def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
     simplification = textures[0].simplification
     threshold = simplification.threshold
-    recorded = sum(len(result.recordings) for result in textures)
+    contact = [r for result in textures for r in result.recordings.recordings if r.force_n > 0]
+    simulated = sum(r.simulated for r in contact)
     estimators = ", ".join(sorted({result.model.estimator for result in textures}))
-    simulated = "simulated " if any(result.simulated for result in textures) else ""
+    whose = "simulated " if simulated == len(contact) else ""
+    part = f", {simulated} of them simulated" if simulated and not whose else ""
     return (
-        f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to {recorded} "
-        f"{simulated}recordings (estimator {estimators}). A layer was dropped only where it lies "
-        f"below the threshold “{threshold.name}” in every condition (criterion "
-        f"“{simplification.criterion}”, margin {simplification.margin_db:g} dB).",
+        f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to "
+        f"{len(contact)} {whose}recordings{part} (estimator {estimators}). A layer was "
+        f"dropped only where it lies below the threshold “{threshold.name}” in every condition "
+        f"(criterion “{simplification.criterion}”, margin {simplification.margin_db:g} dB).",
         f"Source of the threshold “{threshold.name}”: {threshold.source.rstrip('.')}. Caveat: "
         f"{threshold.caveat.rstrip('.')}.",
     )
@@ -136,13 +138,14 @@ def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
 
 
 def _texture_fold(result: TextureResult, *, number: int) -> Fold:
-    stem = f"{number + 1}_{_file_name(result.texture)}"
+    stem = f"{number + 1}_{file_stem(result.texture)}"
     verdicts = Table(
         f"verdicts_{stem}",
         f"{result.texture}: verdict on each layer",
         "Distance to the threshold in the condition where the layer stands highest against it "
-        "(+ above); flip probability: chance that other records of the same length would turn the "
-        "verdict.",
+        "(+ above); flip probability: chance that the level's sampling error, which the records' "
+        "length leaves, would turn the verdict in other records; whether the estimator would find "
+        f"the layer again, and its bias, are not in it.{_unresolved_note(result)}",
         simplification_table(result.simplification),
         result.simulated,
         VERDICT_COLUMNS,
@@ -152,6 +155,16 @@ def _texture_fold(result: TextureResult, *, number: int) -> Fold:
         f"{result.texture}: {kept} of {all_layers} layers kept",
         (verdicts, _threshold_picture(result, stem), _course_picture(result, stem)),
         opened=number == 0,
+    )
+
+
+def _unresolved_note(result: TextureResult) -> str:
+    unresolved = result.model.unresolved
+    if not unresolved.any():
+        return ""
+    return (
+        f" In {unresolved.sum()} of {unresolved.size} layer-conditions (a layer in a condition) "
+        "the full model's width or level is not resolved by the 30 Hz smoothing."
     )
 
 
@@ -244,9 +257,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
 def rating_section(responses: Responses) -> Section:
     """Absolute evaluation (PAPER VIII-A)."""
     tests = statistics.rating_tests(responses.absolute)
-    done, tile = _participants(
-        responses.absolute, "absolute evaluation", simulated=responses.simulated
-    )
+    done, tile = _participants(responses, responses.absolute, where="absolute evaluation")
     picture = Picture(
         "ratings",
         "Rated similarity of virtual and real surface",
@@ -282,7 +293,7 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
     chance = 1 / len(matrices["full"].textures)
     rates = statistics.correct_rates(relative, rng=rng, chance=chance)
     tests = statistics.rate_tests(relative)
-    done, tile = _participants(relative, "forced choice", simulated=simulated)
+    done, tile = _participants(responses, relative, where="forced choice")
     overall = rates[rates["texture"] == statistics.ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)
     rate_tile = (shown, f"right answers, full → simplified (chance {chance:.0%})")
@@ -353,11 +364,12 @@ def _rate_tables(
 
 
 def _participants(
-    trials: pd.DataFrame, where: str, *, simulated: bool
+    responses: Responses, trials: pd.DataFrame, *, where: str
 ) -> tuple[str, tuple[str, str]]:
     """The sentence and the tile that say how many took part."""
     people = trials["participant_id"].nunique()
-    who = "simulated participants" if simulated else "participants"
+    who = "simulated participants" if responses.simulated_participants else "participants"
+    who += " at the simulated rig" if responses.simulated_rig else ""
     sentence = f"{where.capitalize()}: {people} {who}, {len(trials)} trials (training left out)."
     return sentence, (str(people), f"{who}, {where}")
 
@@ -383,7 +395,3 @@ def reference_condition(result: TextureResult) -> tuple[float, float]:
     """(speed, force): the strongest force and the highest speed recorded at it."""
     conditions = [recording.condition for recording in result.recordings.recordings]
     return max(conditions, key=lambda condition: (condition[1], condition[0]))
-
-
-def _file_name(texture: str) -> str:
-    return re.sub(r"[^a-z0-9]+", "_", texture.lower()).strip("_") or "texture"

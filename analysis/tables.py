@@ -11,12 +11,13 @@ import pandas as pd
 from modeling import (
     InputError,
     LayerVerdict,
-    Recording,
     RecordingSet,
     Simplification,
+    Spectrum,
     TextureModel,
     similarity,
 )
+from modeling.fitting import recording_spectra
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +54,17 @@ class TextureResult:
         """True where no real surface was touched."""
         return self.model.simulated or any(r.simulated for r in self.recordings.recordings)
 
-    def recording_at(self, speed_mm_s: float, force_n: float) -> Recording:
-        """The first recording of a condition.
+    def spectrum_at(self, speed_mm_s: float, force_n: float) -> Spectrum:
+        """The first recording of a condition at the model's rate, sensor's floor subtracted.
 
         Raises
         ------
         InputError
             Where there is none.
         """
-        for recording in self.recordings.recordings:
+        for recording, measured in recording_spectra(self.recordings, rate_hz=self.model.rate_hz):
             if recording.condition == (speed_mm_s, force_n):
-                return recording
+                return measured
         raise InputError(
             f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and {force_n:g} N, "
             "got none; choose a recorded condition."
@@ -82,25 +83,41 @@ def gfc_table(
     Parameters
     ----------
     recordings : RecordingSet
-        What both models are held against, condition by condition.
+        What both models are held against, condition by condition; those at force 0 are the
+        sensor's floor and are subtracted.
     full, simplified : TextureModel
         Before and after simplification.
     rng : Generator
-        Draws behind the ceiling (METHOD 8).
+        Draws behind the ceiling (METHOD 8), the same for both models.
 
     Returns
     -------
     DataFrame
-        Two rows (model = full, simplified): texture, layers, parameters, conditions, then means
-        over the conditions: gfc30_mean (and gfc30_min), gfc30_floor (white noise of equal RMS),
-        gfc30_ceiling (draws of the recording's own spectrum), gfc5_mean, gfc5_floor,
-        gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of |error|),
-        band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
+        Two rows (model = full, simplified): texture, layers, parameters, conditions (recordings
+        above the sensor's floor), then means over them: gfc30_mean (and gfc30_min), gfc30_floor
+        (white noise of equal RMS), gfc30_ceiling (draws of the recording's own spectrum),
+        gfc5_mean, gfc5_floor, gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of
+        |error|), band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
     """
-    contact = [recording for recording in recordings.recordings if recording.force_n > 0]
+    above_floor = [
+        (recording, measured)
+        for recording, measured in recording_spectra(recordings, rate_hz=full.rate_hz)
+        if measured.magnitude.any()
+    ]
+    if not above_floor:
+        raise InputError(
+            f"{full.texture}: expected recordings above the sensor's floor, got none; check those "
+            "at force 0."
+        )
+    seeds = rng.integers(2**63, size=len(above_floor))
     rows = []
     for name, model in (("full", full), ("simplified", simplified)):
-        reports = [similarity.report(recording, model, rng=rng) for recording in contact]
+        reports = [
+            similarity.report(
+                measured, model.peq(*recording.condition), rng=np.random.default_rng(seed)
+            )
+            for (recording, measured), seed in zip(above_floor, seeds, strict=True)
+        ]
         labels = {
             "texture": full.texture,
             "model": name,
@@ -147,7 +164,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     DataFrame
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
         worst_frequency_hz (the condition where the layer stands highest against the threshold),
-        distance_db (to the threshold there, + above), flip_probability (0–1).
+        distance_db (to the threshold there, + above), flip_probability (0–1), simulated.
     """
     columns = [field.name for field in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
@@ -155,4 +172,4 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     # No condition is the worst one where no threshold is known in any.
     table.loc[table["distance_db"].isna(), worst] = np.nan
     table.insert(0, "texture", simplification.model.texture)
-    return table
+    return table.assign(simulated=simplification.model.simulated)

@@ -65,8 +65,11 @@ COLUMNS: dict[str, dict[str, Any]] = {
     "toggles": {"Description": "Changes between the real and the virtual surface"},
     "response_time_s": {"Description": "From first presentation to answer", "Units": "s"},
     "simulated": {
-        "Description": "Whether the participant or the rig was simulated",
-        "Levels": {"true": "simulated", "false": "a person at a real rig"},
+        "Description": "Whether the participant, the rig or both were simulated",
+        "Levels": {
+            "true": "simulated; SimulatedParticipant and SimulatedRig say what",
+            "false": "a person at a real rig",
+        },
     },
 }
 
@@ -118,7 +121,8 @@ def run_absolute(
         plan=plan,
         columns=COLUMNS,
         description=TASK_DESCRIPTION,
-        simulated=respondent.simulated or rig.simulated,
+        simulated_participant=respondent.simulated,
+        simulated_rig=rig.simulated,
     ) as store:
         script = _script(models, respondent)
         return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)

@@ -54,7 +54,8 @@ class SessionStore:
         plan: SessionPlan,
         columns: Mapping[str, Mapping[str, Any]],
         description: str,
-        simulated: bool,
+        simulated_participant: bool,
+        simulated_rig: bool,
     ) -> SessionStore:
         """Make the files of a session that has none yet, the order of its trials first.
 
@@ -68,8 +69,8 @@ class SessionStore:
             The columns of the responses in order, each with its BIDS description.
         description : str
             What the participant does, for the sidecar.
-        simulated : bool
-            Whether participant or rig are simulated; one data set holds one kind.
+        simulated_participant, simulated_rig : bool
+            Whether they are simulated; one data set holds one kind.
 
         Raises
         ------
@@ -80,12 +81,17 @@ class SessionStore:
         """
         root = Path(data_folder)
         made: list[Path] = []
+        simulated = {
+            "Simulated": simulated_participant or simulated_rig,
+            "SimulatedParticipant": simulated_participant,
+            "SimulatedRig": simulated_rig,
+        }
         try:
             root.mkdir(parents=True, exist_ok=True)
             _describe_data_set(root, plan.study, simulated=simulated)
             sidecar = _sidecar_text(plan, columns, description=description, simulated=simulated)
             store = cls._make_files(root, plan, columns=tuple(columns), sidecar=sidecar, made=made)
-            _add_participant(root, plan.subject, simulated=simulated)
+            _add_participant(root, plan.subject, simulated=simulated_participant)
             _sync_folder(root)
         except OSError as error:
             _remove(made)
@@ -301,7 +307,7 @@ def _sidecar_text(
     columns: Mapping[str, Mapping[str, Any]],
     *,
     description: str,
-    simulated: bool,
+    simulated: Mapping[str, bool],
 ) -> str:
     study = plan.study
     return _json(
@@ -312,20 +318,20 @@ def _sidecar_text(
             "Masking": study.masking,
             "SurfaceVisible": study.surface_visible,
             "Schedule": study.plan(plan.task).schedule,
-            "Simulated": simulated,
+            **simulated,
             **columns,
         }
     )
 
 
-def _describe_data_set(root: Path, study: Study, *, simulated: bool) -> None:
+def _describe_data_set(root: Path, study: Study, *, simulated: Mapping[str, bool]) -> None:
     """Write the description of the data set, or check that the one there is of this study."""
     values = {
         "Name": study.name,
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "raw",
         "License": study.data_license,
-        "Simulated": simulated,
+        **simulated,
         "GeneratedBy": [{"Name": "tactileq", "Version": _own_version()}],
     }
     path = root / "dataset_description.json"
@@ -333,7 +339,7 @@ def _describe_data_set(root: Path, study: Study, *, simulated: bool) -> None:
         _write_new(path, _json(values), made=[])
         _write_new(root / "participants.json", _json(_PARTICIPANTS_SIDECAR), made=[])
     except FileExistsError:
-        _check_description(path, values)
+        _check_description(path, {"Name": study.name, **simulated})
 
 
 def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
@@ -341,10 +347,10 @@ def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
         found = json.loads(path.read_text(encoding="utf-8"))
     except ValueError:
         found = {}
-    for key in ("Name", "Simulated"):
-        if found.get(key) != wanted[key]:
+    for key, value in wanted.items():
+        if found.get(key) != value:
             raise InputError(
-                f"expected a data folder with {key} {wanted[key]!r} in {path}, got "
+                f"expected a data folder with {key} {value!r} in {path}, got "
                 f"{found.get(key)!r}; choose another data folder for these sessions."
             )
 
@@ -352,8 +358,8 @@ def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
 _PARTICIPANTS_SIDECAR = {
     "participant_id": {"Description": "Participant"},
     "simulated": {
-        "Description": "Whether the participant or the rig was simulated",
-        "Levels": {"true": "simulated", "false": "a person at a real rig"},
+        "Description": "Whether the participant was simulated",
+        "Levels": {"true": "simulated", "false": "a person"},
     },
 }
 

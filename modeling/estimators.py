@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import curve_fit
+from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from modeling.errors import InputError
@@ -39,6 +39,7 @@ UNRESOLVED_S_HZ = 5.0
 FWHM_PER_S = 2 * np.sqrt(2 * np.log(2))
 BANDWIDTH_PER_S = 1.36
 GAIN_STEPS = 12
+HIDDEN_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,8 @@ class Layers:
     level_sd_db : (m,) ndarray
         Standard deviation of each layer's level, 4.34/√(πBT) dB.
     unresolved : (m,) ndarray of bool
-        Width below what the smoothing resolves.
+        Width below what the smoothing resolves, or height within what the skirts of neighbours
+        reach by themselves: the layer's width or level is a bound rather than an estimate.
     """
 
     noise_gain: float
@@ -148,19 +150,24 @@ def fit_layers(
     bandwidth = np.clip(bandwidth, LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * spectrum.rate_hz)
     at_peak = np.interp(frequencies_hz, spectrum.frequency_hz, smoothed)
     if consistent:
-        gains = _consistent_gains(spectrum, frequencies_hz, bandwidth, at_peak - floor, floor)
+        gains, hidden = _consistent_gains(
+            spectrum, frequencies_hz, bandwidth, at_peak - floor, floor
+        )
+        unresolved = (unresolved & ~failed) | hidden
     else:
         gains = at_peak
     level_sd_db = 10 / np.log(10) / np.sqrt(np.pi * bandwidth * spectrum.duration_s)
-    return Layers(floor, frequencies_hz, bandwidth, gains, level_sd_db, unresolved & ~failed)
+    return Layers(floor, frequencies_hz, bandwidth, gains, level_sd_db, unresolved)
 
 
-def _gaussian(offset: Floats, height: float, s: float) -> Floats:
-    curve: Floats = height * np.exp(-0.5 * (offset / s) ** 2)
-    return curve
+def _gaussian_misfit(shape: Floats, offset: Floats, values: Floats) -> Floats:
+    height, s = shape
+    misfit: Floats = height * np.exp(-0.5 * (offset / s) ** 2) - values
+    return misfit
 
 
-def _gaussian_jacobian(offset: Floats, height: float, s: float) -> Floats:
+def _gaussian_jacobian(shape: Floats, offset: Floats, values: Floats) -> Floats:
+    height, s = shape
     bell = np.exp(-0.5 * (offset / s) ** 2)
     return np.column_stack([bell, height * bell * offset**2 / s**3])
 
@@ -174,19 +181,17 @@ def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> floa
         offset, values = frequency_hz[near] - centre_hz, heights[near]
         if values.size < 4 or not (values > 0).any():
             return np.nan
-        try:
-            found, _ = curve_fit(
-                _gaussian,
-                offset,
-                values,
-                p0=(max(values.max(), 1e-300), s),
-                jac=_gaussian_jacobian,
-                maxfev=200,
-            )
-        except RuntimeError:
-            return np.nan
-        s = abs(float(found[1]))
-        if not (found[0] > 0 and 0 < s < frequency_hz[-1]):
+        top = float(values.max())
+        found = least_squares(
+            _gaussian_misfit,
+            (1.0, s),
+            jac=_gaussian_jacobian,
+            args=(offset, values / top),
+            method="lm",
+            max_nfev=200,
+        )
+        height, s = found.x[0], abs(float(found.x[1]))
+        if not (found.success and height > 0 and 0 < s < frequency_hz[-1]):
             return np.nan
     return s
 
@@ -203,24 +208,38 @@ def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, NDArray[
 
 def _consistent_gains(
     spectrum: Spectrum, frequencies_hz: Floats, bandwidths_hz: Floats, targets: Floats, floor: float
-) -> Floats:
+) -> tuple[Floats, NDArray[np.bool_]]:
     """Gains ≥ 0 that give the smoothed coherent model its measured heights above the floor.
 
-    A multiplicative fixed point; each step is held to a factor of 2.
+    A multiplicative fixed point, each step held to a factor of 2. Where the skirts of neighbours
+    reach a layer's height by themselves it has no such gain; then it keeps half of the gain that
+    it would need alone, and is marked as hidden.
     """
     step_hz = spectrum.rate_hz / spectrum.n_samples
-    bins = np.rint(frequencies_hz / step_hz).astype(int)
     bands = band_response(
         spectrum.frequency_hz,
         centres_hz=frequencies_hz,
         bandwidths_hz=bandwidths_hz,
         rate_hz=spectrum.rate_hz,
     )
+    # The smoothed value at a layer's frequency is a weighted sum over all frequencies; reflected
+    # smoothing is symmetric, so a smoothed impulse holds the weights.
+    impulses = np.zeros(bands.shape)
+    impulses[np.arange(frequencies_hz.size), np.rint(frequencies_hz / step_hz).astype(int)] = 1.0
+    weights = smooth(impulses, SMOOTHING_HZ, step_hz=step_hz)
     targets = np.maximum(targets, 0.0)
-    gains = targets.copy()
+    alone = targets.copy()
     for _ in range(GAIN_STEPS):
-        response = np.abs(floor + gains @ bands)
-        reached = smooth(response, SMOOTHING_HZ, step_hz=step_hz)[bins] - floor
-        factor = np.divide(targets, reached, out=np.full(targets.shape, 2.0), where=reached > 0)
-        gains = gains * np.clip(factor, 0.5, 2.0)
-    return gains
+        reached = (weights * np.abs(floor + alone[:, None] * bands)).sum(axis=1) - floor
+        alone = alone * _step(targets, reached)
+    gains = alone.copy()
+    for _ in range(GAIN_STEPS):
+        reached = weights @ np.abs(floor + gains @ bands) - floor
+        gains = np.maximum(gains * _step(targets, reached), HIDDEN_SHARE * alone)
+    return gains, gains <= HIDDEN_SHARE * alone
+
+
+def _step(targets: Floats, reached: Floats) -> Floats:
+    factor = np.divide(targets, reached, out=np.full(targets.shape, 2.0), where=reached > 0)
+    step: Floats = np.clip(factor, 0.5, 2.0)
+    return step

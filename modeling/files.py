@@ -12,6 +12,13 @@ from pathlib import Path
 from modeling.errors import InputError
 
 
+def file_stem(name: str) -> str:
+    """A name as a file name: letters, digits and `-_.` stay, all else becomes `-`."""
+    kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
+    # "", "." and ".." would not be a file in the folder but another folder.
+    return kept if kept.strip(".") else "-" * max(len(kept), 1)
+
+
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file so that it is there whole or not at all."""
     target = Path(path)

@@ -21,7 +21,7 @@ from modeling.estimators import (
 )
 from modeling.model import TextureModel
 from modeling.recording import Recording, RecordingSet
-from modeling.spectra import Spectrum, mean_spectrum, model_rate_hz, spectrum, subtract_floor
+from modeling.spectra import MODEL_RATE_HZ, Spectrum, mean_spectrum, spectrum, subtract_floor
 from modeling.tracking import Condition, assign_peaks, reference_of, visiting_order
 
 
@@ -101,6 +101,31 @@ def condition_spectra(records: RecordingSet) -> dict[Condition, Spectrum]:
     InputError
         If a record has contact but no speed, or none has contact.
     """
+    by_condition: dict[Condition, list[Spectrum]] = {}
+    for record, measured in recording_spectra(records):
+        by_condition.setdefault(record.condition, []).append(measured)
+    return {condition: mean_spectrum(found) for condition, found in by_condition.items()}
+
+
+def recording_spectra(
+    records: RecordingSet, *, rate_hz: float = MODEL_RATE_HZ
+) -> list[tuple[Recording, Spectrum]]:
+    """Each recording with contact and its spectrum, at one rate, the sensor's floor subtracted.
+
+    This is what models are fitted to and held against (METHOD 2).
+
+    Parameters
+    ----------
+    records : RecordingSet
+        One texture; recordings at force 0 are the floor.
+    rate_hz : float
+        Of the spectra, unless a recording with contact has a lower rate: then that one.
+
+    Raises
+    ------
+    InputError
+        If a record has contact but no speed, or none has contact.
+    """
     contact = [r for r in records.recordings if r.force_n > 0]
     still = [r for r in contact if r.speed_mm_s == 0]
     if still or not contact:
@@ -108,16 +133,13 @@ def condition_spectra(records: RecordingSet) -> dict[Condition, Spectrum]:
         raise InputError(
             f"expected recordings with a speed and a force above 0, got {got}; correct the labels."
         )
-    rate_hz = min(model_rate_hz(r.rate_hz) for r in contact)
+    rate_hz = min(rate_hz, *(r.rate_hz for r in contact))
+    spectra = [spectrum(r, rate_hz=rate_hz) for r in contact]
     floors = [spectrum(r, rate_hz=rate_hz) for r in records.recordings if r.force_n == 0]
-    by_condition: dict[Condition, list[Spectrum]] = {}
-    for record in contact:
-        by_condition.setdefault(record.condition, []).append(spectrum(record, rate_hz=rate_hz))
-    spectra = {condition: mean_spectrum(found) for condition, found in by_condition.items()}
     if floors:
         floor = mean_spectrum(floors)
-        spectra = {condition: subtract_floor(s, floor) for condition, s in spectra.items()}
-    return spectra
+        spectra = [subtract_floor(measured, floor) for measured in spectra]
+    return list(zip(contact, spectra, strict=True))
 
 
 def _only_unit(records: RecordingSet) -> str:

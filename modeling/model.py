@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.errors import InputError
+from modeling.errors import InputError, check_texture_name
 from modeling.files import write_text
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
@@ -60,7 +60,8 @@ class TextureModel:
     simulated : bool
         True where the recordings behind it were simulated.
     inherited, unresolved : (S, F, m) array_like of bool, optional
-        Frequency taken over from the reference condition; width below what smoothing resolves.
+        Frequency taken over from the reference condition; width or level not resolved (see
+        `modeling.Layers`).
     interpolated : (S, F) array_like of bool, optional
         Condition without a recording, filled from its neighbours.
 
@@ -87,6 +88,7 @@ class TextureModel:
     interpolated: Bools = field(default_factory=_no_marks)
 
     def __post_init__(self) -> None:
+        self._check_kinds()
         shape = np.shape(self.gains)
         for name in _BOOLEAN_ARRAYS:
             if np.size(getattr(self, name)) == 0:
@@ -118,6 +120,17 @@ class TextureModel:
                     f"expected {name} of shape {shape}, got {getattr(self, name).shape}; "
                     "the arrays of a model share one grid and one number of layers."
                 )
+
+    def _check_kinds(self) -> None:
+        # A file may hold anything: "false" in quotes would count as true.
+        check_texture_name(self.texture)
+        number = isinstance(self.rate_hz, int | float) and not isinstance(self.rate_hz, bool)
+        if not (number and isinstance(self.simulated, bool) and isinstance(self.estimator, str)):
+            raise InputError(
+                f"{self.texture}: expected a number for rate_hz, true or false for simulated and "
+                f"text for estimator, got {self.rate_hz!r}, {self.simulated!r} and "
+                f"{self.estimator!r}; fit the model again."
+            )
 
     def _check_values(self) -> None:
         _check_rate(self.rate_hz)
@@ -308,7 +321,7 @@ def _load_json(path: Path) -> dict[str, Any]:
     version = values.pop("version", None)
     if version != VERSION:
         raise InputError(
-            f"expected a model of version {VERSION} in {path}, got version {version}; "
+            f"expected a model of version {VERSION} in {path}, got version {version!r}; "
             "update tactileq or fit the model again."
         )
     return values

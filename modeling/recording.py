@@ -27,6 +27,7 @@ INDEX_COLUMNS = (
     "repeat",
     "simulated",
     "samples",
+    "clipped_share",
 )
 
 
@@ -52,6 +53,9 @@ class Recording:
         True where no real surface was touched.
     repeat : int
         1 for the first record of a condition, 2 for the second, …
+    clipped_share : float
+        Share (0–1) of the samples in which the sensor was at its limit; left out (NaN), it is
+        counted in `samples`. Give it where they are no longer the sensor's own (DFT321).
 
     Raises
     ------
@@ -67,6 +71,7 @@ class Recording:
     unit: str = "g"
     simulated: bool = False
     repeat: int = 1
+    clipped_share: float = np.nan
 
     def __post_init__(self) -> None:
         where = f"recording of {self.texture!r}"
@@ -92,6 +97,12 @@ class Recording:
             raise InputError(
                 f"{where}: expected a repeat of at least 1, got {self.repeat}; fix it."
             )
+        if np.isnan(self.clipped_share):
+            object.__setattr__(self, "clipped_share", float(clipped_samples(self.samples).mean()))
+        if not 0 <= self.clipped_share <= 1:
+            raise InputError(
+                f"{where}: expected a clipped_share of 0 to 1, got {self.clipped_share}; fix it."
+            )
         if not self.texture.strip() or any(c in self.texture for c in "\t\r\n"):
             raise InputError(
                 f"expected a texture name of one line without tabs, got {self.texture!r}; name it."
@@ -106,23 +117,6 @@ class Recording:
     def condition(self) -> tuple[float, float]:
         """(speed in mm/s, force in N)."""
         return self.speed_mm_s, self.force_n
-
-    @property
-    def clipped_share(self) -> float:
-        """Share (0–1) of samples stuck at the extremes, 0 where the record does not clip.
-
-        Runs of at least three equal samples at the maximum or the minimum count as clipped where
-        samples pile up there: more than three times as many as at the next level inwards. Noise
-        that is merely quantised has shorter runs, and a smooth crest that is merely quantised
-        holds its highest level at most 1/(√2 − 1) = 2.4 times as long as the next one.
-        """
-        levels = np.unique(self.samples)
-        clipped = 0
-        for extreme, next_inwards in ((levels[-1], levels[-2]), (levels[0], levels[1])):
-            stuck = self.samples == extreme
-            if np.count_nonzero(stuck) > 3 * np.count_nonzero(self.samples == next_inwards):
-                clipped += _samples_in_long_runs(stuck)
-        return clipped / self.samples.size
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Recording):
@@ -139,6 +133,7 @@ class Recording:
             self.unit,
             self.simulated,
             self.repeat,
+            self.clipped_share,
         )
 
     def describe(self) -> str:
@@ -173,10 +168,30 @@ def _checked_samples(samples: ArrayLike, where: str) -> NDArray[np.float64]:
     return array
 
 
-def _samples_in_long_runs(mask: NDArray[np.bool_], shortest: int = 3) -> int:
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
-    lengths = edges[1::2] - edges[::2]
-    return int(lengths[lengths >= shortest].sum())
+def clipped_samples(samples: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which samples of one sensor axis are stuck at the highest or lowest value.
+
+    An end counts, then with all its samples, where they pile up: more than twice as many as at
+    the next three levels inwards together. A quantised sinusoid's highest level holds as many as
+    those three, noise has fewer the further out. A level of more than half the samples is rest.
+
+    Parameters
+    ----------
+    samples : (n,) ndarray
+        Finite, as the sensor gave them: before any filter or combination.
+
+    Returns
+    -------
+    (n,) ndarray of bool
+    """
+    # Rounded, so that rounding errors do not split one level into many.
+    rounded = np.round(samples / (np.abs(samples).max() or 1.0), 9)
+    levels, counts = np.unique(rounded, return_counts=True)
+    stuck = np.zeros(samples.size, dtype=np.bool_)
+    for end, inwards in ((0, counts[1:4]), (-1, counts[-4:-1])):
+        if 2 * inwards.sum() < counts[end] <= samples.size / 2:
+            stuck |= rounded == levels[end]
+    return stuck
 
 
 class RecordingSet:
@@ -291,6 +306,7 @@ def _index_cells(recording: Recording) -> tuple[str, ...]:
         str(recording.repeat),
         str(recording.simulated).lower(),
         str(recording.samples.size),
+        repr(recording.clipped_share),
     )
 
 
@@ -310,7 +326,8 @@ def _sidecar_row(path: Path) -> dict[str, str]:
         raise InputError(
             f"expected a JSON object in {sidecar}, got something else; rewrite it."
         ) from None
-    return {"file": path.name, **{key: str(value) for key, value in values.items()}}
+    given = {key: str(value) for key, value in values.items() if value is not None}
+    return {**given, "file": path.name}
 
 
 def _load_row(folder: Path, row: dict[str, str]) -> Recording:
@@ -321,7 +338,7 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     if path.suffix.lower() == ".wav":
         samples, rate_hz = read_wav(path)
         if row.get("g_per_fullscale"):
-            samples = samples * number(row["g_per_fullscale"], f"g_per_fullscale of {path.name}")
+            samples = samples * full_scale(row["g_per_fullscale"], path.name)
             unit = "g"
     else:
         samples = _read_samples(path)
@@ -335,7 +352,10 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
             row.get("texture") or folder.name,
             unit=unit,
             simulated=_flag(row.get("simulated") or "false", f"simulated of {path.name}"),
-            repeat=_whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
+            repeat=whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
+            clipped_share=number(
+                row.get("clipped_share") or "nan", f"clipped_share of {path.name}"
+            ),
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
@@ -363,11 +383,20 @@ def number(text: str, name: str) -> float:
         raise InputError(f"expected a number for {name}, got {got}; fill it in.") from None
 
 
-def _whole_number(text: str, name: str) -> int:
+def whole_number(text: str, name: str) -> int:
+    """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
     value = number(text, name)
-    if not value.is_integer():
-        raise InputError(f"expected a whole number for {name}, got {text}; correct it.")
+    if not (value.is_integer() and value >= 1):
+        raise InputError(f"expected a whole number for {name}, at least 1, got {text}; correct it.")
     return int(value)
+
+
+def full_scale(value: str | float, file: str) -> float:
+    """Acceleration (g) of a full-scale sample, finite and above 0; InputError otherwise."""
+    value_g = number(str(value), f"g_per_fullscale of {file}")
+    if not (np.isfinite(value_g) and value_g > 0):
+        raise InputError(f"{file}: expected g per full scale above 0, got {value_g}; correct it.")
+    return value_g
 
 
 def _flag(text: str, name: str) -> bool:
@@ -422,7 +451,7 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
     Raises
     ------
     InputError
-        If the file is no readable WAV or has several channels.
+        If the file is no readable WAV, has several channels, or is shorter than it says.
     """
     import soundfile  # late: loads a shared library that most uses never need
 
@@ -433,5 +462,13 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
     if samples.shape[1] != 1:
         raise InputError(
             f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
+        )
+    with path.open("rb") as file:
+        form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
+    # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
+    if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:
+        raise InputError(
+            f"expected {announced} bytes in {path}, as its header says, got "
+            f"{path.stat().st_size}; the file is truncated, copy or record it again."
         )
     return samples[:, 0], float(rate_hz)

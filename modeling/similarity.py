@@ -28,7 +28,8 @@ class SimilarityReport:
     Every GFC stands between its floor (white noise of equal RMS) and its ceiling (the recording's
     smoothed spectrum against random draws shaped by it). `oracle_gap` is 1 − GFC30/ceiling.
     `band_energy_error_db` has one value per band of `BAND_EDGES_HZ` that the data reach, in dB,
-    model over recording; `band_edges_hz` holds those bands' edges.
+    model over recording; `band_edges_hz` holds those bands' edges. The log-spectral distance is
+    over the frequencies where the sensor's floor has left anything of the recording.
     """
 
     gfc30: float
@@ -122,6 +123,8 @@ def report(
         drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
         ceilings.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
     smoothed = smooth(response, SIGMAS_HZ[0], step_hz=step_hz)[band]
+    truth = measured.smoothed()[band]
+    heard = measured.magnitude[band] > 0  # where the sensor's floor took all, dB mean nothing
     edges, band_errors = band_energy_error_db(
         frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2
     )
@@ -132,7 +135,7 @@ def report(
         floor_gfc5=floors[1],
         ceiling_gfc30=ceilings[0],
         ceiling_gfc5=ceilings[1],
-        log_spectral_distance_db=log_spectral_distance_db(smoothed, measured.smoothed()[band]),
+        log_spectral_distance_db=log_spectral_distance_db(smoothed[heard], truth[heard]),
         rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
         band_edges_hz=edges,
         band_energy_error_db=band_errors,

@@ -35,9 +35,10 @@ class LayerVerdict:
     distance_db : float
         Its level there, in dB relative to the threshold; NaN where no threshold is known.
     flip_probability : float
-        Chance that other records of the same length would have put the layer on the other side
-        of the all-conditions rule, from the levels' standard deviations (errors taken as normal
-        and independent between conditions); NaN where no threshold is known.
+        Chance that the levels' sampling error, which the records' length leaves, would put the
+        layer on the other side of the all-conditions rule in other records (errors taken as normal
+        and independent between conditions); NaN where no threshold is known. Whether the estimator
+        would find the layer again, and the estimator's bias, are not in it.
     """
 
     layer: int
@@ -96,9 +97,9 @@ def simplify(
     """Drop every layer that is below threshold in every condition, stably and in sum.
 
     A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
-    grid, the chance that this verdict flips is below 5 %, and all dropped layers together (powers
-    weighted by the threshold) stay below threshold too; else the loudest of them are kept. The
-    noise and at least one layer always stay.
+    grid, the chance that sampling error turns this verdict is below 5 %, and all dropped layers
+    together (powers weighted by the threshold) stay below threshold too; else the loudest of them
+    are kept. The noise and at least one layer always stay.
 
     Parameters
     ----------
@@ -172,7 +173,7 @@ def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:
 
 
 def _flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
-    """P(the all-conditions verdict differs in another record), (m,); NaN with no threshold."""
+    """P(sampling error of the levels turns the all-conditions verdict), (m,); NaN if unknown."""
     with np.errstate(divide="ignore", invalid="ignore"):
         z = np.where(level_sd_db > 0, -distances / level_sd_db, np.copysign(np.inf, -distances))
     below = np.prod(ndtr(z), axis=0)

@@ -50,7 +50,7 @@ class Spectrum:
 
 
 def smooth(magnitude: Floats, sigma_hz: float, *, step_hz: float) -> Floats:
-    """Gaussian smoothing of (n,) magnitudes spaced by `step_hz`, reflected at the edges."""
+    """Gaussian smoothing of (…, n) magnitudes spaced by `step_hz`, reflected at the edges."""
     smoothed: Floats = gaussian_filter1d(magnitude, sigma_hz / step_hz, mode="reflect")
     return smoothed
 
@@ -94,7 +94,7 @@ def spectrum(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Spectru
     Parameters
     ----------
     recording : Recording
-        At least 0.02 s after resampling (64 samples).
+        At least 64 samples after resampling.
     rate_hz : float
         Model rate; data of a lower rate keep their own.
     """

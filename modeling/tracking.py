@@ -20,15 +20,17 @@ def visiting_order(conditions: Sequence[Condition]) -> list[Condition]:
 def reference_of(condition: Condition, visited: Sequence[Condition]) -> Condition:
     """The condition whose layers name the peaks of this one.
 
-    The next-faster one at the same force, else the next-stronger one at the same speed, else (only
-    where recordings are missing) the one visited last.
+    The next-faster one at the same force, else the next-stronger one at the same speed. Where that
+    speed was not recorded at all yet, the one at the nearest force whose speed is nearest.
     """
     speed, force = condition
     faster = [c for c in visited if c[1] == force and c[0] > speed]
     if faster:
         return min(faster)
     stronger = [c for c in visited if c[0] == speed and c[1] > force]
-    return min(stronger, key=lambda c: c[1]) if stronger else visited[-1]
+    if stronger:
+        return min(stronger, key=lambda c: c[1])
+    return min(visited, key=lambda c: (abs(c[1] - force), abs(c[0] - speed)))
 
 
 def assign_peaks(peaks_hz: Floats, layers_hz: Floats) -> NDArray[np.intp]:

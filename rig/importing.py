@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.files import read_table
-from modeling.recording import number, read_wav
+from modeling.recording import clipped_samples, full_scale, number, read_wav, whole_number
 from modeling.spectra import dft321
 from modeling.thresholds import STANDARD_GRAVITY_M_S2
 
@@ -23,6 +23,9 @@ AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
 G_PER_UNIT = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY_M_S2, "arbitrary": 1.0}
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
 LONGEST_GAP = 2.5
+# A tool's vibration needs more; a rate below this means time in another unit than supposed.
+LOWEST_RATE_HZ = 20.0
+LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
 _TIME_NAMES = {"time", "t", "timestamp"}
 _AXIS_NAME = re.compile(r"(?:a|acc|accel|acceleration)?_?([xyz])")
 
@@ -60,13 +63,11 @@ def import_wav(
     records = []
     for path, label in zip(paths, labels, strict=True):
         samples, rate_hz = read_wav(path)
-        full_scale = label.g_per_fullscale or g_per_fullscale
-        if full_scale is not None and not (np.isfinite(full_scale) and full_scale > 0):
-            raise InputError(
-                f"{path.name}: expected g per full scale above 0, got {full_scale}; correct it."
-            )
-        unit = "arbitrary" if full_scale is None else "g"
-        records.append(_recording(path, samples * (full_scale or 1.0), rate_hz, label, unit=unit))
+        scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
+        unit = "arbitrary" if scale is None else "g"
+        if scale is not None:
+            samples = samples * full_scale(scale, path.name)
+        records.append(_recording(path, samples, rate_hz, label, unit=unit))
     return RecordingSet(records)
 
 
@@ -105,12 +106,14 @@ def import_csv(
     for path, label in zip(paths, labels, strict=True):
         columns = _read_columns(path)
         rate = rate_hz if rate_hz is not None else _rate_from_time(path, columns)
-        samples, found_unit = _chosen_axis(path, columns, axis)
+        axes, found_unit = _chosen_axes(path, columns, axis)
         final_unit = unit or found_unit or "arbitrary"
         _check_unit(final_unit, f"the header of {path.name}")
-        samples = samples * G_PER_UNIT[final_unit]
         name = "arbitrary" if final_unit == "arbitrary" else "g"
-        records.append(_recording(path, samples, rate, label, unit=name))
+        samples = (dft321(axes) if len(axes) == 3 else axes[0]) * G_PER_UNIT[final_unit]
+        # Combined axes no longer show their limits, so those are looked for here.
+        clipped = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
+        records.append(_recording(path, samples, rate, label, unit=name, clipped_share=clipped))
     return RecordingSet(records)
 
 
@@ -120,31 +123,42 @@ def labels_from_table(table: Path, paths: Sequence[Path], *, texture: str | None
     Raises
     ------
     InputError
-        For a file that the table does not name, and for cells that are no numbers.
+        For a file that the table names not once, and for cells that are no usable numbers.
     """
-    rows = {row["file"]: row for row in read_table(table, ("file", "speed_mm_s", "force_n"))}
+    rows: dict[str, dict[str, str]] = {}
+    for row in read_table(table, ("file", "speed_mm_s", "force_n")):
+        if row["file"] in rows:
+            raise InputError(
+                f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
+            )
+        rows[row["file"]] = row
     labels = []
     for path in paths:
-        row = rows.get(path.name) or rows.get(str(path))
-        if row is None:
+        if not (found := rows.get(path.name) or rows.get(str(path))):
             raise InputError(
                 f"expected a row for {path.name} in {table}, got none; add its speed and force."
             )
-        full_scale = row.get("g_per_fullscale")
+        scale = found.get("g_per_fullscale")
         labels.append(
             Label(
-                row.get("texture") or texture or table.parent.resolve().name,
-                number(row["speed_mm_s"], f"speed_mm_s of {path.name}"),
-                number(row["force_n"], f"force_n of {path.name}"),
-                int(number(row.get("repeat") or "1", f"repeat of {path.name}")),
-                number(full_scale, f"g_per_fullscale of {path.name}") if full_scale else None,
+                found.get("texture") or texture or table.parent.resolve().name,
+                number(found["speed_mm_s"], f"speed_mm_s of {path.name}"),
+                number(found["force_n"], f"force_n of {path.name}"),
+                whole_number(found.get("repeat") or "1", f"repeat of {path.name}"),
+                full_scale(scale, path.name) if scale else None,
             )
         )
     return labels
 
 
 def _recording(
-    path: Path, samples: NDArray[np.float64], rate_hz: float, label: Label, *, unit: str
+    path: Path,
+    samples: NDArray[np.float64],
+    rate_hz: float,
+    label: Label,
+    *,
+    unit: str,
+    clipped_share: float = np.nan,
 ) -> Recording:
     try:
         return Recording(
@@ -155,6 +169,7 @@ def _recording(
             label.texture,
             unit=unit,
             repeat=label.repeat,
+            clipped_share=clipped_share,
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
@@ -168,28 +183,49 @@ def _check_unit(unit: str | None, where: str) -> None:
         )
 
 
-def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Columns of numbers by their header."""
+def _read_lines(path: Path) -> list[str]:
     if not path.is_file():
         raise InputError(f"expected a CSV file at {path}, got nothing there; give its path.")
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
         raise InputError(f"expected a text file, got other bytes in {path}; export CSV.") from None
+    lines = text.splitlines()
     if len(lines) < 2:
         raise InputError(
             f"expected a header and rows of numbers in {path.name}, got {len(lines)} lines; "
             "export or record it again."
         )
+    if not text.endswith("\n"):
+        raise InputError(
+            f"expected a line end after the last line of {path.name}, got {lines[-1]!r} without "
+            "one, so it may be truncated; add a line end if the file is complete."
+        )
+    return lines
+
+
+def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Columns of numbers by their header."""
+    lines = _read_lines(path)
     delimiter = max(",;\t", key=lines[0].count)
     rows = list(csv.reader(lines, delimiter=delimiter))
     header = [cell.strip() for cell in rows[0]]
+    if all(_is_number(cell) for cell in header):
+        raise InputError(
+            f"expected a header line in {path.name} (time,x,y,z), got numbers; add one."
+        )
+    if len(set(header)) < len(header):
+        raise InputError(
+            f"expected each column name once in {path.name}, got {', '.join(header)}; rename."
+        )
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             raise InputError(
                 f"expected {len(header)} values in line {line} of {path.name}, got {len(row)}; "
                 "the file is truncated or damaged, export or record it again."
             )
+    if delimiter == ";":
+        rows = [[c if "." in c else c.replace(",", ".") for c in row] for row in rows]
     try:
         values = np.array(rows[1:], dtype=np.float64)
     except ValueError as error:
@@ -197,10 +233,6 @@ def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
             f"expected numbers below the header of {path.name}, got a cell that is none ({error});"
             " correct the file."
         ) from None
-    if all(_is_number(cell) for cell in header):
-        raise InputError(
-            f"expected a header line in {path.name} (time,x,y,z), got numbers; add one."
-        )
     return dict(zip(header, values.T, strict=True))
 
 
@@ -240,16 +272,27 @@ def _rate_from_time(path: Path, columns: dict[str, NDArray[np.float64]]) -> floa
         raise InputError(
             f"expected time in s, ms or us in {path.name}, got {unit!r}; convert it or give --rate."
         )
-    time = columns[name] * SECONDS_PER_UNIT[unit]
-    steps = np.diff(time)
-    if not (
-        np.isfinite(time).all() and time.size > 1 and (steps >= 0).all() and time[-1] > time[0]
-    ):
+    mean_step = _mean_step_s(path, columns[name] * SECONDS_PER_UNIT[unit])
+    lowest = LOWEST_RATE_HZ if unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
+    if 1 / mean_step <= lowest:
+        raise InputError(
+            f"expected a rate above {lowest:g} Hz in {path.name}, got {1 / mean_step:.4g} Hz by "
+            f"its column {name!r}: is time in ms or us? Name the unit in the header (time_s, "
+            "time_ms, time_us) or give --rate."
+        )
+    return 1 / mean_step
+
+
+def _mean_step_s(path: Path, time_s: NDArray[np.float64]) -> float:
+    """Mean distance of the samples (s), which must rise evenly."""
+    steps = np.diff(time_s)
+    span = float(time_s[-1] - time_s[0])
+    if not (np.isfinite(time_s).all() and span > 0 and (steps >= 0).all()):
         raise InputError(
             f"expected rising times in {path.name}, got some that fall, repeat or are not finite; "
             "repair the file or give --rate."
         )
-    mean_step = float(time[-1] - time[0]) / steps.size
+    mean_step = span / steps.size
     # Coarse time stamps repeat and jump by whole ticks; lost samples leave a longer gap.
     tick = float(steps[steps > 0].min())
     if steps.max() > LONGEST_GAP * max(mean_step, tick):
@@ -257,42 +300,44 @@ def _rate_from_time(path: Path, columns: dict[str, NDArray[np.float64]]) -> floa
             f"expected evenly spaced samples in {path.name}, got a gap of {steps.max():.4g} s "
             f"among steps of {mean_step:.4g} s; samples are missing, record again or give --rate."
         )
-    return 1 / mean_step
+    return mean_step
 
 
-def _chosen_axis(
+def _chosen_axes(
     path: Path, columns: dict[str, NDArray[np.float64]], axis: Axis | None
 ) -> tuple[NDArray[np.float64], str]:
-    """The samples of the chosen axis (or of all three as one), and the unit in their header."""
+    """The chosen axis (1, n), or all three (3, n), as recorded, and the unit in their header."""
     time = _time_column(columns)
     others = [name for name in columns if name != time]
-    if axis is None:
-        if len(others) != 1:
-            raise InputError(
-                f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "
-                f"{', '.join(others)}; choose an axis."
-            )
-        return columns[others[0]], _name_and_unit(others[0])[1]
-    by_axis: dict[str, str] = {}
-    for name in others:
-        if match := _AXIS_NAME.fullmatch(_name_and_unit(name)[0]):
-            by_axis.setdefault(match.group(1), name)
-    wanted = "xyz" if axis == "dft321" else axis
-    missing = [letter for letter in wanted if letter not in by_axis]
-    if missing:
+    if axis is None and len(others) != 1:
         raise InputError(
-            f"expected columns named {', '.join(wanted)} in {path.name}, got {', '.join(others)}; "
-            "rename them or choose another axis."
+            f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "
+            f"{', '.join(others)}; choose an axis."
         )
-    units = {_name_and_unit(by_axis[letter])[1] for letter in wanted}
+    chosen = others if axis is None else _names_of_axes(path, others, axis)
+    units = {_name_and_unit(name)[1] for name in chosen}
     if len(units) > 1:
         raise InputError(
             f"expected one unit for all axes of {path.name}, got {' and '.join(sorted(units))}; "
             "convert them."
         )
-    samples = np.array([columns[by_axis[letter]] for letter in wanted])
+    samples = np.array([columns[name] for name in chosen])
     if not np.isfinite(samples).all():
         raise InputError(
             f"expected finite samples in {path.name}, got NaN or inf; repair or record again."
         )
-    return (dft321(samples) if axis == "dft321" else samples[0]), units.pop()
+    return samples, units.pop()
+
+
+def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:
+    """The columns of the axis, or of all three."""
+    found = [(_AXIS_NAME.fullmatch(_name_and_unit(name)[0]), name) for name in names]
+    wanted = "xyz" if axis == "dft321" else axis
+    chosen = [name for letter in wanted for match, name in found if match and match[1] == letter]
+    letters = [match[1] for match, name in found if match and name in chosen]
+    if sorted(letters) != list(wanted):
+        raise InputError(
+            f"expected columns named {', '.join(wanted)} (each once) in {path.name}, got "
+            f"{', '.join(names)}; rename them or choose another axis."
+        )
+    return chosen

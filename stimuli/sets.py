@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -13,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from modeling import InputError, Renderer, TextureModel
-from modeling.files import check_replaceable, replace_folder, write_table
+from modeling.files import check_replaceable, file_stem, replace_folder, write_table
 
 SETTLING_S = 0.5
 FADE_S = 0.01
+LONGEST_S = 3600.0
 
 
 @dataclass(frozen=True)
@@ -85,17 +85,20 @@ def write_set(
     models : sequence of (label, TextureModel)
         The label ("full", "simplified", …) goes into the manifest's column `model`.
     conditions : sequence of (speed_mm_s, force_n)
+        Finite, at least 0.
     rate_hz, duration_s : float
-        Rate a whole number and at least every model's; duration at least one sample.
+        Rate a whole number and at least every model's; duration one sample to one hour.
     seed : int
     progress : callable, optional
         Called with the file's name after each file.
+
+    Raises
+    ------
+    InputError
+        For anything outside these ranges; then nothing is written.
     """
     target = Path(folder)
-    if not (np.isfinite(rate_hz) and rate_hz > 0 and float(rate_hz).is_integer()):
-        raise InputError(f"expected a whole rate in Hz for WAV files, got {rate_hz}; round it.")
-    if not (np.isfinite(duration_s) and round(duration_s * rate_hz) >= 1):
-        raise InputError(f"expected a duration above 0 s, got {duration_s}; give a longer one.")
+    _check_options(conditions, rate_hz, duration_s)
     check_replaceable(target, index_name="manifest.tsv", what="a stimulus set")
     manifest: list[Stimulus] = []
     with replace_folder(target) as fresh:
@@ -104,7 +107,7 @@ def write_set(
                 vibration = render_stimulus(
                     model, speed, force_n=force, rate_hz=rate_hz, duration_s=duration_s, seed=seed
                 )
-                name = _file_name(f"{model.texture}_{label}", speed, force)
+                name = file_stem(f"{model.texture}_{label}_{speed:g}mms_{force:g}N") + ".wav"
                 if (fresh / name).exists():
                     raise InputError(
                         f"expected each texture, model and condition once, got {name} twice; "
@@ -122,9 +125,23 @@ def write_set(
     return tuple(manifest)
 
 
-def _file_name(title: str, speed_mm_s: float, force_n: float) -> str:
-    # Names may hold anything; a file's must not lead into another folder.
-    return re.sub(r"[^\w.+-]+", "-", f"{title}_{speed_mm_s:g}mms_{force_n:g}N") + ".wav"
+def _check_options(
+    conditions: Sequence[tuple[float, float]], rate_hz: float, duration_s: float
+) -> None:
+    if not (np.isfinite(rate_hz) and rate_hz > 0 and float(rate_hz).is_integer()):
+        raise InputError(f"expected a whole rate in Hz for WAV files, got {rate_hz}; round it.")
+    if not (np.isfinite(duration_s) and round(duration_s * rate_hz) >= 1):
+        raise InputError(f"expected a duration above 0 s, got {duration_s}; give a longer one.")
+    if duration_s > LONGEST_S:
+        raise InputError(
+            f"expected a duration of at most {LONGEST_S:g} s, got {duration_s}; give a shorter one."
+        )
+    for condition in conditions:
+        if not all(np.isfinite(value) and value >= 0 for value in condition):
+            raise InputError(
+                "expected speeds (mm/s) and forces (N) of at least 0, got "
+                f"{condition[0]} mm/s at {condition[1]} N; correct them."
+            )
 
 
 def _row(

@@ -302,3 +302,28 @@ def test_failed_save_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Mon
         bilinear_model(n_layers=1).save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("simulated", "false"),
+        ("simulated", None),
+        ("texture", 5),
+        ("texture", None),
+        ("texture", "a\tb"),
+        ("rate_hz", "5000"),
+        ("rate_hz", True),
+        ("estimator", None),
+        ("unit", 1),
+    ],
+)
+def test_a_file_with_a_wrong_kind_of_value_is_refused(
+    tmp_path: Path, name: str, value: object
+) -> None:
+    path = tmp_path / "m.json"
+    bilinear_model().save(path)
+    values = json.loads(path.read_text(encoding="utf-8"))
+    path.write_text(json.dumps({**values, name: value}), encoding="utf-8")
+    with pytest.raises(InputError, match=r"m\.json: .*expected"):
+        TextureModel.load(path)

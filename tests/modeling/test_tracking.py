@@ -103,9 +103,10 @@ def test_visiting_order_is_force_by_force_downwards() -> None:
         ((350, 2.0), [(350, 3.5), (200, 3.5), (50, 3.5)], (350, 3.5)),
         ((200, 2.0), [(350, 3.5), (200, 3.5), (50, 3.5), (350, 2.0)], (350, 2.0)),
         ((350, 0.5), [(350, 3.5), (350, 2.0), (200, 2.0)], (350, 2.0)),
-        ((350, 2.0), [(200, 3.5), (50, 3.5)], (50, 3.5)),
+        ((350, 2.0), [(200, 3.5), (50, 3.5)], (200, 3.5)),
+        ((350, 1.0), [(350, 3.5), (200, 2.0), (50, 2.0)], (350, 3.5)),
     ],
-    ids=["faster", "next faster", "stronger", "faster first", "next stronger", "a hole"],
+    ids=["faster", "next faster", "stronger", "faster first", "next stronger", "hole", "two holes"],
 )
 def test_reference(
     condition: tuple[float, float],
