@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError
 from modeling.files import check_replaceable, read_table, replace_folder, write_table
+from modeling.wav import full_scale, read_wav
 
 UNITS = ("g", "arbitrary")
 MIN_SAMPLES = 64
@@ -338,7 +339,8 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     if path.suffix.lower() == ".wav":
         samples, rate_hz = read_wav(path)
         if row.get("g_per_fullscale"):
-            samples = samples * full_scale(row["g_per_fullscale"], path.name)
+            scale_g = number(row["g_per_fullscale"], f"g_per_fullscale of {path.name}")
+            samples = samples * full_scale(scale_g, path.name)
             unit = "g"
     else:
         samples = _read_samples(path)
@@ -391,14 +393,6 @@ def whole_number(text: str, name: str) -> int:
     return int(value)
 
 
-def full_scale(value: str | float, file: str) -> float:
-    """Acceleration (g) of a full-scale sample, finite and above 0; InputError otherwise."""
-    value_g = number(str(value), f"g_per_fullscale of {file}")
-    if not (np.isfinite(value_g) and value_g > 0):
-        raise InputError(f"{file}: expected g per full scale above 0, got {value_g}; correct it.")
-    return value_g
-
-
 def _flag(text: str, name: str) -> bool:
     # A typing error must not turn simulated data into measured ones.
     if text.lower() not in ("true", "false"):
@@ -443,32 +437,3 @@ def _read_samples(path: Path) -> NDArray[np.float64]:
             f"expected one number per line in {path}, got a line that is none ({error}); "
             "import files of another layout with tactileq import csv."
         ) from None
-
-
-def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
-    """Samples (1 = full scale) and rate (Hz) of a mono WAV file.
-
-    Raises
-    ------
-    InputError
-        If the file is no readable WAV, has several channels, or is shorter than it says.
-    """
-    import soundfile  # late: loads a shared library that most uses never need
-
-    try:
-        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
-    except (soundfile.LibsndfileError, OSError) as error:
-        raise InputError(f"expected a WAV file, got {path} ({error}); convert it.") from None
-    if samples.shape[1] != 1:
-        raise InputError(
-            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
-        )
-    with path.open("rb") as file:
-        form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
-    # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
-    if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:
-        raise InputError(
-            f"expected {announced} bytes in {path}, as its header says, got "
-            f"{path.stat().st_size}; the file is truncated, copy or record it again."
-        )
-    return samples[:, 0], float(rate_hz)

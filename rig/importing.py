@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.files import read_table
-from modeling.recording import clipped_samples, full_scale, number, read_wav, whole_number
+from modeling.recording import clipped_samples, number, whole_number
 from modeling.spectra import dft321
 from modeling.thresholds import STANDARD_GRAVITY_M_S2
+from modeling.wav import full_scale, read_wav
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
@@ -145,7 +146,9 @@ def labels_from_table(table: Path, paths: Sequence[Path], *, texture: str | None
                 number(found["speed_mm_s"], f"speed_mm_s of {path.name}"),
                 number(found["force_n"], f"force_n of {path.name}"),
                 whole_number(found.get("repeat") or "1", f"repeat of {path.name}"),
-                full_scale(scale, path.name) if scale else None,
+                full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name)
+                if scale
+                else None,
             )
         )
     return labels
@@ -331,11 +334,10 @@ def _chosen_axes(
 
 def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:
     """The columns of the axis, or of all three."""
-    found = [(_AXIS_NAME.fullmatch(_name_and_unit(name)[0]), name) for name in names]
+    letters = {n: m[1] for n in names if (m := _AXIS_NAME.fullmatch(_name_and_unit(n)[0]))}
     wanted = "xyz" if axis == "dft321" else axis
-    chosen = [name for letter in wanted for match, name in found if match and match[1] == letter]
-    letters = [match[1] for match, name in found if match and name in chosen]
-    if sorted(letters) != list(wanted):
+    chosen = [name for letter in wanted for name in letters if letters[name] == letter]
+    if [letters[name] for name in chosen] != list(wanted):
         raise InputError(
             f"expected columns named {', '.join(wanted)} (each once) in {path.name}, got "
             f"{', '.join(names)}; rename them or choose another axis."

@@ -172,6 +172,72 @@ def test_simulated_and_real_participants_are_never_mixed(study_folder, write_tas
         load_responses(study_folder)
 
 
+SIMULATED_KEYS = ("Simulated", "SimulatedParticipant", "SimulatedRig")
+
+
+@pytest.mark.parametrize("rig", [False, True])
+@pytest.mark.parametrize("participants", [False, True])
+def test_what_was_simulated_is_carried(study_folder, write_task, absolute_rows, participants, rig):
+    facts = dict(zip(SIMULATED_KEYS, (participants or rig, participants, rig), strict=True))
+    (study_folder / "dataset_description.json").write_text(json.dumps(facts))
+    listed = f"participant_id\tsimulated\nsub-01\t{str(participants).lower()}\n"
+    (study_folder / "participants.tsv").write_text(listed)
+    either = str(participants or rig).lower()
+    path = write_task("absolute", [[*row[:-1], either] for row in absolute_rows])
+    sidecar = path.with_suffix(".json")
+    sidecar.write_text(json.dumps(facts))
+    responses = load_responses(study_folder)
+    assert responses.simulated_participants is participants
+    assert responses.simulated_rig is rig
+    assert responses.simulated is (participants or rig)
+    sidecar.write_text(json.dumps({**facts, "SimulatedParticipant": not participants}))
+    with pytest.raises(InputError, match="SimulatedParticipant .* never a mixture") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, sidecar)
+
+
+@pytest.mark.parametrize(
+    "facts", [(True, False, False), (False, True, False), (True, "yes", False), (True,)]
+)
+def test_a_description_that_does_not_tell_what_was_simulated_is_refused(study_folder, facts):
+    path = study_folder / "dataset_description.json"
+    path.write_text(json.dumps(dict(zip(SIMULATED_KEYS, facts, strict=False))))
+    with pytest.raises(InputError, match="say what was simulated") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def _write_order(data: Path, participant: str, content: object) -> Path:
+    path = data / "sourcedata" / participant / "ses-01"
+    path.mkdir(parents=True)
+    path /= f"{participant}_ses-01_task-relative_order.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_a_session_that_ended_early_is_named(study_folder, write_task, relative_rows):
+    write_task("relative", relative_rows)
+    _write_order(study_folder, "sub-01", {"trials": [{}] * 7})
+    write_task("relative", relative_rows[:4], participant="sub-02")
+    _write_order(study_folder, "sub-02", {"trials": [{}] * 23})
+    write_task("relative", [], participant="sub-03")
+    _write_order(study_folder, "sub-03", {"trials": [{}] * 23})
+    responses = load_responses(study_folder)
+    assert responses.warnings == (
+        "sub-02 relative ses-01 answered 4 of 23 trials (ended early).",
+        "sub-03 relative ses-01 answered 0 of 23 trials (ended early).",
+    )
+    assert len(responses.relative) == 11
+
+
+def test_an_order_without_trials_is_refused(study_folder, write_task, relative_rows):
+    write_task("relative", relative_rows)
+    path = _write_order(study_folder, "sub-01", {"trials": 23})
+    with pytest.raises(InputError, match="a list of trials") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
 def test_simulated_answers_in_a_data_set_of_people_are_refused(
     study_folder, write_task, absolute_rows
 ):

@@ -6,8 +6,12 @@ import pytest
 
 from analysis.load import Responses, load_responses
 from analysis.statistics import confusion_matrices, rate_tests, rating_tests
+from experiments.design import RelativeTrial
+from experiments.models import ModelSets
+from experiments.relative import run_relative
 from experiments.simulate import simulate_study
 from experiments.study import Study, TaskPlan
+from experiments.trial_loop import Choice, SessionAborted, Surfaces
 from modeling import Threshold, simplify
 from rig.twin import SimulatedRig
 from stimuli.planted import planted_texture
@@ -42,8 +46,44 @@ def responses(tmp_path_factory) -> Responses:
     return load_responses(folder)
 
 
+def test_a_session_left_early_is_named(tmp_path):
+    class Leaving:
+        """A person who gives four answers and goes."""
+
+        simulated = False
+        answered = 0
+
+        def announce(self, title: str, text: str) -> None: ...
+
+        def confirm_mount(self, tray: str) -> None: ...
+
+        def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
+            if self.answered == 4:
+                raise SessionAborted
+            self.answered += 1
+            surfaces.present_virtual(0)
+            return Choice(button=0, response_time_s=1.0)
+
+    truths = {texture: planted_texture(texture) for texture in Study.load().textures}
+    run_relative(
+        Study.load(),
+        subject=1,
+        session=1,
+        models=ModelSets(full=truths, simplified=truths),
+        rig=SimulatedRig(),
+        respondent=Leaving(),
+        data_folder=tmp_path,
+    )
+    responses = load_responses(tmp_path)
+    assert (responses.simulated_participants, responses.simulated_rig) == (False, True)
+    (warning,) = responses.warnings
+    assert warning.startswith("sub-01 relative ses-01 answered 4 of ")
+    assert warning.endswith(" trials (ended early).")
+
+
 def test_every_answer_arrives(responses):
-    assert responses.simulated
+    assert responses.simulated_participants
+    assert responses.simulated_rig
     assert responses.warnings == ()
     assert len(responses.absolute) == 3 * 3 * 2
     assert len(responses.relative) == 4 * 3 * 2 * 2

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -15,10 +16,13 @@ from analysis.load import Responses
 from analysis.page import cell, label
 from analysis.report import write_report
 from analysis.tables import TextureResult
-from modeling import InputError, Threshold, simplify
+from modeling import InputError, RecordingSet, Threshold, simplify
 
 pytestmark = pytest.mark.filterwarnings("error")
 WARNING = "sub-01_ses-01_task-absolute_beh.tsv: the last line was cut short & is left out."
+
+
+BANNER = "SIMULATED: {}."
 
 
 class Page(HTMLParser):
@@ -44,11 +48,15 @@ class Page(HTMLParser):
         self.text += data
 
 
-def responses_of(ratings: pd.DataFrame, choices: pd.DataFrame, *, simulated: bool) -> Responses:
+def responses_of(
+    ratings: pd.DataFrame, choices: pd.DataFrame, *, simulated: bool, rig: bool | None = None
+) -> Responses:
+    """Answers whose participants and (unless told otherwise) rig are simulated or not."""
     return Responses(
         absolute=ratings,
         relative=choices,
-        simulated=simulated,
+        simulated_participants=simulated,
+        simulated_rig=simulated if rig is None else rig,
         absolute_training=ratings.iloc[:0],
         relative_training=choices.iloc[:0],
         warnings=(WARNING,),
@@ -132,8 +140,10 @@ def test_tables_beside_the_report_are_exact(folder, ratings):
 
 def test_simulated_results_are_called_so(shown):
     assert shown.text.count("SIMULATED") > 15
-    assert "SIMULATED: no real surface was touched and no person took part." in shown.text
-    assert "16 simulated participants" in shown.text
+    assert (
+        BANNER.format("the recordings come from no real surface; no person took part") in shown.text
+    )
+    assert "16 simulated participants at the simulated rig" in shown.text
     assert "say nothing about what people feel" in shown.text
 
 
@@ -171,10 +181,63 @@ def test_a_report_of_real_answers_alone(tmp_path, ratings, choices):
     assert "16participants, absolute evaluation" in shown.text  # a tile: number, then words
 
 
+def test_a_person_at_the_simulated_rig_is_a_person(tmp_path, ratings, choices):
+    people = responses_of(ratings, choices, simulated=False, rig=True)
+    shown = Page(write_report(tmp_path / "report.html", responses=people).read_text("utf-8"))
+    told = "people took part, but at a simulated rig, where nobody felt a real surface"
+    assert BANNER.format(told) in shown.text
+    assert "Absolute evaluation: 16 participants at the simulated rig, 224 trials" in shown.text
+    assert "16participants at the simulated rig, forced choice" in shown.text
+    assert "The participants are people, but the rig was simulated" in shown.text
+    assert "(SIMULATED)" in shown.text
+    assert "simulated participants" not in shown.text.lower()
+    assert "no person" not in shown.text
+
+
+def test_simulated_participants_at_a_real_rig_are_no_people(tmp_path, ratings, choices):
+    answers = responses_of(ratings, choices, simulated=True, rig=False)
+    shown = Page(write_report(tmp_path / "report.html", responses=answers).read_text("utf-8"))
+    assert BANNER.format("no person took part") in shown.text
+    assert "16simulated participants, forced choice" in shown.text
+    assert "Simulated participants follow a model" in shown.text
+    assert "simulated rig" not in shown.text
+
+
+def test_simulated_and_real_recordings_are_told_apart(tmp_path, results):
+    measured = replace(
+        results[1],
+        recordings=RecordingSet(
+            replace(recording, simulated=False) for recording in results[1].recordings.recordings
+        ),
+        model=replace(results[1].model, simulated=False),
+        truth=None,
+    )
+    path = write_report(tmp_path / "report.html", textures=[results[0], measured])
+    shown = Page(path.read_text(encoding="utf-8"))
+    told = "the recordings of 1 of 2 textures come from no real surface"
+    assert BANNER.format(told) in shown.text
+    assert "fitted to 8 recordings, 4 of them simulated (" in shown.text
+
+
+def test_the_flip_probability_says_what_it_covers(shown):
+    assert "in other records; whether the estimator would find the layer again" in shown.text
+
+
+@pytest.mark.parametrize("marked", [0, 3])
+def test_unresolved_layers_are_counted(tmp_path, results, marked):
+    model = results[0].model
+    unresolved = np.zeros(model.unresolved.shape, dtype=bool)
+    unresolved.flat[:marked] = True
+    result = replace(results[0], model=replace(model, unresolved=unresolved))
+    path = write_report(tmp_path / "report.html", textures=[result])
+    told = f"In {marked} of {unresolved.size} layer-conditions"
+    assert (told in Page(path.read_text(encoding="utf-8")).text) == (marked > 0)
+
+
 def test_a_report_of_models_alone(tmp_path, results):
     path = write_report(tmp_path / "report.html", textures=results[:1])
     shown = Page(path.read_text(encoding="utf-8"))
-    assert "SIMULATED: no real surface was touched." in shown.text
+    assert BANNER.format("the recordings come from no real surface") in shown.text
     assert "t-test" not in shown.text
 
 

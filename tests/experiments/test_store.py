@@ -29,9 +29,17 @@ COLUMNS = {"trial": {"Description": "number"}, "note": {"Description": "anything
 Rows = Callable[[Path], list[dict[str, str]]]
 
 
-def create(folder: Path, plan: SessionPlan, *, simulated: bool = True) -> SessionStore:
+def create(
+    folder: Path, plan: SessionPlan, *, simulated: bool = True, rig: bool | None = None
+) -> SessionStore:
+    """A session whose participant and (unless told otherwise) rig are simulated or not."""
     return SessionStore.create(
-        folder, plan=plan, columns=COLUMNS, description="a test", simulated=simulated
+        folder,
+        plan=plan,
+        columns=COLUMNS,
+        description="a test",
+        simulated_participant=simulated,
+        simulated_rig=simulated if rig is None else rig,
     )
 
 
@@ -137,6 +145,24 @@ def test_simulated_and_real_sessions_never_share_a_folder(tmp_path: Path, study:
     with pytest.raises(InputError, match="Name 'Another'"):
         create(tmp_path, plan_of(replace(study, name="Another"), subject=2), simulated=False)
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("participant", [True, False])
+@pytest.mark.parametrize("rig", [True, False])
+def test_it_is_told_what_was_simulated(
+    tmp_path: Path, study: Study, rows: Rows, participant: bool, rig: bool
+) -> None:
+    create(tmp_path, plan_of(study), simulated=participant, rig=rig).close()
+    (sidecar,) = tmp_path.rglob("*_beh.json")
+    for path in (sidecar, tmp_path / "dataset_description.json"):
+        told = json.loads(path.read_text())
+        assert told["Simulated"] is (participant or rig)
+        assert told["SimulatedParticipant"] is participant
+        assert told["SimulatedRig"] is rig
+    listed = rows(tmp_path / "participants.tsv")
+    assert [row["simulated"] for row in listed] == [str(participant).lower()]
+    with pytest.raises(InputError, match="choose another data folder"):
+        create(tmp_path, plan_of(study, subject=2), simulated=not participant, rig=rig)
 
 
 def test_the_sidecar_tells_the_circumstances(tmp_path: Path, study: Study) -> None:

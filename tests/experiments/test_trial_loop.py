@@ -28,6 +28,19 @@ def log_of(folder: Path, rows: Any) -> list[tuple[str, str]]:
     return [(row["event"], row["detail"]) for row in rows(path)]
 
 
+@pytest.mark.parametrize("task", ["absolute", "relative"])
+def test_a_person_at_the_simulated_rig_is_stored_as_a_person(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, task: str, rows: Any
+) -> None:
+    respondent.simulated = False
+    result = session(study, tmp_path, task, models=models, rig=rig, respondent=respondent)
+    sidecar = json.loads(result.path.with_suffix(".json").read_text())
+    assert (sidecar["SimulatedParticipant"], sidecar["SimulatedRig"]) == (False, True)
+    assert {row["simulated"] for row in rows(result.path)} == {"true"}
+    (participant,) = rows(tmp_path / "participants.tsv")
+    assert participant["simulated"] == "false"
+
+
 def test_an_absolute_session_is_stored_as_it_went(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
 ) -> None:

@@ -9,7 +9,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
-from modeling.files import read_table, replace_folder, write_table, write_text
+from modeling.files import file_stem, read_table, replace_folder, write_table, write_text
+
+
+@pytest.mark.parametrize(
+    ("name", "stem"),
+    [
+        ("wall paper", "wall-paper"),
+        ("no_7-b.2", "no_7-b.2"),
+        ("été/../x", "été-..-x"),
+        ("..", "--"),
+    ],
+)
+def test_a_name_becomes_a_file_name(name: str, stem: str) -> None:
+    assert file_stem(name) == stem
+
+
+@given(st.text())
+def test_no_name_leads_out_of_its_folder(name: str) -> None:
+    folder = Path("/folder")
+    assert (folder / file_stem(name)).parent == folder
+    assert file_stem(name) not in ("", ".", "..")
+
 
 cells = st.text(
     st.characters(exclude_categories=["Cs"], exclude_characters="\t\r\n"), min_size=1, max_size=8

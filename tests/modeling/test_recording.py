@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-import soundfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -57,6 +55,8 @@ def test_unusable_samples_are_refused(
         ({"texture": "a\tb"}, "texture name"),
         ({"texture": "a\nb"}, "texture name"),
         ({"repeat": 0}, "repeat of at least 1"),
+        ({"clipped_share": -0.1}, "clipped_share of 0 to 1"),
+        ({"clipped_share": np.inf}, "clipped_share of 0 to 1"),
     ],
 )
 def test_wrong_labels_are_refused(
@@ -87,6 +87,7 @@ def test_samples_are_copied_and_frozen(make_recording: RecordingMaker) -> None:
         {"unit": "arbitrary"},
         {"simulated": True},
         {"repeat": 2},
+        {"clipped_share": 0.5},
     ],
 )
 def test_recordings_differ_in_every_label(
@@ -108,6 +109,80 @@ def test_clipped_share_of_known_clipping(make_recording: RecordingMaker) -> None
     assert make_recording(one_sided).clipped_share == pytest.approx(expected / 2, abs=1e-3)
 
 
+STEPS_G = (0.0, 4 / 2**16, 0.001907349)  # float, 16 bit over ±2 g, the sensor's
+
+
+def quantised(samples: np.ndarray, step_g: float) -> np.ndarray:
+    return np.rint(samples / step_g) * step_g if step_g else samples
+
+
+@pytest.mark.parametrize("step_g", STEPS_G)
+@pytest.mark.parametrize("limit_in_sd", [3.0, 2.0, 1.5, 1.0, 0.3, 0.05])
+def test_all_clipped_samples_of_noise_count(
+    make_recording: RecordingMaker, limit_in_sd: float, step_g: float
+) -> None:
+    """0.27 % to 96 % beyond the limits, most of them single samples."""
+    noise = 0.5 * np.random.default_rng(3).standard_normal(22704)
+    limit = 0.5 * limit_in_sd
+    expected = np.mean(np.abs(noise) >= limit)
+    clipped = quantised(np.clip(noise, -limit, limit), step_g)
+    share = make_recording(clipped).clipped_share
+    # Samples within half a step of the limit read as the limit.
+    assert expected <= share == pytest.approx(expected, rel=0.02, abs=2e-4)
+    below = np.mean(noise <= -limit)
+    one_sided = quantised(np.maximum(noise, -limit), step_g)
+    assert make_recording(one_sided).clipped_share == pytest.approx(below, rel=0.02, abs=2e-4)
+
+
+def test_rest_is_not_clipping(make_recording: RecordingMaker) -> None:
+    impulse = np.zeros(5000)
+    impulse[100:103] = 1.0, 3.0, 2.0
+    taps = np.where(np.arange(5000) % 500 < 5, np.linspace(0.1, 3.0, 5000), 0.0)
+    for line in (impulse, -impulse, taps, impulse + 0.98):
+        assert make_recording(line).clipped_share == 0.0
+
+
+@pytest.mark.parametrize("step_g", STEPS_G)
+@pytest.mark.parametrize("seed", range(3))
+def test_noise_is_not_clipped(make_recording: RecordingMaker, seed: int, step_g: float) -> None:
+    noise = np.random.default_rng(seed).standard_normal(22704)
+    assert make_recording(quantised(noise, step_g)).clipped_share == 0.0
+    assert make_recording(noise.astype(np.float32)).clipped_share == 0.0
+
+
+@pytest.mark.parametrize("rate_hz", [1000, 10_000, 22_704])
+@pytest.mark.parametrize("amplitude", [1.0, 1.49, 2.499, 5.5, 20.3])
+def test_tones_are_not_clipped(
+    make_recording: RecordingMaker, rate_hz: int, amplitude: float
+) -> None:
+    """Also where the rate is a multiple of the frequency, so that every crest is the same."""
+    t = np.arange(rate_hz) / rate_hz
+    for frequency_hz in (7, 40.3, 50, 100, 125, 250):
+        for phase in (0.0, 0.5, np.pi / 2):
+            tone = amplitude * np.sin(2 * np.pi * frequency_hz * t + phase)
+            assert make_recording(tone).clipped_share == 0.0
+            assert make_recording(quantised(tone, 1.0)).clipped_share == 0.0
+
+
+def test_given_share_wins_and_survives_the_disk(
+    make_recording: RecordingMaker, tmp_path: Path
+) -> None:
+    recording = make_recording(NOISE, clipped_share=0.125)
+    RecordingSet([recording]).save(tmp_path / "set")
+    (loaded,) = RecordingSet.load(tmp_path / "set").recordings
+    assert loaded.clipped_share == recording.clipped_share == 0.125
+
+
+def test_index_without_shares_has_them_counted(
+    make_recording: RecordingMaker, tmp_path: Path
+) -> None:
+    recording = make_recording(np.clip(np.random.default_rng(0).standard_normal(1000), -1, 1))
+    RecordingSet([recording]).save(tmp_path / "set")
+    edit(tmp_path / "set/recordings.tsv", "clipped_share", "remark")
+    (loaded,) = RecordingSet.load(tmp_path / "set").recordings
+    assert loaded.clipped_share == recording.clipped_share > 0.3
+
+
 @pytest.mark.parametrize("step_g", [0.001907349, 0.05, 0.3])
 def test_quantised_noise_is_not_clipped(make_recording: RecordingMaker, step_g: float) -> None:
     for seed in range(5):
@@ -127,13 +202,12 @@ def test_quantised_smooth_vibration_is_not_clipped(
     narrow = sosfilt(sections, rng.standard_normal(22704))
     narrow *= amplitude_g / np.abs(narrow).max()
     for smooth in (tone, narrow):
-        quantised = np.rint(smooth / 0.001907349) * 0.001907349
-        assert make_recording(quantised).clipped_share == 0.0
+        assert make_recording(quantised(smooth, 0.001907349)).clipped_share == 0.0
     if amplitude_g >= 0.5:
         limited = np.clip(tone, -0.9 * amplitude_g, 0.9 * amplitude_g)
-        quantised = np.rint(limited / 0.001907349) * 0.001907349
         expected = 1 - 2 / np.pi * np.arcsin(0.9)
-        assert make_recording(quantised).clipped_share == pytest.approx(expected, abs=0.01)
+        share = make_recording(quantised(limited, 0.001907349)).clipped_share
+        assert share == pytest.approx(expected, abs=0.01)
 
 
 # --- sets
@@ -252,12 +326,14 @@ def test_csv_of_other_bytes_is_refused(folder: Path) -> None:
         ("\t100.0\t2.0", "\tfast\t2.0", "number for speed_mm_s of 0002.csv, got 'fast'"),
         ("\t100.0\t2.0", "\t100.0\t", "number for force_n of 0002.csv, got nothing"),
         ("\t100.0\t2.0", "\t100.0\t1.0", "one recording per condition"),
-        ("\t100.0\t2.0", "\t100.0\t2.0\t3", "9 cells"),
+        ("\t100.0\t2.0", "\t100.0\t2.0\t3", "10 cells"),
         ("\t2.0\t5000.0\tg", "\t2.0\t5000.0\tm/s2", "unit among g, arbitrary"),
         ("\t2.0\t5000.0\tg", "\t2.0\t\tg", "rate_hz of 0002.csv, got nothing"),
         ("\t2.0\t5000.0\tg", "\t2.0\t0\tg", "rate above 0"),
         ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\tnan", "whole number for repeat"),
         ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\t1.5", "whole number for repeat"),
+        ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\tinf", "whole number for repeat"),
+        ("\t2.0\t5000.0\tg\t1", "\t2.0\t5000.0\tg\t0", "at least 1"),
         ("\t2.0\t5000.0\tg\t1\tfalse", "\t2.0\t5000.0\tg\t1\tyes", "true or false"),
         ("0002.csv", "0003.csv", "0003.csv"),
         ("file\ttexture", "name\ttexture", "add file"),
@@ -359,55 +435,3 @@ def test_foreign_folders_are_not_replaced(tmp_path: Path, make_recording: Record
     with pytest.raises(InputError, match="expected a folder"):
         RecordingSet([make_recording()]).save(tmp_path / "notes.txt")
     assert snapshot(tmp_path) == {"notes.txt": b"mine"}
-
-
-# --- WAV
-
-
-def write_wav(path: Path, samples: np.ndarray, rate_hz: int = 8000) -> None:
-    soundfile.write(path, samples, rate_hz, subtype="FLOAT")
-
-
-def test_wav_listed_in_an_index(tmp_path: Path) -> None:
-    samples = (0.1 * NOISE).astype(np.float32)
-    write_wav(tmp_path / "a.wav", samples)
-    (tmp_path / "recordings.tsv").write_text(
-        "file\ttexture\tspeed_mm_s\tforce_n\tg_per_fullscale\na.wav\tfelt\t80\t1.5\t50\n"
-    )
-    recording = RecordingSet.load(tmp_path).recordings[0]
-    assert (recording.rate_hz, recording.unit) == (8000.0, "g")
-    assert (recording.texture, recording.condition) == ("felt", (80.0, 1.5))
-    assert np.array_equal(recording.samples, samples.astype(float) * 50)
-
-
-def test_wav_with_a_json_sidecar(tmp_path: Path) -> None:
-    write_wav(tmp_path / "a.wav", NOISE / 10)
-    sidecar = {"texture": "felt", "speed_mm_s": 80, "force_n": 1.5, "simulated": True}
-    (tmp_path / "a.json").write_text(json.dumps(sidecar))
-    write_wav(tmp_path / "unlisted.wav", NOISE / 10)
-    (recording,) = RecordingSet.load(tmp_path).recordings
-    assert recording.unit == "arbitrary"
-    assert recording.simulated
-    assert recording.condition == (80.0, 1.5)
-    assert recording.samples == pytest.approx(NOISE / 10, rel=1e-6)
-
-
-@pytest.mark.parametrize("sidecar", ["", "[]", "{", '{"texture": "felt", "speed_mm_s": 80}'])
-def test_damaged_sidecars_are_refused(tmp_path: Path, sidecar: str) -> None:
-    write_wav(tmp_path / "a.wav", NOISE / 10)
-    (tmp_path / "a.json").write_text(sidecar)
-    with pytest.raises(InputError, match="expected"):
-        RecordingSet.load(tmp_path)
-
-
-def test_unusable_wav_files_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.json").write_text('{"texture": "felt", "speed_mm_s": 80, "force_n": 1}')
-    write_wav(tmp_path / "a.wav", np.stack([NOISE, NOISE], axis=1) / 10)
-    with pytest.raises(InputError, match=r"one channel .*, got 2"):
-        RecordingSet.load(tmp_path)
-    (tmp_path / "a.wav").write_bytes(b"RIFF nothing")
-    with pytest.raises(InputError, match="expected a WAV file"):
-        RecordingSet.load(tmp_path)
-    (tmp_path / "a.wav").write_bytes(b"")
-    with pytest.raises(InputError, match="expected a WAV file"):
-        RecordingSet.load(tmp_path)

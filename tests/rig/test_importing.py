@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
-from modeling import InputError
+from modeling import InputError, RecordingSet
 from rig.importing import Label, import_csv, import_wav, labels_from_table
 
 LABEL = Label("oak", 100.0, 1.0)
@@ -102,6 +102,8 @@ def test_without_a_unit_it_is_arbitrary(tmp_path: Path, axes: NDArray[np.float64
         ("x,y,z", {"axis": "x"}, "expected a time column or --rate"),
         ("time,x,y,z", {}, "expected --axis x, y, z or dft321"),
         ("time,x,y,q", {"axis": "dft321"}, "expected columns named x, y, z"),
+        ("time,x,ax,z", {"axis": "x"}, "expected columns named x .each once."),
+        ("time,x,y,ay", {"axis": "dft321"}, "expected columns named x, y, z .each once."),
         ("time,x,y,z", {"axis": "w"}, "expected an axis among"),
         ("time,x (furlong),y,z", {"axis": "x"}, "got 'furlong'"),
         ("time,x,y,z", {"axis": "x", "unit": "stone"}, "got 'stone'"),
@@ -127,7 +129,11 @@ def test_refused_layouts(
     [
         ("", "got 0 lines"),
         ("time,x\n", "got 1 lines"),
-        ("time,x\n0,1\n0.1,2\n0.2", "truncated or damaged"),
+        ("time,x\n0,1\n0.1,2\n0.2", "add a line end if the file is complete"),
+        ("time,x\n0,1\n0.1,2\n0.2,3", "add a line end if the file is complete"),
+        ("time,x\n0,1\n0.1,2\n0.2\n", "truncated or damaged"),
+        ("time,x,x,y,z\n0,1,2,3,4\n", "each column name once"),
+        ("time;x\n0,5;1.234,5\n", "a cell that is none"),
         ("time,x\n0,1\n0.1,two\n", "a cell that is none"),
         ("0,1\n0.1,2\n", "expected a header line"),
     ],
@@ -165,6 +171,47 @@ def test_falling_times_are_refused(tmp_path: Path, axes: NDArray[np.float64]) ->
         import_csv([path], [LABEL])
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "factor", "header"),
+    [(3200, 1e3, "time"), (22_704, 1e3, "time"), (220_704, 1e6, "t"), (3200, 1e3, "time_s")],
+)
+def test_time_in_another_unit_is_noticed(
+    tmp_path: Path, axes: NDArray[np.float64], rate_hz: int, factor: float, header: str
+) -> None:
+    columns = np.vstack([np.arange(2000) / rate_hz * factor, axes[0]])
+    path = write_csv(tmp_path / "a.csv", f"{header},x", columns)
+    with pytest.raises(InputError, match="is time in ms or us"):
+        import_csv([path], [LABEL])
+    given = import_csv([path], [LABEL], rate_hz=rate_hz).recordings[0]
+    assert given.rate_hz == rate_hz
+    named = write_csv(tmp_path / "b.csv", "time_ms,x" if factor == 1e3 else "time_us,x", columns)
+    assert import_csv([named], [LABEL]).recordings[0].rate_hz == pytest.approx(rate_hz)
+
+
+def test_decimal_commas_between_semicolons(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s;x_g;y_g;z_g", with_time(axes), delimiter=";")
+    with_points = import_csv([path], [LABEL], axis="z")
+    path.write_text(path.read_text().replace(".", ","))
+    assert import_csv([path], [LABEL], axis="z") == with_points
+
+
+def test_clipping_of_single_axes_is_seen_after_their_combination(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    limited = np.clip(axes, [[-0.5], [-0.4], [-9]], [[0.5], [9], [9]])
+    stuck = limited != axes
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g,y_g,z_g", with_time(limited))
+    combined = import_csv([path], [LABEL], axis="dft321")
+    assert combined.recordings[0].clipped_share == stuck.any(axis=0).mean() > 0.1
+    combined.save(tmp_path / "set")
+    assert RecordingSet.load(tmp_path / "set") == combined
+    for axis, share in zip(("x", "y", "z"), stuck.mean(axis=1), strict=True):
+        single = import_csv([path], [LABEL], axis=axis).recordings[0]  # type: ignore[arg-type]
+        assert single.clipped_share == share
+    whole = write_csv(tmp_path / "b.csv", "time_s,x_g,y_g,z_g", with_time(axes))
+    assert import_csv([whole], [LABEL], axis="dft321").recordings[0].clipped_share == 0.0
+
+
 def write_wav(path: Path, samples: NDArray[np.float64], *, rate_hz: int = 10_000) -> Path:
     wavfile.write(path, rate_hz, np.round(samples * 32767).astype(np.int16))
     return path
@@ -186,6 +233,9 @@ def test_wav_with_a_meaningless_scale_is_refused(tmp_path: Path, full_scale: flo
     path = write_wav(tmp_path / "a.wav", np.sin(np.arange(1000.0)))
     with pytest.raises(InputError, match="g per full scale above 0"):
         import_wav([path], [LABEL], g_per_fullscale=full_scale)
+    label = Label("oak", 100.0, 1.0, g_per_fullscale=full_scale)
+    with pytest.raises(InputError, match="g per full scale above 0"):
+        import_wav([path], [label], g_per_fullscale=16.0)
 
 
 def test_stereo_and_noise_bytes_are_refused(tmp_path: Path) -> None:
@@ -219,3 +269,40 @@ def test_labels_from_a_table(tmp_path: Path) -> None:
     table.write_text("file\tspeed_mm_s\tforce_n\na.wav\tfast\t0.5\n")
     with pytest.raises(InputError, match="speed_mm_s"):
         labels_from_table(table, [Path("a.wav")], texture=None)
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        ("a.wav\t50\t0.5\t1.5\t", "whole number for repeat of a.wav"),
+        ("a.wav\t50\t0.5\tinf\t", "whole number for repeat of a.wav"),
+        ("a.wav\t50\t0.5\tnan\t", "whole number for repeat of a.wav"),
+        ("a.wav\t50\t0.5\t0\t", "at least 1, got 0"),
+        ("a.wav\t50\t0.5\t-1\t", "at least 1, got -1"),
+        ("a.wav\t50\t0.5\t1\t0", "g per full scale above 0, got 0"),
+        ("a.wav\t50\t0.5\t1\t-16", "g per full scale above 0, got -16"),
+        ("a.wav\t50\t0.5\t1\tloud", "number for g_per_fullscale of a.wav"),
+        ("a.wav\t50\t0.5\t1\t\na.wav\t60\t0.5\t2\t", "one row for a.wav"),
+    ],
+)
+def test_refused_labels(tmp_path: Path, row: str, sentence: str) -> None:
+    table = tmp_path / "labels.tsv"
+    table.write_text(f"file\tspeed_mm_s\tforce_n\trepeat\tg_per_fullscale\n{row}\n")
+    with pytest.raises(InputError, match=sentence):
+        labels_from_table(table, [Path("a.wav")], texture="oak")
+
+
+def test_empty_scale_is_none_given(tmp_path: Path) -> None:
+    table = tmp_path / "labels.tsv"
+    table.write_text("file\tspeed_mm_s\tforce_n\tg_per_fullscale\na.wav\t50\t1\t\n")
+    labels = labels_from_table(table, [Path("a.wav")], texture="oak")
+    assert labels == [Label("oak", 50.0, 1.0)]
+    path = write_wav(tmp_path / "a.wav", np.sin(np.arange(1000.0)) / 2)
+    assert import_wav([path], labels, g_per_fullscale=16.0).recordings[0].unit == "g"
+
+
+def test_cut_wav_is_refused(tmp_path: Path) -> None:
+    path = write_wav(tmp_path / "a.wav", np.sin(np.arange(1000.0)) / 2)
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(InputError, match="truncated"):
+        import_wav([path], [LABEL])

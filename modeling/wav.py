@@ -1,0 +1,46 @@
+"""WAV files of one axis, and what their full scale stands for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.errors import InputError
+
+
+def full_scale(value_g: float, file: str) -> float:
+    """Acceleration (g) of a full-scale sample of `file`; InputError unless finite and above 0."""
+    if not (np.isfinite(value_g) and value_g > 0):
+        raise InputError(f"{file}: expected g per full scale above 0, got {value_g}; correct it.")
+    return value_g
+
+
+def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
+    """Samples (1 = full scale) and rate (Hz) of a mono WAV file.
+
+    Raises
+    ------
+    InputError
+        If the file is no readable WAV, has several channels, or is shorter than it says.
+    """
+    import soundfile  # late: loads a shared library that most uses never need
+
+    try:
+        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
+    except (soundfile.LibsndfileError, OSError) as error:
+        raise InputError(f"expected a WAV file, got {path} ({error}); convert it.") from None
+    if samples.shape[1] != 1:
+        raise InputError(
+            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
+        )
+    with path.open("rb") as file:
+        form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
+    # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
+    if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:
+        raise InputError(
+            f"expected {announced} bytes in {path}, as its header says, got "
+            f"{path.stat().st_size}; the file is truncated, copy or record it again."
+        )
+    return samples[:, 0], float(rate_hz)
