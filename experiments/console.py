@@ -149,14 +149,15 @@ class Console:
 
         def update() -> None:
             real.lit, virtual.lit = surfaces.shows_real, not surfaces.shows_real
-            proceed.enabled = magnitude.rated and frequency.rated
+            compared = surfaces.switches > 0
+            proceed.enabled = compared and magnitude.rated and frequency.rated
 
         page = Page(
             "rate",
             widgets=(real, virtual, magnitude, frequency, proceed),
             decoration=(
                 self._title("How alike are the two surfaces?"),
-                self._note("The filled button is the surface that you feel now.", y=0.212),
+                self._note("Feel both; the filled button is the one that you feel now.", y=0.212),
                 *self._cards((0.072, 0.2), (-0.153, 0.2)),
             ),
         )

@@ -326,12 +326,15 @@ def _sidecar_text(
 
 def _describe_data_set(root: Path, study: Study, *, simulated: Mapping[str, bool]) -> None:
     """Write the description of the data set, or check that the one there is of this study."""
+    design = study.to_dict()
+    wanted = {"Name": study.name, **simulated, "StudyDesign": design}
     values = {
         "Name": study.name,
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "raw",
         "License": study.data_license,
         **simulated,
+        "StudyDesign": design,
         "GeneratedBy": [{"Name": "tactileq", "Version": _own_version()}],
     }
     path = root / "dataset_description.json"
@@ -339,7 +342,7 @@ def _describe_data_set(root: Path, study: Study, *, simulated: Mapping[str, bool
         _write_new(path, _json(values), made=[])
         _write_new(root / "participants.json", _json(_PARTICIPANTS_SIDECAR), made=[])
     except FileExistsError:
-        _check_description(path, {"Name": study.name, **simulated})
+        _check_description(path, json.loads(_json(wanted)))
 
 
 def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
@@ -348,11 +351,16 @@ def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
     except ValueError:
         found = {}
     for key, value in wanted.items():
-        if found.get(key) != value:
-            raise InputError(
-                f"expected a data folder with {key} {value!r} in {path}, got "
-                f"{found.get(key)!r}; choose another data folder for these sessions."
-            )
+        there = found.get(key)
+        if there == value:
+            continue
+        if isinstance(value, dict) and isinstance(there, dict):
+            changed = sorted(k for k in value.keys() | there if value.get(k) != there.get(k))
+            key, there, value = f"{key} unchanged", f"another {', '.join(changed)}", "as begun"
+        raise InputError(
+            f"expected a data folder with {key} {value!r} in {path}, got {there!r}; choose "
+            "another data folder for these sessions."
+        )
 
 
 _PARTICIPANTS_SIDECAR = {

@@ -55,11 +55,6 @@ def smooth(magnitude: Floats, sigma_hz: float, *, step_hz: float) -> Floats:
     return smoothed
 
 
-def model_rate_hz(recording_rate_hz: float) -> float:
-    """The rate a model takes from data of this rate: 5 kHz, or the data's own where lower."""
-    return min(MODEL_RATE_HZ, recording_rate_hz)
-
-
 def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     """Mean removed, resampled by FFT, 10 Hz high-pass (4th-order Butterworth, one direction).
 

@@ -127,13 +127,6 @@ def test_an_absolute_trial_by_mouse(tmp_path: Path, display: str, rows: Any) -> 
         person.wait_for_page("rate")
         assert person.presented == [[trial.first_surface, trial.texture]]
 
-        other = "real" if trial.first_surface == "virtual" else "virtual"
-        person.click(other)
-        assert person.wait_for_surface() == [other, trial.texture]
-        person.session.stdin.write("press\n")
-        person.session.stdin.flush()
-        assert person.wait_for_surface() == [trial.first_surface, trial.texture]
-
         # Dragging onto a scale from outside rates nothing, so Continue stays without effect.
         for scale in ("magnitude", "frequency"):
             x, y = person.handles[f"{scale}:50"]
@@ -144,6 +137,14 @@ def test_an_absolute_trial_by_mouse(tmp_path: Path, display: str, rows: Any) -> 
         # A drag that begins on the scale counts where it is let go, be it off the line.
         (left, y), (right, _) = person.handles["frequency:0"], person.handles["frequency:100"]
         person.drag((right, y), (left + (right - left) // 4, y + 60))
+        # Who has felt only one of the two surfaces cannot go on.
+        person.click("continue")
+        other = "real" if trial.first_surface == "virtual" else "virtual"
+        person.click(other)
+        assert person.wait_for_surface() == [other, trial.texture]
+        person.session.stdin.write("press\n")
+        person.session.stdin.flush()
+        assert person.wait_for_surface() == [trial.first_surface, trial.texture]
         person.click("continue")
         person.wait_for_page("mount")
         person.xdotool("key", "Escape")

@@ -253,3 +253,11 @@ def test_a_folder_that_is_a_file_is_told_in_one_sentence(tmp_path: Path, study: 
     with pytest.raises(StoreError, match="Nothing was presented"):
         create(tmp_path / "data", plan_of(study))
     assert (tmp_path / "data").read_text() == "a file"
+
+
+def test_a_changed_study_needs_another_data_folder(tmp_path: Path, study: Study) -> None:
+    create(tmp_path, plan_of(study)).close()
+    changed = replace(study, seed=study.seed + 1)
+    with pytest.raises(InputError, match=r"another seed.*choose another data folder"):
+        create(tmp_path, plan_of(changed, subject=2))
+    assert not list(tmp_path.rglob("sub-02*"))
