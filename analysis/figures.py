@@ -40,7 +40,7 @@ def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
     axes = figure.subplots(2, 2, sharex=True, sharey="row")
     for column, model in enumerate(MODELS):
         plot_model_spectrum(comparison, model=model, ax=axes[0, column])
-        plot_layers_and_threshold(comparison, ax=axes[1, column])
+        plot_layers_and_threshold(comparison, model=model, ax=axes[1, column])
         axes[0, column].set_xlabel("")
     for ax in axes[:, 1]:
         ax.set_ylabel("")
@@ -67,8 +67,10 @@ def plot_model_spectrum(
     return ax
 
 
-def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None = None) -> Axes:
-    """Each layer's amplitude by the criterion (stems at f) against the detection threshold."""
+def plot_layers_and_threshold(
+    comparison: SpectrumComparison, *, model: str = "full", ax: Axes | None = None
+) -> Axes:
+    """Amplitude of the model's layers by the criterion (stems at f) against the threshold."""
     ax = _axes_or_new(ax)
     threshold = comparison.threshold
     ax.plot(
@@ -79,7 +81,7 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
     )
     # A layer without power must not stretch the axis: weaker ones stand on its lower edge.
     bottom = float(threshold.acceleration_g.min()) / 1000
-    _plot_stems(ax, comparison, bottom=bottom)
+    _plot_stems(ax, comparison, bottom=bottom, with_dropped=model == "full")
     ax.axvspan(
         threshold.frequency_hz[-1],
         comparison.frequency_hz[-1],
@@ -95,9 +97,12 @@ def plot_layers_and_threshold(comparison: SpectrumComparison, *, ax: Axes | None
     return ax
 
 
-def _plot_stems(ax: Axes, comparison: SpectrumComparison, *, bottom: float) -> None:
+def _plot_stems(
+    ax: Axes, comparison: SpectrumComparison, *, bottom: float, with_dropped: bool
+) -> None:
     """Numbered stems from the bottom of the axes up to each layer's amplitude."""
-    for dropped, label in ((False, "layer, kept"), (True, "layer, dropped by simplification")):
+    labels = {False: "layer, kept", True: "layer, dropped by simplification"}
+    for dropped, label in labels.items() if with_dropped else [(False, labels[False])]:
         colour = VERMILLION if dropped else BLUE
         chosen = comparison.dropped == dropped
         if not chosen.any():
@@ -246,10 +251,10 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
     """One confusion matrix: row shares in per cent with counts."""
     ax = _axes_or_new(ax)
     shares = 100 * matrix.row_shares
-    ax.imshow(shares, vmin=0, vmax=100, cmap="cividis", aspect="auto")
+    ax.imshow(shares, vmin=0, vmax=100, cmap="cividis_r", aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
         text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
-        shade = "white" if not share > 55 else "black"
+        shade = "black" if not share > 55 else "white"
         shade = shade if np.isfinite(share) else GREY
         ax.text(column, row, text, ha="center", va="center", fontsize=9, color=shade)
     names = list(matrix.textures)

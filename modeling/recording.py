@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.errors import InputError
+from modeling.errors import InputError, check_texture_name
 from modeling.files import check_replaceable, read_table, replace_folder, write_table
 from modeling.wav import full_scale, read_wav
 
@@ -75,6 +75,7 @@ class Recording:
     clipped_share: float = np.nan
 
     def __post_init__(self) -> None:
+        check_texture_name(self.texture)
         where = f"recording of {self.texture!r}"
         object.__setattr__(self, "samples", _checked_samples(self.samples, where))
         for name in ("rate_hz", "speed_mm_s", "force_n"):
@@ -103,10 +104,6 @@ class Recording:
         if not 0 <= self.clipped_share <= 1:
             raise InputError(
                 f"{where}: expected a clipped_share of 0 to 1, got {self.clipped_share}; fix it."
-            )
-        if not self.texture.strip() or any(c in self.texture for c in "\t\r\n"):
-            raise InputError(
-                f"expected a texture name of one line without tabs, got {self.texture!r}; name it."
             )
 
     @property
@@ -225,6 +222,12 @@ class RecordingSet:
 
     def __len__(self) -> int:
         return len(self.recordings)
+
+    def __iter__(self) -> Iterator[Recording]:
+        return iter(self.recordings)
+
+    def __repr__(self) -> str:
+        return f"<RecordingSet of {len(self)} recordings of {', '.join(self.textures)}>"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RecordingSet):

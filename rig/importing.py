@@ -28,7 +28,7 @@ LONGEST_GAP = 2.5
 LOWEST_RATE_HZ = 20.0
 LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
 _TIME_NAMES = {"time", "t", "timestamp"}
-_AXIS_NAME = re.compile(r"(?:a|acc|accel|acceleration)?_?([xyz])")
+_AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def import_csv(
     axis : {"x", "y", "z", "dft321"}, optional
         Needed where a file has more than one column beside time.
     unit : {"g", "mg", "m/s2", "arbitrary"}, optional
-        Unit of the axes; wins over a unit in the header (`x (g)`, `x_g`). With neither the unit is
+        Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
         `arbitrary`.
     rate_hz : float, optional
         Wins over the time column.
@@ -108,6 +108,11 @@ def import_csv(
         columns = _read_columns(path)
         rate = rate_hz if rate_hz is not None else _rate_from_time(path, columns)
         axes, found_unit = _chosen_axes(path, columns, axis)
+        if unit and found_unit and unit != found_unit:
+            raise InputError(
+                f"expected one unit for {path.name}, got {found_unit!r} in its header and {unit!r} "
+                "from --unit; leave --unit out or correct the header."
+            )
         final_unit = unit or found_unit or "arbitrary"
         _check_unit(final_unit, f"the header of {path.name}")
         name = "arbitrary" if final_unit == "arbitrary" else "g"
@@ -189,11 +194,8 @@ def _check_unit(unit: str | None, where: str) -> None:
 def _read_lines(path: Path) -> list[str]:
     if not path.is_file():
         raise InputError(f"expected a CSV file at {path}, got nothing there; give its path.")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(f"expected a text file, got other bytes in {path}; export CSV.") from None
-    lines = text.splitlines()
+    text = _decoded(path)
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         raise InputError(
             f"expected a header and rows of numbers in {path.name}, got {len(lines)} lines; "
@@ -205,6 +207,20 @@ def _read_lines(path: Path) -> list[str]:
             "one, so it may be truncated; add a line end if the file is complete."
         )
     return lines
+
+
+def _decoded(path: Path) -> str:
+    """The text of a file in UTF-8, UTF-16 with its mark, or the Western code page."""
+    data = path.read_bytes()
+    marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
+    for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
+        try:
+            text = data.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        if "\0" not in text:
+            return text
+    raise InputError(f"expected a text file, got other bytes in {path}; export CSV.")
 
 
 def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
@@ -340,6 +356,7 @@ def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:
     if [letters[name] for name in chosen] != list(wanted):
         raise InputError(
             f"expected columns named {', '.join(wanted)} (each once) in {path.name}, got "
-            f"{', '.join(names)}; rename them or choose another axis."
+            f"{', '.join(names)}; rename them, choose another axis, or leave --axis out where "
+            "there is only one."
         )
     return chosen

@@ -306,3 +306,32 @@ def test_cut_wav_is_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(InputError, match="truncated"):
         import_wav([path], [LABEL])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "cp1252"])
+def test_encodings_comments_and_blank_lines(
+    tmp_path: Path, axes: NDArray[np.float64], encoding: str
+) -> None:
+    header = "time (s),Linear Acceleration x (m/s²),Gyroscope x (rad/s)"
+    path = write_csv(tmp_path / "a.csv", header, with_time(axes[:2]))
+    text = "# phone, held flat\n" + path.read_text(encoding="utf-8") + "\n"
+    path.write_text(text, encoding=encoding)
+    recording = import_csv([path], [LABEL], axis="x").recordings[0]
+    np.testing.assert_allclose(recording.samples, axes[0] / 9.80665, rtol=1e-12)
+    assert recording.unit == "g"
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(bytes(range(256)) * 10)
+    with pytest.raises(InputError, match="other bytes"):
+        import_csv([path], [LABEL])
+
+
+def test_an_option_must_not_contradict_the_header(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x_m_s2", with_time(axes[:1]))
+    with pytest.raises(InputError, match=r"'m/s2' in its header and 'g' from --unit"):
+        import_csv([path], [LABEL], unit="g")
+    assert import_csv([path], [LABEL], unit="m/s2").recordings[0].unit == "g"
