@@ -481,6 +481,13 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     check_own_results(out, "demo", contents=DEMO_CONTENTS)
     plan = study_from(None)
     threshold = threshold_named("codec")
+    settings = {
+        "estimators": ["paper-consistent", "paper"],
+        "threshold": threshold.name,
+        "criterion": "energy",
+        "margin_db": 0.0,
+        "study": plan.to_dict(),
+    }
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
     with replace_folder(out) as fresh:
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
@@ -506,9 +513,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
                 progress=advance,
             )
         run_study(plan, real, full, fewer, fresh / "data", threshold, seed)
-        provenance = write_provenance(
-            fresh / "provenance.json", "demo", {"threshold": threshold.name}, seed=seed
-        )
+        provenance = write_provenance(fresh / "provenance.json", "demo", settings, seed=seed)
         with share_of("Analyzing") as tell:
             write_report(
                 fresh / "report.html",

@@ -251,7 +251,7 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
     """One confusion matrix: row shares in per cent with counts."""
     ax = _axes_or_new(ax)
     shares = 100 * matrix.row_shares
-    ax.imshow(shares, vmin=0, vmax=100, cmap="cividis_r", aspect="auto")
+    ax.imshow(shares, vmin=0, vmax=100, cmap="Blues", aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
         text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
         shade = "black" if not share > 55 else "white"

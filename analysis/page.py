@@ -225,7 +225,8 @@ def cell(column: str, value: object) -> str:
         return f"{value:g}"
     size = abs(value)
     digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
-    tiny = 0 < size < 0.0005
+    # Below 1e-9 is what sums of thirds leave of a zero.
+    tiny = 1e-9 < size < 0.0005
     return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
 
 

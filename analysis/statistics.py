@@ -355,7 +355,7 @@ def _shapiro(differences: Floats) -> float:
 
 def _without_rounding_noise(differences: Floats) -> Floats:
     """Make 2/3 − 1/3 and 1 − 2/3 the same number, so that ties and zero variance are seen."""
-    rounded: Floats = np.round(differences, 9)
+    rounded: Floats = np.round(differences, 12)
     return rounded
 
 
