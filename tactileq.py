@@ -67,6 +67,15 @@ Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")
 Simplified = Annotated[Path, typer.Option("--simplified", help="Folder of simplified models.")]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 
+SurfaceName = Annotated[
+    str | None, typer.Option("--texture", help="Name of the surface; the name of --out without it.")
+]
+SpeedOfAll = Annotated[float | None, typer.Option("--speed", help="Speed of all files, mm/s.")]
+ForceOfAll = Annotated[float | None, typer.Option("--force", help="Force of all files, N.")]
+LabelTable = Annotated[
+    Path | None, typer.Option("--labels", help="TSV: file, speed_mm_s, force_n (texture, repeat).")
+]
+
 REPORT_CONTENTS = {"report.html", "tables", "figures", "provenance.json"}
 DEMO_CONTENTS = REPORT_CONTENTS | {"recordings", "models", "simplified", "stimuli", "data"}
 
@@ -127,12 +136,10 @@ def record(
 def import_wav(
     files: Annotated[list[Path], typer.Argument(help="Mono WAV files.")],
     out: Out = Path("recordings"),
-    texture: Annotated[str | None, typer.Option(help="Name of the surface.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Speed of all files, mm/s.")] = None,
-    force: Annotated[float | None, typer.Option(help="Force of all files, N.")] = None,
-    labels: Annotated[
-        Path | None, typer.Option(help="TSV: file, speed_mm_s, force_n (texture, repeat).")
-    ] = None,
+    texture: SurfaceName = None,
+    speed: SpeedOfAll = None,
+    force: ForceOfAll = None,
+    labels: LabelTable = None,
     g_per_fullscale: Annotated[
         float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
     ] = None,
@@ -156,12 +163,10 @@ def import_wav(
 def import_csv(
     files: Annotated[list[Path], typer.Argument(help="CSV files with a header line.")],
     out: Out = Path("recordings"),
-    texture: Annotated[str | None, typer.Option(help="Name of the surface.")] = None,
-    speed: Annotated[float | None, typer.Option(help="Speed of all files, mm/s.")] = None,
-    force: Annotated[float | None, typer.Option(help="Force of all files, N.")] = None,
-    labels: Annotated[
-        Path | None, typer.Option(help="TSV: file, speed_mm_s, force_n (texture, repeat).")
-    ] = None,
+    texture: SurfaceName = None,
+    speed: SpeedOfAll = None,
+    force: ForceOfAll = None,
+    labels: LabelTable = None,
     axis: Annotated[
         Literal["x", "y", "z", "dft321"] | None, typer.Option(help="Axis, or all as one.")
     ] = None,
