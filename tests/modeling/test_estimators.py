@@ -197,3 +197,31 @@ def test_all_numbers_stay_legal_on_noise(estimator: str) -> None:
 def test_unknown_estimators_are_refused() -> None:
     with pytest.raises(InputError, match="paper, paper-consistent, got 'magic'"):
         find_layers(spectrum_of(np.ones(2501)), estimator="magic")
+
+
+def test_a_layer_hidden_under_skirts_keeps_half_its_own_gain_and_is_marked() -> None:
+    frequency = np.arange(0.0, 2501.0)
+    lone = PEQ(
+        noise_gain=0.02,
+        frequencies_hz=np.array([400.0]),
+        bandwidths_hz=np.array([100.0]),
+        gains=np.array([0.5]),
+        rate_hz=5000.0,
+    )
+    spectrum = Spectrum(frequency, lone.response(frequency), 5000.0, 5000)
+    unknown = np.full(2, np.nan)
+
+    def fit(frequencies_hz: list[float]) -> Layers:
+        return fit_layers(
+            spectrum,
+            np.array(frequencies_hz),
+            fallback_bandwidths_hz=unknown[: len(frequencies_hz)],
+            estimator="paper-consistent",
+        )
+
+    # At 460 Hz there is nothing but the skirt of the layer at 400 Hz.
+    both = fit([400.0, 460.0])
+    alone = fit([460.0])
+    assert both.unresolved.tolist() == [False, True]
+    assert both.gains[1] == pytest.approx(0.5 * alone.gains[0], rel=0.02)
+    assert not alone.unresolved[0]
