@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from modeling.errors import InputError
-from modeling.model import TextureModel
+from modeling.model import Bools, TextureModel
 from modeling.peq import Floats, band_rms
 from modeling.thresholds import Threshold
 
@@ -131,6 +131,7 @@ def simplify(
     distances = distances.reshape(by_condition)
     flips = _flip_probabilities(distances, model.level_sd_db.reshape(by_condition))
     reasons = _reasons(distances, flips)
+    _name_unresolved(reasons, model.unresolved.reshape(-1, model.n_layers))
     keep = [layer for layer, (kept, _) in enumerate(reasons) if kept]
     verdicts = tuple(
         _verdict(model, layer, distances[:, layer] - margin_db, reasons[layer], float(flips[layer]))
@@ -158,6 +159,14 @@ def _reasons(distances: Floats, flips: Floats) -> list[tuple[bool, str]]:
         loudest = int(np.argmax(distances.max(axis=0)))
         decided[loudest] = (True, "below threshold, kept as the last layer")
     return decided
+
+
+def _name_unresolved(decided: list[tuple[bool, str]], unresolved: Bools) -> None:
+    """Say of a dropped layer where its level is a bound rather than an estimate."""
+    for layer, (kept, reason) in enumerate(decided):
+        count = int(unresolved[:, layer].sum())
+        if count and not kept:
+            decided[layer] = (kept, f"{reason} (not resolved in {count} of {len(unresolved)})")
 
 
 def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:

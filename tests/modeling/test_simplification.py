@@ -107,6 +107,17 @@ def test_layers_below_in_every_condition_go(make_model: ModelMaker) -> None:
     assert result.layers[1].reason == "below threshold in every condition"
 
 
+def test_a_dropped_layer_whose_level_is_a_bound_says_so(make_model: ModelMaker) -> None:
+    model = make_model(0.0, at_db(6, -6))
+    unresolved = np.zeros(model.gains.shape, dtype=bool)
+    unresolved[0, :, 1] = True
+    result = run(TextureModel(**{**fields_of(model), "unresolved": unresolved}))
+    count, conditions = unresolved.sum(), model.noise_gains.size
+    assert result.layers[1].reason == (
+        f"below threshold in every condition (not resolved in {count} of {conditions})"
+    )
+
+
 @pytest.mark.parametrize("condition", [(0, 0), (1, 0), (2, 1)])
 def test_layer_above_in_one_condition_is_kept(
     make_model: ModelMaker, condition: tuple[int, int]
