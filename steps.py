@@ -7,11 +7,15 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
     from analysis.load import Responses
     from analysis.tables import TextureResult
     from experiments.console import Console
@@ -128,18 +132,32 @@ def tell_clamped(name: str, model: TextureModel, conditions: Sequence[tuple[floa
             )
 
 
-def models_of_study(
-    models: Mapping[str, TextureModel], responses: Responses
-) -> dict[str, TextureModel]:
-    """The models of the textures that were asked about, all of them."""
+def results_of_study(
+    responses: Responses,
+    *,
+    recordings: Path,
+    full: Mapping[str, TextureModel],
+    shown: Mapping[str, TextureModel],
+    verdict: Callable[[TextureModel, TextureModel | None], Simplification],
+) -> list[TextureResult]:
+    """Recordings, models and verdicts of every texture that was asked about."""
+    from analysis.tables import TextureResult
+    from modeling import RecordingSet
+    from modeling.files import file_stem
+
     asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
-    missing = [texture for texture in asked if texture not in models]
+    missing = [texture for texture in asked if texture not in full]
     if missing:
         raise ValueError(
             f"expected a model of each texture in the answers, got none of {', '.join(missing)}; "
             "give the folder of the models that were presented."
         )
-    return {texture: models[texture] for texture in asked}
+    results = []
+    for texture in asked:
+        records = RecordingSet.load(recordings / file_stem(texture)).of_texture(texture)
+        model = full[texture]
+        results.append(TextureResult(records, model, verdict(model, shown.get(texture))))
+    return results
 
 
 def _read_object(path: Path) -> dict[str, Any]:
@@ -213,14 +231,54 @@ def warn_of_clipping(records: RecordingSet) -> None:
             )
 
 
-def fit_or_why_not(records: RecordingSet, estimator: str) -> tuple[TextureModel | None, str | None]:
-    """The texture's model, or the reason where its recordings do not span a grid."""
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """What the recordings of one texture say: layers and spectra always, a model if they can."""
+
+    texture: str
+    layers: pd.DataFrame
+    spectra: pd.DataFrame
+    picture: Figure
+    model: TextureModel | None
+    why_not: str | None
+
+
+def find_in(records: RecordingSet, estimator: str) -> Findings:
+    """Layers, spectra and, where the recordings span a grid, the model of one texture."""
+    from analysis.comparison import spectrum_panels
+    from analysis.figures import figure_spectra
+    from analysis.recordings import layers_table, spectra_table
     from modeling import GridError, fit_texture
 
+    fitted, why_not = None, None
     try:
-        return fit_texture(records, estimator=estimator), None
+        fitted = fit_texture(records, estimator=estimator)
     except GridError as error:
-        return None, str(error)
+        why_not = str(error)
+    return Findings(
+        records.texture,
+        layers_table(records, estimator=estimator),
+        spectra_table(records),
+        figure_spectra(spectrum_panels(records, estimator=estimator)),
+        fitted,
+        why_not,
+    )
+
+
+def save_findings(found: Findings, out: Path) -> Path:
+    """Write one texture's findings and tell of them; returns their path without the ending."""
+    from modeling.files import file_stem, write_text
+
+    start = out / file_stem(found.texture)
+    for name, table in (("layers", found.layers), ("spectra", found.spectra)):
+        write_text(f"{start}_{name}.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
+    found.picture.savefig(f"{start}_spectra.png", dpi=110)
+    print(f"{found.texture}: layers of each recording in {start}_layers.tsv, {start}_spectra.png")
+    if found.model is None:
+        print(f"no full model of {found.why_not}")
+    else:
+        save_and_tell(found.model, out)
+    return start
 
 
 def save_and_tell(fitted: TextureModel, out: Path) -> None:
@@ -280,8 +338,8 @@ def load_models(folder: Path) -> dict[str, TextureModel]:
 def simplification_shown(
     full: TextureModel,
     shown: TextureModel | None,
-    threshold: Threshold,
     *,
+    threshold: Threshold,
     criterion: CriterionName,
     margin_db: float,
 ) -> Simplification:
@@ -358,3 +416,21 @@ def demo_texture(name: str, folder: Path, seed: int) -> TextureResult:
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     others = (fit_texture(records, estimator="paper"),)
     return TextureResult(records, full, simplification, truth, others)
+
+
+def demo_stimuli(folder: Path, results: Sequence[TextureResult], seed: int) -> None:
+    """One second of every full and simplified model of the demo at 150 mm/s and 1.5 N."""
+    from stimuli.sets import write_set
+
+    models = [("full", r.model) for r in results]
+    models += [("simplified", r.simplification.model) for r in results]
+    with progress("Rendering stimuli", len(models)) as advance:
+        write_set(
+            folder,
+            models,
+            conditions=[(150.0, 1.5)],
+            rate_hz=48000.0,
+            duration_s=1.0,
+            seed=seed,
+            progress=advance,
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from math import isnan
 from pathlib import Path
 from typing import Annotated, Literal
@@ -13,15 +14,16 @@ from steps import (
     add_to_set,
     check_own_model,
     check_own_results,
+    demo_stimuli,
     demo_texture,
-    fit_or_why_not,
+    find_in,
     labels_of,
     load_models,
-    models_of_study,
     open_console,
     progress,
+    results_of_study,
     run_study,
-    save_and_tell,
+    save_findings,
     share_of,
     simplification_shown,
     simulated_note,
@@ -204,11 +206,8 @@ def model(
 
     Example: tactileq model recordings/canvas --out models
     """
-    from analysis.comparison import spectrum_panels
-    from analysis.figures import figure_spectra
-    from analysis.recordings import layers_table, spectra_table
     from modeling import RecordingSet
-    from modeling.files import file_stem, write_text
+    from modeling.files import file_stem
     from modeling.spectra import MODEL_RATE_HZ
 
     records = RecordingSet.load(folder)
@@ -225,32 +224,16 @@ def model(
         )
     for texture in records.textures:
         check_own_model(out / file_stem(texture), "model")
-    results = []
+    findings = []
     with progress("Finding layers, fitting", len(records.textures)) as advance:
         for texture in records.textures:
-            one = records.of_texture(texture)
-            tables = {
-                "layers": layers_table(one, estimator=estimator),
-                "spectra": spectra_table(one),
-            }
-            panels = figure_spectra(spectrum_panels(one, estimator=estimator))
-            results.append((texture, tables, panels, *fit_or_why_not(one, estimator)))
+            findings.append(find_in(records.of_texture(texture), estimator))
             advance(texture)
     out.mkdir(parents=True, exist_ok=True)
-    for texture, tables, panels, fitted, why_not in results:
-        start = out / file_stem(texture)
-        for name, table in tables.items():
-            text = table.to_csv(sep="\t", index=False, na_rep="n/a")
-            write_text(f"{start}_{name}.tsv", text)
-        panels.savefig(f"{start}_spectra.png", dpi=110)
-        write_provenance(
-            Path(f"{start}_provenance.json"), "model", {"estimator": estimator}, inputs=[folder]
-        )
-        print(f"{texture}: layers of each recording in {start}_layers.tsv, {start}_spectra.png")
-        if fitted is None:
-            print(f"no full model of {why_not}")
-        else:
-            save_and_tell(fitted, out)
+    for found in findings:
+        start = save_findings(found, out)
+        settings = {"estimator": estimator}
+        write_provenance(Path(f"{start}_provenance.json"), "model", settings, inputs=[folder])
 
 
 @app.command()
@@ -429,22 +412,25 @@ def analyze(
     """
     from analysis.load import load_responses
     from analysis.report import write_report
-    from analysis.tables import TextureResult
-    from modeling import RecordingSet
-    from modeling.files import file_stem, replace_folder
+    from modeling.files import replace_folder
 
     check_own_results(out, "analyze", contents=REPORT_CONTENTS)
     responses = load_responses(data)
     folders = (recordings, models, simplified)
     results = []
     if recordings is not None and models is not None and simplified is not None:
-        level, shown = threshold_named(threshold), load_models(simplified)
-        for texture, full in models_of_study(load_models(models), responses).items():
-            verdicts = simplification_shown(
-                full, shown.get(texture), level, criterion=criterion, margin_db=margin_db
-            )
-            records = RecordingSet.load(recordings / file_stem(texture)).of_texture(texture)
-            results.append(TextureResult(records, full, verdicts))
+        results = results_of_study(
+            responses,
+            recordings=recordings,
+            full=load_models(models),
+            shown=load_models(simplified),
+            verdict=partial(
+                simplification_shown,
+                threshold=threshold_named(threshold),
+                criterion=criterion,
+                margin_db=margin_db,
+            ),
+        )
     elif folders != (None, None, None):
         raise ValueError(
             "expected --recordings, --models and --simplified together, got only some of them; "
@@ -481,7 +467,6 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     from analysis.report import write_report
     from modeling.files import replace_folder
     from stimuli.planted import TEXTURES
-    from stimuli.sets import write_set
 
     check_own_results(out, "demo", contents=DEMO_CONTENTS)
     plan = study_from(None)
@@ -501,22 +486,10 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             for result in Parallel(n_jobs=2, return_as="generator")(jobs):
                 results.append(result)
                 advance(result.texture)
+        demo_stimuli(fresh / "stimuli", results, seed)
         full = {r.texture: r.model for r in results}
         fewer = {r.texture: r.simplification.model for r in results}
-        real = {r.texture: r.truth for r in results}
-        labelled = [("full", m) for m in full.values()] + [
-            ("simplified", m) for m in fewer.values()
-        ]
-        with progress("Rendering stimuli", len(labelled)) as advance:
-            write_set(
-                fresh / "stimuli",
-                labelled,
-                conditions=[(150.0, 1.5)],
-                rate_hz=48000.0,
-                duration_s=1.0,
-                seed=seed,
-                progress=advance,
-            )
+        real = {r.texture: r.truth for r in results if r.truth is not None}
         run_study(plan, real, full, fewer, fresh / "data", threshold, seed)
         provenance = write_provenance(fresh / "provenance.json", "demo", settings, seed=seed)
         with share_of("Analyzing") as tell:

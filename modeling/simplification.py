@@ -131,7 +131,7 @@ def simplify(
     distances = distances.reshape(by_condition)
     flips = _flip_probabilities(distances, model.level_sd_db.reshape(by_condition))
     reasons = _reasons(distances, flips)
-    _name_unresolved(reasons, model.unresolved.reshape(-1, model.n_layers))
+    _name_unresolved(reasons, model.unresolved.reshape(by_condition))
     keep = [layer for layer, (kept, _) in enumerate(reasons) if kept]
     verdicts = tuple(
         _verdict(model, layer, distances[:, layer] - margin_db, reasons[layer], float(flips[layer]))

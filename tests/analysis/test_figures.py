@@ -102,7 +102,10 @@ def test_correct_rates(choices):
 
 def test_undefined_and_missing_values_do_not_break_the_bars(choices):
     always_right = choices.assign(correct=1.0)
-    figures.figure_correct_rates(rate_tests(always_right), simulated=False).draw_without_rendering()
+    figure = figures.figure_correct_rates(rate_tests(always_right), simulated=False)
+    figure.draw_without_rendering()
+    heights = {bar.get_height() for bar in figure.axes[0].patches}
+    assert heights == {1.0}
 
 
 def test_confusion_matrices_state_orientation_counts_and_chance(choices):

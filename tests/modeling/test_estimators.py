@@ -191,7 +191,9 @@ def test_all_numbers_stay_legal_on_noise(estimator: str) -> None:
     for level in (1e-12, 1.0, 1e6):
         for _ in range(5):
             layers = find_layers(spectrum_of(level * rng.rayleigh(size=2501)), estimator=estimator)
-            model_of(layers)  # refuses what is not finite or out of range
+            # A PEQ refuses what is not finite or out of range.
+            assert model_of(layers).gains.size == layers.frequencies_hz.size
+            assert (layers.gains >= 0).all()
 
 
 def test_unknown_estimators_are_refused() -> None:

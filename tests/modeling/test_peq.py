@@ -182,8 +182,9 @@ def test_without_layers_the_response_is_flat() -> None:
 
 @pytest.mark.parametrize("edge", [1.0, 0.49 * RATE_HZ])
 def test_legal_edges_are_accepted(edge: float) -> None:
-    one_band(edge, 0.1)
-    one_band(edge, 0.45 * RATE_HZ)
+    for bandwidth_hz in (0.1, 0.45 * RATE_HZ):
+        peq = one_band(edge, bandwidth_hz)
+        assert (peq.frequencies_hz[0], peq.bandwidths_hz[0]) == (edge, bandwidth_hz)
 
 
 @pytest.mark.parametrize(
