@@ -173,10 +173,12 @@ def _read_object(path: Path) -> dict[str, Any]:
 def labels_of(
     files: Sequence[Path],
     table: Path | None,
+    *,
     texture: str,
     speed: float | None,
     force: float | None,
 ) -> list[Label]:
+    """Labels of the files from a table, or the same speed and force for all of them."""
     from rig.importing import Label, labels_from_table
 
     if table is not None:
@@ -222,6 +224,7 @@ def add_to_set(
 
 
 def warn_of_clipping(records: RecordingSet) -> None:
+    """Name every clipped recording and the share of it that is clipped."""
     for recording in records.recordings:
         if recording.clipped_share > 0:
             print(
@@ -282,6 +285,7 @@ def save_findings(found: Findings, out: Path) -> Path:
 
 
 def save_and_tell(fitted: TextureModel, out: Path) -> None:
+    """Save a model and say how it came about, with the conditions that were interpolated."""
     from modeling import missing_conditions
     from modeling.files import file_stem
 
@@ -301,6 +305,7 @@ def save_and_tell(fitted: TextureModel, out: Path) -> None:
 
 
 def simulated_note(model: TextureModel) -> str:
+    """What a printed line says of a model that nobody recorded."""
     return " (simulated)" if model.simulated else ""
 
 
@@ -312,12 +317,14 @@ def threshold_named(name: str) -> Threshold:
 
 
 def study_from(path: Path | None) -> Study:
+    """The study of this file, or the paper's."""
     from experiments.study import Study
 
     return Study.load(path) if path is not None else Study.load()
 
 
 def load_models(folder: Path) -> dict[str, TextureModel]:
+    """All models of a folder by the name of their texture; two of one texture are refused."""
     from modeling import TextureModel
 
     paths = sorted(p for p in folder.glob("*.json") if not p.name.endswith("provenance.json"))
@@ -372,13 +379,15 @@ def open_console(*, fullscreen: bool, screen: int) -> Console:
 
 def run_study(
     plan: Study,
+    *,
     real: Mapping[str, TextureModel],
     full: Mapping[str, TextureModel],
-    fewer: Mapping[str, TextureModel],
+    simplified: Mapping[str, TextureModel],
     data: Path,
     threshold: Threshold,
     seed: int,
 ) -> None:
+    """Simulate all participants of a study at the simulated rig, with a progress bar."""
     from experiments.simulate import simulate_study
     from rig.twin import SimulatedRig
 
@@ -389,7 +398,7 @@ def run_study(
             plan,
             real=real,
             full=full,
-            simplified=fewer,
+            simplified=simplified,
             rig=SimulatedRig(real, seed=seed),
             data_folder=data,
             seed=seed,
@@ -398,10 +407,10 @@ def run_study(
         )
 
 
-def demo_texture(name: str, folder: Path, seed: int) -> TextureResult:
+def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
     from analysis.tables import TextureResult
-    from modeling import RecordingSet, Threshold, fit_texture
+    from modeling import RecordingSet, fit_texture
     from modeling import simplify as drop_layers
     from modeling.files import file_stem
     from stimuli.planted import planted_texture, record_texture
@@ -411,7 +420,7 @@ def demo_texture(name: str, folder: Path, seed: int) -> TextureResult:
     record_texture(truth, seed=seed).save(place)
     records = RecordingSet.load(place)
     full = fit_texture(records)
-    simplification = drop_layers(full, Threshold.shipped("codec"))
+    simplification = drop_layers(full, threshold)
     full.save(folder / "models" / f"{file_stem(name)}.json")
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     others = (fit_texture(records, estimator="paper"),)

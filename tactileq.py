@@ -154,7 +154,7 @@ def import_wav(
 
     records = read(
         files,
-        labels_of(files, labels, texture or out.name, speed, force),
+        labels_of(files, labels, texture=texture or out.name, speed=speed, force=force),
         g_per_fullscale=g_per_fullscale,
     )
     settings = {"g_per_fullscale": g_per_fullscale, "labels": str(labels)}
@@ -185,7 +185,7 @@ def import_csv(
 
     records = read(
         files,
-        labels_of(files, labels, texture or out.name, speed, force),
+        labels_of(files, labels, texture=texture or out.name, speed=speed, force=force),
         axis=axis,
         unit=unit,
         rate_hz=rate_hz,
@@ -382,7 +382,15 @@ def simulate(
         )
     real = {name: planted_texture(name) for name in plan.textures}
     full, fewer = load_models(models), load_models(simplified)
-    run_study(plan, real, full, fewer, data, threshold_named(threshold), seed)
+    run_study(
+        plan,
+        real=real,
+        full=full,
+        simplified=fewer,
+        data=data,
+        threshold=threshold_named(threshold),
+        seed=seed,
+    )
     note = data / "sourcedata" / "simulate_provenance.json"
     settings = {"study": plan.to_dict(), "threshold": threshold}
     write_provenance(note, "simulate", settings, seed=seed, inputs=[models, simplified])
@@ -471,26 +479,36 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     check_own_results(out, "demo", contents=DEMO_CONTENTS)
     plan = study_from(None)
     threshold = threshold_named("codec")
-    settings = {
-        "estimators": ["paper-consistent", "paper"],
-        "threshold": threshold.name,
-        "criterion": "energy",
-        "margin_db": 0.0,
-        "study": plan.to_dict(),
-    }
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
     with replace_folder(out) as fresh:
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            jobs = (delayed(demo_texture)(name, fresh, seed) for name in TEXTURES)
+            record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
             results = []
-            for result in Parallel(n_jobs=2, return_as="generator")(jobs):
+            for result in Parallel(n_jobs=2, return_as="generator")(
+                delayed(record)(name) for name in TEXTURES
+            ):
                 results.append(result)
                 advance(result.texture)
         demo_stimuli(fresh / "stimuli", results, seed)
         full = {r.texture: r.model for r in results}
         fewer = {r.texture: r.simplification.model for r in results}
         real = {r.texture: r.truth for r in results if r.truth is not None}
-        run_study(plan, real, full, fewer, fresh / "data", threshold, seed)
+        run_study(
+            plan,
+            real=real,
+            full=full,
+            simplified=fewer,
+            data=fresh / "data",
+            threshold=threshold,
+            seed=seed,
+        )
+        settings = {
+            "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
+            "threshold": threshold.name,
+            "criterion": results[0].simplification.criterion,
+            "margin_db": results[0].simplification.margin_db,
+            "study": plan.to_dict(),
+        }
         provenance = write_provenance(fresh / "provenance.json", "demo", settings, seed=seed)
         with share_of("Analyzing") as tell:
             write_report(

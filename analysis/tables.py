@@ -62,13 +62,16 @@ class TextureResult:
         InputError
             Where there is none.
         """
-        for recording, measured in recording_spectra(self.recordings, rate_hz=self.model.rate_hz):
-            if recording.condition == (speed_mm_s, force_n):
-                return measured
-        raise InputError(
-            f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and {force_n:g} N, "
-            "got none; choose a recorded condition."
-        )
+        condition = (speed_mm_s, force_n)
+        here = [r for r in self.recordings if r.condition == condition]
+        if not here:
+            raise InputError(
+                f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and "
+                f"{force_n:g} N, got none; choose a recorded condition."
+            )
+        floor = [r for r in self.recordings if r.force_n == 0]
+        spectra = recording_spectra(RecordingSet([here[0], *floor]), rate_hz=self.model.rate_hz)
+        return spectra[0][1]
 
 
 def gfc_table(

@@ -12,9 +12,8 @@ from typing import Any
 
 from experiments.design import Phase, RelativeTrial, plan_session
 from experiments.models import ModelSets
-from experiments.store import SessionStore
 from experiments.study import Study
-from experiments.trial_loop import Respondent, Script, SessionResult, Surfaces, run_trials
+from experiments.trial_loop import Respondent, Script, SessionResult, Surfaces, run_session
 from modeling import TextureModel
 from rig.interface import TextureRig
 
@@ -110,16 +109,15 @@ def run_relative(
     """
     models.require(study.textures)
     plan = plan_session(study, task="relative", subject=subject, session=session)
-    with SessionStore.create(
-        data_folder,
-        plan=plan,
+    return run_session(
+        plan,
+        _script(models, respondent),
         columns=COLUMNS,
         description=TASK_DESCRIPTION,
-        simulated_participant=respondent.simulated,
-        simulated_rig=rig.simulated,
-    ) as store:
-        script = _script(models, respondent)
-        return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)
+        rig=rig,
+        respondent=respondent,
+        data_folder=data_folder,
+    )
 
 
 def _script(models: ModelSets, respondent: Respondent) -> Script:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from experiments.design import AbsoluteTrial, Phase, RelativeTrial, Trial
+from experiments.design import AbsoluteTrial, Phase, RelativeTrial, SessionPlan, Trial
 from experiments.store import SessionStore
 from modeling import InputError, TextureModel
 from rig.interface import TextureRig
@@ -198,6 +198,50 @@ class Script:
     virtual: Callable[[Any], Sequence[TextureModel]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Any, Surfaces], Mapping[str, object]]
+
+
+def run_session(
+    plan: SessionPlan,
+    script: Script,
+    *,
+    columns: Mapping[str, Mapping[str, Any]],
+    description: str,
+    rig: TextureRig,
+    respondent: Respondent,
+    data_folder: str | Path,
+) -> SessionResult:
+    """Store the plan of a session, then run its trials.
+
+    Parameters
+    ----------
+    plan : SessionPlan
+    script : Script
+        The protocol.
+    columns : mapping of column to its description
+        Of the file of answers.
+    description : str
+        Of the task.
+    rig, respondent
+        What presents, and who answers.
+    data_folder : path
+        Root of the data set.
+
+    Raises
+    ------
+    InputError
+        If the session has been run before.
+    StoreError
+        If the disk does not take the answers.
+    """
+    with SessionStore.create(
+        data_folder,
+        plan=plan,
+        columns=columns,
+        description=description,
+        simulated_participant=respondent.simulated,
+        simulated_rig=rig.simulated,
+    ) as store:
+        return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)
 
 
 def run_trials(

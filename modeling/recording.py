@@ -373,6 +373,15 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     return recording
 
 
+def is_number(text: str) -> bool:
+    """Whether a text reads as a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def number(text: str, name: str) -> float:
     """A number from a table's cell.
 
@@ -381,11 +390,10 @@ def number(text: str, name: str) -> float:
     InputError
         Naming `name`, where the cell is empty or no number.
     """
-    try:
-        return float(text)
-    except ValueError:
+    if not is_number(text):
         got = repr(text) if text.strip() else "nothing"
-        raise InputError(f"expected a number for {name}, got {got}; fill it in.") from None
+        raise InputError(f"expected a number for {name}, got {got}; fill it in.")
+    return float(text)
 
 
 def whole_number(text: str, name: str) -> int:
@@ -403,14 +411,6 @@ def _flag(text: str, name: str) -> bool:
     return text.lower() == "true"
 
 
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
 def _read_samples(path: Path) -> NDArray[np.float64]:
     """One column of numbers below a header; a last line without its end counts as truncated."""
     try:
@@ -423,7 +423,7 @@ def _read_samples(path: Path) -> NDArray[np.float64]:
     lines = text.split("\n")
     if len(lines) < 2 or not text.strip():
         raise InputError(f"expected a header and samples in {path}, got an empty file; re-record.")
-    if _is_number(lines[0]):
+    if is_number(lines[0]):
         raise InputError(
             f"expected a header such as acceleration_g as the first line of {path}, got the number "
             f"{lines[0]}; add one, or the first sample would be lost."

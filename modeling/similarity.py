@@ -113,17 +113,17 @@ def report(
     band = (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
     step_hz = measured.rate_hz / measured.n_samples
     response = peq.response(frequency)
-    draws = _draws(measured.smoothed(), rng)
+    outline = measured.smoothed()
+    draws = _draws(outline, rng)
     scores, floors, ceilings = [], [], []
     for sigma_hz in SIGMAS_HZ:
         truth = measured.smoothed(sigma_hz)
         scores.append(gfc(smooth(response, sigma_hz, step_hz=step_hz)[band], truth[band]))
         floors.append(gfc(np.ones(int(band.sum())), truth[band]))
-        shape = smooth(measured.smoothed(), sigma_hz, step_hz=step_hz)[band]
+        shape = smooth(outline, sigma_hz, step_hz=step_hz)[band]
         drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
         ceilings.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
-    smoothed = smooth(response, SIGMAS_HZ[0], step_hz=step_hz)[band]
-    truth = measured.smoothed()[band]
+    smoothed, truth = smooth(response, SIGMAS_HZ[0], step_hz=step_hz)[band], outline[band]
     heard = measured.magnitude[band] > 0  # where the sensor's floor took all, dB mean nothing
     edges, band_errors = band_energy_error_db(
         frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2

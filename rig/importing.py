@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.files import read_table
-from modeling.recording import clipped_samples, number, whole_number
+from modeling.recording import clipped_samples, is_number, number, whole_number
 from modeling.spectra import dft321
 from modeling.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.wav import full_scale, read_wav
@@ -229,7 +229,7 @@ def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
     delimiter = max(",;\t", key=lines[0].count)
     rows = list(csv.reader(lines, delimiter=delimiter))
     header = [cell.strip() for cell in rows[0]]
-    if all(_is_number(cell) for cell in header):
+    if all(is_number(cell) for cell in header):
         raise InputError(
             f"expected a header line in {path.name} (time,x,y,z), got numbers; add one."
         )
@@ -253,14 +253,6 @@ def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
             " correct the file."
         ) from None
     return dict(zip(header, values.T, strict=True))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _name_and_unit(header: str) -> tuple[str, str]:
