@@ -1,5 +1,6 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules and every test
+# make bench   time the modeling beside its rivals
 # make install what both begin with: .venv/ from requirements.lock
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
@@ -9,7 +10,7 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
 BIN := .venv/bin
 PYTEST_FLAGS ?=
 
-.PHONY: install demo test lint lock clean
+.PHONY: install demo test bench lint lock clean
 
 install: .venv/installed
 
@@ -33,6 +34,9 @@ lint: install
 test: lint
 	@sh tools/system-packages
 	$(BIN)/pytest $(PYTEST_FLAGS)
+
+bench: install
+	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock

@@ -7,21 +7,19 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from importlib.metadata import version
+from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.figure import Figure
-
     from analysis.load import Responses
     from analysis.tables import TextureResult
     from experiments.console import Console
     from experiments.study import Study
     from modeling import RecordingSet, Simplification, TextureModel, Threshold
     from modeling.simplification import CriterionName
+    from rig.hatt import HattTexture
     from rig.importing import Label
 
 
@@ -59,6 +57,19 @@ def _hash(path: Path) -> str:
         digest.update(str(file.relative_to(path.parent)).encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()
+
+
+def sentence_of(error: Exception) -> str:
+    """What a user is told of an error: one sentence, never a traceback."""
+    # A StoreError carries its own sentence, the system's errors only a number and a word.
+    if isinstance(error, OSError) and error.errno is not None and error.filename is not None:
+        return (
+            f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
+            "path, its permissions and the space on the disk."
+        )
+    if isinstance(error, MemoryError):
+        return "expected a task that fits the memory, got a larger one; ask for less at once."
+    return str(error)
 
 
 @contextmanager
@@ -130,6 +141,18 @@ def tell_clamped(name: str, model: TextureModel, conditions: Sequence[tuple[floa
                 f"note: {name} was recorded up to {fastest:g} mm/s and {strongest:g} N; "
                 f"{speed:g} mm/s at {force:g} N is rendered as its nearest edge."
             )
+
+
+def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:
+    """Say how many conditions lie outside what a toolkit's texture was modelled from."""
+    moved = [c for c in conditions if not all(map(isclose, c, texture.nearest(*c)))]
+    if moved:
+        fastest, strongest = texture.conditions.max(axis=0)
+        print(
+            f"note: {texture.material} reaches {fastest:g} mm/s and {strongest:g} N; "
+            f"{len(moved)} of {len(conditions)} conditions lie beyond its models and sound as the "
+            "nearest condition within them."
+        )
 
 
 def results_of_study(
@@ -225,83 +248,18 @@ def add_to_set(
 
 def warn_of_clipping(records: RecordingSet) -> None:
     """Name every clipped recording and the share of it that is clipped."""
-    for recording in records.recordings:
-        if recording.clipped_share > 0:
-            print(
-                f"warning: {recording.describe()} is clipped in {recording.clipped_share:.2%} of "
-                "its samples; its level is too low.",
-                file=sys.stderr,
-            )
+    for warning in clipping_warnings(records):
+        print(warning, file=sys.stderr)
 
 
-@dataclass(frozen=True, eq=False)
-class Findings:
-    """What the recordings of one texture say: layers and spectra always, a model if they can."""
-
-    texture: str
-    layers: pd.DataFrame
-    spectra: pd.DataFrame
-    picture: Figure
-    model: TextureModel | None
-    why_not: str | None
-
-
-def find_in(records: RecordingSet, estimator: str) -> Findings:
-    """Layers, spectra and, where the recordings span a grid, the model of one texture."""
-    from analysis.comparison import spectrum_panels
-    from analysis.figures import figure_spectra
-    from analysis.recordings import layers_table, spectra_table
-    from modeling import GridError, fit_texture
-
-    fitted, why_not = None, None
-    try:
-        fitted = fit_texture(records, estimator=estimator)
-    except GridError as error:
-        why_not = str(error)
-    return Findings(
-        records.texture,
-        layers_table(records, estimator=estimator),
-        spectra_table(records),
-        figure_spectra(spectrum_panels(records, estimator=estimator)),
-        fitted,
-        why_not,
-    )
-
-
-def save_findings(found: Findings, out: Path) -> Path:
-    """Write one texture's findings and tell of them; returns their path without the ending."""
-    from modeling.files import file_stem, write_text
-
-    start = out / file_stem(found.texture)
-    for name, table in (("layers", found.layers), ("spectra", found.spectra)):
-        write_text(f"{start}_{name}.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
-    found.picture.savefig(f"{start}_spectra.png", dpi=110)
-    print(f"{found.texture}: layers of each recording in {start}_layers.tsv, {start}_spectra.png")
-    if found.model is None:
-        print(f"no full model of {found.why_not}")
-    else:
-        save_and_tell(found.model, out)
-    return start
-
-
-def save_and_tell(fitted: TextureModel, out: Path) -> None:
-    """Save a model and say how it came about, with the conditions that were interpolated."""
-    from modeling import missing_conditions
-    from modeling.files import file_stem
-
-    path = out / f"{file_stem(fitted.texture)}.json"
-    fitted.save(path)
-    conditions = fitted.noise_gains.size
-    inherited = int(fitted.inherited.any(axis=2).sum())
-    unresolved = int(fitted.unresolved.any(axis=2).sum())
-    print(
-        f"{fitted.texture}{simulated_note(fitted)}: {fitted.n_layers} layers, "
-        f"{fitted.n_parameters} numbers per condition; some layer inherited its frequency in "
-        f"{inherited} and was not resolved in {unresolved} of {conditions} conditions: {path}"
-    )
-    if missing := missing_conditions(fitted):
-        names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
-        print(f"{fitted.texture}: interpolated for want of a recording: {names}")
+def clipping_warnings(records: RecordingSet) -> list[str]:
+    """One sentence for every clipped recording."""
+    return [
+        f"warning: {recording.describe()} is clipped in {recording.clipped_share:.2%} of its "
+        "samples; its level is too low."
+        for recording in records.recordings
+        if recording.clipped_share > 0
+    ]
 
 
 def simulated_note(model: TextureModel) -> str:

@@ -4,33 +4,32 @@ from __future__ import annotations
 
 import sys
 from functools import partial
-from math import isnan
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from modeling_steps import draw_condition, model_textures, tell_verdicts
 from steps import (
     add_to_set,
     check_own_model,
     check_own_results,
     demo_stimuli,
     demo_texture,
-    find_in,
     labels_of,
     load_models,
     open_console,
     progress,
     results_of_study,
     run_study,
-    save_findings,
+    sentence_of,
     share_of,
     simplification_shown,
     simulated_note,
     study_from,
+    tell_beyond_hull,
     tell_clamped,
     threshold_named,
-    warn_of_clipping,
     write_provenance,
 )
 
@@ -52,7 +51,7 @@ app.add_typer(imports, name="import")
 Out = Annotated[Path, typer.Option("--out", help="Where the results go.")]
 Seed = Annotated[int, typer.Option(min=0, max=2**31, help="Seed of everything that is random.")]
 Estimator = Annotated[
-    Literal["paper", "paper-consistent"], typer.Option(help="How layers are found.")
+    Literal["joint", "paper", "paper-consistent"], typer.Option(help="How layers are found.")
 ]
 ThresholdName = Annotated[
     str, typer.Option("--threshold", help="codec, pen-hold, or a TSV file of your own.")
@@ -87,18 +86,8 @@ def main() -> None:
     try:
         app(standalone_mode=True)
         return
-    except OSError as error:
-        # A StoreError carries its own sentence, the system's errors only a number and a word.
-        sentence = str(error)
-        if error.errno is not None and error.filename is not None:
-            sentence = (
-                f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
-                "path, its permissions and the space on the disk."
-            )
-    except ValueError as error:  # InputError is one
-        sentence = str(error)
-    except MemoryError:
-        sentence = "expected a task that fits the memory, got a larger one; ask for less at once."
+    except (ValueError, OSError, MemoryError) as error:  # InputError is a ValueError
+        sentence = sentence_of(error)
     print(f"error: {sentence}", file=sys.stderr)
     raise SystemExit(1)
 
@@ -194,46 +183,67 @@ def import_csv(
     add_to_set(out, records, "import csv", settings=settings, files=files)
 
 
+@imports.command("hatt")
+def import_hatt(
+    files: Annotated[list[Path], typer.Argument(help="Models_....xml of the toolkit.")],
+    out: Out = Path("recordings"),
+    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated.")] = None,
+    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated.")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Sampling rate in Hz; the file's without it.")
+    ] = None,
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 1.0,
+    seed: Seed = 0,
+) -> None:
+    """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
+
+    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. The toolkit is not included.
+
+    Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
+    """
+    from modeling import RecordingSet
+    from rig.hatt import load_hatt
+
+    speeds = speed or [50.0 * step for step in range(1, 8)]
+    forces = force or [0.5 * step for step in range(1, 8)]
+    textures = [load_hatt(file) for file in files]
+    made = []
+    with progress("Synthesising", len(textures)) as advance:
+        for texture in textures:
+            made.append(
+                texture.recordings(
+                    speeds, forces, duration_s=duration_s, rate_hz=rate_hz, seed=seed
+                )
+            )
+            advance(texture.material)
+    records = RecordingSet(record for of_texture in made for record in of_texture)
+    settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
+    add_to_set(out, records, "import hatt", settings=settings, files=files)
+    for texture in textures:
+        tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
+
+
 @app.command()
 def model(
-    folder: Annotated[Path, typer.Argument(help="Folder of recordings.")],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="FOLDER…", help="Folders of recordings, or a folder of them."),
+    ],
     out: Out = Path("models"),
-    estimator: Estimator = "paper-consistent",
+    estimator: Estimator = "joint",
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the layers over the grid.")] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
+    ] = None,
 ) -> None:
     """Find the layers of every recording and fit a model of each texture over its grid.
 
-    Writes TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv and TEXTURE_spectra.png.
+    Writes TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv and TEXTURE_spectra.png, with
+    --plot also TEXTURE_layers.png. A texture that cannot be modelled does not stop the others.
 
-    Example: tactileq model recordings/canvas --out models
+    Example: tactileq model recordings/* --out models --plot
     """
-    from modeling import RecordingSet
-    from modeling.files import file_stem
-    from modeling.spectra import MODEL_RATE_HZ
-
-    records = RecordingSet.load(folder)
-    if len({file_stem(texture) for texture in records.textures}) < len(records.textures):
-        raise ValueError(
-            f"expected textures that differ in letters or digits, got {records.textures}; rename."
-        )
-    warn_of_clipping(records)
-    rate_hz = min(r.rate_hz for r in records.recordings)
-    if rate_hz < MODEL_RATE_HZ:
-        print(
-            f"note: the data's rate of {rate_hz:g} Hz becomes the model's; the band from "
-            f"{rate_hz / 2:g} to {MODEL_RATE_HZ / 2:g} Hz is lost."
-        )
-    for texture in records.textures:
-        check_own_model(out / file_stem(texture), "model")
-    findings = []
-    with progress("Finding layers, fitting", len(records.textures)) as advance:
-        for texture in records.textures:
-            findings.append(find_in(records.of_texture(texture), estimator))
-            advance(texture)
-    out.mkdir(parents=True, exist_ok=True)
-    for found in findings:
-        start = save_findings(found, out)
-        settings = {"estimator": estimator}
-        write_provenance(Path(f"{start}_provenance.json"), "model", settings, inputs=[folder])
+    model_textures(folders, out, estimator=estimator, plot=plot, jobs=jobs)
 
 
 @app.command()
@@ -243,10 +253,20 @@ def simplify(
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
     margin_db: Margin = 0.0,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw spectra, layers and threshold of one condition.")
+    ] = False,
+    recordings: Annotated[
+        Path | None, typer.Option(help="With --plot: recordings to draw the model beside.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="With --plot: mm/s, else fastest.")] = None,
+    force: Annotated[float | None, typer.Option(help="With --plot: N, else strongest.")] = None,
 ) -> None:
     """Drop the layers that nobody can feel, with a reason for each.
 
-    Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3
+    Writes TEXTURE.json and TEXTURE_layers.tsv, with --plot also TEXTURE_threshold.png.
+
+    Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
     """
     from analysis.tables import simplification_table
     from modeling import TextureModel
@@ -257,18 +277,16 @@ def simplify(
     start = out / file_stem(full.texture)
     check_own_model(start, "simplify")
     result = drop_layers(full, threshold_named(threshold), criterion=criterion, margin_db=margin_db)
+    if plot:
+        draw_condition(full, result, start, recordings=recordings, speed=speed, force=force)
+    elif (recordings, speed, force) != (None, None, None):
+        raise ValueError(
+            "expected --plot with --recordings, --speed or --force, got none; add --plot."
+        )
     result.model.save(f"{start}.json")
     table = simplification_table(result)
     write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
-    for verdict in result.layers:
-        line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"
-        if not isnan(verdict.distance_db):  # where a threshold is known
-            line += (
-                f"; {verdict.distance_db:+.1f} dB at {verdict.worst_speed_mm_s:g} mm/s, "
-                f"{verdict.worst_force_n:g} N ({verdict.worst_frequency_hz:.0f} Hz)"
-            )
-        print(line)
-    print(f"threshold: {result.threshold.name} ({result.threshold.caveat})")
+    tell_verdicts(result)
     settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
     provenance = Path(f"{start}_provenance.json")
     write_provenance(provenance, "simplify", settings, inputs=[model_file])

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.recordings import RecordingLayers
 from analysis.tables import TextureResult
-from modeling import InputError, RecordingSet, TextureModel, Threshold, find_layers
-from modeling.fitting import condition_spectra
+from modeling import (
+    PEQ,
+    InputError,
+    Simplification,
+    Spectrum,
+    TextureModel,
+    Threshold,
+    find_layers,
+)
+from modeling.peq import band_response
 from modeling.simplification import CriterionName, layer_amplitudes_g
-from modeling.spectra import SMOOTHING_HZ, smooth
+from modeling.spectra import SMOOTHING_HZ, mean_spectrum, smooth
 
 Floats = NDArray[np.float64]
+THRESHOLD_REACH = 2**0.25  # a layer's threshold is drawn a quarter of an octave to both sides
 
 
 @dataclass(frozen=True, eq=False)
 class SpectrumComparison:
-    """One recording, its full and simplified model and the detection threshold (PAPER fig. 6).
+    """One condition: recording, full and simplified model, threshold (PAPER fig. 6).
 
     Parameters
     ----------
@@ -30,10 +41,17 @@ class SpectrumComparison:
     frequency_hz : (n,) ndarray
         0 … rate/2.
     recording, full, simplified : (n,) ndarray
-        Magnitudes in g per unit noise, all smoothed alike (Gaussian, σ = 30 Hz).
+        Magnitudes in g per unit noise, all smoothed alike (Gaussian, σ = 30 Hz); `recording` is
+        NaN where there is none.
     layer_frequency_hz, layer_amplitude_g : (m,) ndarray
         Frequency and amplitude (g peak) of each layer of the full model here; the amplitude is
         the one that `criterion` compares with the threshold.
+    layer_response : (m, n) ndarray
+        Each layer's own response |G·H(f)| in g per unit noise, not smoothed.
+    layer_threshold : (m, n) ndarray
+        The gain (g per unit noise) with which a layer of this width would stand at the threshold
+        by `criterion`, a quarter of an octave around the layer, NaN elsewhere and where no
+        threshold is known. The layer is above threshold where its response peaks above this.
     dropped : (m,) ndarray of bool
         Layers that the simplified model does without.
     threshold : Threshold
@@ -52,6 +70,8 @@ class SpectrumComparison:
     simplified: Floats
     layer_frequency_hz: Floats
     layer_amplitude_g: Floats
+    layer_response: Floats
+    layer_threshold: Floats
     dropped: NDArray[np.bool_]
     threshold: Threshold
     criterion: CriterionName
@@ -73,31 +93,95 @@ def compare_spectra(
     InputError
         Where the condition was not recorded.
     """
-    full, simplification = result.model, result.simplification
-    measured = result.spectrum_at(speed_mm_s, force_n)
-    frequency = measured.frequency_hz
+    compared = compare_condition(
+        result.model,
+        result.simplification,
+        speed_mm_s=speed_mm_s,
+        force_n=force_n,
+        measured=result.spectrum_at(speed_mm_s, force_n),
+    )
+    return replace(compared, simulated=result.simulated)
 
-    def smoothed_response(model: TextureModel) -> Floats:
-        response = model.peq(speed_mm_s, force_n).response(frequency)
-        return smooth(response, SMOOTHING_HZ, step_hz=measured.rate_hz / measured.n_samples)
 
-    at = _grid_index(full, speed_mm_s, force_n=force_n)
-    amplitudes_g = layer_amplitudes_g(full, criterion=simplification.criterion)
+def compare_condition(
+    full: TextureModel,
+    simplification: Simplification,
+    *,
+    speed_mm_s: float,
+    force_n: float,
+    measured: Spectrum | None = None,
+) -> SpectrumComparison:
+    """Bring both models and the threshold of one condition together, with or without a recording.
+
+    Parameters
+    ----------
+    full : TextureModel
+    simplification : Simplification
+        Of `full`.
+    speed_mm_s, force_n : float
+        Anywhere within the model's grid.
+    measured : Spectrum, optional
+        Of a recording of this condition, at the model's rate.
+
+    Raises
+    ------
+    InputError
+        For a condition beyond the grid.
+    """
+    _require_within_grid(full, speed_mm_s, force_n=force_n)
+    frequency = np.arange(full.rate_hz // 2 + 1) if measured is None else measured.frequency_hz
+    peq, fewer = (m.peq(speed_mm_s, force_n) for m in (full, simplification.model))
     return SpectrumComparison(
         texture=full.texture,
         speed_mm_s=speed_mm_s,
         force_n=force_n,
-        simulated=result.simulated,
+        simulated=full.simulated,
         frequency_hz=frequency,
-        recording=measured.smoothed(SMOOTHING_HZ),
-        full=smoothed_response(full),
-        simplified=smoothed_response(simplification.model),
-        layer_frequency_hz=full.frequencies_hz[at],
-        layer_amplitude_g=amplitudes_g[at],
+        recording=np.full(frequency.size, np.nan) if measured is None else measured.smoothed(),
+        full=_smoothed_response(peq, frequency),
+        simplified=_smoothed_response(fewer, frequency),
+        layer_frequency_hz=peq.frequencies_hz,
+        layer_amplitude_g=layer_amplitudes_g(peq, criterion=simplification.criterion),
+        layer_response=np.abs(peq.gains)[:, None] * np.abs(_bands(peq, frequency)),
+        layer_threshold=_layer_thresholds(peq, simplification, frequency_hz=frequency),
         dropped=np.array([v.verdict == "dropped" for v in simplification.layers], bool),
         threshold=simplification.threshold,
         criterion=simplification.criterion,
     )
+
+
+def _smoothed_response(peq: PEQ, frequency_hz: Floats) -> Floats:
+    """The model's response, smoothed as recordings are (Gaussian, σ = 30 Hz)."""
+    step_hz = float(frequency_hz[1] - frequency_hz[0])
+    return smooth(peq.response(frequency_hz), SMOOTHING_HZ, step_hz=step_hz)
+
+
+def _layer_thresholds(peq: PEQ, simplification: Simplification, *, frequency_hz: Floats) -> Floats:
+    """The threshold as a gain of each layer, (m, n), around its frequency; NaN elsewhere."""
+    unit_gains = replace(peq, gains=np.ones(peq.gains.size))
+    per_gain = layer_amplitudes_g(unit_gains, criterion=simplification.criterion)
+    centres = peq.frequencies_hz[:, None]
+    near = (frequency_hz >= centres / THRESHOLD_REACH) & (frequency_hz <= centres * THRESHOLD_REACH)
+    return np.where(near, simplification.threshold.at(frequency_hz) / per_gain[:, None], np.nan)
+
+
+def _bands(peq: PEQ, frequency_hz: Floats) -> NDArray[np.complex128]:
+    return band_response(
+        frequency_hz,
+        centres_hz=peq.frequencies_hz,
+        bandwidths_hz=peq.bandwidths_hz,
+        rate_hz=peq.rate_hz,
+    )
+
+
+def _require_within_grid(model: TextureModel, speed_mm_s: float, *, force_n: float) -> None:
+    speeds, forces = model.speeds_mm_s, model.forces_n
+    if not (speeds[0] <= speed_mm_s <= speeds[-1] and forces[0] <= force_n <= forces[-1]):
+        raise InputError(
+            f"expected a condition within the grid of {model.texture!r}, {speeds[0]:g} to "
+            f"{speeds[-1]:g} mm/s and {forces[0]:g} to {forces[-1]:g} N, got {speed_mm_s:g} mm/s "
+            f"and {force_n:g} N; choose one inside."
+        )
 
 
 def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tuple[int, int]:
@@ -156,8 +240,65 @@ def layer_course(model: TextureModel, *, force_n: float) -> LayerCourse:
 
 
 @dataclass(frozen=True, eq=False)
+class LayersOverGrid:
+    """Frequency and amplitude of each layer in every condition, with what was not measured marked.
+
+    Parameters
+    ----------
+    texture, estimator : str
+    simulated : bool
+    unit : str
+        Of the amplitudes: g, or arbitrary.
+    speeds_mm_s : (S,) ndarray
+    forces_n : (F,) ndarray
+    frequency_hz, amplitude : (S, F, m) ndarray
+        Amplitude of the sinusoid of equal power, √2·G·√(k/(1+k)) (METHOD 7), peak.
+    mean_frequency_hz, mean_amplitude : (S, m) ndarray
+        Over the forces.
+    inherited, unresolved : (S, F, m) ndarray of bool
+        No peak of its own there; width or level a bound (METHOD 4, 5).
+    interpolated : (S, F) ndarray of bool
+        Condition without a recording.
+    """
+
+    texture: str
+    estimator: str
+    simulated: bool
+    unit: str
+    speeds_mm_s: Floats
+    forces_n: Floats
+    frequency_hz: Floats
+    amplitude: Floats
+    mean_frequency_hz: Floats
+    mean_amplitude: Floats
+    inherited: NDArray[np.bool_]
+    unresolved: NDArray[np.bool_]
+    interpolated: NDArray[np.bool_]
+
+
+def layers_over_grid(model: TextureModel) -> LayersOverGrid:
+    """What a model's layers do over its grid."""
+    amplitude = layer_amplitudes_g(model, criterion="energy")
+    return LayersOverGrid(
+        texture=model.texture,
+        estimator=model.estimator,
+        simulated=model.simulated,
+        unit=model.unit,
+        speeds_mm_s=model.speeds_mm_s,
+        forces_n=model.forces_n,
+        frequency_hz=model.frequencies_hz,
+        amplitude=amplitude,
+        mean_frequency_hz=model.frequencies_hz.mean(axis=1),
+        mean_amplitude=amplitude.mean(axis=1),
+        inherited=model.inherited,
+        unresolved=model.unresolved,
+        interpolated=model.interpolated,
+    )
+
+
+@dataclass(frozen=True, eq=False)
 class SpectrumPanel:
-    """The smoothed spectrum of one condition and the layers found in it alone.
+    """The smoothed spectrum of one condition, the layers found in it alone, and the model there.
 
     Parameters
     ----------
@@ -170,6 +311,8 @@ class SpectrumPanel:
         Smoothed magnitude (σ = 30 Hz) in `unit` per unit noise.
     layer_frequency_hz, layer_height : (m,) ndarray
         Where the layers are, and the smoothed spectrum's height there.
+    response : (n,) ndarray
+        The fitted model's response, smoothed alike; empty where there is no model.
     """
 
     title: str
@@ -179,35 +322,50 @@ class SpectrumPanel:
     magnitude: Floats
     layer_frequency_hz: Floats
     layer_height: Floats
+    response: Floats
 
 
 def spectrum_panels(
-    recordings: RecordingSet, *, estimator: str = "paper-consistent"
+    found: Sequence[RecordingLayers], *, estimator: str, model: TextureModel | None = None
 ) -> tuple[SpectrumPanel, ...]:
-    """Find the layers of every condition on its own; no grid is needed.
+    """One panel per condition of one texture, by speed and force; no grid is needed.
 
     Parameters
     ----------
-    recordings : RecordingSet
-        Any textures and conditions with contact.
+    found : sequence of RecordingLayers
+        Repeats of a condition are averaged.
     estimator : str
-        As in `modeling.fit_texture`.
+        The one that found them; it finds the layers of averages.
+    model : TextureModel, optional
+        Fitted to the same recordings.
     """
-    panels = []
-    for texture in recordings.textures:
-        chosen = recordings.of_texture(texture)
-        for (speed_mm_s, force_n), measured in sorted(condition_spectra(chosen).items()):
-            found = find_layers(measured, estimator=estimator).frequencies_hz
-            magnitude = measured.smoothed(SMOOTHING_HZ)
-            panels.append(
-                SpectrumPanel(
-                    title=f"{texture}, {speed_mm_s:g} mm/s, {force_n:g} N",
-                    unit=chosen.recordings[0].unit,
-                    simulated=any(r.simulated for r in chosen.recordings),
-                    frequency_hz=measured.frequency_hz,
-                    magnitude=magnitude,
-                    layer_frequency_hz=found,
-                    layer_height=np.interp(found, measured.frequency_hz, magnitude),
-                )
-            )
-    return tuple(panels)
+    by_condition: dict[tuple[float, float], list[RecordingLayers]] = {}
+    for each in found:
+        by_condition.setdefault(each.recording.condition, []).append(each)
+    return tuple(
+        _panel(repeats, estimator=estimator, model=model)
+        for _, repeats in sorted(by_condition.items())
+    )
+
+
+def _panel(
+    repeats: Sequence[RecordingLayers], *, estimator: str, model: TextureModel | None
+) -> SpectrumPanel:
+    recording, measured, layers = repeats[0].recording, repeats[0].spectrum, repeats[0].layers
+    if len(repeats) > 1:
+        measured = mean_spectrum([each.spectrum for each in repeats])
+        layers = find_layers(measured, estimator=estimator)
+    magnitude = measured.smoothed(SMOOTHING_HZ)
+    response = np.zeros(0)
+    if model is not None:
+        response = _smoothed_response(model.peq(*recording.condition), measured.frequency_hz)
+    return SpectrumPanel(
+        title=f"{recording.texture}, {recording.speed_mm_s:g} mm/s, {recording.force_n:g} N",
+        unit=recording.unit,
+        simulated=any(each.recording.simulated for each in repeats),
+        frequency_hz=measured.frequency_hz,
+        magnitude=magnitude,
+        layer_frequency_hz=layers.frequencies_hz,
+        layer_height=np.interp(layers.frequencies_hz, measured.frequency_hz, magnitude),
+        response=response,
+    )

@@ -2,26 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from analysis.comparison import LayerCourse, SpectrumComparison, SpectrumPanel
+from analysis.drawing import (
+    BLACK,
+    BLUE,
+    GREY,
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    ORANGE,
+    SKY_BLUE,
+    VERMILLION,
+    axes_or_new,
+    finish_axes,
+    log_frequency_axis,
+    shared_legend,
+    stamp_if_simulated,
+)
 from analysis.load import MODELS, SCALES
 from analysis.statistics import ALL_TEXTURES, ConfusionMatrix
 
-# Okabe and Ito's palette, told apart by people with any colour vision.
-BLUE, VERMILLION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
-PURPLE, SKY_BLUE, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6E6E6E"
 MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
 MODEL_HATCHES = {"full": "", "simplified": "///"}
-LAYER_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
-LAYER_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 LEVELS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
 BAR_WIDTH = 0.38
@@ -44,7 +54,7 @@ def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
         axes[0, column].set_xlabel("")
     for ax in axes[:, 1]:
         ax.set_ylabel("")
-    _shared_legend(figure, axes[:, 0], loc="outside lower center", ncols=6)
+    shared_legend(figure, axes[:, 0], loc="outside lower center", ncols=4)
     figure.suptitle(
         f"{comparison.texture}, {comparison.speed_mm_s:g} mm/s, {comparison.force_n:g} N"
     )
@@ -54,16 +64,46 @@ def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
 def plot_model_spectrum(
     comparison: SpectrumComparison, *, model: str, ax: Axes | None = None
 ) -> Axes:
-    """Smoothed magnitude of the recording and of one model (full or simplified)."""
-    ax = _axes_or_new(ax)
-    response = comparison.full if model == "full" else comparison.simplified
-    ax.plot(comparison.frequency_hz, comparison.recording, color=GREY, lw=2.5, label="recording")
-    ax.plot(comparison.frequency_hz, response, color=BLUE, lw=1.5, ls="--", label="model")
-    _log_frequency(ax, comparison.frequency_hz[-1])
+    """One model (full or simplified) and the recording, smoothed; its layers and their thresholds.
+
+    The threshold stands at each layer as the gain with which that layer would be just felt, so a
+    layer is above threshold where its own response peaks above it.
+    """
+    ax = axes_or_new(ax)
+    frequency, response = comparison.frequency_hz, getattr(comparison, model)
+    if np.isfinite(comparison.recording).any():
+        ax.plot(frequency, comparison.recording, color=GREY, lw=2.5, label="recording")
+    ax.plot(frequency, response, color=BLUE, lw=1.5, ls="--", label="model")
+    labels = {False: "layer alone", True: "layer alone, dropped"}
+    for layer, dropped in enumerate(comparison.dropped):
+        if dropped and model == "simplified":
+            continue
+        ax.plot(
+            frequency,
+            comparison.layer_response[layer],
+            color=VERMILLION if dropped else SKY_BLUE,
+            ls=":" if dropped else "-",
+            lw=1.2,
+            label=labels.pop(bool(dropped), None),
+        )
+        ax.plot(
+            frequency,
+            comparison.layer_threshold[layer],
+            color=BLACK,
+            lw=1.2,
+            label="" if layer else "gain at which the layer here would be just felt",
+        )
+    # Far skirts of layers must not stretch the axis.
+    lowest, highest = (
+        response.min(),
+        max(response.max(), np.nanmax(comparison.recording, initial=0)),
+    )
+    ax.set_ylim(lowest / 5, 3 * highest)
+    log_frequency_axis(ax, frequency[-1])
     ax.set_yscale("log")
-    ax.set_ylabel("magnitude, smoothed by 30 Hz\n(g per unit noise)")
+    ax.set_ylabel("magnitude (g per unit noise),\nmodel and recording smoothed")
     ax.set_title(f"({'a' if model == 'full' else 'b'}) {model} model", loc="left")
-    _stamp(ax, comparison.simulated)
+    stamp_if_simulated(ax, comparison.simulated)
     return ax
 
 
@@ -71,7 +111,7 @@ def plot_layers_and_threshold(
     comparison: SpectrumComparison, *, model: str = "full", ax: Axes | None = None
 ) -> Axes:
     """Amplitude of the model's layers by the criterion (stems at f) against the threshold."""
-    ax = _axes_or_new(ax)
+    ax = axes_or_new(ax)
     threshold = comparison.threshold
     ax.plot(
         threshold.frequency_hz,
@@ -89,11 +129,11 @@ def plot_layers_and_threshold(
         alpha=0.12,
         label="no threshold known",
     )
-    _log_frequency(ax, comparison.frequency_hz[-1])
+    log_frequency_axis(ax, comparison.frequency_hz[-1])
     ax.set_yscale("log")
     ax.set_ylim(bottom, 3 * max(threshold.acceleration_g.max(), *comparison.layer_amplitude_g, 0))
     ax.set_ylabel(f"{AMPLITUDE_LABELS[comparison.criterion]}\n(g peak)")
-    _stamp(ax, comparison.simulated)
+    stamp_if_simulated(ax, comparison.simulated)
     return ax
 
 
@@ -151,7 +191,7 @@ def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
         ax.set_ylabel(f"rated similarity of {scale} (0–100)")
         ax.set_ylim(0, 115)
         ax.set_yticks(range(0, 101, 20))
-    _shared_legend(figure, figure.axes[:1])
+    shared_legend(figure, figure.axes[:1])
     figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
     return figure
 
@@ -176,14 +216,14 @@ def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float 
     ax.set_ylabel("correct rate (share of trials, 0–1)")
     ax.set_ylim(0, 1.15)
     ax.set_yticks(np.arange(0, 1.01, 0.2))
-    _shared_legend(figure, figure.axes[:1])
+    shared_legend(figure, figure.axes[:1])
     figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
     return figure
 
 
 def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = None) -> Axes:
     """Mean ± standard error per texture, full beside simplified, with significance marks."""
-    ax = _axes_or_new(ax)
+    ax = axes_or_new(ax)
     place = np.arange(len(tests))
     for side, model in zip((-0.5, 0.5), MODELS, strict=True):
         ax.bar(
@@ -203,8 +243,8 @@ def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = 
         _significance_bracket(ax, float(x), top=max(full_top, top), p=float(p))
     ax.set_xticks(place, list(tests["texture"]), rotation=30, ha="right")
     ax.set_xlabel("texture")
-    _finish(ax)
-    _stamp(ax, simulated)
+    finish_axes(ax)
+    stamp_if_simulated(ax, simulated)
     return ax
 
 
@@ -249,7 +289,7 @@ def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool
 
 def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None = None) -> Axes:
     """One confusion matrix: row shares in per cent with counts."""
-    ax = _axes_or_new(ax)
+    ax = axes_or_new(ax)
     shares = 100 * matrix.row_shares
     ax.imshow(shares, vmin=0, vmax=100, cmap="Blues", aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
@@ -262,7 +302,7 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
     ax.set_yticks(range(len(names)), names)
     ax.set_xlabel("virtual surface answered")
     ax.set_ylabel("real surface presented")
-    _stamp(ax, simulated)
+    stamp_if_simulated(ax, simulated)
     return ax
 
 
@@ -278,7 +318,7 @@ def figure_layer_courses(courses: Sequence[LayerCourse]) -> Figure:
     axes = figure.subplots(1, 2)
     plot_layer_course(courses, quantity="frequency_hz", ax=axes[0])
     plot_layer_course(courses, quantity="amplitude", ax=axes[1])
-    _shared_legend(figure, axes[:1], loc="outside right center", ncols=1)
+    shared_legend(figure, axes[:1], loc="outside right center", ncols=1)
     figure.suptitle(f"{courses[0].texture}, {courses[0].force_n:g} N")
     return figure
 
@@ -287,7 +327,7 @@ def plot_layer_course(
     courses: Sequence[LayerCourse], *, quantity: str, ax: Axes | None = None
 ) -> Axes:
     """One quantity (frequency_hz or amplitude) of each layer over speed."""
-    ax = _axes_or_new(ax)
+    ax = axes_or_new(ax)
     for course, solid in zip(courses, (True, False), strict=False):
         values: NDArray[np.float64] = getattr(course, quantity)
         for layer in range(values.shape[1]):
@@ -307,8 +347,8 @@ def plot_layer_course(
     ax.set_ylabel("frequency (Hz)" if frequency else f"amplitude, sinusoid of equal power ({unit})")
     ax.set_xlabel("speed (mm/s)")
     ax.set_ylim(bottom=0)
-    _finish(ax)
-    _stamp(ax, any(course.simulated for course in courses))
+    finish_axes(ax)
+    stamp_if_simulated(ax, any(course.simulated for course in courses))
     return ax
 
 
@@ -328,16 +368,29 @@ def figure_spectra(panels: Sequence[SpectrumPanel]) -> Figure:
             ax.set_ylabel("")
         if not lowest_of_its_column:
             ax.set_xlabel("")
+    shared_legend(figure, figure.axes[:1], loc="outside lower center", ncols=3)
     return figure
 
 
 def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes:
-    """Smoothed spectrum of one condition; triangles mark its layers, numbers are their Hz."""
-    ax = _axes_or_new(ax)
-    ax.plot(panel.frequency_hz, panel.magnitude, color=GREY, lw=1.5)
+    """Smoothed spectrum of one condition; triangles mark its layers, numbers are their Hz.
+
+    The dashed line is the response of the model that was fitted to the whole grid, if there is one.
+    """
+    ax = axes_or_new(ax)
+    ax.plot(panel.frequency_hz, panel.magnitude, color=GREY, lw=1.5, label="recording, smoothed")
     ax.plot(
-        panel.layer_frequency_hz, panel.layer_height * 1.25, ls="", marker="v", color=VERMILLION
+        panel.layer_frequency_hz,
+        panel.layer_height * 1.25,
+        ls="",
+        marker="v",
+        color=VERMILLION,
+        label="layer found in it alone (Hz)",
     )
+    if panel.response.size:
+        ax.plot(
+            panel.frequency_hz, panel.response, color=BLUE, lw=1.2, ls="--", label="model, smoothed"
+        )
     labelled = 0.0
     for x, y in zip(panel.layer_frequency_hz, panel.layer_height, strict=True):
         if x > LEAST_LABEL_RATIO * labelled:
@@ -352,53 +405,14 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
             )
     count = panel.layer_frequency_hz.size
     ax.text(0.98, 0.9, f"{count} layer{'s' * (count != 1)}", transform=ax.transAxes, ha="right")
-    _log_frequency(ax, panel.frequency_hz[-1])
+    log_frequency_axis(ax, panel.frequency_hz[-1])
     ax.set_yscale("log")
+    # Few ticks: drawing them takes most of the time that a grid of 49 panels takes.
+    ax.yaxis.set_major_locator(LogLocator(subs=(1, 3)))
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.yaxis.set_minor_locator(NullLocator())
     ax.margins(y=0.25)
     ax.set_ylabel(f"magnitude\n({panel.unit} per unit noise)")
     ax.set_title(panel.title, loc="left", fontsize=9)
-    _stamp(ax, panel.simulated)
+    stamp_if_simulated(ax, panel.simulated)
     return ax
-
-
-def _shared_legend(
-    figure: Figure, axes: Iterable[Axes], *, loc: Any = "outside upper center", ncols: int = 2
-) -> None:
-    handles = [handle for ax in axes for handle in ax.get_legend_handles_labels()[0]]
-    figure.legend(handles=handles, loc=loc, ncols=ncols, frameon=False, fontsize=9)
-
-
-def _axes_or_new(ax: Axes | None) -> Axes:
-    return Figure(layout="constrained").subplots() if ax is None else ax
-
-
-def _log_frequency(ax: Axes, highest_hz: float) -> None:
-    ax.set_xscale("log")
-    ax.set_xlim(10, highest_hz)
-    ax.set_xlabel("frequency (Hz)")
-    ticks = [f for f in (10, 30, 100, 300, 1000) if f < highest_hz]
-    ax.set_xticks(ticks, [str(f) for f in ticks])
-    ax.set_xticks([], minor=True)
-    _finish(ax)
-
-
-def _finish(ax: Axes) -> None:
-    ax.spines[["top", "right"]].set_visible(False)
-    ax.grid(axis="y", color=GREY, alpha=0.2)
-    ax.set_axisbelow(True)
-
-
-def _stamp(ax: Axes, simulated: bool) -> None:
-    """Nobody may take a simulated result for a measured one, wherever the picture ends up."""
-    if simulated:
-        ax.text(
-            1.0,
-            1.01,
-            "SIMULATED",
-            transform=ax.transAxes,
-            ha="right",
-            va="bottom",
-            color=VERMILLION,
-            weight="bold",
-            fontsize=9,
-        )

@@ -67,6 +67,34 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
     return sentences
 
 
+def regression_outcomes(support: pd.DataFrame) -> list[str]:
+    """How well speed and force explain the parameters, from `regressions.support_table`."""
+    explained = "; ".join(
+        f"{row['parameter']} {row['adjusted_r_squared']:.2f} "
+        f"({row['published_adjusted_r_squared']:.2f})"
+        for row in support.to_dict("records")
+        if np.isfinite(row["adjusted_r_squared"])
+    )
+    if not explained:
+        return []
+    return [
+        "Regressions on speed, force and their product: mean adjusted R² (in brackets the "
+        f"published one) {explained}."
+    ]
+
+
+def driving_outcomes(driving: pd.DataFrame) -> list[str]:
+    """What the grid's numbers buy, from `regressions.driving_table`; means over the textures."""
+    overall = driving[driving["texture"] == ALL_TEXTURES]
+    ways = {"grid": "the grid", "conditions": "regressions", "centroid": "the centroid alone"}
+    shown = [
+        f"{ways[row['driven_by']]} {row['numbers']:.0f} numbers, GFC30 {row['gfc30_mean']:.4f}, "
+        f"log-spectral distance {row['log_spectral_distance_db']:.2f} dB"
+        for row in overall.to_dict("records")
+    ]
+    return [f"A full model driven by (means over the textures): {'; '.join(shown)}."] * bool(shown)
+
+
 def planted_outcomes(planted: pd.DataFrame) -> list[str]:
     """One sentence per estimator, from `planted.planted_truth_table` rows; means over textures."""
     overall = planted[planted["layer"] == ALL_LAYERS]

@@ -17,8 +17,14 @@ from analysis.statistics import ALL_TEXTURES
 
 PICTURE_DPI = 150
 PIXELS_PER_INCH = 92
-_P_VALUES = ("p", "p_holm", "shapiro_p", "wilcoxon_p", "flip_probability")
-_NAMES = ("scale", "texture", "model", "estimator", "layer", "verdict", "presented", "answered")
+_P_VALUES = (
+    *("p", "p_holm", "shapiro_p", "wilcoxon_p", "flip_probability"),
+    *("p_speed", "p_force", "p_speed_force", "p_speed_alone", "p_amplitude"),
+)
+_NAMES = (
+    *("scale", "texture", "model", "estimator", "layer", "verdict", "presented", "answered"),
+    *("parameter", "coefficient", "driven_by", "reduced"),
+)
 _GRID_AXES = ("_mm_s", "force_n")
 _LABELS = {
     "mean_full": "mean full",
@@ -41,6 +47,28 @@ _LABELS = {
     "gfc5_mean": "GFC5 mean",
     "gfc5_floor": "GFC5 floor",
     "gfc5_ceiling": "GFC5 ceiling",
+    "multiple_r": "R",
+    "adjusted_r_squared": "adjusted R²",
+    "published_adjusted_r_squared": "published",
+    "speed_coefficient": "α1 (v)",
+    "force_coefficient": "α2 (F)",
+    "speed_force_coefficient": "α3 (v·F)",
+    "p_speed": "p of α1",
+    "p_force": "p of α2",
+    "p_speed_force": "p of α3",
+    "support_speed": "support α1 (%)",
+    "support_force": "support α2 (%)",
+    "support_speed_force": "support α3 (%)",
+    "published_support_speed": "published α1 (%)",
+    "published_support_force": "published α2 (%)",
+    "published_support_speed_force": "published α3 (%)",
+    "mean_significant": "mean of significant ones",
+    "published_for_n": "published, taken as per N",
+    "slope_speed_alone": "slope on speed alone (Hz per mm/s)",
+    "p_speed_alone": "p",
+    "amplitude_r": "r with amplitude",
+    "p_amplitude": "p",
+    "mean_centroid_hz": "mean (Hz)",
 }
 _UNITS = {"hz": "Hz", "db": "dB", "n": "N", "mm_s": "mm/s", "s": "s"}
 
@@ -225,8 +253,8 @@ def cell(column: str, value: object) -> str:
         return f"{value:g}"
     size = abs(value)
     digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
-    # Below 1e-9 is what sums of thirds leave of a zero.
-    tiny = 1e-9 < size < 0.0005
+    # Below 1e-12 is what sums of thirds leave of a zero.
+    tiny = 1e-12 < size < 0.0005
     return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
 
 

@@ -2,27 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from modeling import Recording, RecordingSet, Spectrum, find_layers
-from modeling.fitting import recording_spectra
+from modeling import Layers, Recording, Spectrum, find_layers
 
 SPECTRUM_STEP_HZ = 5.0
 
 
-def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent") -> pd.DataFrame:
-    """The layers of each recording alone: one row per layer, or one with `layer` 0 where none is.
+@dataclass(frozen=True, eq=False)
+class RecordingLayers:
+    """One recording, its spectrum (sensor's floor subtracted), and the layers found in it alone."""
 
-    The sensor's floor (recordings at force 0) is subtracted and not listed.
+    recording: Recording
+    spectrum: Spectrum
+    layers: Layers
+
+
+def layers_of_recordings(
+    measured: Sequence[tuple[Recording, Spectrum]], *, estimator: str
+) -> tuple[RecordingLayers, ...]:
+    """Find the layers of each recording; no grid is needed.
 
     Parameters
     ----------
-    recordings : RecordingSet
+    measured : sequence of (Recording, Spectrum)
+        From `modeling.fitting.recording_spectra`.
     estimator : str
         As in `modeling.fit_texture`.
+    """
+    return tuple(
+        RecordingLayers(recording, found, find_layers(found, estimator=estimator))
+        for recording, found in measured
+    )
+
+
+def layers_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
+    """The layers of each recording: one row per layer, or one with `layer` 0 where none is.
+
+    Parameters
+    ----------
+    found : sequence of RecordingLayers
 
     Returns
     -------
@@ -32,8 +56,8 @@ def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent
         unresolved.
     """
     rows: list[dict[str, Any]] = []
-    for recording, measured in _spectra(recordings):
-        found = find_layers(measured, estimator=estimator)
+    for each in found:
+        recording, layers = each.recording, each.layers
         labels = {
             "texture": recording.texture,
             "speed_mm_s": recording.speed_mm_s,
@@ -41,29 +65,31 @@ def layers_table(recordings: RecordingSet, *, estimator: str = "paper-consistent
             "repeat": recording.repeat,
             "unit": recording.unit,
             "simulated": recording.simulated,
-            "noise_gain": found.noise_gain,
+            "noise_gain": layers.noise_gain,
         }
-        layers = {
-            "layer": np.arange(1, found.gains.size + 1),
-            "frequency_hz": found.frequencies_hz,
-            "bandwidth_hz": found.bandwidths_hz,
-            "gain": found.gains,
-            "level_sd_db": found.level_sd_db,
-            "unresolved": found.unresolved,
+        columns = {
+            "layer": np.arange(1, layers.gains.size + 1),
+            "frequency_hz": layers.frequencies_hz,
+            "bandwidth_hz": layers.bandwidths_hz,
+            "gain": layers.gains,
+            "level_sd_db": layers.level_sd_db,
+            "unresolved": layers.unresolved,
         }
-        if not found.gains.size:
+        if not layers.gains.size:
             rows.append({**labels, "layer": 0})
         rows += [
-            {**labels, **dict(zip(layers, layer, strict=True))}
-            for layer in zip(*layers.values(), strict=True)
+            {**labels, **dict(zip(columns, layer, strict=True))}
+            for layer in zip(*columns.values(), strict=True)
         ]
     return pd.DataFrame(rows)
 
 
-def spectra_table(recordings: RecordingSet) -> pd.DataFrame:
+def spectra_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
     """The smoothed spectrum (σ = 30 Hz) of each recording every 5 Hz, in long form.
 
-    The sensor's floor (recordings at force 0) is subtracted and not listed.
+    Parameters
+    ----------
+    found : sequence of RecordingLayers
 
     Returns
     -------
@@ -72,7 +98,8 @@ def spectra_table(recordings: RecordingSet) -> pd.DataFrame:
         noise).
     """
     parts = []
-    for recording, measured in _spectra(recordings):
+    for each in found:
+        recording, measured = each.recording, each.spectrum
         frequency = np.arange(0.0, measured.rate_hz / 2, SPECTRUM_STEP_HZ)
         parts.append(
             pd.DataFrame(
@@ -88,12 +115,3 @@ def spectra_table(recordings: RecordingSet) -> pd.DataFrame:
             )
         )
     return pd.concat(parts, ignore_index=True)
-
-
-def _spectra(recordings: RecordingSet) -> list[tuple[Recording, Spectrum]]:
-    """All recordings with contact; each texture has its own floor and rate."""
-    return [
-        pair
-        for texture in recordings.textures
-        for pair in recording_spectra(recordings.of_texture(texture))
-    ]

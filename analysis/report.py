@@ -19,11 +19,13 @@ from analysis.sections import (
     planted_section,
     rating_section,
 )
+from analysis.sections_regression import parameter_section
 from analysis.tables import TextureResult
 from modeling import InputError
 from modeling.files import write_text
 
-MODELS_SHARE = 0.6  # of the time that a report of a whole study takes
+MODELS_SHARE = 0.35  # of the time that a report of a whole study takes
+PARAMETERS_SHARE = 0.3
 
 
 def write_report(
@@ -103,9 +105,13 @@ def _sections(
         def tell_models(share: float, what: str) -> None:
             tell(MODELS_SHARE * share, what)
 
+        def tell_parameters(share: float, what: str) -> None:
+            tell(MODELS_SHARE + PARAMETERS_SHARE * share, what)
+
         sections.append(model_section(textures, rng=rng, progress=tell_models))
+        sections.append(parameter_section(textures, rng=rng, progress=tell_parameters))
     if responses is not None:
-        tell(MODELS_SHARE, "analysing answers")
+        tell(MODELS_SHARE + PARAMETERS_SHARE, "analysing answers")
         if not responses.absolute.empty:
             sections.append(rating_section(responses))
         if not responses.relative.empty:

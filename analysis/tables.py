@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -12,6 +12,7 @@ from modeling import (
     InputError,
     LayerVerdict,
     RecordingSet,
+    RegressedModel,
     Simplification,
     Spectrum,
     TextureModel,
@@ -102,19 +103,36 @@ def gfc_table(
         gfc5_mean, gfc5_floor, gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of
         |error|), band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
     """
+    models = {"full": full, "simplified": simplified}
+    table = likeness_table(recordings, models, rng=rng)
+    table.insert(3, "parameters", [model.n_parameters for model in models.values()])
+    return table
+
+
+def likeness_table(
+    recordings: RecordingSet,
+    models: Mapping[str, TextureModel | RegressedModel],
+    *,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """How alike recordings and each of these models of one texture are, one row per model.
+
+    Parameters, errors and columns as in `gfc_table`, but for `parameters`.
+    """
+    first = next(iter(models.values()))
     above_floor = [
         (recording, measured)
-        for recording, measured in recording_spectra(recordings, rate_hz=full.rate_hz)
+        for recording, measured in recording_spectra(recordings, rate_hz=first.rate_hz)
         if measured.magnitude.any()
     ]
     if not above_floor:
         raise InputError(
-            f"{full.texture}: expected recordings above the sensor's floor, got none; check those "
+            f"{first.texture}: expected recordings above the sensor's floor, got none; check those "
             "at force 0."
         )
     seeds = rng.integers(2**63, size=len(above_floor))
     rows = []
-    for name, model in (("full", full), ("simplified", simplified)):
+    for name, model in models.items():
         reports = [
             similarity.report(
                 measured, model.peq(*recording.condition), rng=np.random.default_rng(seed)
@@ -122,10 +140,9 @@ def gfc_table(
             for (recording, measured), seed in zip(above_floor, seeds, strict=True)
         ]
         labels = {
-            "texture": full.texture,
+            "texture": first.texture,
             "model": name,
             "layers": model.n_layers,
-            "parameters": model.n_parameters,
             "conditions": len(reports),
         }
         rows.append(labels | _means(reports))

@@ -1,12 +1,15 @@
 """Texture models: from recordings to parameters, to fewer parameters, to vibration."""
 
 from modeling import similarity
+from modeling.autoregressive import ARFilter, ARModel, fit_ar
 from modeling.errors import GridError, InputError
-from modeling.estimators import ESTIMATORS, Layers, find_layers
+from modeling.estimators import ESTIMATORS, find_layers
 from modeling.fitting import fit_texture, missing_conditions
+from modeling.layers import Layers
 from modeling.model import TextureModel
 from modeling.peq import PEQ
 from modeling.recording import Recording, RecordingSet
+from modeling.regressed import RegressedModel
 from modeling.renderer import Renderer
 from modeling.simplification import CRITERIA, LayerVerdict, Simplification, simplify
 from modeling.spectra import Spectrum, spectrum
@@ -16,18 +19,22 @@ __all__ = [
     "CRITERIA",
     "ESTIMATORS",
     "PEQ",
+    "ARFilter",
+    "ARModel",
     "GridError",
     "InputError",
     "LayerVerdict",
     "Layers",
     "Recording",
     "RecordingSet",
+    "RegressedModel",
     "Renderer",
     "Simplification",
     "Spectrum",
     "TextureModel",
     "Threshold",
     "find_layers",
+    "fit_ar",
     "fit_texture",
     "missing_conditions",
     "similarity",

@@ -1,14 +1,13 @@
-"""From a spectrum to noise gain and layers: the paper's recipe, as printed and made consistent.
+"""From a spectrum to noise gain and layers: `joint`, and the paper's recipe in two readings.
 
-`paper` reads the recipe plainly: B is the full width at half maximum of the smoothed peak and G its
-height. That counts the noise floor twice and the smoothing as width. `paper-consistent` fits the
-peak above the floor, takes the smoothing out of its width, and chooses gains such that the model,
-smoothed alike, has the measured heights (METHOD 4).
+`joint` is in `modeling.joint`. `paper` reads the recipe plainly: B is the full width at half
+maximum of the smoothed peak and G its height. That counts the noise floor twice and the smoothing
+as width. `paper-consistent` fits the peak above the floor, takes the smoothing out of its width,
+and chooses gains such that the model, smoothed alike, has the measured heights (METHOD 4).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -17,6 +16,8 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from modeling.errors import InputError
+from modeling.joint import fit_jointly
+from modeling.layers import Layers
 from modeling.peq import (
     HIGHEST_BANDWIDTH_SHARE,
     LOWEST_BANDWIDTH_HZ,
@@ -26,8 +27,8 @@ from modeling.peq import (
 )
 from modeling.spectra import SMOOTHING_HZ, Spectrum, smooth
 
-EstimatorName = Literal["paper", "paper-consistent"]
-ESTIMATORS: tuple[EstimatorName, ...] = ("paper", "paper-consistent")
+EstimatorName = Literal["joint", "paper", "paper-consistent"]
+ESTIMATORS: tuple[EstimatorName, ...] = ("joint", "paper", "paper-consistent")
 
 NOISE_BAND = (0.8, 1.0)  # of the Nyquist frequency (2.0–2.5 kHz at 5 kHz)
 # A hill counts as a peak where it rises above its saddle by more than the smoothed spectrum's own
@@ -42,31 +43,6 @@ GAIN_STEPS = 12
 HIDDEN_SHARE = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Layers:
-    """Noise gain and m layers of one spectrum, by rising frequency.
-
-    Parameters
-    ----------
-    noise_gain : float
-        G_w, in g per unit noise.
-    frequencies_hz, bandwidths_hz, gains : (m,) ndarray
-        As in `PEQ`.
-    level_sd_db : (m,) ndarray
-        Standard deviation of each layer's level, 4.34/√(πBT) dB.
-    unresolved : (m,) ndarray of bool
-        Width below what the smoothing resolves, or height within what the skirts of neighbours
-        reach by themselves: the layer's width or level is a bound rather than an estimate.
-    """
-
-    noise_gain: float
-    frequencies_hz: Floats
-    bandwidths_hz: Floats
-    gains: Floats
-    level_sd_db: Floats
-    unresolved: NDArray[np.bool_]
-
-
 def check_estimator(estimator: str) -> EstimatorName:
     """The name itself, or InputError where there is no such estimator."""
     for name in ESTIMATORS:
@@ -77,14 +53,16 @@ def check_estimator(estimator: str) -> EstimatorName:
     )
 
 
-def find_layers(spectrum: Spectrum, *, estimator: str = "paper-consistent") -> Layers:
+def find_layers(spectrum: Spectrum, *, estimator: str = "joint") -> Layers:
     """Noise gain and layers of one spectrum alone, without a grid to track them over.
 
     Parameters
     ----------
     spectrum : Spectrum
-    estimator : {"paper", "paper-consistent"}
+    estimator : {"joint", "paper", "paper-consistent"}
     """
+    if check_estimator(estimator) == "joint":
+        return fit_jointly(spectrum)
     frequencies = find_peak_frequencies(spectrum)
     nothing = np.full(frequencies.shape, np.nan)
     return fit_layers(
@@ -127,7 +105,7 @@ def fit_layers(
     fallback_bandwidths_hz: Floats,
     estimator: EstimatorName,
 ) -> Layers:
-    """Widths and gains of layers whose frequencies are known.
+    """Widths and gains, by the paper's recipe, of layers whose frequencies are known.
 
     Parameters
     ----------

@@ -140,3 +140,34 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
             )
         rows.append(dict(zip(header, cells, strict=True)))
     return rows
+
+
+def is_number(text: str) -> bool:
+    """Whether a text reads as a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def number(text: str, name: str) -> float:
+    """A number from a table's cell.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, where the cell is empty or no number.
+    """
+    if not is_number(text):
+        got = repr(text) if text.strip() else "nothing"
+        raise InputError(f"expected a number for {name}, got {got}; fill it in.")
+    return float(text)
+
+
+def whole_number(text: str, name: str) -> int:
+    """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
+    value = number(text, name)
+    if not (value.is_integer() and value >= 1):
+        raise InputError(f"expected a whole number for {name}, at least 1, got {text}; correct it.")
+    return int(value)

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import griddata
-from scipy.spatial import QhullError
 
-from modeling.errors import GridError, InputError
+from modeling.errors import InputError
 from modeling.estimators import (
     EstimatorName,
-    Layers,
     check_estimator,
     find_peak_frequencies,
     fit_layers,
 )
+from modeling.grid import Condition, fill_grid, grid_axes
+from modeling.layers import Layers
 from modeling.model import TextureModel
 from modeling.recording import Recording, RecordingSet
 from modeling.spectra import MODEL_RATE_HZ, Spectrum, mean_spectrum, spectrum, subtract_floor
-from modeling.tracking import Condition, assign_peaks, reference_of, visiting_order
+from modeling.tracking import assign_peaks, reference_of, visiting_order
+from modeling.whole_grid import fit_grid_jointly
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,7 @@ class _Tracked:
 
 
 def fit_texture(
-    recordings: RecordingSet | Iterable[Recording], *, estimator: str = "paper-consistent"
+    recordings: RecordingSet | Iterable[Recording], *, estimator: str = "joint"
 ) -> TextureModel:
     """Model one texture over its grid of speeds and forces.
 
@@ -46,7 +46,7 @@ def fit_texture(
     ----------
     recordings : RecordingSet or iterable of Recording
         One texture, at least 2 speeds × 2 forces, one unit; any rates.
-    estimator : {"paper-consistent", "paper"}
+    estimator : {"joint", "paper", "paper-consistent"}
 
     Returns
     -------
@@ -60,28 +60,41 @@ def fit_texture(
     InputError
         Where they mix textures or units, or have contact without speed.
     """
-    chosen = check_estimator(estimator)
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
-    texture, unit = records.texture, _only_unit(records)
-    spectra = condition_spectra(records)
-    speeds = sorted({speed for speed, _ in spectra})
-    forces = sorted({force for _, force in spectra})
-    if len(speeds) < 2 or len(forces) < 2:
-        raise GridError(
-            f"{texture}: expected recordings at 2 or more speeds and 2 or more forces for a full "
-            f"model, got {_count(speeds, 'speed')} and {_count(forces, 'force')}; "
-            f"record more {'force' if len(forces) < 2 else 'speed'} levels."
-        )
-    tracked = _track(spectra, chosen)
+    check_estimator(estimator)
+    only_unit(records)
+    return fit_spectra(recording_spectra(records), estimator=estimator)
+
+
+def fit_spectra(
+    measured: Sequence[tuple[Recording, Spectrum]], *, estimator: str = "joint"
+) -> TextureModel:
+    """Model one texture from spectra that `recording_spectra` has prepared; see `fit_texture`.
+
+    Parameters
+    ----------
+    measured : sequence of (Recording, Spectrum)
+        With contact; the same texture, unit and rate in all.
+    estimator : {"joint", "paper", "paper-consistent"}
+    """
+    chosen = check_estimator(estimator)
+    first, spectrum_of_first = measured[0]
+    spectra = spectra_by_condition(measured)
+    speeds, forces = grid_axes(spectra, first.texture)
+    if chosen == "joint":
+        fitted = fit_grid_jointly(spectra)
+        tracked = {c: _Tracked(fitted.layers[c], fitted.inherited[c]) for c in spectra}
+    else:
+        tracked = _track(spectra, chosen)
     return TextureModel(
-        texture=texture,
-        rate_hz=next(iter(spectra.values())).rate_hz,
+        texture=first.texture,
+        rate_hz=spectrum_of_first.rate_hz,
         speeds_mm_s=np.array(speeds),
         forces_n=np.array(forces),
         estimator=chosen,
-        unit=unit,
-        simulated=any(r.simulated for r in records.recordings),
-        **_grids(tracked, speeds, forces, texture),
+        unit=first.unit,
+        simulated=any(r.simulated for r, _ in measured),
+        **_grids(tracked, first.texture),
     )
 
 
@@ -101,9 +114,16 @@ def condition_spectra(records: RecordingSet) -> dict[Condition, Spectrum]:
     InputError
         If a record has contact but no speed, or none has contact.
     """
+    return spectra_by_condition(recording_spectra(records))
+
+
+def spectra_by_condition(
+    measured: Sequence[tuple[Recording, Spectrum]],
+) -> dict[Condition, Spectrum]:
+    """The spectrum of each condition, repeats averaged."""
     by_condition: dict[Condition, list[Spectrum]] = {}
-    for record, measured in recording_spectra(records):
-        by_condition.setdefault(record.condition, []).append(measured)
+    for record, found in measured:
+        by_condition.setdefault(record.condition, []).append(found)
     return {condition: mean_spectrum(found) for condition, found in by_condition.items()}
 
 
@@ -142,18 +162,15 @@ def recording_spectra(
     return list(zip(contact, spectra, strict=True))
 
 
-def _only_unit(records: RecordingSet) -> str:
-    units = sorted({r.unit for r in records.recordings})
+def only_unit(records: RecordingSet) -> str:
+    """The unit of all recordings; InputError where there are two of them, or two textures."""
+    texture, units = records.texture, sorted({r.unit for r in records.recordings})
     if len(units) > 1:
         raise InputError(
-            f"{records.texture}: expected one unit in all recordings, got {' and '.join(units)}; "
+            f"{texture}: expected one unit in all recordings, got {' and '.join(units)}; "
             "calibrate all of them or none."
         )
     return units[0]
-
-
-def _count(levels: list[float], name: str) -> str:
-    return f"{len(levels)} {name}{'' if len(levels) == 1 else 's'}"
 
 
 def _track(
@@ -186,57 +203,26 @@ def _track(
     return tracked
 
 
-def _grids(
-    tracked: dict[Condition, _Tracked], speeds: list[float], forces: list[float], texture: str
-) -> dict[str, Any]:
+def _grids(tracked: Mapping[Condition, _Tracked], texture: str) -> dict[str, Any]:
     """The model's arrays; holes of the grid are filled from their neighbours and marked."""
-    conditions = [(speed, force) for speed in speeds for force in forces]
-    known = np.array([condition in tracked for condition in conditions])
-    present = [tracked[c] for c, there in zip(conditions, known, strict=True) if there]
-    m = present[0].inherited.size
-    shape = (len(speeds), len(forces))
-    points = np.array(conditions)
 
-    def grid(rows: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-        full = np.empty((len(conditions), rows[0].size))
-        full[known] = rows
-        if not known.all() and rows[0].size:
-            full[~known] = _fill(points[known], np.array(rows), points[~known], texture)
-        return full.reshape(*shape, -1)
+    def grid(name: str) -> NDArray[np.float64]:
+        return fill_grid({c: getattr(t.layers, name) for c, t in tracked.items()}, texture)[0]
 
-    def marks(rows: list[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        full = np.zeros((len(conditions), m), dtype=bool)
-        full[known] = rows
-        return full.reshape(*shape, m)
+    def marks(rows: Mapping[Condition, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+        known = {c: row.astype(np.float64) for c, row in rows.items()}
+        # A condition that was filled in has no marks of its own.
+        marked: NDArray[np.bool_] = fill_grid(known, texture)[0] == 1
+        return marked & ~interpolated[:, :, None]
 
+    noise = {c: np.array([t.layers.noise_gain]) for c, t in tracked.items()}
+    noise_gains, interpolated = fill_grid(noise, texture)
     return {
-        "noise_gains": grid([np.array([t.layers.noise_gain]) for t in present])[:, :, 0],
-        "frequencies_hz": grid([t.layers.frequencies_hz for t in present]),
-        "bandwidths_hz": grid([t.layers.bandwidths_hz for t in present]),
-        "gains": grid([t.layers.gains for t in present]),
-        "level_sd_db": grid([t.layers.level_sd_db for t in present]),
-        "inherited": marks([t.inherited for t in present]),
-        "unresolved": marks([t.layers.unresolved for t in present]),
-        "interpolated": ~known.reshape(shape),
+        "noise_gains": noise_gains[:, :, 0],
+        **{
+            name: grid(name) for name in ("frequencies_hz", "bandwidths_hz", "gains", "level_sd_db")
+        },
+        "inherited": marks({c: t.inherited for c, t in tracked.items()}),
+        "unresolved": marks({c: t.layers.unresolved for c, t in tracked.items()}),
+        "interpolated": interpolated,
     }
-
-
-def _fill(
-    points: NDArray[np.float64],
-    values: NDArray[np.float64],
-    holes: NDArray[np.float64],
-    texture: str,
-) -> NDArray[np.float64]:
-    """Linear interpolation over (speed, force); beyond the outermost neighbours the nearest one."""
-    try:
-        linear = griddata(points, values, holes, method="linear", rescale=True)
-    except (QhullError, ValueError):
-        raise GridError(
-            f"{texture}: expected recordings that span the grid, got {len(points)} of "
-            f"{len(points) + len(holes)} conditions on one line; record more of them."
-        ) from None
-    nearest = griddata(points, values, holes, method="nearest", rescale=True)
-    filled = np.where(np.isnan(linear), nearest, linear)
-    # Rounding must not carry a value beyond its neighbours, and so out of the legal range.
-    bounded: NDArray[np.float64] = np.clip(filled, values.min(axis=0), values.max(axis=0))
-    return bounded

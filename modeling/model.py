@@ -6,19 +6,27 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError, check_texture_name
 from modeling.files import write_text
+from modeling.grid import Cells, check_axes, within_grid
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    from modeling.regressed import RegressedModel
 
 Bools = NDArray[np.bool_]
 FORMAT = "tactileq.texture-model"
 VERSION = 1
+DrivenBy = Literal["conditions", "centroid"]
+Model = TypeVar("Model", bound="DataclassInstance")
 
 
 def _no_marks() -> Bools:
@@ -103,14 +111,7 @@ class TextureModel:
         self._check_values()
 
     def _check_axes(self) -> None:
-        for name in ("speeds_mm_s", "forces_n"):
-            axis = getattr(self, name)
-            rising = axis.ndim == 1 and axis.size >= 2 and bool((np.diff(axis) > 0).all())
-            if not rising or not (axis[0] > 0 and np.isfinite(axis).all()):
-                raise InputError(
-                    f"expected at least two rising values above 0 in {name}, got "
-                    f"{axis.tolist()}; a model needs a grid of at least 2 × 2."
-                )
+        check_axes(self.speeds_mm_s, self.forces_n)
         grid = (self.speeds_mm_s.size, self.forces_n.size)
         wanted = grid + np.shape(self.gains)[2:3]
         for name in _ARRAYS[2:]:
@@ -170,28 +171,13 @@ class TextureModel:
         force_n : (n,) array_like
             Normal force; negative values count as lift-off.
         """
-        speed = np.abs(np.atleast_1d(np.asarray(speed_mm_s, dtype=np.float64)))
-        force = np.atleast_1d(np.asarray(force_n, dtype=np.float64))
-        contact = np.isfinite(speed) & np.isfinite(force)
-        speed, force = np.where(contact, speed, 0.0), np.where(contact, force, 0.0)
-        ramp = np.minimum(speed / self.speeds_mm_s[0], 1.0)
-        ramp = ramp * np.clip(force / self.forces_n[0], 0.0, 1.0)
-        row, row_share = _cell(self.speeds_mm_s, speed)
-        column, column_share = _cell(self.forces_n, force)
-
-        def blend(grid: Floats) -> Floats:
-            tail = (slice(None),) + (None,) * (grid.ndim - 2)
-            x, y = row_share[tail], column_share[tail]
-            low = grid[row, column] * (1 - x) + grid[row + 1, column] * x
-            high = grid[row, column + 1] * (1 - x) + grid[row + 1, column + 1] * x
-            blended: Floats = low * (1 - y) + high * y
-            return blended
-
+        hand = within_grid(self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n)
+        cells = Cells(self.speeds_mm_s, self.forces_n, hand=hand)
         return Parameters(
-            blend(self.noise_gains) * ramp,
-            blend(self.frequencies_hz),
-            blend(self.bandwidths_hz),
-            blend(self.gains) * ramp[:, None],
+            cells.blend(self.noise_gains) * hand.ramp,
+            cells.blend(self.frequencies_hz),
+            cells.blend(self.bandwidths_hz),
+            cells.blend(self.gains) * hand.ramp[:, None],
         )
 
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
@@ -199,17 +185,26 @@ class TextureModel:
 
         Interpolation between legal values may leave the legal range by rounding; it is clamped.
         """
-        at = self.parameters(speed_mm_s, force_n)
-        frequency, bandwidth, _ = clamp_bands(
-            at.frequencies_hz[0], at.bandwidths_hz[0], rate_hz=self.rate_hz
-        )
-        return PEQ(
-            noise_gain=float(at.noise_gain[0]),
-            frequencies_hz=frequency,
-            bandwidths_hz=bandwidth,
-            gains=at.gains[0],
-            rate_hz=self.rate_hz,
-        )
+        return first_peq(self.parameters(speed_mm_s, force_n), rate_hz=self.rate_hz)
+
+    def regressed(self, *, by: DrivenBy = "conditions") -> RegressedModel:
+        """The texture driven by regressions instead of the grid (METHOD 6 and 9).
+
+        Parameters
+        ----------
+        by : {"conditions", "centroid"}
+            What drives every parameter: speed, force and their product, by the reduced models of
+            eq. 3; or the spectral centroid's response to speed alone, from which all layers are
+            derived (PAPER IX-B; force then acts only below the lowest recorded one).
+
+        Raises
+        ------
+        InputError
+            For another word, or by="centroid" where no layer has a gain.
+        """
+        from modeling.regressed import regressed_model
+
+        return regressed_model(self, by=by)
 
     def at_rate(self, rate_hz: float) -> TextureModel:
         """The same output spectrum written for noise of unit variance at another rate.
@@ -246,18 +241,7 @@ class TextureModel:
         InputError
             If the file is missing, is no such model, or has a newer version.
         """
-        values = _load_json(Path(path))
-        names = {f.name for f in fields(TextureModel)}
-        if set(values) != names:
-            wrong = ", ".join(sorted(names ^ set(values)))
-            raise InputError(
-                f"expected the fields of a texture model in {path}, got too few or too many "
-                f"({wrong}); fit the model again."
-            )
-        try:
-            return TextureModel(**values)
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{path}: {error}") from None
+        return model_from(TextureModel, load_json(path, FORMAT, version=VERSION), path=path)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, TextureModel):
@@ -286,11 +270,18 @@ def _check_rate(rate_hz: float) -> None:
         raise InputError(f"expected a rate above 0 Hz, got {rate_hz}; give the rate.")
 
 
-def _cell(axis: Floats, value: Floats) -> tuple[NDArray[np.intp], Floats]:
-    """Index of the grid cell that holds each value, and the position within it (0 … 1)."""
-    inside = np.clip(value, axis[0], axis[-1])
-    index = np.clip(np.searchsorted(axis, inside, side="right") - 1, 0, axis.size - 2)
-    return index, (inside - axis[index]) / (axis[index + 1] - axis[index])
+def first_peq(at: Parameters, *, rate_hz: float) -> PEQ:
+    """The PEQ at the first of the points, frequencies and widths moved into the legal range."""
+    frequency, bandwidth, _ = clamp_bands(
+        at.frequencies_hz[0], at.bandwidths_hz[0], rate_hz=rate_hz
+    )
+    return PEQ(
+        noise_gain=float(at.noise_gain[0]),
+        frequencies_hz=frequency,
+        bandwidths_hz=bandwidth,
+        gains=at.gains[0],
+        rate_hz=rate_hz,
+    )
 
 
 def dump_json(values: dict[str, Any]) -> str:
@@ -306,22 +297,51 @@ def _rows(value: Any) -> str:
     return encode(value)
 
 
-def _load_json(path: Path) -> dict[str, Any]:
-    if not path.is_file():
-        raise InputError(f"expected a model file at {path}, got no file there; give its path.")
+def load_json(path: str | Path, file_format: str, *, version: int) -> dict[str, Any]:
+    """The fields of a model file of this format and version.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no JSON, or is of another format or version.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise InputError(f"expected a model file at {source}, got no file there; give its path.")
     try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(source.read_text(encoding="utf-8"))
     except ValueError:
-        raise InputError(f"expected JSON in {path}, got something else; fit it again.") from None
-    if not isinstance(values, dict) or values.pop("format", None) != FORMAT:
+        raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
+    if not isinstance(values, dict) or values.pop("format", None) != file_format:
         raise InputError(
-            f"expected the format {FORMAT} in {path}, got another; give a model made by "
-            "tactileq model."
+            f"expected the format {file_format} in {source}, got another; give a model of "
+            "that kind."
         )
-    version = values.pop("version", None)
-    if version != VERSION:
+    found = values.pop("version", None)
+    if found != version:
         raise InputError(
-            f"expected a model of version {VERSION} in {path}, got version {version!r}; "
+            f"expected a model of version {version} in {source}, got version {found!r}; "
             "update tactileq or fit the model again."
         )
     return values
+
+
+def model_from(kind: type[Model], values: dict[str, Any], *, path: str | Path) -> Model:
+    """The model (a dataclass of this kind) with these fields, read from `path`.
+
+    Raises
+    ------
+    InputError
+        If fields are missing, unknown or wrong.
+    """
+    names = {f.name for f in fields(kind)}
+    if set(values) != names:
+        wrong = ", ".join(sorted(names ^ set(values)))
+        raise InputError(
+            f"expected the fields of a texture model in {path}, got too few or too many "
+            f"({wrong}); fit the model again."
+        )
+    try:
+        return kind(**values)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: {error}") from None

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError, check_texture_name
-from modeling.files import check_replaceable, read_table, replace_folder, write_table
+from modeling.files import (
+    check_replaceable,
+    is_number,
+    number,
+    read_table,
+    replace_folder,
+    whole_number,
+    write_table,
+)
 from modeling.wav import full_scale, read_wav
 
 UNITS = ("g", "arbitrary")
@@ -274,30 +282,54 @@ class RecordingSet:
             write_table(fresh / INDEX_NAME, INDEX_COLUMNS, rows)
 
     @staticmethod
-    def load(folder: str | Path) -> RecordingSet:
+    def load(folder: str | Path, *, texture: str | None = None) -> RecordingSet:
         """Read a folder with `recordings.tsv` (CSV or WAV files), or WAV files with JSON sidecars.
+
+        Parameters
+        ----------
+        folder : str or Path
+        texture : str, optional
+            The only texture whose files are read; all of them without it.
 
         Raises
         ------
         InputError
             With the file's name, for a folder that is not one and for any unusable record.
         """
-        source = Path(folder)
-        if not source.is_dir():
-            raise InputError(
-                f"expected a folder of recordings, got {source}; give a folder that holds "
-                f"{INDEX_NAME}."
-            )
-        if (source / INDEX_NAME).is_file():
-            rows = read_table(source / INDEX_NAME, ("file", "texture", "speed_mm_s", "force_n"))
-            return RecordingSet(_load_row(source, row) for row in rows)
-        sidecars = sorted(p for p in source.glob("*.wav") if p.with_suffix(".json").is_file())
-        if not sidecars:
-            raise InputError(
-                f"expected {INDEX_NAME} (or WAV files with JSON sidecars) in {source}, got "
-                "neither; import the files first (tactileq import wav|csv)."
-            )
-        return RecordingSet(_load_row(source, _sidecar_row(path)) for path in sidecars)
+        rows = _listed(Path(folder))
+        return RecordingSet(
+            _load_row(Path(folder), row) for row in rows if texture in (None, row["texture"])
+        )
+
+
+def is_recording_set(folder: Path) -> bool:
+    """Whether `RecordingSet.load` finds anything in this folder."""
+    return (folder / INDEX_NAME).is_file() or bool(_sidecar_files(folder))
+
+
+def textures_in(folder: str | Path) -> tuple[str, ...]:
+    """Names of the textures that a folder lists (none in an empty list); no samples are read."""
+    return tuple(dict.fromkeys(row["texture"] for row in _listed(Path(folder))))
+
+
+def _listed(folder: Path) -> list[dict[str, str]]:
+    """One row of text per recording of a folder, each with its texture (else the folder's name)."""
+    if not folder.is_dir():
+        raise InputError(
+            f"expected a folder of recordings, got {folder}; give a folder that holds {INDEX_NAME}."
+        )
+    if (folder / INDEX_NAME).is_file():
+        rows = read_table(folder / INDEX_NAME, ("file", "texture", "speed_mm_s", "force_n"))
+    elif not (rows := [_sidecar_row(path) for path in _sidecar_files(folder)]):
+        raise InputError(
+            f"expected {INDEX_NAME} (or WAV files with JSON sidecars) in {folder}, got neither; "
+            "import the files first (tactileq import wav|csv)."
+        )
+    return [{**row, "texture": row.get("texture") or folder.name} for row in rows]
+
+
+def _sidecar_files(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.glob("*.wav") if p.with_suffix(".json").is_file())
 
 
 def _index_cells(recording: Recording) -> tuple[str, ...]:
@@ -354,7 +386,7 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
             rate_hz,
             number(row.get("speed_mm_s", ""), f"speed_mm_s of {path.name}"),
             number(row.get("force_n", ""), f"force_n of {path.name}"),
-            row.get("texture") or folder.name,
+            row["texture"],
             unit=unit,
             simulated=_flag(row.get("simulated") or "false", f"simulated of {path.name}"),
             repeat=whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
@@ -371,37 +403,6 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
             "truncated or was changed, copy or record it again."
         )
     return recording
-
-
-def is_number(text: str) -> bool:
-    """Whether a text reads as a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def number(text: str, name: str) -> float:
-    """A number from a table's cell.
-
-    Raises
-    ------
-    InputError
-        Naming `name`, where the cell is empty or no number.
-    """
-    if not is_number(text):
-        got = repr(text) if text.strip() else "nothing"
-        raise InputError(f"expected a number for {name}, got {got}; fill it in.")
-    return float(text)
-
-
-def whole_number(text: str, name: str) -> int:
-    """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
-    value = number(text, name)
-    if not (value.is_integer() and value >= 1):
-        raise InputError(f"expected a whole number for {name}, at least 1, got {text}; correct it.")
-    return int(value)
 
 
 def _flag(text: str, name: str) -> bool:

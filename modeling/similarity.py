@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from modeling.autoregressive import ARModel
 from modeling.errors import InputError
-from modeling.model import TextureModel
 from modeling.peq import PEQ, Floats
 from modeling.recording import Recording
 from modeling.spectra import Spectrum, smooth, spectrum
@@ -19,6 +20,23 @@ HIGHEST_SHARE = 0.98
 SIGMAS_HZ = (30.0, 5.0)
 BAND_EDGES_HZ = (10, 20, 35, 60, 90, 130, 180, 250, 350, 480, 800, 1300, 2500)
 CEILING_DRAWS = 8
+
+
+@runtime_checkable
+class SpectralFilter(Protocol):
+    """What one condition's filter must tell: a `PEQ`, an `ARFilter`, or another kind."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        """Magnitude in g per unit noise at (n,) frequencies."""
+
+
+class PEQModel(Protocol):
+    """A model that gives a PEQ for any speed and force."""
+
+    def peq(self, speed_mm_s: float, force_n: float) -> PEQ: ...
 
 
 @dataclass(frozen=True)
@@ -92,7 +110,7 @@ def band_energy_error_db(
 
 def report(
     recording: Recording | Spectrum,
-    model: TextureModel | PEQ,
+    model: PEQModel | ARModel | SpectralFilter,
     *,
     rng: np.random.Generator | None = None,
 ) -> SimilarityReport:
@@ -101,18 +119,19 @@ def report(
     Parameters
     ----------
     recording : Recording or Spectrum
-        A Spectrum names no condition, so it goes with a PEQ.
-    model : TextureModel or PEQ
-        A TextureModel is taken at the recording's speed and force.
+        A Spectrum names no condition, so it goes with a filter.
+    model : TextureModel, RegressedModel, ARModel; or PEQ, ARFilter
+        A model is taken at the recording's speed and force. Any object with `rate_hz` and
+        `response(frequency_hz)` will do for a filter.
     rng : Generator, optional
         Draws for the ceiling; by default a generator of fixed seed, so that a table repeats.
     """
-    peq, measured = _at_condition(recording, model)
+    fitted, measured = _at_condition(recording, model)
     rng = np.random.default_rng(0) if rng is None else rng
     frequency = measured.frequency_hz
     band = (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
     step_hz = measured.rate_hz / measured.n_samples
-    response = peq.response(frequency)
+    response = fitted.response(frequency)
     outline = measured.smoothed()
     draws = _draws(outline, rng)
     scores, floors, ceilings = [], [], []
@@ -158,25 +177,31 @@ def _draws(shape: Floats, rng: np.random.Generator) -> list[Floats]:
 
 
 def _at_condition(
-    recording: Recording | Spectrum, model: TextureModel | PEQ
-) -> tuple[PEQ, Spectrum]:
-    if isinstance(model, TextureModel):
-        if isinstance(recording, Spectrum):
-            raise InputError(
-                "expected a recording or a PEQ, got a spectrum (which names no speed and force) "
-                "and a whole model; take model.peq(speed_mm_s, force_n)."
-            )
-        model = model.peq(*recording.condition)
+    recording: Recording | Spectrum, model: PEQModel | ARModel | SpectralFilter
+) -> tuple[SpectralFilter, Spectrum]:
+    fitted = model if isinstance(model, SpectralFilter) else _filter_at(recording, model)
     if isinstance(recording, Spectrum):
         measured = recording
     else:
-        measured = spectrum(recording, rate_hz=model.rate_hz)
-    if measured.rate_hz != model.rate_hz:
+        measured = spectrum(recording, rate_hz=fitted.rate_hz)
+    if measured.rate_hz != fitted.rate_hz:
         raise InputError(
-            f"expected data that reach the model's rate of {model.rate_hz:g} Hz, got "
+            f"expected data that reach the model's rate of {fitted.rate_hz:g} Hz, got "
             f"{measured.rate_hz:g} Hz; fit a model at the data's rate."
         )
-    return model, measured
+    return fitted, measured
+
+
+def _filter_at(recording: Recording | Spectrum, model: PEQModel | ARModel) -> SpectralFilter:
+    """A model's filter at the recording's condition."""
+    if isinstance(recording, Spectrum):
+        raise InputError(
+            "expected a recording or a PEQ, got a spectrum (which names no speed and force) and a "
+            "whole model; take model.peq(speed_mm_s, force_n), or an AR model's filter(…)."
+        )
+    if isinstance(model, ARModel):
+        return model.filter(*recording.condition)
+    return model.peq(*recording.condition)
 
 
 def _pair(a: ArrayLike, b: ArrayLike) -> tuple[Floats, Floats]:

@@ -10,13 +10,20 @@ from scipy.special import ndtr
 
 from modeling.errors import InputError
 from modeling.model import Bools, TextureModel
-from modeling.peq import Floats, band_rms
+from modeling.peq import PEQ, Floats, band_rms
 from modeling.thresholds import Threshold
 
 CriterionName = Literal["energy", "paper-fft", "paper-gain"]
 CRITERIA: tuple[CriterionName, ...] = ("energy", "paper-fft", "paper-gain")
 HIGHEST_FLIP_PROBABILITY = 0.05
 PAPER_RECORD_S = 1.0
+# `level_sd_db` is that of the energy. A gain is told less well, since an error of it is mostly made
+# up for by one of the width. Cramér–Rao bound of a lone layer without floor: exactly twice.
+DEVIATIONS_PER_LEVEL_SD: dict[CriterionName, float] = {
+    "energy": 1.0,
+    "paper-fft": 2.0,
+    "paper-gain": 2.0,
+}
 
 
 @dataclass(frozen=True)
@@ -35,10 +42,10 @@ class LayerVerdict:
     distance_db : float
         Its level there, in dB relative to the threshold; NaN where no threshold is known.
     flip_probability : float
-        Chance that the levels' sampling error, which the records' length leaves, would put the
-        layer on the other side of the all-conditions rule in other records (errors taken as normal
-        and independent between conditions); NaN where no threshold is known. Whether the estimator
-        would find the layer again, and the estimator's bias, are not in it.
+        P(flip): how often the layer would be on the other side of the all-conditions rule if the
+        levels scattered once more by their standard deviations, as in a block bootstrap of the
+        records (normal, independent between conditions); NaN where a threshold is not known. Not
+        in it: whether the estimator would find the layer again, its bias, the other rules.
     """
 
     layer: int
@@ -62,8 +69,10 @@ class Simplification:
     margin_db: float
 
 
-def layer_amplitudes_g(model: TextureModel, *, criterion: CriterionName) -> Floats:
-    """The amplitude of each layer that is compared with a threshold, (S, F, m), in g peak.
+def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -> Floats:
+    """The amplitude of each layer that is compared with a threshold, in g peak.
+
+    (S, F, m) for a model, (m,) for the PEQ of one condition.
 
     `energy`: the sinusoid of equal power, √2·G·√(k/(1+k)). `paper-fft`: the single-sided FFT
     amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself (METHOD 7).
@@ -97,9 +106,10 @@ def simplify(
     """Drop every layer that is below threshold in every condition, stably and in sum.
 
     A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
-    grid, the chance that sampling error turns this verdict is below 5 %, and all dropped layers
-    together (powers weighted by the threshold) stay below threshold too; else the loudest of them
-    are kept. The noise and at least one layer always stay.
+    grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
+    weighted by the threshold, margin included) stay below it too; else the loudest of them are
+    kept. Where no threshold is known the layer is kept. The noise and at least one layer always
+    stay (PAPER V, METHOD 7).
 
     Parameters
     ----------
@@ -115,6 +125,22 @@ def simplify(
     InputError
         For a model in arbitrary units, an unknown criterion or a negative margin.
     """
+    _check_input(model, criterion, margin_db)
+    by_condition = (model.noise_gains.size, model.n_layers)
+    distances = distances_db(model, threshold, criterion=criterion).reshape(by_condition)
+    level_sd_db = DEVIATIONS_PER_LEVEL_SD[criterion] * model.level_sd_db.reshape(by_condition)
+    flips = _flip_probabilities(distances + margin_db, level_sd_db)
+    decided = _decide(distances + margin_db, flips, threshold)
+    _name_unresolved(decided, model.unresolved.reshape(by_condition))
+    verdicts = tuple(
+        _verdict(model, layer, distances[:, layer], decided[layer], float(flips[layer]))
+        for layer in range(model.n_layers)
+    )
+    keep = [layer for layer, (kept, _) in enumerate(decided) if kept]
+    return Simplification(model.with_layers(keep), verdicts, criterion, threshold, margin_db)
+
+
+def _check_input(model: TextureModel, criterion: str, margin_db: float) -> None:
     if model.unit != "g":
         raise InputError(
             f"{model.texture}: expected a model in g, got the unit {model.unit!r}; thresholds are "
@@ -126,27 +152,18 @@ def simplify(
         )
     if not (np.isfinite(margin_db) and margin_db >= 0):
         raise InputError(f"expected a margin of at least 0 dB, got {margin_db}; correct it.")
-    distances = distances_db(model, threshold, criterion=criterion) + margin_db
-    by_condition = (model.noise_gains.size, model.n_layers)
-    distances = distances.reshape(by_condition)
-    flips = _flip_probabilities(distances, model.level_sd_db.reshape(by_condition))
-    reasons = _reasons(distances, flips)
-    _name_unresolved(reasons, model.unresolved.reshape(by_condition))
-    keep = [layer for layer, (kept, _) in enumerate(reasons) if kept]
-    verdicts = tuple(
-        _verdict(model, layer, distances[:, layer] - margin_db, reasons[layer], float(flips[layer]))
-        for layer in range(model.n_layers)
-    )
-    return Simplification(model.with_layers(keep), verdicts, criterion, threshold, margin_db)
 
 
-def _reasons(distances: Floats, flips: Floats) -> list[tuple[bool, str]]:
+def _decide(distances: Floats, flips: Floats, threshold: Threshold) -> list[tuple[bool, str]]:
     """(kept?, reason) per layer, from (conditions, m) distances that include the margin."""
+    known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
     decided: list[tuple[bool, str]] = []
     for level, flip in zip(distances.T, flips, strict=True):
         if np.isnan(level).any():
             outside = int(np.isnan(level).sum())
-            decided.append((True, f"no threshold known in {outside} of {level.size} conditions"))
+            where = f"{outside} of {level.size} conditions"
+            reason = f"no threshold known in {where} ({threshold.name} covers {known})"
+            decided.append((True, reason))
         elif (level >= 0).any():
             above = int((level >= 0).sum())
             decided.append((True, f"above threshold in {above} of {level.size} conditions"))
@@ -182,8 +199,13 @@ def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:
 
 
 def _flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
-    """P(sampling error of the levels turns the all-conditions verdict), (m,); NaN if unknown."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    """P(flip) per layer, (m,), from (conditions, m) distances and deviations; NaN if unknown.
+
+    The levels' deviations enter once, as in a bootstrap of the records. That two recordings differ
+    by √2 of it is made up for by selection: of several levels the one nearest to the threshold is
+    there in part by its own error. Planted repeats turn about as often as said here.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         z = np.where(level_sd_db > 0, -distances / level_sd_db, np.copysign(np.inf, -distances))
     below = np.prod(ndtr(z), axis=0)
     dropped = (distances < 0).all(axis=0)

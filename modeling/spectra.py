@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +32,15 @@ class Spectrum:
     rate_hz : float
     n_samples : int
         N, the number of samples behind it.
+    averaged : float
+        How many records of that length it is the mean of, ≥ 1.
     """
 
     frequency_hz: Floats
     magnitude: Floats
     rate_hz: float
     n_samples: int
+    averaged: float = 1.0
 
     @property
     def duration_s(self) -> float:
@@ -149,7 +152,8 @@ def mean_spectrum(spectra: list[Spectrum]) -> Spectrum:
     magnitudes = [np.interp(longest.frequency_hz, s.frequency_hz, s.magnitude) for s in spectra]
     lengths = [s.n_samples for s in spectra]
     average = np.asarray(np.average(magnitudes, axis=0, weights=lengths), dtype=np.float64)
-    return Spectrum(longest.frequency_hz, average, longest.rate_hz, longest.n_samples)
+    records = sum(lengths) ** 2 / sum(length**2 for length in lengths)
+    return Spectrum(longest.frequency_hz, average, longest.rate_hz, longest.n_samples, records)
 
 
 def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
@@ -158,6 +162,4 @@ def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
     # Rayleigh-distributed bins: E|X|² = (4/π)(E|X|)², alike in both, so means subtract in power.
     smoothed = np.maximum(spectrum.smoothed(), 1e-300)
     kept = np.sqrt(np.maximum(1 - (level / smoothed) ** 2, 0.0))
-    return Spectrum(
-        spectrum.frequency_hz, spectrum.magnitude * kept, spectrum.rate_hz, spectrum.n_samples
-    )
+    return replace(spectrum, magnitude=spectrum.magnitude * kept)

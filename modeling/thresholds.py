@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.errors import InputError
-from modeling.files import read_table
+from modeling.files import number, read_table
 from modeling.peq import Floats
-from modeling.recording import number
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold")
+LEVEL_COLUMNS = ("acceleration_g", "displacement_um")
 
 
 def displacement_to_acceleration_g(frequency_hz: ArrayLike, displacement_um: ArrayLike) -> Floats:
@@ -32,12 +32,17 @@ class Threshold:
     Parameters
     ----------
     name : str
-    frequency_hz : (n,) ndarray
+    frequency_hz : (n,) array_like
         Rising, > 0, n ≥ 2.
-    acceleration_g : (n,) ndarray
+    acceleration_g : (n,) array_like
         Peak acceleration at threshold, > 0.
     source, caveat : str
         Where the numbers come from and what speaks against them.
+
+    Raises
+    ------
+    InputError
+        Naming the first value that cannot be part of a threshold.
     """
 
     name: str
@@ -47,15 +52,21 @@ class Threshold:
     caveat: str
 
     def __post_init__(self) -> None:
-        frequency, level = self.frequency_hz, self.acceleration_g
-        good = frequency.size >= 2 and frequency.shape == level.shape
-        good = good and bool((np.diff(frequency) > 0).all() and (frequency > 0).all())
-        good = good and bool(np.isfinite(frequency).all())
-        if not (good and np.isfinite(level).all() and (level > 0).all()):
+        for name in ("frequency_hz", "acceleration_g"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        wrong = _what_is_wrong(self.frequency_hz, self.acceleration_g)
+        if wrong:
             raise InputError(
-                f"expected at least two rising frequencies with levels above 0 in the threshold "
-                f"{self.name!r}, got frequencies {frequency.tolist()}; correct the table."
+                "expected at least two rising frequencies with levels above 0 in the threshold "
+                f"{self.name!r}, got {wrong}; correct the table."
             )
+
+    @property
+    def valid_range_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the table; outside nothing is known."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
 
     def at(self, frequency_hz: ArrayLike) -> Floats:
         """Threshold in g (peak) at any frequencies, log–log interpolated; NaN outside the range."""
@@ -76,18 +87,18 @@ class Threshold:
         Raises
         ------
         InputError
-            For a missing file, missing columns or values that are no thresholds.
+            For a missing file, missing or doubled columns or values that are no thresholds.
         """
         source = Path(path)
         rows = read_table(source, ("frequency_hz",))
-        column = next(
-            (c for c in ("acceleration_g", "displacement_um") if c in (rows or [{}])[0]), ""
-        )
-        if not column:
+        columns = [name for name in LEVEL_COLUMNS if name in (rows or [{}])[0]]
+        if len(columns) != 1:
+            got = "both" if columns else ("neither" if rows else "no rows")
             raise InputError(
-                f"expected a column acceleration_g or displacement_um with values in {source}, got "
-                "neither; a threshold needs levels."
+                f"expected one column, {' or '.join(LEVEL_COLUMNS)}, with values in {source}, got "
+                f"{got}; a threshold needs one level (peak) for each frequency."
             )
+        column = columns[0]
         cells = [
             [number(row[name], f"{name} in {source.name}") for row in rows]
             for name in ("frequency_hz", column)
@@ -114,6 +125,25 @@ class Threshold:
             )
         with resources.as_file(resources.files("modeling") / "thresholds" / f"{name}.tsv") as path:
             return Threshold.load(path)
+
+
+def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
+    """The first reason why these numbers are no threshold; empty where they are one."""
+    if frequency_hz.ndim != 1 or frequency_hz.shape != acceleration_g.shape:
+        return f"arrays of shapes {frequency_hz.shape} and {acceleration_g.shape}"
+    if frequency_hz.size < 2:
+        return f"{frequency_hz.size} of them"
+    wrong = ~(np.isfinite(frequency_hz) & (frequency_hz > 0))
+    if wrong.any():
+        return f"a frequency of {frequency_hz[wrong][0]:g} Hz"
+    falls = np.diff(frequency_hz) <= 0
+    if falls.any():
+        at = int(np.argmax(falls))
+        return f"{frequency_hz[at + 1]:g} Hz after {frequency_hz[at]:g} Hz"
+    wrong = ~(np.isfinite(acceleration_g) & (acceleration_g > 0))
+    if wrong.any():
+        return f"the level {acceleration_g[wrong][0]:g} at {frequency_hz[wrong][0]:g} Hz"
+    return ""
 
 
 def _notes(path: Path) -> dict[str, str]:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from modeling.grid import Condition
 from modeling.peq import Floats
-
-Condition = tuple[float, float]
 
 
 def visiting_order(conditions: Sequence[Condition]) -> list[Condition]:

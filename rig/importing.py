@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modeling import InputError, Recording, RecordingSet
-from modeling.files import read_table
-from modeling.recording import clipped_samples, is_number, number, whole_number
+from modeling.files import is_number, number, read_table, whole_number
+from modeling.recording import clipped_samples
 from modeling.spectra import dft321
 from modeling.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.wav import full_scale, read_wav

@@ -1,9 +1,14 @@
-"""Shared by all tests: one option that forbids skipping."""
+"""Shared by all tests: an option that forbids skipping, and files of a toolkit's layout."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
 import pytest
 from hypothesis import settings
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
 
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
 settings.register_profile("house", deadline=None)
@@ -28,3 +33,73 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")
     if session.config.getoption("--no-skips") and reporter.stats.get("skipped"):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+@pytest.fixture
+def hatt_xml() -> Callable[..., str]:
+    """Text of a file in the layout of the Penn Haptic Texture Toolkit, of planted filters."""
+    return _hatt_xml
+
+
+def _hatt_xml(
+    *,
+    material: str = "Planted 1",
+    rate_hz: float = 1000.0,
+    conditions: Sequence[tuple[float, float]] = ((0, 0), (300, 0), (0, 4), (300, 4), (160, 1.5)),
+    moving_average: bool = True,
+) -> str:
+    """A resonance at v/2 mm and another near 0.3 of the rate; silent at rest and at no force.
+
+    Line spectral frequencies are found by numpy's roots, to six decimals as in the toolkit.
+    """
+    triangles = Delaunay(np.array(conditions, dtype=float)).simplices + 1
+    models = [
+        _hatt_model(number, *condition, rate_hz=rate_hz, moving_average=moving_average)
+        for number, condition in enumerate(conditions, start=1)
+    ]
+    speeds, forces = zip(*conditions, strict=True)
+    fields = [
+        f"<material>{material}</material>",
+        "<AccelUnits>m/s^2</AccelUnits><SpeedUnits>mm/s</SpeedUnits><ForceUnits>N</ForceUnits>",
+        f"<SampleRate>{rate_hz:g}</SampleRate><mu>0.3</mu>",
+        f"<numMod>{len(conditions)}</numMod><numTri>{len(triangles)}</numTri>",
+        f"<maxSpeed>{max(speeds):f}</maxSpeed><maxForce>{max(forces):f}</maxForce>",
+        f'<speedList type="array">{_values("%f", speeds)}</speedList>',
+        f'<forceList type="array">{_values("%f", forces)}</forceList>',
+        *(f'<tri type="array">{_values("%d", corners)}</tri>' for corners in triangles),
+        f"<numARCoeff>4</numARCoeff><numMACoeff>{2 * moving_average}</numMACoeff>",
+        *models,
+    ]
+    lines = "\n".join(fields)
+    return f'<?xml version="1.0" encoding="utf-8"?>\n<modelSet texture="1">\n{lines}\n</modelSet>\n'
+
+
+def _hatt_model(
+    number: int, speed_mm_s: float, force_n: float, *, rate_hz: float, moving_average: bool
+) -> str:
+    peaks = np.array([(40 + speed_mm_s / 2) / rate_hz, 0.3 + 0.01 * force_n])
+    poles = np.array([0.93, 0.8]) * np.exp(2j * np.pi * peaks)
+    autoregressive = np.poly([*poles, *poles.conj()]).real
+    parts = _hatt_part("AR", autoregressive)
+    if moving_average:
+        parts += _hatt_part("MA", np.array([1.0, 0.2, -0.3])) + "<gain>3.000000</gain>"
+    variance = 0.01 * speed_mm_s * force_n
+    return (
+        f"<model><modNum>{number}</modNum>{parts}<var>{variance:f}</var>"
+        f"<speedMod>{speed_mm_s:f}</speedMod><forceMod>{force_n:f}</forceMod></model>"
+    )
+
+
+def _hatt_part(name: str, polynomial: NDArray[np.float64]) -> str:
+    padded = np.append(polynomial, 0.0)
+    sum_and_difference = (padded + padded[::-1], padded - padded[::-1])
+    angles = np.angle(np.concatenate([np.roots(part) for part in sum_and_difference]))
+    frequencies = np.sort(angles[(angles > 1e-6) & (angles < np.pi - 1e-6)])
+    return (
+        f"<{name}coeff>{_values('%.20f', polynomial)}</{name}coeff>"
+        f"<{name}lsf>{_values('%f', frequencies)}</{name}lsf>"
+    )
+
+
+def _values(layout: str, numbers: Iterable[float]) -> str:
+    return "".join(f"<value>{layout % number}</value>" for number in numbers)

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis")
-FRONT = ("tactileq", "steps")
+FRONT = ("tactileq", "steps", "modeling_steps")
 
 
 def imported(path: Path) -> set[str]:
@@ -56,7 +56,7 @@ def test_every_command_has_an_example() -> None:
     import tactileq
 
     commands = tactileq.app.registered_commands + tactileq.imports.registered_commands
-    assert len(commands) == 10
+    assert len(commands) == 11
     for command in commands:
         assert command.callback is not None
         assert "Example: tactileq " in (command.callback.__doc__ or ""), command.callback

@@ -13,8 +13,10 @@ from matplotlib.text import Text
 
 from analysis import figures
 from analysis.comparison import compare_spectra, layer_course, spectrum_panels
+from analysis.recordings import layers_of_recordings
 from analysis.statistics import confusion_matrices, rate_tests, rating_tests
 from modeling import InputError, RecordingSet
+from modeling.fitting import recording_spectra
 
 pytestmark = pytest.mark.filterwarnings("error")
 OKABE_ITO = {
@@ -134,7 +136,7 @@ def test_layers_over_speed_beside_the_planted_ones(results):
         assert "SIMULATED" in texts(ax)
         assert len(ax.lines) == result.model.n_layers + result.truth.n_layers
     assert "planted" in texts(figure)
-    assert "paper-consistent, layer 1" in texts(figure)
+    assert f"{result.model.estimator}, layer 1" in texts(figure)
     first = frequency.lines[0]
     assert first.get_ydata().tolist() == result.model.frequencies_hz[:, 1, 0].tolist()
 
@@ -142,7 +144,8 @@ def test_layers_over_speed_beside_the_planted_ones(results):
 @pytest.mark.parametrize("count", [1, 3])
 def test_small_multiples_of_spectra_need_no_grid(results, count):
     recordings = RecordingSet(results[0].recordings.recordings[:count])
-    panels = spectrum_panels(recordings)
+    found = layers_of_recordings(recording_spectra(recordings), estimator="paper")
+    panels = spectrum_panels(found, estimator="paper")
     figure = figures.figure_spectra(panels)
     axes = drawn(figure)
     assert len(axes) == count

@@ -101,14 +101,14 @@ def test_the_report_needs_nothing_but_itself(folder, shown):
 
 def test_links_lead_somewhere(shown):
     anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
-    assert len(anchors) == 6
+    assert len(anchors) == 7
     assert set(anchors) <= set(shown.identifiers)
     assert len(shown.identifiers) == len(set(shown.identifiers))
 
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     pictures = {path.stem: path.read_bytes() for path in (folder / "figures").iterdir()}
-    assert len(pictures) == 2 * 2 + 3
+    assert len(pictures) == 2 * 2 + 1 + 3
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
         for reference in shown.references
@@ -123,6 +123,8 @@ def test_every_table_is_in_the_report_and_beside_it(folder, shown):
     names = {path.stem for path in (folder / "tables").iterdir()}
     assert {"gfc", "rating_tests", "correct_rates", "rate_tests", "planted_truth"} <= names
     assert {"planted_layers", "confusion_full", "confusion_simplified", "provenance"} <= names
+    assert {"regressions", "regression_support", "regression_coefficients"} <= names
+    assert {"centroid", "centroid_amplitude", "driving"} <= names
     assert sum(name.startswith("verdicts_") for name in names) == 2
     assert shown.tags.count("table") == len(names)
     for name in names:

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis.comparison import compare_spectra
-from analysis.recordings import layers_table, spectra_table
+from analysis.recordings import layers_of_recordings, layers_table, spectra_table
 from analysis.tables import TextureResult, gfc_table, simplification_table
 from modeling import (
     InputError,
@@ -21,6 +21,7 @@ from modeling import (
     simplify,
     spectrum,
 )
+from modeling.fitting import recording_spectra
 from stimuli.planted import planted_texture, record_texture
 
 
@@ -165,12 +166,21 @@ def test_tables_of_recordings_leave_out_the_floor_and_what_it_adds(results, tabl
     clean = results[0].recordings
     other = results[1].recordings.recordings
     _, still = with_sensor_noise(clean, 0.02, rng=np.random.default_rng(3))
-    table = table_of(RecordingSet([*clean.recordings, still, *other]))
+
+    def table_from(recordings):
+        measured = []
+        for texture in dict.fromkeys(recording.texture for recording in recordings):
+            measured += recording_spectra(RecordingSet(recordings).of_texture(texture))
+        return table_of(layers_of_recordings(measured, estimator="paper-consistent"))
+
+    table = table_from([*clean.recordings, still, *other])
     assert set(table["force_n"]) == {1.0, 3.0}
     assert table["simulated"].all()
     value = "noise_gain" if table_of is layers_table else "magnitude"
-    before, after = (t.groupby("texture")[value].mean() for t in (table_of(clean), table))
+    before, after = (
+        t.groupby("texture")[value].mean() for t in (table_from(clean.recordings), table)
+    )
     assert after["leather"] < before["leather"]
     # The other texture has no floor of its own.
-    alone = table_of(RecordingSet(other)).groupby("texture")[value].mean()
+    alone = table_from(other).groupby("texture")[value].mean()
     assert after[results[1].texture] == alone[results[1].texture]

@@ -48,10 +48,19 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     assert all(table.simulated.all() for table in answers.values())
     assert json.loads((demo / "provenance.json").read_text())["seed"] == 1
 
-    for name in ("gfc", "rating_tests", "rate_tests", "correct_rates", "planted_truth"):
+    names = ["gfc", "rating_tests", "rate_tests", "correct_rates", "planted_truth"]
+    names += ["regressions", "regression_support", "regression_coefficients", "centroid", "driving"]
+    for name in names:
         table = pd.read_csv(demo / "tables" / f"{name}.tsv", sep="\t")
         assert len(table) > 0
         assert table.simulated.all()
+    regressions = pd.read_csv(demo / "tables/regressions.tsv", sep="\t")
+    layers = sum(m.n_layers for m in full.values())
+    assert len(regressions) == len(TEXTURES) + 3 * layers
+    driving = pd.read_csv(demo / "tables/driving.tsv", sep="\t")
+    numbers = driving[driving.texture == "all textures"].set_index("driven_by").numbers
+    assert numbers["grid"] > 10 * numbers["conditions"] > 10 * numbers["centroid"]
+    assert (demo / "figures/centroid.png").read_bytes().startswith(b"\x89PNG")
 
 
 def answers_of(data: Path, task: str) -> pd.DataFrame:

@@ -89,7 +89,7 @@ def test_paper_counts_the_floor_into_the_height() -> None:
 @pytest.mark.parametrize("s_hz", [8.0, 20.0, 40.0, 80.0])
 def test_consistent_takes_floor_and_smoothing_out_of_the_width(s_hz: float) -> None:
     """B = 1.36·s with s² = s_fit² − 30²; the floor does not widen it."""
-    layers = find_layers(spectrum_of(0.1 + bump(600, s_hz, 0.5)))
+    layers = find_layers(spectrum_of(0.1 + bump(600, s_hz, 0.5)), estimator="paper-consistent")
     assert layers.noise_gain == pytest.approx(0.1)
     assert layers.bandwidths_hz == pytest.approx([1.36 * s_hz], rel=5e-3)
     assert not layers.unresolved.any()
@@ -97,7 +97,7 @@ def test_consistent_takes_floor_and_smoothing_out_of_the_width(s_hz: float) -> N
 
 @pytest.mark.parametrize(("s_hz", "unresolved"), [(2.0, True), (4.8, True), (5.3, False)])
 def test_widths_below_5_hz_are_marked_unresolved(s_hz: float, unresolved: bool) -> None:
-    layers = find_layers(spectrum_of(0.01 + bump(600, s_hz, 5.0)))
+    layers = find_layers(spectrum_of(0.01 + bump(600, s_hz, 5.0)), estimator="paper-consistent")
     assert layers.unresolved.tolist() == [unresolved]
     if unresolved:
         assert layers.bandwidths_hz == pytest.approx([1.36 * 5])

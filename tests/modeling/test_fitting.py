@@ -18,7 +18,8 @@ from modeling import (
     fit_texture,
     missing_conditions,
 )
-from modeling.fitting import _fill, condition_spectra
+from modeling.fitting import condition_spectra
+from modeling.grid import fill_grid
 from modeling.recording import RecordingSet
 
 ModelMaker = Callable[..., TextureModel]
@@ -211,7 +212,8 @@ def test_linear_truth_is_filled_exactly(hole: tuple[int, int]) -> None:
     values = np.stack([3 + 0.2 * grid[:, 0] - 4 * grid[:, 1], -grid[:, 1]], axis=1)
     missing = np.zeros(20, dtype=bool)
     missing[hole[0] * 4 + hole[1]] = True
-    filled = _fill(grid[~missing], values[~missing], grid[missing], "planted")[0]
+    rows = {tuple(c): v for c, v, hole_ in zip(grid, values, missing, strict=True) if not hole_}
+    filled = fill_grid(rows, "planted")[0].reshape(20, -1)[missing][0]
     corner = hole[0] in (0, 4) and hole[1] in (0, 3)
     if not corner:
         assert filled == pytest.approx(values[missing][0], rel=1e-9)
@@ -227,8 +229,9 @@ def test_filling_stays_within_the_legal_range(limit: float) -> None:
     rng = np.random.default_rng(0)
     for _ in range(20):
         holes = rng.random(49) < 0.3
-        known = np.full(((~holes).sum(), 1), limit)
-        assert (_fill(grid[~holes], known, grid[holes], "planted") == limit).all()
+        filled, interpolated = fill_grid({tuple(c): [limit] for c in grid[~holes]}, "planted")
+        assert (filled == limit).all()
+        assert interpolated.sum() == holes.sum()
 
 
 def test_recordings_on_a_line_are_refused(make_model: ModelMaker) -> None:

@@ -13,6 +13,7 @@ from hypothesis.extra import numpy as hnp
 from scipy.signal import butter, sosfilt
 
 from modeling import InputError, Recording, RecordingSet
+from modeling.recording import is_recording_set, textures_in
 
 RecordingMaker = Callable[..., Recording]
 NOISE = np.random.default_rng(1).standard_normal(100)
@@ -435,3 +436,18 @@ def test_foreign_folders_are_not_replaced(tmp_path: Path, make_recording: Record
     with pytest.raises(InputError, match="expected a folder"):
         RecordingSet([make_recording()]).save(tmp_path / "notes.txt")
     assert snapshot(tmp_path) == {"notes.txt": b"mine"}
+
+
+def test_one_texture_of_a_folder_is_read_and_the_others_are_left_alone(tmp_path: Path) -> None:
+    noise = np.random.default_rng(8).normal(0, 0.1, 200)
+    oak, elm = (Recording(noise, 5000.0, 100.0, 1.0, name) for name in ("oak", "elm"))
+    RecordingSet([oak, elm]).save(tmp_path / "set")
+    assert textures_in(tmp_path / "set") == ("oak", "elm")
+    assert is_recording_set(tmp_path / "set")
+    assert not is_recording_set(tmp_path)
+    (tmp_path / "set/0001.csv").write_text("")
+    assert RecordingSet.load(tmp_path / "set", texture="elm").recordings == (elm,)
+    with pytest.raises(InputError, match="got an empty file"):
+        RecordingSet.load(tmp_path / "set", texture="oak")
+    with pytest.raises(InputError, match="expected at least one recording"):
+        RecordingSet.load(tmp_path / "set", texture="ash")

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
-from modeling import PEQ, InputError, Renderer, TextureModel
+from modeling import PEQ, ARModel, InputError, Renderer, TextureModel
+from modeling.line_spectral import line_spectral_frequencies
 
 ModelMaker = Callable[..., TextureModel]
 LAYERS = [(80.0, 25.0, 0.5), (300.0, 40.0, -0.3), (900.0, 120.0, 0.4)]
@@ -273,3 +276,143 @@ def test_mismatched_trajectories_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="two arrays of one length"):
         Renderer(moving_model()).render(speed, force, samples=samples)
+
+
+# --- autoregressive models
+
+
+def ar_model(order: int = 6) -> ARModel:
+    """Frequencies that move with speed, gains that grow with force."""
+    even = np.pi * np.arange(1, order + 1) / (order + 1)
+    towards = np.linspace(0.2, 0.6, 3)[:, None, None] * np.ones((3, 2, 1))
+    # Warped towards 0: a resonance at low frequencies, stronger for faster strokes.
+    return ARModel(
+        texture="all-pole",
+        rate_hz=5000.0,
+        speeds_mm_s=[50.0, 150.0, 350.0],
+        forces_n=[0.5, 2.0],
+        line_spectral_frequencies=(1 - towards) * even + towards * even**2 / np.pi,
+        gains=0.1 * np.array([[1.0, 2.0]] * 3),
+        level_sd_db=np.zeros((3, 2)),
+    )
+
+
+def jumping_ar_model() -> ARModel:
+    """A resonance of 10 Hz width at 20 Hz or at 2300 Hz, by speed."""
+    poles = [np.exp(np.pi / 5000 * (-10 + 2j * f)) for f in (20.0, 2300.0)]
+    frequencies = [line_spectral_frequencies(np.poly([z, z.conj()]).real[1:]) for z in poles]
+    return ARModel(
+        texture="jumping",
+        rate_hz=5000.0,
+        speeds_mm_s=[100.0, 300.0],
+        forces_n=[1.0, 3.0],
+        line_spectral_frequencies=np.stack([frequencies] * 2, axis=1),
+        gains=np.ones((2, 2)),
+        level_sd_db=np.zeros((2, 2)),
+    )
+
+
+@pytest.mark.parametrize("size", [1, 7, 256])
+@pytest.mark.parametrize("order", [1, 6, 21])
+def test_ar_blocks_of_any_size_are_bit_identical(order: int, size: int) -> None:
+    speed, force = trajectory(1500)
+    whole = Renderer(ar_model(order), seed=5).render(speed, force)
+    assert np.array_equal(whole, in_blocks(Renderer(ar_model(order), seed=5), speed, force, size))
+    assert np.ptp(whole) > 0
+
+
+@pytest.mark.parametrize("order", [1, 2, 7, 20])
+def test_ar_rendering_is_the_recursion_of_its_filter(order: int) -> None:
+    """scipy's direct form on the same noise, constant parameters."""
+    from modeling.noise import stream_key, white_noise
+
+    fitted = ar_model(order).filter(150.0, 2.0)
+    noise = white_noise(stream_key(8, 3), 0, 2000)
+    expected = lfilter([fitted.gain], [1.0, *fitted.coefficients], noise)
+    rendered = Renderer(ar_model(order), seed=8, stream=3).render(150.0, 2.0, samples=2000)
+    assert rendered == pytest.approx(expected, abs=1e-11)
+
+
+def test_models_of_both_kinds_are_driven_by_the_same_noise() -> None:
+    from modeling.noise import stream_key, white_noise
+
+    flat = np.pi * np.arange(1, 4) / 4  # a₁ = a₂ = a₃ = 0
+    model = replace(
+        ar_model(3),
+        line_spectral_frequencies=np.broadcast_to(flat, (3, 2, 3)),
+        gains=np.ones((3, 2)),
+    )
+    assert Renderer(model, seed=4).render(200.0, 2.0, samples=100) == pytest.approx(
+        white_noise(stream_key(4), 0, 100), abs=1e-12
+    )
+
+
+def test_ar_level_is_right_while_poles_jump() -> None:
+    """20 ↔ 2300 Hz each millisecond: a direct form explodes, the lattice keeps its level."""
+    model, count = jumping_ar_model(), 100_000
+    speed = np.where(np.arange(count) // 5 % 2, 300.0, 100.0)
+    signal = Renderer(model, seed=1).render(speed, np.full(count, 2.0))
+    filters = [model.filter(v, 2.0) for v in (100.0, 300.0)]
+    impulse = np.zeros(20_000)
+    impulse[0] = 1
+    variances = [np.sum(lfilter([1.0], [1.0, *f.coefficients], impulse) ** 2) for f in filters]
+    for which, variance in enumerate(variances):
+        part = signal[np.arange(count) // 5 % 2 == which]
+        assert 10 * np.log10(np.mean(part**2) / variance) == pytest.approx(0, abs=0.5)
+    # What is avoided: the same filters switched in a direct form on its past outputs.
+    noise = np.random.default_rng(0).uniform(-1.7, 1.7, 200)
+    past = [0.0, 0.0]
+    for n, w in enumerate(noise):
+        a1, a2 = filters[n // 5 % 2].coefficients
+        past = [w - a1 * past[0] - a2 * past[1], past[0]]
+    assert abs(past[0]) > 1e20
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_ar_lift_off_is_counted_and_harmless(bad: float) -> None:
+    speed, force = np.full(2000, 150.0), np.full(2000, 2.0)
+    clean = Renderer(ar_model(), seed=6).render(speed, force)
+    speed[500:520], force[515:530] = bad, bad
+    renderer = Renderer(ar_model(), seed=6)
+    signal = renderer.render(speed, force)
+    assert renderer.counters.lift_offs == 30
+    assert np.array_equal(signal[:500], clean[:500])
+    assert not signal[500:530].any()
+    assert signal[-200:] == pytest.approx(clean[-200:], abs=1e-6)
+
+
+@pytest.mark.parametrize(("speed", "force"), [(0.0, 2.0), (200.0, 0.0), (200.0, -1.0)])
+def test_ar_silence_at_rest_and_off_the_surface(speed: float, force: float) -> None:
+    assert not Renderer(ar_model()).render(speed, force, samples=200).any()
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 10_000))
+def test_ar_output_stays_bounded_under_any_motion(seed: int) -> None:
+    """The states hold no more energy than the noise brought: |y| ≤ RMS · √Σw²."""
+    speed, force = trajectory(400, seed)
+    signal = Renderer(jumping_ar_model(), seed=seed).render(speed, force)
+    rms = Renderer(jumping_ar_model())._filter.settings(speed, force)
+    bound = max(level for level, _ in rms) * np.sqrt(3 * 400)
+    assert np.isfinite(signal).all()
+    assert np.abs(signal).max() <= bound
+
+
+@pytest.mark.parametrize("rate_hz", [48000.0, 4000.0, np.nan])
+def test_ar_models_are_rendered_at_their_own_rate(rate_hz: float) -> None:
+    with pytest.raises(InputError, match="own rate of 5000 Hz.*render at that rate and resample"):
+        Renderer(ar_model(), rate_hz=rate_hz)
+
+
+def test_any_layered_model_is_rendered() -> None:
+    """Only rate_hz, n_layers and parameters() are asked for."""
+
+    class Borrowed:
+        rate_hz, n_layers = 5000.0, 3
+        parameters = staticmethod(moving_model().parameters)
+
+    speed, force = trajectory(300)
+    assert np.array_equal(
+        Renderer(Borrowed(), seed=2).render(speed, force),
+        Renderer(moving_model(), seed=2).render(speed, force),
+    )

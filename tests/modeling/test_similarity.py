@@ -10,7 +10,16 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from modeling import PEQ, InputError, Recording, TextureModel, similarity, spectrum
+from modeling import (
+    PEQ,
+    ARFilter,
+    ARModel,
+    InputError,
+    Recording,
+    TextureModel,
+    similarity,
+    spectrum,
+)
 from modeling.spectra import Spectrum
 
 ModelMaker = Callable[..., TextureModel]
@@ -20,8 +29,8 @@ LAYERS = [(150.0, 30.0, 0.5), (600.0, 60.0, -0.5), (1300.0, 100.0, 0.5)]
 magnitudes = hnp.arrays(float, 20, elements=st.floats(0, 1e6, allow_subnormal=False))
 
 
-def scattered(peq: PEQ, rng: np.random.Generator) -> Spectrum:
-    """A fresh draw of the PEQ's output: Rayleigh-distributed bins around its response."""
+def scattered(peq: similarity.SpectralFilter, rng: np.random.Generator) -> Spectrum:
+    """A fresh draw of a filter's output: Rayleigh-distributed bins around its response."""
     draw = peq.response(FREQUENCY_HZ) * rng.rayleigh(np.sqrt(2 / np.pi), FREQUENCY_HZ.size)
     return Spectrum(FREQUENCY_HZ, draw, 5000.0, 5000)
 
@@ -206,3 +215,52 @@ def test_rates_that_do_not_match_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="model's rate of 5000 Hz, got 1000 Hz"):
         similarity.report(make_recording(rate_hz=1000.0), make_model(0.05, LAYERS))
+
+
+def test_ar_filter_is_held_to_the_same_measures(make_recording: RecordingMaker) -> None:
+    truth = ARFilter(coefficients=[-1.2, 0.72], gain=0.1, rate_hz=5000.0)
+    rng = np.random.default_rng(7)
+    reports = [similarity.report(scattered(truth, rng), truth, rng=rng) for _ in range(8)]
+    assert np.mean([r.gfc30 for r in reports]) > 0.99
+    assert abs(np.mean([r.oracle_gap for r in reports])) < 0.004
+    assert np.mean([r.rms_error_db for r in reports]) == pytest.approx(0, abs=0.15)
+    half = ARFilter(coefficients=truth.coefficients, gain=0.05, rate_hz=5000.0)
+    measured = scattered(truth, rng)
+    shift = similarity.report(measured, half).rms_error_db
+    shift -= similarity.report(measured, truth).rms_error_db
+    assert shift == pytest.approx(-20 * np.log10(2))
+
+
+def test_ar_model_is_taken_at_the_recordings_condition(make_recording: RecordingMaker) -> None:
+    frequencies = np.array([[[0.5, 1.5]] * 2, [[1.0, 2.5]] * 2])
+    model = ARModel(
+        texture="planted",
+        rate_hz=5000.0,
+        speeds_mm_s=[100.0, 300.0],
+        forces_n=[1.0, 3.0],
+        line_spectral_frequencies=frequencies,
+        gains=[[0.1, 0.2], [0.3, 0.4]],
+        level_sd_db=np.zeros((2, 2)),
+    )
+    recording = make_recording(
+        np.random.default_rng(0).standard_normal(5000), speed_mm_s=250.0, force_n=1.2
+    )
+    there = similarity.report(recording, model)
+    assert there.rms_error_db == pytest.approx(
+        similarity.report(spectrum(recording), model.filter(250.0, 1.2)).rms_error_db
+    )
+    with pytest.raises(InputError, match="whole model"):
+        similarity.report(spectrum(recording), model)
+
+
+def test_anything_with_a_rate_and_a_response_is_reported_on(make_model: ModelMaker) -> None:
+    peq = make_model(0.05, LAYERS).peq(200.0, 2.0)
+
+    class Table:
+        rate_hz = 5000.0
+
+        def response(self, frequency_hz: np.ndarray) -> np.ndarray:
+            return np.interp(frequency_hz, FREQUENCY_HZ, peq.response(FREQUENCY_HZ))
+
+    measured = scattered(peq, np.random.default_rng(8))
+    assert similarity.report(measured, Table()).gfc30 == similarity.report(measured, peq).gfc30

@@ -87,22 +87,34 @@ def test_outside_the_range_nothing_is_known() -> None:
 
 
 @pytest.mark.parametrize(
-    "points",
+    ("points", "got"),
     [
-        [(10.0, 1.0)],
-        [(20.0, 1.0), (10.0, 1.0)],
-        [(10.0, 1.0), (10.0, 2.0)],
-        [(0.0, 1.0), (10.0, 1.0)],
-        [(10.0, 0.0), (20.0, 1.0)],
-        [(10.0, -1.0), (20.0, 1.0)],
-        [(10.0, np.nan), (20.0, 1.0)],
-        [(np.nan, 1.0), (20.0, 1.0)],
-        [(10.0, 1.0), (np.inf, 1.0)],
+        ([(10.0, 1.0)], "got 1 of them"),
+        ([(20.0, 1.0), (10.0, 1.0)], "got 10 Hz after 20 Hz"),
+        ([(10.0, 1.0), (10.0, 2.0)], "got 10 Hz after 10 Hz"),
+        ([(0.0, 1.0), (10.0, 1.0)], "got a frequency of 0 Hz"),
+        ([(-5.0, 1.0), (10.0, 1.0)], "got a frequency of -5 Hz"),
+        ([(10.0, 0.0), (20.0, 1.0)], "got the level 0 at 10 Hz"),
+        ([(10.0, 1.0), (20.0, -1.0)], "got the level -1 at 20 Hz"),
+        ([(10.0, np.nan), (20.0, 1.0)], "got the level nan at 10 Hz"),
+        ([(np.nan, 1.0), (20.0, 1.0)], "got a frequency of nan Hz"),
+        ([(10.0, 1.0), (np.inf, 1.0)], "got a frequency of inf Hz"),
     ],
 )
-def test_values_that_are_no_thresholds_are_refused(points: list[tuple[float, float]]) -> None:
-    with pytest.raises(InputError, match="rising frequencies with levels above 0"):
+def test_values_that_are_no_thresholds_are_refused(
+    points: list[tuple[float, float]], got: str
+) -> None:
+    with pytest.raises(InputError, match=f"rising frequencies with levels above 0.*{got}"):
         table(*points)
+
+
+def test_arrays_of_other_shapes_are_refused_and_lists_are_taken() -> None:
+    with pytest.raises(InputError, match=r"shapes \(2,\) and \(3,\)"):
+        Threshold("own", [10, 20], [1, 2, 3], "", "")  # type: ignore[arg-type]
+    own = Threshold("own", [10, 20], [1, 2], "", "")  # type: ignore[arg-type]
+    assert own.at(20.0) == pytest.approx(2.0)
+    assert own.valid_range_hz == (10.0, 20.0)
+    assert not own.acceleration_g.flags.writeable
 
 
 @pytest.mark.parametrize(
@@ -131,6 +143,11 @@ def test_own_table_in_both_columns(
         ("frequency_hz\tacceleration_g\n", "expected"),
         ("frequency_hz\tacceleration_g\n10\t1\n", "two rising frequencies"),
         ("frequency_hz\tacceleration_g\n10\t1\n20\n", "2 cells"),
+        ("frequency_hz\tacceleration_g\n20\t1\n10\t1\n", "10 Hz after 20 Hz"),
+        ("frequency_hz\tacceleration_g\n10\t1\n10\t2\n", "10 Hz after 10 Hz"),
+        ("frequency_hz\tacceleration_g\n10\t-1\n20\t2\n", "level -1 at 10 Hz"),
+        ("frequency_hz\tacceleration_g\n10\tnan\n20\t2\n", "level nan at 10 Hz"),
+        ("frequency_hz\tacceleration_g\tdisplacement_um\n10\t1\t1\n20\t2\t1\n", "got both"),
         ("frequency_hz\tacceleration_g\n10\tmuch\n20\t1\n", "number for acceleration_g"),
         ("frequency_hz\tacceleration_g\n10\t\n20\t1\n", "number for acceleration_g"),
         ("frequency_hz,acceleration_g\n10,1\n20,1\n", "tab-separated"),
@@ -141,6 +158,21 @@ def test_damaged_tables_are_refused(tmp_path: Path, text: str, sentence: str) ->
     path.write_text(text)
     with pytest.raises(InputError, match=sentence):
         Threshold.load(path)
+
+
+def test_comments_and_windows_line_ends_are_read(tmp_path: Path) -> None:
+    path = tmp_path / "lab.tsv"
+    path.write_bytes(
+        b"# source: rig 2\r\nfrequency_hz\tacceleration_g\r\n10\t1\r\n# worn tip\r\n20\t2\r\n"
+    )
+    own = Threshold.load(path)
+    assert own.at([10.0, 20.0]) == pytest.approx([1.0, 2.0])
+    assert (own.source, own.caveat) == ("rig 2", "not stated in the file")
+
+
+@pytest.mark.parametrize(("name", "lowest", "highest"), [("codec", 10, 400), ("pen-hold", 10, 320)])
+def test_shipped_tables_state_their_range(name: str, lowest: float, highest: float) -> None:
+    assert Threshold.shipped(name).valid_range_hz == (lowest, highest)
 
 
 def test_missing_tables_are_refused(tmp_path: Path) -> None:

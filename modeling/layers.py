@@ -1,0 +1,42 @@
+"""What every estimator returns for one spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.peq import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Layers:
+    """Noise gain and m layers of one spectrum, by rising frequency.
+
+    Parameters
+    ----------
+    noise_gain : float
+        G_w, in g per unit noise.
+    frequencies_hz, bandwidths_hz, gains : (m,) ndarray
+        As in `PEQ`.
+    level_sd_db : (m,) ndarray
+        Standard deviation of each layer's level in dB, from the record's length.
+    unresolved : (m,) ndarray of bool
+        The layer's width or level is a bound rather than an estimate: the width is below what the
+        record or the smoothing resolves, the height within what the skirts of neighbours reach by
+        themselves, or the amplitude within one standard deviation of nothing.
+    """
+
+    noise_gain: float
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    gains: Floats
+    level_sd_db: Floats
+    unresolved: NDArray[np.bool_]
+
+
+def no_layers(noise_gain: float) -> Layers:
+    """Noise alone."""
+    none = np.zeros(0)
+    return Layers(noise_gain, none, none, none, none, np.zeros(0, dtype=bool))

@@ -1,0 +1,293 @@
+"""Whittle's likelihood of a spectrum: expected power, its derivatives, and their best fit.
+
+The power of a periodogram's line scatters exponentially about its expected value, so the log
+likelihood of a model is −Σ (P/S + ln S) over the lines (Whittle 1953, "Estimation and information
+in stationary time series"), here over averages of neighbouring lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.peq import HIGHEST_FREQUENCY_SHARE, Floats
+from modeling.spectra import HIGH_PASS_HZ, Spectrum
+
+Bools = NDArray[np.bool_]
+
+# Half an octave above its corner the preparation's high-pass takes less than 0.2 dB.
+LOWEST_HZ = 1.5 * HIGH_PASS_HZ
+HIGHEST_SHARE = 0.98
+EMPTY_BELOW_DB = -50.0  # smoothed spectrum relative to its maximum: no signal there
+# Real spectra are no exact sums of bands: a bin's relative misfit that is forgiven.
+FORGIVEN_MISFIT = 0.12
+BIN_SHARE = 0.05
+SHAPE_RANGE = (0.8, 8.0)  # 1 is Lorentzian, 8 all but Gaussian
+NARROWEST_LINES = 1.5
+WIDEST_SHARE = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Power:
+    """The periodogram in the band that holds signal: expected value (response)², one per line.
+
+    Parameters
+    ----------
+    frequency_hz, power : (n,) ndarray
+        Evenly spaced; power in (unit per unit noise)².
+    rate_hz, step_hz : float
+    records : float
+        How many records it is the mean of.
+    """
+
+    frequency_hz: Floats
+    power: Floats
+    rate_hz: float
+    step_hz: float
+    records: float
+
+
+@dataclass(frozen=True, eq=False)
+class Bins:
+    """Averages over bins, narrow near peaks and of nearly constant relative width elsewhere."""
+
+    power: Floats
+    weight: Floats
+    count: Floats
+    tangent: Floats
+    cotangent: Floats
+    rate_hz: float
+
+
+# Expected power (n,) and its relative derivatives (p, n), from parameters, layers and bins.
+Response = Callable[[Floats, int, Bins], tuple[Floats, Floats]]
+
+
+def signal_power(spectrum: Spectrum) -> Power | None:
+    """The band of a spectrum that holds signal; None for silence.
+
+    From 15 Hz to 0.98 of the Nyquist frequency, or to where the smoothed spectrum last stands
+    within 50 dB of its maximum: above a recorder's own low-pass there is nothing to model, and an
+    empty region would rule the likelihood.
+    """
+    smoothed = spectrum.smoothed()
+    within = (spectrum.frequency_hz >= LOWEST_HZ) & (
+        spectrum.frequency_hz <= HIGHEST_SHARE * spectrum.rate_hz / 2
+    )
+    loudest = float(smoothed[within].max(initial=0.0))
+    if not loudest > 0:
+        return None
+    last = np.flatnonzero(within & (smoothed >= loudest * 10 ** (EMPTY_BELOW_DB / 20)))[-1]
+    within[last + 1 :] = False
+    # Of a Rayleigh-distributed magnitude of mean r the mean square is (4/π)r²; of the mean of K
+    # such magnitudes it is r² + (4/π − 1)r²/K.
+    records = spectrum.averaged
+    return Power(
+        spectrum.frequency_hz[within],
+        spectrum.magnitude[within] ** 2 / (1 + (4 / np.pi - 1) / records),
+        spectrum.rate_hz,
+        spectrum.rate_hz / spectrum.n_samples,
+        records,
+    )
+
+
+def split(theta: Floats, m: int) -> tuple[Floats, ...]:
+    """Log noise gain (1,), log frequencies, bandwidths and gains (m,) each, and the rest."""
+    return (
+        theta[:1],
+        theta[1 : 1 + m],
+        theta[1 + m : 1 + 2 * m],
+        theta[1 + 2 * m : 1 + 3 * m],
+        theta[1 + 3 * m :],
+    )
+
+
+def centres_and_widths(theta: Floats, m: int) -> tuple[Floats, Floats]:
+    """Frequencies and bandwidths (Hz) among the parameters."""
+    _, frequency, bandwidth, _, _ = split(theta, m)
+    return np.exp(frequency), np.exp(bandwidth)
+
+
+def bins_near(power: Power, centres_hz: Floats, widths_hz: Floats) -> Bins:
+    """Bins of 5 % of the frequency, but narrow against each peak that is near."""
+    frequency, step = power.frequency_hz, power.step_hz
+    width = np.maximum(BIN_SHARE * frequency, 2 * step)
+    for centre, peak_width in zip(centres_hz, widths_hz, strict=True):
+        np.minimum(width, 0.2 * peak_width + 0.15 * np.abs(frequency - centre), out=width)
+    number = np.cumsum(step / np.maximum(width, step)).astype(np.intp)
+    starts = np.concatenate(([0], np.flatnonzero(number[1:] != number[:-1]) + 1))
+    lines = np.diff(np.append(starts, frequency.size))
+    # Lines that the sensor's floor took whole say nothing.
+    heard = np.add.reduceat((power.power > 0).astype(np.float64), starts)
+    tangent = np.tan(np.pi / power.rate_hz * (frequency[starts] + (lines - 1) * step / 2))
+    average = np.add.reduceat(power.power, starts) / np.maximum(heard, 1.0)
+    heard = heard * power.records
+    weight = heard / (1 + heard * FORGIVEN_MISFIT**2)
+    told = heard > 0
+    return Bins(
+        average[told], weight[told], heard[told], tangent[told], 1 / tangent[told], power.rate_hz
+    )
+
+
+def offsets(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats, Floats]:
+    """u (m, n), where a band is 1/(1 − ju), and its derivatives by log f and log B.
+
+    H = 1/(1 − ju) with u = (g²·cot(πF/fs) − tan(πF/fs))/(k(1+g²)) at the frequency F, where
+    g = tan(πf/fs) and k = tan(πB/fs): `peq.band_response`, rearranged.
+    """
+    per_hz = np.pi / bins.rate_hz
+    centre, width = centres_and_widths(theta, m)
+    g, k = np.tan(per_hz * centre), np.tan(per_hz * width)
+    scale = 1 / (k * (1 + g * g))
+    u = (g * g * scale)[:, None] * bins.cotangent - scale[:, None] * bins.tangent
+    growth = 2 * g * per_hz * centre
+    by_frequency = (growth * (1 + g * g) * scale)[:, None] * bins.cotangent - growth[:, None] * u
+    by_width = u * (-per_hz * width * (1 + k * k) / k)[:, None]
+    return u, by_frequency, by_width
+
+
+def power_sum_of_peaks(theta: Floats, m: int, bins: Bins) -> Floats:
+    """The parts of `power_sum`, noise first, (m+1, n)."""
+    noise, _, _, gain, shape = split(theta, m)
+    u, _, _ = offsets(theta, m, bins)
+    nu = np.exp(shape[0])
+    phi = np.exp(-nu * np.log1p((2 ** (1 / nu) - 1) * u * u))
+    floor = np.full((1, bins.tangent.size), np.exp(2 * noise[0]))
+    return np.concatenate((floor, np.exp(2 * gain)[:, None] * phi))
+
+
+def power_sum(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
+    """Expected power G_w² + Σ G_i²·φ(u_i) (n,) and its relative derivatives (3m+2, n).
+
+    φ = (1 + (2^(1/ν) − 1)·u²)^(−ν): −3 dB at u = ±1 whatever the shape ν.
+    """
+    noise, _, _, gain, shape = split(theta, m)
+    u, by_frequency, by_width = offsets(theta, m, bins)
+    nu, twice = np.exp(shape[0]), (2 * np.exp(2 * gain))[:, None]
+    c = 2 ** (1 / nu) - 1
+    square = u * u
+    log_base = np.log1p(c * square)
+    phi = np.exp(-nu * log_base)
+    slope = phi / (1 + c * square)
+    floor = np.exp(2 * noise[0])
+    expected = floor + 0.5 * twice[:, 0] @ phi
+    by_u = twice * slope * u * (-nu * c)
+    derivative = np.empty((theta.size, expected.size))
+    derivative[0] = 2 * floor
+    derivative[1 : 1 + m] = by_u * by_frequency
+    derivative[1 + m : 1 + 2 * m] = by_u * by_width
+    derivative[1 + 2 * m : 1 + 3 * m] = twice * phi
+    by_shape = square * slope * ((1 + c) * np.log(2) / nu) - log_base * phi
+    derivative[-1] = nu * (0.5 * twice[:, 0] @ by_shape)
+    derivative /= expected
+    return expected, derivative
+
+
+def coherent(signs: Floats) -> Response:
+    """The coherent power |G_w + Σ s_i·G_i·H_i|² of layers with these signs, as `power_sum`."""
+
+    def response(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
+        noise, _, _, gain, _ = split(theta, m)
+        u, by_frequency, by_width = offsets(theta, m, bins)
+        real = 1 / (1 + u * u)
+        imaginary = u * real
+        signed = np.exp(gain) * signs
+        in_phase, quadrature = np.exp(noise[0]) + signed @ real, signed @ imaginary
+        expected = in_phase * in_phase + quadrature * quadrature
+        twice = (2 * signed)[:, None]
+        by_u = ((1 - u * u) * quadrature - 2 * u * in_phase) * (real * real) * twice
+        derivative = np.empty((theta.size, expected.size))
+        derivative[0] = 2 * np.exp(noise[0]) * in_phase
+        derivative[1 : 1 + m] = by_u * by_frequency
+        derivative[1 + m : 1 + 2 * m] = by_u * by_width
+        derivative[1 + 2 * m :] = (real * in_phase + imaginary * quadrature) * twice
+        derivative /= expected
+        return expected, derivative
+
+    return response
+
+
+def misfit_of(bins: Bins, expected: Floats) -> float:
+    """Minus the log likelihood, 0 where every bin is as expected."""
+    ratio = bins.power / expected
+    return float(bins.weight @ (ratio - 1 - np.log(ratio)))
+
+
+def maximise(
+    response: Response,
+    theta: Floats,
+    bins: Bins,
+    *,
+    m: int,
+    limits: tuple[Floats, Floats],
+    free: Bools | None = None,
+    steps: int,
+    enough: float,
+) -> tuple[Floats, float]:
+    """Parameters of the greatest likelihood near a start, and the misfit there.
+
+    Fisher scoring with Levenberg–Marquardt damping.
+
+    Parameters
+    ----------
+    theta : (p,) ndarray
+        The start; see `split`.
+    limits : pair of (p,) ndarray
+    free : (p,) ndarray of bool, optional
+        Which parameters may move; all by default.
+    steps : int
+        At most.
+    enough : float
+        Stop where a step gains less log likelihood than this.
+    """
+    low, high = limits
+    theta = np.minimum(np.maximum(theta, low), high)
+    damping = 1e-2
+    expected, derivative = response(theta, m, bins)
+    misfit = misfit_of(bins, expected)
+    for _ in range(steps):
+        if free is not None:
+            derivative = derivative * free[:, None]
+        weighted = derivative * bins.weight
+        information = weighted @ derivative.T
+        score = weighted @ (bins.power / expected - 1)
+        while True:
+            damped = information.copy()
+            damped.flat[:: damped.shape[0] + 1] += damping * np.diag(information) + 1e-9
+            step = np.minimum(np.maximum(np.linalg.solve(damped, score), -1.0), 1.0)
+            tried = np.minimum(np.maximum(theta + step, low), high)
+            expected_tried, derivative_tried = response(tried, m, bins)
+            misfit_tried = misfit_of(bins, expected_tried)
+            if misfit_tried < misfit or damping > 100:
+                break
+            damping *= 10
+        if not misfit_tried < misfit:
+            break
+        gained = misfit - misfit_tried
+        theta, expected, derivative, misfit = tried, expected_tried, derivative_tried, misfit_tried
+        damping = max(damping / 10, 1e-4)
+        if gained < enough:
+            break
+    return theta, misfit
+
+
+def limits_of(m: int, power: Power, *, shaped: bool) -> tuple[Floats, Floats]:
+    """Lowest and highest parameters of m layers: what a model may hold and a record can tell."""
+    one, none = np.ones(m), np.zeros(0)
+    rate_hz = power.rate_hz
+    low, high = LOWEST_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz
+    shape = np.log(SHAPE_RANGE) if shaped else (none, none)
+    edges = zip(
+        (low, NARROWEST_LINES * power.step_hz, shape[0]),
+        (high, WIDEST_SHARE * rate_hz, shape[1]),
+        strict=True,
+    )
+    (f_low, f_high), (b_low, b_high), (s_low, s_high) = edges
+    free = np.full(m, 50.0)
+    return (
+        np.hstack((-50.0, np.log(f_low) * one, np.log(b_low) * one, -free, s_low)),
+        np.hstack((50.0, np.log(f_high) * one, np.log(b_high) * one, free, s_high)),
+    )

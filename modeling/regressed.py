@@ -1,0 +1,280 @@
+"""A texture driven by regressions instead of a grid (METHOD 6 and 9, PAPER IX-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modeling.errors import InputError, check_texture_name
+from modeling.files import write_text
+from modeling.grid import check_axes, within_grid
+from modeling.model import (
+    DrivenBy,
+    Parameters,
+    TextureModel,
+    dump_json,
+    first_peq,
+    load_json,
+    model_from,
+)
+from modeling.peq import PEQ, Floats
+from modeling.recording import UNITS
+from modeling.regression import (
+    AMPLITUDE,
+    BANDWIDTH,
+    FREQUENCY,
+    NOISE_GAIN,
+    SPEED,
+    TERMS,
+    Regression,
+    centroid_observations,
+    parameter_observations,
+    parameter_regressions,
+    reduced_regression,
+)
+
+FORMAT = "tactileq.regressed-model"
+VERSION = 1
+CENTROID = "centroid"
+_TERMS = {"conditions": TERMS, "centroid": (CENTROID,)}
+_COEFFICIENTS = ("noise_gain", "frequencies_hz", "bandwidths_hz", "amplitudes", "centroid_hz")
+_ARRAYS = ("speeds_mm_s", "forces_n", "signs", *_COEFFICIENTS)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RegressedModel:
+    """Coefficients of every PEQ parameter of one texture with m layers; `TextureModel.regressed`.
+
+    With driven_by="conditions" every parameter is β + α1·v + α2·F + α3·v·F (eq. 3), k = 4; with
+    "centroid" it is p0 + p1·SC(v), k = 2, and SC(v) = c0 + c1·v. What a reduced model leaves out
+    is 0.
+
+    Parameters
+    ----------
+    texture : str
+    rate_hz : float
+        The rate at which the driving noise has unit variance.
+    driven_by : {"conditions", "centroid"}
+    speeds_mm_s, forces_n : (2,) array_like
+        The lowest and the highest of the grid, > 0.
+    noise_gain : (k,) array_like
+        Coefficients of G_w, in `unit` per unit noise.
+    frequencies_hz, bandwidths_hz, amplitudes : (k, m) array_like
+        Coefficients of f and B (Hz) and of |G| (`unit` per unit noise).
+    signs : (m,) array_like
+        Each layer's sign over the whole texture, 1 or −1.
+    centroid_hz : (2,) or (0,) array_like
+        c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing.
+    estimator, unit, simulated
+        As in the `TextureModel` behind it.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes or values out of range.
+    """
+
+    texture: str
+    rate_hz: float
+    driven_by: DrivenBy
+    speeds_mm_s: Floats
+    forces_n: Floats
+    noise_gain: Floats
+    frequencies_hz: Floats
+    bandwidths_hz: Floats
+    amplitudes: Floats
+    signs: Floats
+    centroid_hz: Floats
+    estimator: str
+    unit: str = "g"
+    simulated: bool = False
+
+    def __post_init__(self) -> None:
+        self._check_kinds()
+        for name in _ARRAYS:
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        check_axes(self.speeds_mm_s, self.forces_n)
+        self._check_shapes()
+        finite = all(np.isfinite(getattr(self, name)).all() for name in _COEFFICIENTS)
+        if not finite or not np.isin(self.signs, (-1.0, 1.0)).all():
+            raise InputError(
+                "expected finite coefficients and signs of 1 or −1, got others; make the model "
+                "again from its grid."
+            )
+
+    def _check_kinds(self) -> None:
+        check_texture_name(self.texture)
+        rate = self.rate_hz
+        number = isinstance(rate, int | float) and not isinstance(rate, bool)
+        kinds = number and isinstance(self.simulated, bool) and isinstance(self.estimator, str)
+        if not (kinds and np.isfinite(rate) and rate > 0 and self.unit in UNITS):
+            raise InputError(
+                f"{self.texture}: expected a rate above 0 Hz, a unit among {', '.join(UNITS)}, "
+                f"true or false for simulated and text for estimator, got {rate!r}, "
+                f"{self.unit!r}, {self.simulated!r} and {self.estimator!r}; make the model again."
+            )
+        _check_driver(self.driven_by)
+
+    def _check_shapes(self) -> None:
+        k, m = 1 + len(_TERMS[self.driven_by]), self.signs.size
+        wanted: dict[str, tuple[int, ...]] = {
+            "speeds_mm_s": (2,),
+            "forces_n": (2,),
+            "noise_gain": (k,),
+            "signs": (m,),
+            **dict.fromkeys(("frequencies_hz", "bandwidths_hz", "amplitudes"), (k, m)),
+            "centroid_hz": (2,) if self.driven_by == CENTROID else (0,),
+        }
+        for name, shape in wanted.items():
+            if getattr(self, name).shape != shape:
+                raise InputError(
+                    f"expected {name} of shape {shape}, got {getattr(self, name).shape}; the "
+                    "arrays of a model share one number of layers and of coefficients."
+                )
+
+    @property
+    def n_layers(self) -> int:
+        """Number of layers, m."""
+        return int(self.signs.size)
+
+    @property
+    def n_parameters(self) -> int:
+        """Numbers stored in all: the coefficients that are not 0 (of a grid: S·F·(1 + 3m))."""
+        return sum(int(np.count_nonzero(getattr(self, name))) for name in _COEFFICIENTS)
+
+    def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
+        """The PEQ's parameters at n points, with the edges of METHOD 9 (`modeling.grid`).
+
+        A noise gain or an amplitude that its regression would make negative is 0; a layer never
+        changes its sign. Frequencies and widths may leave the legal range, as those of a
+        `TextureModel` may by rounding; `peq` and `Renderer` clamp them.
+
+        Parameters
+        ----------
+        speed_mm_s : (n,) array_like
+            Tangential speed; its sign (direction) does not matter.
+        force_n : (n,) array_like
+            Normal force; negative values count as lift-off.
+        """
+        hand = within_grid(self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n)
+        drive = self._drive(hand.speed_mm_s, hand.force_n)
+
+        def respond(coefficients: Floats) -> Floats:
+            # Term by term, not as a matrix product: its bits would depend on the number of points.
+            constant, *slopes = coefficients
+            shape = (hand.ramp.size, *coefficients.shape[1:])
+            response: Floats = np.broadcast_to(constant, shape)
+            for x, slope in zip(drive, slopes, strict=True):
+                response = response + x.reshape(-1, *(1,) * slope.ndim) * slope
+            return response
+
+        return Parameters(
+            np.maximum(respond(self.noise_gain), 0.0) * hand.ramp,
+            respond(self.frequencies_hz),
+            respond(self.bandwidths_hz),
+            self.signs * np.maximum(respond(self.amplitudes), 0.0) * hand.ramp[:, None],
+        )
+
+    def _drive(self, speed_mm_s: Floats, force_n: Floats) -> list[Floats]:
+        """What the slopes are multiplied with, each (n,)."""
+        if self.driven_by == CENTROID:
+            return [self.centroid_hz[0] + self.centroid_hz[1] * speed_mm_s]
+        return [speed_mm_s, force_n, speed_mm_s * force_n]
+
+    def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
+        """The PEQ at one speed (mm/s) and force (N), in the legal range."""
+        return first_peq(self.parameters(speed_mm_s, force_n), rate_hz=self.rate_hz)
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as versioned JSON; the file is there whole or not at all."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        for name in _ARRAYS:
+            values[name] = values[name].tolist()
+        write_text(path, dump_json({"format": FORMAT, "version": VERSION, **values}))
+
+    @staticmethod
+    def load(path: str | Path) -> RegressedModel:
+        """Read a model written by `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is no such model, or has another version.
+        """
+        return model_from(RegressedModel, load_json(path, FORMAT, version=VERSION), path=path)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RegressedModel):
+            return NotImplemented
+        return all(
+            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def regressed_model(model: TextureModel, *, by: DrivenBy = "conditions") -> RegressedModel:
+    """Replace a model's grid by its reduced regressions; `TextureModel.regressed` explains `by`.
+
+    By the centroid, SC(v) is fitted first and every parameter then to SC(v), each reduced to what
+    is significant. SC(v) being a straight line, each parameter is one in speed, too: what the
+    detour buys is that one response, the centroid's, moves all layers.
+    """
+    _check_driver(by)
+    centroid_hz: Floats = np.zeros(0)
+    if by == CENTROID:
+        centroid_hz, fits = _fits_by_centroid(model)
+    else:
+        fits = {(r.parameter, r.layer): r.reduced for r in parameter_regressions(model)}
+
+    def rows(parameter: str, layers: range) -> Floats:
+        chosen = [_row(fits[parameter, layer], _TERMS[by]) for layer in layers]
+        return np.array(chosen, dtype=np.float64).reshape(-1, 1 + len(_TERMS[by])).T
+
+    layers = range(1, model.n_layers + 1)
+    return RegressedModel(
+        texture=model.texture,
+        rate_hz=model.rate_hz,
+        driven_by=by,
+        speeds_mm_s=model.speeds_mm_s[[0, -1]],
+        forces_n=model.forces_n[[0, -1]],
+        noise_gain=rows(NOISE_GAIN, range(1))[:, 0],
+        frequencies_hz=rows(FREQUENCY, layers),
+        bandwidths_hz=rows(BANDWIDTH, layers),
+        amplitudes=rows(AMPLITUDE, layers),
+        signs=np.where(model.gains[~model.interpolated].sum(axis=0) < 0, -1.0, 1.0),
+        centroid_hz=centroid_hz,
+        estimator=model.estimator,
+        unit=model.unit,
+        simulated=model.simulated,
+    )
+
+
+def _check_driver(driven_by: str) -> None:
+    if driven_by not in tuple(_TERMS):  # a file may hold a list, which no dictionary can look up
+        raise InputError(
+            f"expected a model driven by {' or '.join(_TERMS)}, got {driven_by!r}; choose one."
+        )
+
+
+def _fits_by_centroid(model: TextureModel) -> tuple[Floats, dict[tuple[str, int], Regression]]:
+    """c0 and c1 of SC(v), and every parameter's regression on SC(v)."""
+    centroid, speed, _ = centroid_observations(model)
+    course = _row(reduced_regression(centroid, {SPEED: speed}), (SPEED,))
+    fits = {
+        (o.parameter, o.layer): reduced_regression(
+            o.values, {CENTROID: course[0] + course[1] * o.speed_mm_s}
+        )
+        for o in parameter_observations(model)
+    }
+    return np.array(course), fits
+
+
+def _row(fit: Regression, terms: tuple[str, ...]) -> list[float]:
+    """The intercept and the coefficient of each of these terms, 0 where a term was dropped."""
+    return [float(fit.coefficients[0]), *(fit.coefficient(term) for term in terms)]

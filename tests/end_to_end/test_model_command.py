@@ -1,0 +1,211 @@
+"""Many textures in one command: the same files whatever the number of jobs, broken ones named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from subprocess import CompletedProcess
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+import tactileq
+from modeling import Recording, RecordingSet, TextureModel
+from stimuli.planted import planted_texture, record_texture
+
+AXES = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+ENDINGS = (".json", "_layers.tsv", "_spectra.tsv", "_spectra.png", "_provenance.json")
+
+
+def recorded(name: str) -> RecordingSet:
+    """A planted texture on 2 × 2 conditions of half a second at the model rate."""
+    return record_texture(planted_texture(name, **AXES), rate_hz=5000.0, duration_s=0.5)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def colours_in(path: Path) -> int:
+    """How many different colours a picture holds: an empty one has few."""
+    return len(np.unique(np.asarray(Image.open(path).convert("RGB")).reshape(-1, 3), axis=0))
+
+
+@pytest.fixture
+def main(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., CompletedProcess[str]]:
+    """`run` without a process of its own: loading the libraries takes longer than the work."""
+
+    def call(*arguments: object) -> CompletedProcess[str]:
+        monkeypatch.chdir(tmp_path)
+        words = [str(argument) for argument in arguments]
+        # Worker processes would outlive the test, in the folder where they began.
+        words += ["--jobs", "1"] if words[0] == "model" else []
+        monkeypatch.setattr("sys.argv", ["tactileq", *words])
+        with pytest.raises(SystemExit) as end:
+            tactileq.main()
+        told = capsys.readouterr()
+        return CompletedProcess(words, int(end.value.code or 0), told.out, told.err)
+
+    return call
+
+
+@pytest.fixture
+def three(tmp_path: Path) -> Path:
+    """A folder of two recording sets, one of them with two textures, and a stray file."""
+    folder = tmp_path / "recordings"
+    recorded("canvas").save(folder / "canvas")
+    both = [*recorded("MDF").recordings, *recorded("wall paper").recordings]
+    RecordingSet(both).save(folder / "others")
+    (folder / "notes.txt").write_text("recorded on Monday")
+    return folder
+
+
+def test_one_job_and_several_write_the_same_bytes(run, three: Path) -> None:
+    for jobs, given in (("1", [three]), ("2", [three / "canvas", three / "others"])):
+        done = run("model", *given, "--jobs", jobs, "--plot", "--out", f"by-{jobs}")
+        assert done.returncode == 0, done.stderr
+        assert "3/3" in done.stdout
+        told = [line for line in done.stdout.splitlines() if "(simulated): " in line]
+        assert [line.split(" (")[0] for line in told] == ["canvas", "MDF", "wall paper"]
+    written = contents(three.parent / "by-1")
+    assert written == contents(three.parent / "by-2")
+    stems = ("canvas", "MDF", "wall-paper")
+    assert set(written) == {s + ending for s in stems for ending in (*ENDINGS, "_layers.png")}
+    for stem in stems:
+        for picture in ("spectra", "layers"):
+            assert colours_in(three.parent / f"by-1/{stem}_{picture}.png") > 20
+
+
+def test_a_model_of_many_is_the_model_of_one(main, three: Path) -> None:
+    assert main("model", three, "--out", "many").returncode == 0
+    recorded("wall paper").save(three.parent / "alone")
+    assert main("model", "alone", "--out", "one").returncode == 0
+    many, one = (three.parent / folder / "wall-paper.json" for folder in ("many", "one"))
+    assert many.read_bytes() == one.read_bytes()
+
+
+def break_recordings(folder: Path) -> dict[str, str]:
+    """Five textures that cannot be modelled, and what is to be said of each."""
+    noise = np.random.default_rng(3).normal(0, 0.1, 3000)
+
+    def save(name: str, samples, **labels: float) -> Path:
+        at = {"speed_mm_s": 100.0, "force_n": 1.0} | labels
+        RecordingSet([Recording(samples, 5000.0, at["speed_mm_s"], at["force_n"], name)]).save(
+            folder / name
+        )
+        return folder / name
+
+    (save("lost", noise) / "0001.csv").unlink()
+    (save("nan", noise) / "0001.csv").write_text("acceleration_g\n" + "0.1\nnan\n" * 100)
+    save("still", noise, speed_mm_s=0.0)
+    table = save("mislabelled", noise) / "recordings.tsv"
+    table.write_text(table.read_text().replace("\t100.0\t", "\tfast\t"))
+    RecordingSet([Recording(noise[:100], 22704.0, 100.0, 1.0, "short")]).save(folder / "short")
+    (save("headless", noise) / "recordings.tsv").write_text("file\n0001.csv\n")
+    return {
+        "lost": "got nothing there",
+        "nan": "expected finite samples",
+        "still": "expected recordings with a speed and a force above 0",
+        "mislabelled": "expected a number for speed_mm_s",
+        "short": "expected at least 64 samples",
+        "headless": "expected the columns file, texture",
+    }
+
+
+def test_broken_textures_are_named_and_the_others_modelled(main, three: Path) -> None:
+    broken = break_recordings(three)
+    done = main("model", three, "--out", "models")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    *sentences, summary = done.stderr.splitlines()
+    assert len(sentences) == len(broken)
+    for name, words in broken.items():
+        (sentence,) = [line for line in sentences if f"{three / name}: " in line]
+        assert sentence.startswith("error: ")
+        assert words in sentence
+    assert summary.startswith("error: expected 9 textures that can be modelled, got 6 that cannot")
+    assert all(name in summary for name in broken)
+    expected = {s + ending for s in ("canvas", "MDF", "wall-paper") for ending in ENDINGS}
+    assert set(contents(three.parent / "models")) == expected
+    assert TextureModel.load(three.parent / "models/canvas.json").texture == "canvas"
+
+
+def test_one_texture_of_a_folder_may_be_broken(main, three: Path) -> None:
+    table = pd.read_csv(three / "others/recordings.tsv", sep="\t")
+    file = table.file[table.texture == "MDF"].iloc[0]
+    (three / "others" / file).write_text("")
+    done = main("model", three / "others", "--out", "models")
+    assert done.returncode == 1
+    assert "error: MDF in " in done.stderr
+    assert "got 1 that cannot (MDF in " in done.stderr
+    assert {path.stem for path in (three.parent / "models").glob("*.json")} == {
+        "wall-paper",
+        "wall-paper_provenance",
+    }
+
+
+def test_two_textures_of_one_file_name_are_refused_before_any_work(main, three: Path) -> None:
+    recorded("canvas").save(three / "again")
+    refused = main("model", three, "--out", "models")
+    assert refused.returncode == 1
+    assert "expected each texture once" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    for folder in ("again", "canvas"):
+        assert str(three / folder) in refused.stderr
+    assert not (three.parent / "models").exists()
+
+
+def test_a_texture_without_a_grid_gets_tables_and_no_model(main, three: Path) -> None:
+    some = RecordingSet(r for r in recorded("PVC").recordings if r.force_n == 1.0)
+    some.save(three / "PVC")
+    done = main("model", three, "--plot", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    assert "no full model of PVC: " in done.stdout
+    names = {path.name for path in (three.parent / "models").glob("PVC*")}
+    assert names == {"PVC" + ending for ending in ENDINGS[1:]}
+
+
+def test_clipping_is_told_for_each_texture(main, tmp_path: Path) -> None:
+    loud = np.clip(np.sin(2 * np.pi * 60 * np.arange(5000) / 5000) * 2, -1, 1)
+    for name in ("oak", "elm"):
+        RecordingSet([Recording(loud, 5000.0, 100.0, 1.0, name)]).save(tmp_path / "set" / name)
+    done = main("model", "set")
+    assert done.returncode == 0
+    warnings = done.stderr.splitlines()
+    assert [line.split(" at ")[0] for line in warnings] == ["warning: elm", "warning: oak"]
+
+
+def test_simplify_draws_the_condition_that_was_asked_for(main, three: Path) -> None:
+    assert main("model", three / "canvas", "--out", "models").returncode == 0
+    simplify = ("simplify", "models/canvas.json", "--out", "fewer")
+    picture = three.parent / "fewer/canvas_threshold.png"
+    assert main(*simplify).returncode == 0
+    assert not picture.exists()
+    seen = set()
+    for options in (
+        (),
+        ("--recordings", three),
+        ("--recordings", three / "canvas"),
+        ("--speed", 150, "--force", 2),
+    ):
+        done = main(*simplify, "--plot", *options)
+        assert done.returncode == 0, done.stderr
+        assert colours_in(picture) > 20
+        seen.add(picture.read_bytes())
+    assert len(seen) == 3  # the folder of the set and the folder above it mean the same
+    before = contents(three.parent / "fewer")
+    for options, sentence in (
+        (("--speed", 150), "expected --plot with"),
+        (("--plot", "--speed", 500), "expected a condition within the grid"),
+        (("--plot", "--speed", 150, "--recordings", three), "choose a recorded condition"),
+        (("--plot", "--recordings", three / "others"), "expected recordings of 'canvas'"),
+    ):
+        refused = main(*simplify, *options)
+        assert refused.returncode == 1
+        assert sentence in refused.stderr
+        assert refused.stderr.count("\n") == 1
+    assert contents(three.parent / "fewer") == before
