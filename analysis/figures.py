@@ -74,7 +74,7 @@ def plot_model_spectrum(
     if np.isfinite(comparison.recording).any():
         ax.plot(frequency, comparison.recording, color=GREY, lw=2.5, label="recording")
     ax.plot(frequency, response, color=BLUE, lw=1.5, ls="--", label="model")
-    labels = {False: "layer alone", True: "layer alone, dropped"}
+    labels = {False: "layer alone, not smoothed", True: "dropped layer alone"}
     for layer, dropped in enumerate(comparison.dropped):
         if dropped and model == "simplified":
             continue

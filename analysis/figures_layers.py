@@ -52,6 +52,9 @@ def plot_layers_over_grid(layers: LayersOverGrid, *, quantity: str, ax: Axes | N
     if (getattr(layers, quantity) > 0).any():
         # An amplitude of 0 has no place on the axis; its line has a gap there.
         ax.set_yscale("log", nonpositive="mask")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.yaxis.set_minor_formatter("")
     for layer in range(layers.inherited.shape[2]):
         _plot_layer(layers, quantity=quantity, layer=layer, ax=ax)
     ax.set_xticks(layers.speeds_mm_s, [f"{speed:g}" for speed in layers.speeds_mm_s])
@@ -59,10 +62,6 @@ def plot_layers_over_grid(layers: LayersOverGrid, *, quantity: str, ax: Axes | N
     unit = "arbitrary" if layers.unit == "arbitrary" else "g peak"
     frequency = quantity == "frequency_hz"
     ax.set_ylabel("frequency (Hz)" if frequency else f"amplitude, sinusoid of equal power ({unit})")
-    if frequency and ax.get_yscale() == "log":
-        ax.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        ax.yaxis.set_major_formatter("{x:g}")
-        ax.yaxis.set_minor_formatter("")
     finish_axes(ax)
     stamp_if_simulated(ax, layers.simulated)
     return ax

@@ -174,7 +174,8 @@ def _threshold_picture(result: TextureResult, stem: str) -> Picture:
     return Picture(
         f"threshold_{stem}",
         f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
-        "Above: smoothed spectrum of the recording and of each model. Below: each layer's "
+        "Above: smoothed spectrum of the recording and of each model; thin lines: each layer "
+        "alone, and in black the gain at which it would be just felt. Below: each layer's "
         "amplitude by the criterion against the threshold; open crosses mark dropped layers. A "
         "layer may lie below the threshold here and yet be kept, because another condition, its "
         "uncertainty or the sum of the dropped layers decides. Cf. the paper's figure 6.",

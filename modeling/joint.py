@@ -35,8 +35,8 @@ from modeling.spectra import Spectrum
 
 # A layer must raise the log likelihood by this much in a record of 1 s, and by ln T more in one of
 # T s, where chance has more places to look like one. BIC would ask 10 to 12 for three parameters;
-# 6 finds more of the weak layers, and what it finds is nearly always there.
-PENALTY = 6.0
+# 5.5 finds more of the weak layers, and what it finds is nearly always there.
+PENALTY = 5.5
 SEVERAL_AT_ONCE = 40.0
 MOST_LAYERS = 12
 WIDEST_BOX_HZ = 520.0
@@ -207,6 +207,16 @@ def sign_patterns(frequencies_hz: Floats) -> Floats:
     alternating = np.empty(m)
     alternating[np.argsort(frequencies_hz, kind="stable")] = (-1.0) ** np.arange(m)
     return np.stack((np.ones(m), alternating, -alternating))
+
+
+def neighbouring_patterns(frequencies_hz: Floats) -> Floats:
+    """`sign_patterns`, and each of them with one relation between neighbours turned, (k, m).
+
+    Turned means that all layers above a gap change their signs.
+    """
+    patterns = sign_patterns(frequencies_hz)
+    turns = [np.where(frequencies_hz >= above, -1.0, 1.0) for above in np.sort(frequencies_hz)[1:]]
+    return np.unique([*patterns, *(turn * p for turn in turns for p in patterns)], axis=0)
 
 
 def coherent_gains(

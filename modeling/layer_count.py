@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 
 from modeling.errors import InputError
@@ -21,6 +23,7 @@ from modeling.peq import PEQ, Floats
 from modeling.spectra import Spectrum
 
 _WIDTH_SHARES = (0.5, 1.0)
+_NOISE_DB = (0.0, -20.0)
 _ROUNDS = 2
 
 
@@ -65,7 +68,7 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
 
 
 def _starts(power: Power, count: int) -> list[Floats]:
-    """Layers spread over the power, evenly or towards its upper half; wide or narrow."""
+    """Layers spread over the power, evenly or in its upper half, wide or narrow; quiet noise."""
     share = np.cumsum(power.power) / power.power.sum()
     low, high = np.interp([0.1, 0.9], share, power.frequency_hz)
     noise = np.log(np.quantile(power.power[power.power > 0], 0.05)) / 2
@@ -73,11 +76,10 @@ def _starts(power: Power, count: int) -> list[Floats]:
     for places in ((np.arange(count) + 0.5) / count, np.linspace(0.5, 0.98, count)):
         centre = np.interp(places, share, power.frequency_hz)
         height = np.interp(centre, power.frequency_hz, power.power) + power.power.mean()
-        for width_share in _WIDTH_SHARES:
+        for width_share, noise_db in product(_WIDTH_SHARES, _NOISE_DB):
             width = np.full(count, max(width_share * (high - low) / count, 2 * power.step_hz))
-            starts.append(
-                np.concatenate([[noise], np.log(centre), np.log(width), np.log(height) / 2])
-            )
+            parts = ([noise + noise_db * np.log(10) / 20], np.log(centre), np.log(width))
+            starts.append(np.concatenate([*parts, np.log(height) / 2]))
     return starts
 
 

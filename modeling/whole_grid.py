@@ -20,8 +20,8 @@ from modeling.joint import (
     as_layers,
     coherent_fit,
     find_peaks_jointly,
+    neighbouring_patterns,
     power_sum_misfit,
-    sign_patterns,
     without,
 )
 from modeling.layers import Layers
@@ -226,10 +226,7 @@ def _trial(starts: list[_Start], kept: list[int], *, move: bool) -> _Trial:
     if not (here and kept):
         return _Trial(kept, np.ones(len(kept)), [s.fitted(np.ones(0), move=move) for s in here])
     centres = np.median([start.peaks.frequencies_hz for start in here], axis=0)
-    patterns = sign_patterns(centres)
-    steps = [np.where(centres >= centre, -1.0, 1.0) for centre in np.sort(centres)[1:]]
-    turned = [step * pattern for step in steps for pattern in patterns]
-    candidates = np.unique(np.array([*patterns, *turned]), axis=0)
+    candidates = neighbouring_patterns(centres)
     clearest = sorted(here, key=lambda start: -float(start.peaks.evidence.sum()))[:2]
 
     def fitted(signs: Floats, where: list[_Start]) -> list[CoherentFit]:

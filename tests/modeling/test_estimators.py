@@ -118,7 +118,7 @@ def test_smoothed_consistent_model_has_the_measured_heights(
 ) -> None:
     """The definition itself: smoothed alike, model and data agree at each peak above the floor."""
     spectrum = truth(0.05, planted)
-    layers = find_layers(spectrum)
+    layers = find_layers(spectrum, estimator="paper-consistent")
     assert layers.gains.size == len(planted)
     assert (layers.gains > 0).all()
     smoothed = spectrum_of(model_of(layers).response(FREQUENCY_HZ)).smoothed()
