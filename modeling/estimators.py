@@ -18,6 +18,7 @@ from scipy.signal import find_peaks
 from modeling.errors import InputError
 from modeling.joint import fit_jointly
 from modeling.layers import Layers
+from modeling.level_sd import smoothed_level_sd_db
 from modeling.peq import (
     HIGHEST_BANDWIDTH_SHARE,
     LOWEST_BANDWIDTH_HZ,
@@ -120,6 +121,7 @@ def fit_layers(
     heights = smoothed - floor if consistent else smoothed
     fits = [_peak_width(spectrum.frequency_hz, heights, f) for f in frequencies_hz]
     bandwidth, unresolved = _bandwidths(np.array(fits, dtype=np.float64), consistent)
+    fitted_s = np.where(unresolved, np.nan, fits)
     failed = ~np.isfinite(bandwidth)
     instead = np.where(
         np.isfinite(fallback_bandwidths_hz), fallback_bandwidths_hz, FWHM_PER_S * SMOOTHING_HZ
@@ -134,7 +136,13 @@ def fit_layers(
         unresolved = (unresolved & ~failed) | hidden
     else:
         gains = at_peak
-    level_sd_db = 10 / np.log(10) / np.sqrt(np.pi * bandwidth * spectrum.duration_s)
+    level_sd_db = smoothed_level_sd_db(
+        spectrum,
+        heights,
+        frequencies_hz=frequencies_hz,
+        fitted_s_hz=fitted_s,
+        deconvolved=consistent,
+    )
     return Layers(floor, frequencies_hz, bandwidth, gains, level_sd_db, unresolved)
 
 

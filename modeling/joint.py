@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import gammaincinv
 
 from modeling.layers import Layers, no_layers
 from modeling.likelihood import (
@@ -25,6 +26,7 @@ from modeling.likelihood import (
     maximise,
     misfit_of,
     offsets,
+    power_of,
     power_sum,
     power_sum_of_peaks,
     signal_power,
@@ -33,10 +35,12 @@ from modeling.likelihood import (
 from modeling.peq import Floats
 from modeling.spectra import Spectrum
 
-# A layer must raise the log likelihood by this much in a record of 1 s, and by ln T more in one of
-# T s, where chance has more places to look like one. BIC would ask 10 to 12 for three parameters;
-# 5.5 finds more of the weak layers, and what it finds is nearly always there.
-PENALTY = 5.5
+# A layer must raise the log likelihood by this much in a record of 5000 samples, and by ln n more
+# in one n times as long, where chance has more places to look like one (one record of white noise
+# in ten has such a place). BIC would ask 10 to 12 for three parameters;
+# 6 finds more of the weak layers, and what it finds is nearly always there.
+PENALTY = 6.0
+PENALTY_SAMPLES = 5000
 SEVERAL_AT_ONCE = 40.0
 MOST_LAYERS = 12
 WIDEST_BOX_HZ = 520.0
@@ -83,17 +87,19 @@ def find_peaks_jointly(power: Power) -> Peaks:
 
     Growth ends where no further peak raises the log likelihood by `PENALTY`.
     """
-    # Exponentially distributed lines: three in ten lie below 0.357 of their mean.
-    floor = np.quantile(power.power[power.power > 0], 0.3) / 0.357
+    # Where three in ten lines of noise alone would lie; above are peaks. Exponentially distributed
+    # lines, or means of several.
+    below = gammaincinv(power.records, 0.3) / power.records
+    floor = np.quantile(power.power[power.weight > 0], 0.3) / below
     theta, m = np.array([0.5 * np.log(floor), 0.0]), 0
     expected = np.full(power.power.size, floor)
     while m < MOST_LAYERS:
-        candidates = _candidates(power, expected)
+        candidates = _candidates(power, expected)[: MOST_LAYERS - m]
         if not len(candidates):
             break
         grown = _insert(theta, m, candidates, power, expected)
         bins = bins_near(power, *centres_and_widths(grown, m + len(candidates)))
-        before = misfit_of(bins, power_sum(theta, m, bins)[0])
+        before = misfit_of(bins, power_sum(theta if m else _noise_alone(bins), m, bins)[0])
         m_grown = m + len(candidates)
         limits = limits_of(m_grown, power, shaped=True)
         grown, after = maximise(
@@ -103,12 +109,20 @@ def find_peaks_jointly(power: Power) -> Peaks:
             break
         theta, m = grown, m_grown
         expected = _expected_on_lines(theta, m, power)
+    if not m:
+        theta = _noise_alone(bins_near(power, np.zeros(0), np.zeros(0)))
     return _as_peaks(theta, m, power)
+
+
+def _noise_alone(bins: Bins) -> Floats:
+    """Parameters of the likeliest power sum without peaks."""
+    return np.array([0.5 * np.log(bins.weight @ bins.power / bins.weight.sum()), 0.0])
 
 
 def penalty(power: Power) -> float:
     """What a further layer must gain in log likelihood, at least 2."""
-    return max(2.0, PENALTY - float(np.log(power.step_hz)))
+    samples = power.rate_hz / power.step_hz
+    return max(2.0, PENALTY + float(np.log(samples / PENALTY_SAMPLES)))
 
 
 def _candidates(power: Power, expected: Floats) -> Floats:
@@ -117,14 +131,15 @@ def _candidates(power: Power, expected: Floats) -> Floats:
     The likelihood ratio of a box of raised power, over boxes of widths in octaves; the best one,
     and with it all that are beyond doubt and far from it.
     """
-    ratio = np.where(power.power > 0, power.power / expected, 1.0)
-    total = np.concatenate(([0.0], np.cumsum(ratio)))
+    total = np.concatenate(([0.0], np.cumsum(power.weight * power.power / expected)))
+    lines = np.concatenate(([0.0], np.cumsum(power.weight)))
     found = []
     width = NARROWEST_BOX
-    while width * power.step_hz <= WIDEST_BOX_HZ and width < ratio.size:
+    while width * power.step_hz <= WIDEST_BOX_HZ and width < expected.size:
         hop = max(1, width // 6)
-        raised = np.maximum((total[width::hop] - total[:-width:hop]) / width, 1.0)
-        told = width * power.records
+        told = np.maximum(lines[width::hop] - lines[:-width:hop], 1e-9)
+        raised = np.maximum((total[width::hop] - total[:-width:hop]) / told, 1.0)
+        told *= power.records
         gain = told / (1 + told * FORGIVEN_MISFIT**2) * (raised - 1 - np.log(raised))
         for _ in range(4):
             best = int(np.argmax(gain))
@@ -170,14 +185,14 @@ def _expected_on_lines(theta: Floats, m: int, power: Power) -> Floats:
 def _as_peaks(theta: Floats, m: int, power: Power) -> Peaks:
     bins = bins_near(power, *centres_and_widths(theta, m))
     parts = power_sum_of_peaks(theta, m, bins)
-    expected = parts.sum(axis=0)
-    whole = misfit_of(bins, expected)
-    evidence = np.array([misfit_of(bins, expected - part) - whole for part in parts[1:]])
+    whole = misfit_of(bins, parts.sum(axis=0))
+    # Summed anew: next to a pure tone, the whole less the tone would be rounded to nothing.
+    rest = [np.delete(parts, i, axis=0).sum(axis=0) for i in range(1, m + 1)]
+    evidence = np.array([misfit_of(bins, expected) - whole for expected in rest])
     noise, frequency, bandwidth, gain, shape = split(theta, m)
     order = np.argsort(frequency)
-    order = order[
-        evidence[order] > penalty(power)
-    ]  # later peaks may have taken over for earlier ones
+    # Later peaks may have taken over for earlier ones.
+    order = order[evidence[order] > penalty(power)]
     return Peaks(
         noise_gain=float(np.exp(noise[0])),
         frequencies_hz=np.exp(frequency)[order],
@@ -236,7 +251,7 @@ def coherent_gains(
     def response(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
         signed = np.exp(theta[1:]) * signs
         in_phase, quadrature = np.exp(theta[0]) + signed @ real, signed @ imaginary
-        expected = in_phase * in_phase + quadrature * quadrature
+        expected = power_of(in_phase, quadrature)
         derivative = np.empty((theta.size, expected.size))
         derivative[0] = 2 * np.exp(theta[0]) * in_phase
         derivative[1:] = (real * in_phase + imaginary * quadrature) * (2 * signed)[:, None]
@@ -262,7 +277,14 @@ class CoherentFit:
 
 
 def coherent_fit(
-    peaks: Peaks, power: Power, signs: Floats, *, known: Bools, move: bool, bins: Bins
+    peaks: Peaks,
+    power: Power,
+    signs: Floats,
+    *,
+    known: Bools,
+    move: bool,
+    bins: Bins,
+    steps: int = 8,
 ) -> CoherentFit:
     """Layers of the coherent response near peaks found as a power sum.
 
@@ -272,6 +294,8 @@ def coherent_fit(
         Layers whose frequency and width stay as they are.
     move : bool
         Whether the frequencies of the others may move, too.
+    steps : int
+        At most.
     """
     m = peaks.gains.size
     gains, _ = coherent_gains(peaks, bins, signs)
@@ -292,7 +316,7 @@ def coherent_fit(
     # What is known may lie outside of the band that was recorded.
     low, high = np.where(free, low, theta), np.where(free, high, theta)
     theta, misfit = maximise(
-        coherent(signs), theta, bins, m=m, limits=(low, high), free=free, steps=8, enough=0.3
+        coherent(signs), theta, bins, m=m, limits=(low, high), free=free, steps=steps, enough=0.3
     )
     return CoherentFit(theta, signs, misfit, bins)
 
@@ -308,7 +332,7 @@ def fit_jointly(spectrum: Spectrum) -> Layers:
         return no_layers(0.0)
     peaks = find_peaks_jointly(power)
     if not peaks.gains.size:
-        return no_layers(peaks.noise_gain)
+        return no_layers(power.scale * peaks.noise_gain)
     bins = bins_near(power, peaks.frequencies_hz, peaks.bandwidths_hz)
     patterns = sign_patterns(peaks.frequencies_hz)
     signs = min(patterns, key=lambda signs: coherent_gains(peaks, bins, signs)[1])
@@ -384,13 +408,13 @@ def as_layers(fitted: CoherentFit, power: Power, *, known: Bools | None = None) 
     alone_sd, level_sd = _deviations(fitted, fixed)
     lost = alone_sd > 1.0
     bound = np.minimum(np.exp(gain) * alone_sd, np.exp(noise[0]))
-    gains = fitted.signs * np.where(lost, bound, np.exp(gain))
+    gains = power.scale * fitted.signs * np.where(lost, bound, np.exp(gain))
     level_sd_db = 20 / np.log(10) * np.where(lost, 1.0, level_sd)
     widths = np.exp(bandwidth)
     unresolved = lost | (widths < 2 * power.step_hz)
     order = np.argsort(frequency)[~lost[np.argsort(frequency)]] if known is None else np.arange(m)
     return Layers(
-        float(np.exp(noise[0])),
+        power.scale * float(np.exp(noise[0])),
         np.exp(frequency)[order],
         widths[order],
         gains[order],

@@ -59,10 +59,10 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
     noise, frequency, bandwidth, gain, _ = split(theta, count)
     order = np.argsort(frequency)
     return PEQ(
-        noise_gain=float(np.exp(noise[0])),
+        noise_gain=power.scale * float(np.exp(noise[0])),
         frequencies_hz=np.exp(frequency)[order],
         bandwidths_hz=np.exp(bandwidth)[order],
-        gains=(signs * np.exp(gain))[order],
+        gains=power.scale * (signs * np.exp(gain))[order],
         rate_hz=spectrum.rate_hz,
     )
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.peq import HIGHEST_FREQUENCY_SHARE, Floats
+from modeling.peq import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ, Floats
 from modeling.spectra import HIGH_PASS_HZ, Spectrum
 
 Bools = NDArray[np.bool_]
@@ -28,16 +28,23 @@ BIN_SHARE = 0.05
 SHAPE_RANGE = (0.8, 8.0)  # 1 is Lorentzian, 8 all but Gaussian
 NARROWEST_LINES = 1.5
 WIDEST_SHARE = 0.3
+LEAST_POWER = 1e-200
+WIDEST_LOG_GAIN = 50.0  # only so that nothing overflows
 
 
 @dataclass(frozen=True, eq=False)
 class Power:
-    """The periodogram in the band that holds signal: expected value (response)², one per line.
+    """The periodogram in the band that holds signal: (response/scale)² is expected in each line.
 
     Parameters
     ----------
     frequency_hz, power : (n,) ndarray
-        Evenly spaced; power in (unit per unit noise)².
+        Evenly spaced; power relative to the square of `scale`, so that no unit overflows.
+    scale : float
+        The smoothed spectrum's maximum, in the unit per unit noise.
+    weight : (n,) ndarray
+        What a line counts. Where the sensor's floor has left the share q of a line's power, the
+        relative error of the rest is 1/q times as large, so the line counts q².
     rate_hz, step_hz : float
     records : float
         How many records it is the mean of.
@@ -45,6 +52,8 @@ class Power:
 
     frequency_hz: Floats
     power: Floats
+    scale: float
+    weight: Floats
     rate_hz: float
     step_hz: float
     records: float
@@ -52,7 +61,20 @@ class Power:
 
 @dataclass(frozen=True, eq=False)
 class Bins:
-    """Averages over bins, narrow near peaks and of nearly constant relative width elsewhere."""
+    """Averages over n bins, narrow near peaks and of nearly constant relative width elsewhere.
+
+    Parameters
+    ----------
+    power : (n,) ndarray
+        Mean power of the bin's lines, as in `Power`.
+    weight, count : (n,) ndarray
+        Of a bin's log likelihood, with and without forgiveness for what no model fits; `count` is
+        the number of lines, times records, that it is worth.
+    tangent, cotangent : (n,) ndarray
+        tan(πF/fs) and its inverse in the middle F of the bin.
+    rate_hz : float
+        fs.
+    """
 
     power: Floats
     weight: Floats
@@ -78,16 +100,20 @@ def signal_power(spectrum: Spectrum) -> Power | None:
         spectrum.frequency_hz <= HIGHEST_SHARE * spectrum.rate_hz / 2
     )
     loudest = float(smoothed[within].max(initial=0.0))
-    if not loudest > 0:
+    if not (loudest > 0 and (spectrum.magnitude[within] > 0).any()):
         return None
     last = np.flatnonzero(within & (smoothed >= loudest * 10 ** (EMPTY_BELOW_DB / 20)))[-1]
     within[last + 1 :] = False
     # Of a Rayleigh-distributed magnitude of mean r the mean square is (4/π)r²; of the mean of K
     # such magnitudes it is r² + (4/π − 1)r²/K.
     records = spectrum.averaged
+    power = (spectrum.magnitude[within] / loudest) ** 2 / (1 + (4 / np.pi - 1) / records)
+    share = np.broadcast_to(spectrum.share, within.shape)[within]
     return Power(
         spectrum.frequency_hz[within],
-        spectrum.magnitude[within] ** 2 / (1 + (4 / np.pi - 1) / records),
+        power,
+        loudest,
+        np.where(power > 0, share**2, 0.0),
         spectrum.rate_hz,
         spectrum.rate_hz / spectrum.n_samples,
         records,
@@ -120,16 +146,14 @@ def bins_near(power: Power, centres_hz: Floats, widths_hz: Floats) -> Bins:
     number = np.cumsum(step / np.maximum(width, step)).astype(np.intp)
     starts = np.concatenate(([0], np.flatnonzero(number[1:] != number[:-1]) + 1))
     lines = np.diff(np.append(starts, frequency.size))
-    # Lines that the sensor's floor took whole say nothing.
-    heard = np.add.reduceat((power.power > 0).astype(np.float64), starts)
+    heard = np.add.reduceat(power.weight, starts)
     tangent = np.tan(np.pi / power.rate_hz * (frequency[starts] + (lines - 1) * step / 2))
-    average = np.add.reduceat(power.power, starts) / np.maximum(heard, 1.0)
-    heard = heard * power.records
-    weight = heard / (1 + heard * FORGIVEN_MISFIT**2)
-    told = heard > 0
-    return Bins(
-        average[told], weight[told], heard[told], tangent[told], 1 / tangent[told], power.rate_hz
-    )
+    told = heard > 0  # lines that the sensor's floor took whole say nothing
+    heard, tangent = heard[told], tangent[told]
+    average = np.add.reduceat(power.power * power.weight, starts)[told] / heard
+    count = heard * power.records
+    weight = count / (1 + count * FORGIVEN_MISFIT**2)
+    return Bins(average, weight, count, tangent, 1 / tangent, power.rate_hz)
 
 
 def offsets(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats, Floats]:
@@ -186,6 +210,12 @@ def power_sum(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
     return expected, derivative
 
 
+def power_of(in_phase: Floats, quadrature: Floats) -> Floats:
+    """Power of a sum, never quite 0, so that a bin where layers cancel stays comparable."""
+    power: Floats = np.maximum(in_phase * in_phase + quadrature * quadrature, LEAST_POWER)
+    return power
+
+
 def coherent(signs: Floats) -> Response:
     """The coherent power |G_w + Σ s_i·G_i·H_i|² of layers with these signs, as `power_sum`."""
 
@@ -196,7 +226,7 @@ def coherent(signs: Floats) -> Response:
         imaginary = u * real
         signed = np.exp(gain) * signs
         in_phase, quadrature = np.exp(noise[0]) + signed @ real, signed @ imaginary
-        expected = in_phase * in_phase + quadrature * quadrature
+        expected = power_of(in_phase, quadrature)
         twice = (2 * signed)[:, None]
         by_u = ((1 - u * u) * quadrature - 2 * u * in_phase) * (real * real) * twice
         derivative = np.empty((theta.size, expected.size))
@@ -248,46 +278,53 @@ def maximise(
     damping = 1e-2
     expected, derivative = response(theta, m, bins)
     misfit = misfit_of(bins, expected)
-    for _ in range(steps):
-        if free is not None:
-            derivative = derivative * free[:, None]
-        weighted = derivative * bins.weight
-        information = weighted @ derivative.T
-        score = weighted @ (bins.power / expected - 1)
-        while True:
-            damped = information.copy()
-            damped.flat[:: damped.shape[0] + 1] += damping * np.diag(information) + 1e-9
-            step = np.minimum(np.maximum(np.linalg.solve(damped, score), -1.0), 1.0)
-            tried = np.minimum(np.maximum(theta + step, low), high)
-            expected_tried, derivative_tried = response(tried, m, bins)
-            misfit_tried = misfit_of(bins, expected_tried)
-            if misfit_tried < misfit or damping > 100:
+    information, score = _information(bins, expected, derivative, free)
+    while steps > 0:
+        tried = np.minimum(np.maximum(theta + _step(information, score, damping), low), high)
+        expected, derivative = response(tried, m, bins)
+        misfit_tried = misfit_of(bins, expected)
+        if misfit_tried < misfit:
+            gained = misfit - misfit_tried
+            theta, misfit, steps = tried, misfit_tried, steps - 1
+            if gained < enough:
                 break
+            information, score = _information(bins, expected, derivative, free)
+            damping = max(damping / 10, 1e-4)
+        elif damping > 100:
+            break
+        else:
             damping *= 10
-        if not misfit_tried < misfit:
-            break
-        gained = misfit - misfit_tried
-        theta, expected, derivative, misfit = tried, expected_tried, derivative_tried, misfit_tried
-        damping = max(damping / 10, 1e-4)
-        if gained < enough:
-            break
     return theta, misfit
+
+
+def _information(
+    bins: Bins, expected: Floats, derivative: Floats, free: Bools | None
+) -> tuple[Floats, Floats]:
+    """Fisher information (p, p) and score (p,), 0 for what is not free."""
+    if free is not None:
+        derivative = derivative * free[:, None]
+    weighted = derivative * bins.weight
+    return weighted @ derivative.T, weighted @ (bins.power / expected - 1)
+
+
+def _step(information: Floats, score: Floats, damping: float) -> Floats:
+    """Levenberg–Marquardt step, at most a factor of e in any parameter."""
+    damped = information.copy()
+    damped.flat[:: damped.shape[0] + 1] += damping * np.diag(information) + 1e-9
+    step: Floats = np.minimum(np.maximum(np.linalg.solve(damped, score), -1.0), 1.0)
+    return step
 
 
 def limits_of(m: int, power: Power, *, shaped: bool) -> tuple[Floats, Floats]:
     """Lowest and highest parameters of m layers: what a model may hold and a record can tell."""
-    one, none = np.ones(m), np.zeros(0)
-    rate_hz = power.rate_hz
-    low, high = LOWEST_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz
-    shape = np.log(SHAPE_RANGE) if shaped else (none, none)
-    edges = zip(
-        (low, NARROWEST_LINES * power.step_hz, shape[0]),
-        (high, WIDEST_SHARE * rate_hz, shape[1]),
-        strict=True,
-    )
-    (f_low, f_high), (b_low, b_high), (s_low, s_high) = edges
-    free = np.full(m, 50.0)
-    return (
-        np.hstack((-50.0, np.log(f_low) * one, np.log(b_low) * one, -free, s_low)),
-        np.hstack((50.0, np.log(f_high) * one, np.log(b_high) * one, free, s_high)),
-    )
+    shape = np.log(SHAPE_RANGE) if shaped else np.zeros((2, 0))
+    narrowest_hz = max(NARROWEST_LINES * power.step_hz, LOWEST_BANDWIDTH_HZ)
+
+    def limit(gain: float, frequency_hz: float, bandwidth_hz: float) -> Floats:
+        places = np.repeat(np.log([frequency_hz, bandwidth_hz]), m)
+        return np.concatenate(([gain], places, np.full(m, gain)))
+
+    low = limit(-WIDEST_LOG_GAIN, LOWEST_HZ, narrowest_hz)
+    highest_hz = HIGHEST_FREQUENCY_SHARE * power.rate_hz
+    high = limit(WIDEST_LOG_GAIN, highest_hz, WIDEST_SHARE * power.rate_hz)
+    return np.append(low, shape[0]), np.append(high, shape[1])

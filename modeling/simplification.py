@@ -160,13 +160,14 @@ def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureMode
         0-based.
     """
     fewer = model.with_layers(keep)
-    if len(keep) == model.n_layers or model.estimator in ("paper", "paper-consistent"):
+    if len(keep) in (0, model.n_layers) or model.estimator in ("paper", "paper-consistent"):
         return fewer
     frequency = np.geomspace(LOWEST_HZ, HIGHEST_SHARE * model.rate_hz / 2, SIGN_POINTS)
     conditions = [(v, f) for v in range(model.speeds_mm_s.size) for f in range(model.forces_n.size)]
     full = [_response(model, at, frequency) for at in conditions]
     amplitudes = np.abs(fewer.gains)
-    signs = np.sign(fewer.gains[-1, -1])
+    # A layer's sign is one for the whole texture, but where it is silent it has none.
+    signs = np.sign(fewer.gains.sum(axis=(0, 1)))
     best, least = fewer, np.inf
     for pattern in [signs, *neighbouring_patterns(np.median(fewer.frequencies_hz, axis=(0, 1)))]:
         tried = replace(fewer, gains=amplitudes * pattern)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ class Spectrum:
         N, the number of samples behind it.
     averaged : float
         How many records of that length it is the mean of, ≥ 1.
+    share : (n,) ndarray or 1
+        Of each line's power, what subtracting the sensor's floor has left, 0…1.
     """
 
     frequency_hz: Floats
@@ -41,6 +44,7 @@ class Spectrum:
     rate_hz: float
     n_samples: int
     averaged: float = 1.0
+    share: Floats | float = 1.0
 
     @property
     def duration_s(self) -> float:
@@ -149,11 +153,19 @@ def mean_spectrum(spectra: list[Spectrum]) -> Spectrum:
     longest = max(spectra, key=lambda s: s.n_samples)
     if len(spectra) == 1:
         return longest
-    magnitudes = [np.interp(longest.frequency_hz, s.frequency_hz, s.magnitude) for s in spectra]
     lengths = [s.n_samples for s in spectra]
-    average = np.asarray(np.average(magnitudes, axis=0, weights=lengths), dtype=np.float64)
+
+    def average(name: Literal["magnitude", "share"]) -> Floats:
+        values = [
+            np.interp(longest.frequency_hz, s.frequency_hz, s.magnitude * 0 + getattr(s, name))
+            for s in spectra
+        ]
+        return np.asarray(np.average(values, axis=0, weights=lengths), dtype=np.float64)
+
     records = sum(lengths) ** 2 / sum(length**2 for length in lengths)
-    return Spectrum(longest.frequency_hz, average, longest.rate_hz, longest.n_samples, records)
+    return replace(
+        longest, magnitude=average("magnitude"), share=average("share"), averaged=records
+    )
 
 
 def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
@@ -161,5 +173,5 @@ def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
     level = np.interp(spectrum.frequency_hz, floor.frequency_hz, floor.smoothed())
     # Rayleigh-distributed bins: E|X|² = (4/π)(E|X|)², alike in both, so means subtract in power.
     smoothed = np.maximum(spectrum.smoothed(), 1e-300)
-    kept = np.sqrt(np.maximum(1 - (level / smoothed) ** 2, 0.0))
-    return replace(spectrum, magnitude=spectrum.magnitude * kept)
+    share = np.maximum(1 - (level / smoothed) ** 2, 0.0)
+    return replace(spectrum, magnitude=spectrum.magnitude * np.sqrt(share), share=share)

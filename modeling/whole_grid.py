@@ -22,7 +22,6 @@ from modeling.joint import (
     find_peaks_jointly,
     neighbouring_patterns,
     power_sum_misfit,
-    without,
 )
 from modeling.layers import Layers
 from modeling.likelihood import (
@@ -33,14 +32,12 @@ from modeling.likelihood import (
     centres_and_widths,
     signal_power,
 )
-from modeling.peq import Floats
+from modeling.peq import Floats, clamp_bands
 from modeling.spectra import Spectrum
 from modeling.tracks import CLEAR_EVIDENCE, LEAST_SUPPORT, Tracks, find_tracks, foretell, strayed
 
 # Signs and number of layers are decided on conditions spread over the grid.
 DECIDING_CONDITIONS = 6
-DOUBTFUL_SUPPORT = 0.6  # of the conditions: below it a layer may be an artefact
-CLEAR_SUPPORT = 0.9
 ABSENT_GAIN = 0.1  # of the noise gain: where the fit of a layer without a peak starts
 
 
@@ -62,9 +59,15 @@ class _Start:
     bins: Bins
     alone_misfit: float
 
-    def fitted(self, signs: Floats, *, move: bool) -> CoherentFit:
+    def fitted(self, signs: Floats, *, move: bool, steps: int = 8) -> CoherentFit:
         return coherent_fit(
-            self.peaks, self.power, signs, known=self.absent, move=move, bins=self.bins
+            self.peaks,
+            self.power,
+            signs,
+            known=self.absent,
+            move=move,
+            bins=self.bins,
+            steps=steps,
         )
 
     def at(self, frequencies_hz: Floats, bandwidths_hz: Floats, which: Bools) -> _Start:
@@ -97,6 +100,8 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum]) -> GridFit:
     spectra : mapping of (speed, force) to Spectrum
         One texture, at least one condition. A silent one gets the others' layers without gain.
     """
+    # The deciding conditions are picked by their place in the grid, whatever order they come in.
+    spectra = dict(sorted(spectra.items()))
     powers = {condition: signal_power(s) for condition, s in spectra.items()}
     found = {c: SILENCE if p is None else find_peaks_jointly(p) for c, p in powers.items()}
     tracks = find_tracks(found)
@@ -105,12 +110,12 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum]) -> GridFit:
         for row, (c, power) in enumerate(powers.items())
         if power is not None
     }
-    decided = _decide(list(starts.values()), tracks.support)
+    decided = _decide(list(starts.values()), tracks.chosen.shape[1])
     starts = {c: start.only(decided.kept) for c, start in starts.items()}
     fits = {c: start.fitted(decided.signs, move=decided.move) for c, start in starts.items()}
-    fits = _started_again(list(spectra), starts, fits, decided)
     absent = tracks.chosen[:, decided.kept] < 0
-    told = _told(list(spectra), fits, absent)
+    fits = _started_again(spectra, starts, fits, decided=decided, absent=absent)
+    told = _told(spectra, fits, absent)
     layers = {
         c: as_layers(fits[c], starts[c].power, known=absent[row])
         if c in fits
@@ -121,25 +126,23 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum]) -> GridFit:
 
 
 def _started_again(
-    conditions: list[Condition],
+    spectra: Mapping[Condition, Spectrum],
     starts: Mapping[Condition, _Start],
     fits: Mapping[Condition, CoherentFit],
+    *,
     decided: _Decision,
+    absent: Bools,
 ) -> dict[Condition, CoherentFit]:
     """The fits, those begun anew whose layers are absent or have strayed from their law.
 
     They start where the other conditions foretell, and of a strayed one that fit is taken unless it
     is clearly the worse.
     """
-    absent = np.array([
-        starts[c].absent if c in starts else np.ones(len(decided.kept), dtype=bool)
-        for c in conditions
-    ])  # fmt: skip
-    frequency, _ = _told(conditions, fits, absent)
-    off = strayed(np.log(np.array(conditions)), frequency, present=~absent)
-    told = _told(conditions, fits, absent | off)
+    frequency, _ = _told(spectra, fits, absent)
+    off = strayed(np.log(np.array(list(spectra))), frequency, present=~absent)
+    told = _told(spectra, fits, absent | off)
     again = dict(fits)
-    for row, condition in enumerate(conditions):
+    for row, condition in enumerate(spectra):
         if condition not in fits or not (absent[row] | off[row]).any():
             continue
         start = starts[condition].at(told[0][row], told[1][row], absent[row] | off[row])
@@ -155,37 +158,47 @@ def _start(power: Power, found: Peaks, tracks: Tracks, row: int) -> _Start:
     absent = chosen < 0
     gains = np.full(chosen.size, ABSENT_GAIN * found.noise_gain)
     gains[~absent] = found.gains[chosen[~absent]]
-    frequencies, bandwidths = tracks.frequencies_hz[row], tracks.bandwidths_hz[row]
-    peaks = Peaks(
-        found.noise_gain, frequencies, bandwidths, gains, found.shape, np.zeros(absent.size)
+    # A law may lead out of the band.
+    frequencies, bandwidths, _ = clamp_bands(
+        tracks.frequencies_hz[row], tracks.bandwidths_hz[row], rate_hz=power.rate_hz
     )
+    evidence = np.zeros(absent.size)
+    evidence[~absent] = found.evidence[chosen[~absent]]
+    peaks = Peaks(found.noise_gain, frequencies, bandwidths, gains, found.shape, evidence)
     bins = bins_near(power, frequencies, bandwidths)
     return _Start(power, peaks, absent, bins, power_sum_misfit(found, bins))
 
 
-def _decide(starts: list[_Start], support: Floats) -> _Decision:
+def _decide(starts: list[_Start], m: int) -> _Decision:
     """Signs and layers, on conditions spread over the grid.
 
     A layer that the coherent response of the others makes up for is dropped, and the signs of the
-    rest are chosen again. If even the best response falls short of the sum of powers, layers are
-    independent of each other, and stay where that sum has them.
+    rest are chosen again: what layers leave between and beyond each other looks like further ones
+    to a sum of powers. If even the best response falls short of that sum, layers are independent
+    of each other, and stay where it has them.
     """
     some = _spread(starts)
-    everything = list(range(support.size))
-    best = _trial(some, everything, move=True)
-    for layer in np.argsort(support, kind="stable"):
-        # Where the response falls short, an artefact in many conditions may stand in its way.
-        doubtful = DOUBTFUL_SUPPORT if _holds(best, some) else CLEAR_SUPPORT
-        if support[layer] < doubtful and len(best.kept) > 1:
-            best = _if_as_good(best, _trial(some, [i for i in best.kept if i != layer], move=True))
-    while len(best.kept) > 1 and (weakest := _weakest(best)) is not None:
-        fewer = _if_as_good(best, _trial(some, [i for i in best.kept if i != weakest], move=True))
-        if fewer is best:
-            break
-        best = fewer
+    best = _trial(some, list(range(m)), move=True)
+    evidence = sum((start.peaks.evidence for start in some), np.zeros(m))
+    for layer in np.argsort(evidence, kind="stable"):
+        fewer = [i for i in best.kept if i != layer]
+        if fewer and _may_do(some, fewer, best):
+            best = _if_as_good(best, _trial(some, fewer, move=True))
     if not _holds(best, some):
-        return _Decision(everything, _trial(some, everything, move=False).signs, move=False)
+        return _Decision(list(range(m)), _trial(some, list(range(m)), move=False).signs, move=False)
     return _Decision(best.kept, best.signs, move=True)
+
+
+def _may_do(starts: list[_Start], kept: list[int], best: _Trial) -> bool:
+    """Whether these layers alone, with any signs, come near the best fit in the clearest condition.
+
+    A quick look, which spares most layers a trial without them.
+    """
+    clearest = max(range(len(starts)), key=lambda i: float(starts[i].peaks.evidence.sum()))
+    start = starts[clearest].only(kept)
+    limit = best.fits[clearest].misfit + CLEAR_EVIDENCE
+    patterns = neighbouring_patterns(start.peaks.frequencies_hz)
+    return any(start.fitted(signs, move=True, steps=5).misfit < limit for signs in patterns)
 
 
 def _holds(trial: _Trial, starts: list[_Start]) -> bool:
@@ -245,17 +258,6 @@ def _if_as_good(best: _Trial, fewer: _Trial) -> _Trial:
     return fewer if _support(losses) < LEAST_SUPPORT * len(losses) else best
 
 
-def _weakest(best: _Trial) -> int | None:
-    """The layer whose loss, the others not refitted, is least; None if it is out of question."""
-    supports = [
-        _support([without(f, i).misfit - f.misfit for f in best.fits])
-        for i in range(len(best.kept))
-    ]
-    weakest = int(np.argmin(supports))
-    possible = supports[weakest] < 4 * LEAST_SUPPORT * len(best.fits)
-    return best.kept[weakest] if possible else None
-
-
 def _support(losses: list[float]) -> float:
     """Conditions that clearly need a layer, doubtful ones in part; no single one decides."""
     clear = np.sort(np.minimum(np.array(losses) / CLEAR_EVIDENCE, 1.0))
@@ -263,16 +265,18 @@ def _support(losses: list[float]) -> float:
 
 
 def _told(
-    conditions: list[Condition], fits: Mapping[Condition, CoherentFit], absent: Bools
+    spectra: Mapping[Condition, Spectrum], fits: Mapping[Condition, CoherentFit], absent: Bools
 ) -> tuple[Floats, Floats]:
     """Fitted frequencies and bandwidths (C, m); those of absent layers told from the others."""
     frequency, bandwidth = np.ones(absent.shape), np.ones(absent.shape)
-    for row, condition in enumerate(conditions):
+    for row, condition in enumerate(spectra):
         if condition in fits:
             frequency[row], bandwidth[row] = centres_and_widths(
                 fits[condition].theta, absent.shape[1]
             )
-    return foretell(np.log(np.array(conditions)), frequency, bandwidth, present=~absent)
+    told = foretell(np.log(np.array(list(spectra))), frequency, bandwidth, present=~absent)
+    rate_hz = next(iter(spectra.values())).rate_hz
+    return clamp_bands(*told, rate_hz=rate_hz)[:2]
 
 
 def _silent(frequencies_hz: Floats, bandwidths_hz: Floats) -> Layers:

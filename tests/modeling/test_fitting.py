@@ -309,3 +309,82 @@ def test_lowest_rate_counts(make_recording: RecordingMaker) -> None:
     recordings = [make_recording(seed=1), make_recording(seed=2, rate_hz=1000.0, force_n=2.0)]
     spectra = condition_spectra(RecordingSet(recordings))
     assert {s.rate_hz for s in spectra.values()} == {1000.0}
+
+
+# --- a whole texture by `joint`
+
+
+def drawn(peq: PEQ, n: int, *, rng: np.random.Generator) -> np.ndarray:
+    """(n,) samples of one noise through a PEQ at 5 kHz, cut from a longer circle."""
+    response = peq.complex_response(np.fft.rfftfreq(4 * n, 1 / 5000))
+    return np.fft.irfft(response * np.fft.rfft(rng.standard_normal(4 * n)), 4 * n)[:n]
+
+
+def test_repeats_tell_joint_more(make_model: ModelMaker) -> None:
+    """Four records of a condition halve the levels' deviations; means keep gains unbiased."""
+    truth = make_model(0.05, LAYERS)
+    once = record(truth, seed=0)
+    often = [
+        Recording(r.samples, r.rate_hz, r.speed_mm_s, r.force_n, "planted", repeat=k + 1)
+        for k in range(4)
+        for r in record(truth, seed=k)
+    ]
+    one, four = fit_texture(once), fit_texture(often)
+    assert one.n_layers == four.n_layers == 3
+    ratio = four.level_sd_db / one.level_sd_db
+    assert np.median(ratio) == pytest.approx(0.5, abs=0.05)
+    assert four.noise_gains == pytest.approx(0.05, rel=0.05)
+    level_db = 20 * np.log10(four.gains * np.sqrt(four.bandwidths_hz))
+    expected = [20 * np.log10(g * np.sqrt(b)) for _, b, g in LAYERS]
+    assert (np.abs(level_db - expected) < 4 * four.level_sd_db).all()
+
+
+def test_a_floor_above_the_noise_brings_no_layers(make_model: ModelMaker) -> None:
+    """What its subtraction leaves would otherwise be a peak at the same place everywhere."""
+    rng = np.random.default_rng(0)
+    peq = make_model(0.02, [(200.0, 40.0, 1.0), (700.0, 60.0, 0.3)]).peq(100.0, 1.0)
+    recordings = [
+        Recording(drawn(peq, 5000, rng=rng) + 0.1 * rng.standard_normal(5000), 5000.0, v, f, "x")
+        for v in (100.0, 200.0, 300.0)
+        for f in (1.0, 2.0, 3.0)
+    ]
+    floor = Recording(0.1 * rng.standard_normal(5000), 5000.0, 0.0, 0.0, "x")
+    model = fit_texture([*recordings, floor])
+    assert model.n_layers == 2
+    assert model.frequencies_hz == pytest.approx(np.broadcast_to([200.0, 700.0], (3, 3, 2)), abs=20)
+    assert (model.noise_gains < 0.1).all()
+
+
+def test_holes_of_a_joint_model_lie_between_their_neighbours(make_model: ModelMaker) -> None:
+    truth = make_model(0.05, LAYERS, speeds_mm_s=(100.0, 200.0, 300.0), forces_n=(1.0, 2.0, 3.0))
+    model = fit_texture(record(truth, without=((200.0, 2.0),)))
+    assert missing_conditions(model) == [(200.0, 2.0)]
+    assert model.n_layers == 3
+    for name in ("frequencies_hz", "bandwidths_hz", "gains"):
+        values = getattr(model, name)
+        others = values[~model.interpolated]
+        assert (values[1, 1] >= others.min(axis=0)).all()
+        assert (values[1, 1] <= others.max(axis=0)).all()
+    assert (np.sign(model.gains) == np.sign(model.gains[0, 0])).all()
+
+
+def test_a_layer_beyond_the_nyquist_frequency_is_foretold_within_it() -> None:
+    """8 cycles per mm are at 2.4 kHz at 300 mm/s, and would be at 2.8 kHz at 350 mm/s."""
+    rng = np.random.default_rng(0)
+    recordings = []
+    for v in np.linspace(50.0, 350.0, 7):
+        layers = [(200.0, 40.0, 0.3)] + ([(8 * v, 60.0, 0.3)] if v < 280 else [])
+        frequency, bandwidth, gain = np.array(layers).T
+        peq = PEQ(
+            noise_gain=0.02,
+            frequencies_hz=frequency,
+            bandwidths_hz=bandwidth,
+            gains=gain,
+            rate_hz=5000.0,
+        )
+        for f in (1.0, 2.0, 3.0):
+            recordings.append(Recording(drawn(peq, 5000, rng=rng), 5000.0, v, f, "x"))
+    model = fit_texture(recordings)
+    assert model.n_layers == 2
+    assert model.frequencies_hz.max() <= 2450
+    assert model.inherited[-1, :, 1].all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -12,7 +13,11 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
-from modeling.simplification import distances_db, layer_amplitudes_g
+from modeling.simplification import (
+    distances_db,
+    layer_amplitudes_g,
+    with_signs_chosen_again,
+)
 
 ModelMaker = Callable[..., TextureModel]
 # 0.1 g from 10 to 1000 Hz: with `paper-gain` a layer's gain is its level.
@@ -366,3 +371,70 @@ def test_wrong_margins_are_refused(make_model: ModelMaker, margin_db: float) -> 
 def test_unknown_criteria_are_refused(make_model: ModelMaker) -> None:
     with pytest.raises(InputError, match="energy, paper-fft, paper-gain, got 'loudness'"):
         run(make_model(0.0, at_db(1)), criterion="loudness")
+
+
+# --- signs of those that stay (METHOD 3)
+
+ALTERNATING = [(150.0, 60.0, 0.5), (240.0, 60.0, -0.3), (350.0, 60.0, 0.5)]
+
+
+def test_two_neighbours_left_with_equal_signs_are_made_to_alternate(
+    make_model: ModelMaker,
+) -> None:
+    model = make_model(0.02, ALTERNATING)
+    fewer = model.with_layers([0, 2])
+    again = with_signs_chosen_again(model, [0, 2])
+    assert (np.sign(fewer.gains) == [1, 1]).all()
+    assert (again.gains[:, :, 0] * again.gains[:, :, 1] < 0).all()
+    assert (np.abs(again.gains) == np.abs(fewer.gains)).all()
+    between = np.arange(200.0, 300.0)
+    filled = again.peq(200.0, 2.0).response(between)
+    full = model.peq(200.0, 2.0).response(between)
+    hole = fewer.peq(200.0, 2.0).response(between)
+    assert hole.min() < 0.5 * full.min()
+    assert filled.min() > 0.8 * full.min()
+
+
+def test_a_hole_that_the_full_model_has_is_kept(make_model: ModelMaker) -> None:
+    model = make_model(0.02, [(150.0, 60.0, 0.5), (350.0, 60.0, 0.5), (1500.0, 50.0, -0.03)])
+    again = with_signs_chosen_again(model, [0, 1])
+    assert (again.gains == [0.5, 0.5]).all()
+
+
+@pytest.mark.parametrize("estimator", ["paper", "paper-consistent"])
+def test_models_by_the_papers_recipe_keep_their_signs(
+    make_model: ModelMaker, estimator: str
+) -> None:
+    model = replace(make_model(0.02, ALTERNATING), estimator=estimator)
+    again = with_signs_chosen_again(model, [0, 2])
+    assert (again.gains == model.gains[:, :, [0, 2]]).all()
+    assert (again.frequencies_hz == model.frequencies_hz[:, :, [0, 2]]).all()
+
+
+def test_where_nothing_is_dropped_nothing_changes(make_model: ModelMaker) -> None:
+    model = make_model(0.02, [(150.0, 60.0, 0.5), (350.0, 60.0, 0.5)])
+    again = with_signs_chosen_again(model, [0, 1])
+    for name in ("gains", "frequencies_hz", "bandwidths_hz", "noise_gains", "level_sd_db"):
+        assert (getattr(again, name) == getattr(model, name)).all()
+
+
+@pytest.mark.parametrize("keep", [[], [0], [1], [0, 2], [0, 1]])
+def test_whatever_stays_keeps_its_amplitudes_and_one_sign(
+    make_model: ModelMaker, keep: list[int]
+) -> None:
+    """Also where the strongest force and fastest speed are silent, and tell no sign."""
+    planted = make_model(0.02, ALTERNATING)
+    gains = planted.gains.copy()
+    gains[-1, -1] = 0.0
+    model = replace(planted, gains=gains)
+    again = with_signs_chosen_again(model, keep)
+    assert (np.abs(again.gains) == np.abs(gains[:, :, keep])).all()
+    signs = np.sign(again.gains).reshape(4, len(keep))[:-1]
+    assert (signs == signs[0]).all()
+
+
+def test_simplify_chooses_signs_again(make_model: ModelMaker) -> None:
+    high = Threshold("high", np.array([10.0, 1000.0]), np.array([0.4, 0.4]), "planted", "none")
+    simplified = simplify(make_model(0.02, ALTERNATING), high, criterion="paper-gain").model
+    assert simplified.n_layers == 2
+    assert (simplified.gains[:, :, 0] * simplified.gains[:, :, 1] < 0).all()
