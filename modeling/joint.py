@@ -59,7 +59,7 @@ class Peaks:
     ----------
     noise_gain : float
     frequencies_hz, bandwidths_hz, gains : (m,) ndarray
-        Gains are those of the peaks' own power.
+        Gains, relative to `Power.scale`, are those of the peaks' own power.
     shape : float
         Of all peaks: 1 is Lorentzian, larger falls off faster.
     evidence : (m,) ndarray
@@ -268,7 +268,7 @@ def coherent_gains(
 
 @dataclass(frozen=True, eq=False)
 class CoherentFit:
-    """Parameters (see `likelihood.split`) of layers with signs, and how well they fit."""
+    """Parameters (`likelihood.split`; gains relative to `Power.scale`), signs, and the misfit."""
 
     theta: Floats
     signs: Floats

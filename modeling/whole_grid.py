@@ -135,11 +135,13 @@ def _started_again(
 ) -> dict[Condition, CoherentFit]:
     """The fits, those begun anew whose layers are absent or have strayed from their law.
 
-    They start where the other conditions foretell, and of a strayed one that fit is taken unless it
-    is clearly the worse.
+    They start where the other conditions foretell, as do all layers of a condition whose fit has
+    failed; and of a strayed one that fit is taken unless it is clearly the worse.
     """
     frequency, _ = _told(spectra, fits, absent)
-    off = strayed(np.log(np.array(list(spectra))), frequency, present=~absent)
+    off: Bools = strayed(np.log(np.array(list(spectra))), frequency, present=~absent)
+    if decided.move:
+        off = _with_failed(off, [_failed(c, starts, fits) for c in spectra], absent)
     told = _told(spectra, fits, absent | off)
     again = dict(fits)
     for row, condition in enumerate(spectra):
@@ -150,6 +152,23 @@ def _started_again(
         if absent[row].any() or begun.misfit < fits[condition].misfit + COHERENT_BY:
             again[condition] = begun
     return again
+
+
+def _failed(
+    condition: Condition, starts: Mapping[Condition, _Start], fits: Mapping[Condition, CoherentFit]
+) -> bool:
+    """Whether the fit misses what the condition's own peaks explain."""
+    if condition not in fits:
+        return False
+    return fits[condition].misfit > starts[condition].alone_misfit + CLEAR_EVIDENCE
+
+
+def _with_failed(off: Bools, failed: list[bool], absent: Bools) -> Bools:
+    """All layers of failed conditions, too, but those that no other condition could foretell."""
+    whole = off | (np.array(failed)[:, None] & ~absent)
+    told = (~absent & ~whole).any(axis=0)
+    every: Bools = np.where(told, whole, off)
+    return every
 
 
 def _start(power: Power, found: Peaks, tracks: Tracks, row: int) -> _Start:

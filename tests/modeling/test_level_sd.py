@@ -180,7 +180,8 @@ def refitted_level_db(samples: Floats, first: Layers) -> float:
     power = signal_power(spectrum_of_samples(samples, RATE_HZ))
     assert power is not None
     places = first.frequencies_hz, first.bandwidths_hz
-    theta = np.log(np.hstack((first.noise_gain, *places, np.abs(first.gains))))
+    noise_gain, gains = first.noise_gain / power.scale, np.abs(first.gains) / power.scale
+    theta = np.log(np.hstack((noise_gain, *places, gains)))
     start = CoherentFit(theta, np.sign(first.gains), np.inf, bins_near(power, *places))
     known = np.zeros(first.gains.shape, dtype=bool)
     layers = as_layers(refitted(start, power), power, known=known)

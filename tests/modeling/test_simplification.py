@@ -375,7 +375,7 @@ def test_unknown_criteria_are_refused(make_model: ModelMaker) -> None:
 
 # --- signs of those that stay (METHOD 3)
 
-ALTERNATING = [(150.0, 60.0, 0.5), (240.0, 60.0, -0.3), (350.0, 60.0, 0.5)]
+ALTERNATING = [(300.0, 40.0, 0.5), (400.0, 60.0, -0.35), (500.0, 40.0, 0.5)]
 
 
 def test_two_neighbours_left_with_equal_signs_are_made_to_alternate(
@@ -387,7 +387,7 @@ def test_two_neighbours_left_with_equal_signs_are_made_to_alternate(
     assert (np.sign(fewer.gains) == [1, 1]).all()
     assert (again.gains[:, :, 0] * again.gains[:, :, 1] < 0).all()
     assert (np.abs(again.gains) == np.abs(fewer.gains)).all()
-    between = np.arange(200.0, 300.0)
+    between = np.arange(330.0, 470.0)
     filled = again.peq(200.0, 2.0).response(between)
     full = model.peq(200.0, 2.0).response(between)
     hole = fewer.peq(200.0, 2.0).response(between)
