@@ -118,10 +118,10 @@ def _laws(votes: _Votes, conditions: int) -> list[Floats]:
     left = votes.weight.copy()
     laws: list[Floats] = []
     flat = votes.frequency - EXPONENTS[:, None] * votes.x  # (exponents, n)
-    near = 1 - (np.abs(flat[:, :, None] - flat[:, None, :]) / votes.tolerance) ** 2
-    near = np.maximum(near, 0.0)  # (exponents, seeds, votes)
+    everyone = np.arange(left.size)
+    # One exponent at a time: all pairs of all peaks of a large grid would fill the memory.
+    support = np.array([_votes_for(votes, row, everyone) @ left for row in flat])
     while len(laws) < votes.frequency.size:
-        support = near @ left
         exponent, seed = np.unravel_index(int(np.argmax(support)), support.shape)
         if support[exponent, seed] < LEAST_SUPPORT * conditions:
             break
@@ -130,8 +130,16 @@ def _laws(votes: _Votes, conditions: int) -> list[Floats]:
         law = _fitted(votes, mine, start)
         laws.append(law)
         # One peak of each condition; the others there vote for laws of their own.
-        left[mine | _nearest_of_each(votes, law, left > 0)] = 0.0
+        taken = np.flatnonzero(mine | _nearest_of_each(votes, law, left > 0))
+        support -= np.array([_votes_for(votes, row, taken) @ left[taken] for row in flat])
+        left[taken] = 0.0
     return laws
+
+
+def _votes_for(votes: _Votes, flat: Floats, voters: NDArray[np.intp]) -> Floats:
+    """How much each voter is for a law through each peak, (n, voters), 0 beyond its tolerance."""
+    distance = (flat[:, None] - flat[voters]) / votes.tolerance[voters]
+    return np.maximum(1 - distance * distance, 0.0)
 
 
 def _nearest_of_each(votes: _Votes, law: Floats, among: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -25,6 +25,7 @@ from modeling import (
 from modeling.autoregressive import fit_filter
 from modeling.spectra import MODEL_RATE_HZ
 from modeling_steps import model_textures
+from stimuli.planted import planted_texture
 
 RECORDER_RATE_HZ = 22704.0
 AR_ORDER = 20
@@ -161,3 +162,19 @@ def test_command_on_a_study(
         model_textures, args=([tmp_path / "recordings"], tmp_path / "out"), kwargs=options
     )
     assert len(list((tmp_path / "out").glob("*_spectra.png"))) == len(study)
+
+
+@pytest.mark.benchmark(group="parameters at 20 000 points of a stroke")
+@pytest.mark.parametrize("driven_by", ["grid", "conditions", "centroid"])
+def test_parameters_of_a_stroke(benchmark: BenchmarkFixture, driven_by: str) -> None:
+    """A model driven by its grid, and by regressions instead."""
+    planted = planted_texture("canvas")
+    model = planted if driven_by == "grid" else planted.regressed(by=driven_by)
+    time_s = np.arange(20_000) / MODEL_RATE_HZ
+    speed = 400 * np.abs(np.sin(2 * np.pi * time_s))
+    benchmark.extra_info |= {"what": f"by {driven_by}"}
+    if driven_by == "grid":
+        benchmark.extra_info["rival"] = True
+    found = benchmark(model.parameters, speed, np.full(speed.size, 1.5))
+    assert found.gains.shape == (20_000, 4)
+    assert np.isfinite(found.gains).all()
