@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +13,6 @@ from scipy.signal import freqz
 from scipy.signal.windows import tukey
 
 from modeling.errors import InputError, check_texture_name
-from modeling.files import write_text
 from modeling.fitting import only_unit, recording_spectra
 from modeling.grid import Cells, Condition, Floats, check_axes, fill_grid, grid_axes, within_grid
 from modeling.line_spectral import (
@@ -23,12 +21,10 @@ from modeling.line_spectral import (
     prediction_coefficients,
     reflection_coefficients,
 )
-from modeling.model import dump_json, load_json, model_from
 from modeling.recording import UNITS, Recording, RecordingSet
+from modeling.saved import SavedModel
 from modeling.spectra import Spectrum
 
-FORMAT = "tactileq.ar-model"
-VERSION = 1
 HIGHEST_ORDER = 40
 # White noise 90 dB below the record keeps an order that the data do not need from being singular.
 _REGULARISATION = 1e-9
@@ -98,7 +94,7 @@ class ARFilter:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ARModel:
+class ARModel(SavedModel):
     """An all-pole filter of order p in each condition of a grid of S speeds × F forces.
 
     Parameters
@@ -126,6 +122,8 @@ class ARModel:
     InputError
         For a grid smaller than 2 × 2, wrong shapes or values out of range.
     """
+
+    FORMAT = "tactileq.ar-model"
 
     texture: str
     rate_hz: float
@@ -210,33 +208,6 @@ class ARModel:
             gain=float(at.gain[0]),
             rate_hz=self.rate_hz,
         )
-
-    def save(self, path: str | Path) -> None:
-        """Write the model as versioned JSON; the file is there whole or not at all."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        for name in _ARRAYS:
-            values[name] = values[name].tolist()
-        write_text(path, dump_json({"format": FORMAT, "version": VERSION, **values}))
-
-    @staticmethod
-    def load(path: str | Path) -> ARModel:
-        """Read a model written by `save`.
-
-        Raises
-        ------
-        InputError
-            If the file is missing, is no such model, or has another version.
-        """
-        return model_from(ARModel, load_json(path, FORMAT, version=VERSION), path=path)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, ARModel):
-            return NotImplemented
-        return all(
-            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 _ARRAYS = (

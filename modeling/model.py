@@ -2,31 +2,23 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError, check_texture_name
-from modeling.files import write_text
 from modeling.grid import Cells, check_axes, within_grid
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
+from modeling.saved import SavedModel
 
 if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
     from modeling.regressed import RegressedModel
 
 Bools = NDArray[np.bool_]
-FORMAT = "tactileq.texture-model"
-VERSION = 1
 DrivenBy = Literal["conditions", "centroid"]
-Model = TypeVar("Model", bound="DataclassInstance")
 
 
 def _no_marks() -> Bools:
@@ -43,7 +35,7 @@ class Parameters(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TextureModel:
+class TextureModel(SavedModel):
     """PEQ parameters of one texture over a rectangular grid of S speeds × F forces, m layers.
 
     Parameters
@@ -78,6 +70,8 @@ class TextureModel:
     InputError
         For a grid smaller than 2 × 2, wrong shapes or values out of range.
     """
+
+    FORMAT = "tactileq.texture-model"
 
     texture: str
     rate_hz: float
@@ -225,33 +219,6 @@ class TextureModel:
         """The model with only the layers of these indices (0-based), in that order."""
         return replace(self, **{name: getattr(self, name)[:, :, keep] for name in _LAYER_ARRAYS})
 
-    def save(self, path: str | Path) -> None:
-        """Write the model as versioned JSON; the file is there whole or not at all."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        for name in _ARRAYS:
-            values[name] = values[name].tolist()
-        write_text(path, dump_json({"format": FORMAT, "version": VERSION, **values}))
-
-    @staticmethod
-    def load(path: str | Path) -> TextureModel:
-        """Read a model written by `save`.
-
-        Raises
-        ------
-        InputError
-            If the file is missing, is no such model, or has a newer version.
-        """
-        return model_from(TextureModel, load_json(path, FORMAT, version=VERSION), path=path)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, TextureModel):
-            return NotImplemented
-        return all(
-            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
-
 
 _LAYER_ARRAYS = (
     "frequencies_hz",
@@ -282,66 +249,3 @@ def first_peq(at: Parameters, *, rate_hz: float) -> PEQ:
         gains=at.gains[0],
         rate_hz=rate_hz,
     )
-
-
-def dump_json(values: dict[str, Any]) -> str:
-    """JSON with one line per field and, in nested arrays, one line per row of the grid."""
-    lines = [f"  {json.dumps(key)}: {_rows(value)}" for key, value in values.items()]
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _rows(value: Any) -> str:
-    encode: Callable[[Any], str] = lambda v: json.dumps(v, allow_nan=False)  # noqa: E731
-    if isinstance(value, list) and value and isinstance(value[0], list):
-        return "[\n    " + ",\n    ".join(map(encode, value)) + "\n  ]"
-    return encode(value)
-
-
-def load_json(path: str | Path, file_format: str, *, version: int) -> dict[str, Any]:
-    """The fields of a model file of this format and version.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, is no JSON, or is of another format or version.
-    """
-    source = Path(path)
-    if not source.is_file():
-        raise InputError(f"expected a model file at {source}, got no file there; give its path.")
-    try:
-        values = json.loads(source.read_text(encoding="utf-8"))
-    except ValueError:
-        raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
-    if not isinstance(values, dict) or values.pop("format", None) != file_format:
-        raise InputError(
-            f"expected the format {file_format} in {source}, got another; give a model of "
-            "that kind."
-        )
-    found = values.pop("version", None)
-    if found != version:
-        raise InputError(
-            f"expected a model of version {version} in {source}, got version {found!r}; "
-            "update tactileq or fit the model again."
-        )
-    return values
-
-
-def model_from(kind: type[Model], values: dict[str, Any], *, path: str | Path) -> Model:
-    """The model (a dataclass of this kind) with these fields, read from `path`.
-
-    Raises
-    ------
-    InputError
-        If fields are missing, unknown or wrong.
-    """
-    names = {f.name for f in fields(kind)}
-    if set(values) != names:
-        wrong = ", ".join(sorted(names ^ set(values)))
-        raise InputError(
-            f"expected the fields of a texture model in {path}, got too few or too many "
-            f"({wrong}); fit the model again."
-        )
-    try:
-        return kind(**values)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: {error}") from None

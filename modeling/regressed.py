@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.errors import InputError, check_texture_name
-from modeling.files import write_text
 from modeling.grid import check_axes, within_grid
 from modeling.model import (
     DrivenBy,
     Parameters,
     TextureModel,
-    dump_json,
     first_peq,
-    load_json,
-    model_from,
 )
 from modeling.peq import PEQ, Floats
 from modeling.recording import UNITS
@@ -35,9 +30,8 @@ from modeling.regression import (
     parameter_regressions,
     reduced_regression,
 )
+from modeling.saved import SavedModel
 
-FORMAT = "tactileq.regressed-model"
-VERSION = 1
 CENTROID = "centroid"
 _TERMS = {"conditions": TERMS, "centroid": (CENTROID,)}
 _COEFFICIENTS = ("noise_gain", "frequencies_hz", "bandwidths_hz", "amplitudes", "centroid_hz")
@@ -45,7 +39,7 @@ _ARRAYS = ("speeds_mm_s", "forces_n", "signs", *_COEFFICIENTS)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class RegressedModel:
+class RegressedModel(SavedModel):
     """Coefficients of every PEQ parameter of one texture with m layers; `TextureModel.regressed`.
 
     With driven_by="conditions" every parameter is β + α1·v + α2·F + α3·v·F (eq. 3), k = 4; with
@@ -76,6 +70,8 @@ class RegressedModel:
     InputError
         For wrong shapes or values out of range.
     """
+
+    FORMAT = "tactileq.regressed-model"
 
     texture: str
     rate_hz: float
@@ -189,33 +185,6 @@ class RegressedModel:
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
         """The PEQ at one speed (mm/s) and force (N), in the legal range."""
         return first_peq(self.parameters(speed_mm_s, force_n), rate_hz=self.rate_hz)
-
-    def save(self, path: str | Path) -> None:
-        """Write the model as versioned JSON; the file is there whole or not at all."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
-        for name in _ARRAYS:
-            values[name] = values[name].tolist()
-        write_text(path, dump_json({"format": FORMAT, "version": VERSION, **values}))
-
-    @staticmethod
-    def load(path: str | Path) -> RegressedModel:
-        """Read a model written by `save`.
-
-        Raises
-        ------
-        InputError
-            If the file is missing, is no such model, or has another version.
-        """
-        return model_from(RegressedModel, load_json(path, FORMAT, version=VERSION), path=path)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, RegressedModel):
-            return NotImplemented
-        return all(
-            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
-        )
-
-    __hash__ = None  # type: ignore[assignment]
 
 
 def regressed_model(model: TextureModel, *, by: DrivenBy = "conditions") -> RegressedModel:

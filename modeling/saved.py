@@ -1,0 +1,101 @@
+"""What models of every kind share: versioned files that a person can open, and equality."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from modeling.errors import InputError
+from modeling.files import write_text
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance as _Base
+else:
+    _Base = object
+
+
+class SavedModel(_Base):
+    """A frozen dataclass of arrays, numbers and text that is saved as JSON and loads back equal."""
+
+    FORMAT: ClassVar[str]
+    VERSION: ClassVar[int] = 1
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as versioned JSON; the file is there whole or not at all."""
+        values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
+        write_text(path, dump_json({"format": self.FORMAT, "version": self.VERSION, **values}))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a model written by `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is no such model, or has another version.
+        """
+        values = _load_json(Path(path), cls.FORMAT, version=cls.VERSION)
+        names = {f.name for f in fields(cls)}
+        if set(values) != names:
+            wrong = ", ".join(sorted(names ^ set(values)))
+            raise InputError(
+                f"expected the fields of a texture model in {path}, got too few or too many "
+                f"({wrong}); fit the model again."
+            )
+        try:
+            return cls(**values)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}: {error}") from None
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(
+            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def dump_json(values: dict[str, Any]) -> str:
+    """JSON with one line per field and, in nested arrays, one line per row of the grid."""
+    lines = [f"  {json.dumps(key)}: {_rows(value)}" for key, value in values.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _rows(value: Any) -> str:
+    encode: Callable[[Any], str] = lambda v: json.dumps(v, allow_nan=False)  # noqa: E731
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "[\n    " + ",\n    ".join(map(encode, value)) + "\n  ]"
+    return encode(value)
+
+
+def _load_json(source: Path, file_format: str, *, version: int) -> dict[str, Any]:
+    """The fields of a model file of this format and version."""
+    if not source.is_file():
+        raise InputError(f"expected a model file at {source}, got no file there; give its path.")
+    try:
+        values = json.loads(source.read_text(encoding="utf-8"))
+    except ValueError:
+        raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
+    if not isinstance(values, dict) or values.pop("format", None) != file_format:
+        raise InputError(
+            f"expected the format {file_format} in {source}, got another; give a model of "
+            "that kind."
+        )
+    found = values.pop("version", None)
+    if found != version:
+        raise InputError(
+            f"expected a model of version {version} in {source}, got version {found!r}; "
+            "update tactileq or fit the model again."
+        )
+    return values
