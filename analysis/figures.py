@@ -54,7 +54,7 @@ def figure_spectra_and_threshold(comparison: SpectrumComparison) -> Figure:
         axes[0, column].set_xlabel("")
     for ax in axes[:, 1]:
         ax.set_ylabel("")
-    shared_legend(figure, axes[:, 0], loc="outside lower center", ncols=4)
+    shared_legend(figure, axes[:, 0], loc="outside lower center", ncols=3)
     figure.suptitle(
         f"{comparison.texture}, {comparison.speed_mm_s:g} mm/s, {comparison.force_n:g} N"
     )

@@ -251,24 +251,30 @@ def _trial(starts: list[_Start], kept: list[int], *, move: bool) -> _Trial:
     """These layers with the signs that fit best.
 
     Tried are the patterns of METHOD 3 and each of them with one relation between neighbours turned
-    (the layers above it change their signs): all on the two clearest conditions, the best three of
-    them on the rest.
+    (the layers above it change their signs): all on the three clearest conditions, the best
+    three of them on the rest.
     """
     here = [start.only(kept) for start in starts]
     if not (here and kept):
         return _Trial(kept, np.ones(len(kept)), [s.fitted(np.ones(0), move=move) for s in here])
     centres = np.median([start.peaks.frequencies_hz for start in here], axis=0)
     candidates = neighbouring_patterns(centres)
-    clearest = sorted(here, key=lambda start: -float(start.peaks.evidence.sum()))[:2]
+    clearest = sorted(here, key=lambda start: -float(start.peaks.evidence.sum()))[:3]
 
     def fitted(signs: Floats, where: list[_Start]) -> list[CoherentFit]:
         return [start.fitted(signs, move=move) for start in where]
 
-    first = [sum(f.misfit for f in fitted(signs, clearest)) for signs in candidates]
+    first = [_all_but_the_worst(fitted(signs, clearest)) for signs in candidates]
     best = [candidates[i] for i in np.argsort(first, kind="stable")[:3]]
     fits = [fitted(signs, here) for signs in best]
-    chosen = int(np.argmin([sum(f.misfit for f in some) for some in fits]))
+    chosen = int(np.argmin([_all_but_the_worst(some) for some in fits]))
     return _Trial(kept, best[chosen], fits[chosen])
+
+
+def _all_but_the_worst(fits: list[CoherentFit]) -> float:
+    """Summed misfit, of three or more without the largest: that fit may have gone astray."""
+    misfits = [f.misfit for f in fits]
+    return sum(misfits) - (max(misfits) if len(misfits) > 2 else 0.0)
 
 
 def _if_as_good(best: _Trial, fewer: _Trial) -> _Trial:
