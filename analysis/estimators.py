@@ -22,7 +22,7 @@ from modeling import (
     spectrum,
 )
 from modeling.autoregressive import fit_filter, tapered
-from modeling.joint import CoherentFit, as_layers
+from modeling.coherent import CoherentFit, as_layers
 from modeling.likelihood import (
     bins_near,
     centres_and_widths,

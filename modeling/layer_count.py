@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
+from modeling.coherent import sign_patterns
 from modeling.errors import InputError
-from modeling.joint import sign_patterns
 from modeling.likelihood import (
     Power,
     bins_near,

@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from scipy.special import ndtr
 
+from modeling.coherent import neighbouring_patterns
 from modeling.errors import InputError
-from modeling.joint import neighbouring_patterns
 from modeling.model import Bools, TextureModel
 from modeling.peq import PEQ, Floats, band_response, band_rms
 from modeling.similarity import HIGHEST_SHARE, LOWEST_HZ

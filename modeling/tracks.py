@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from modeling.grid import Condition
-from modeling.joint import Peaks
 from modeling.likelihood import LOWEST_HZ
+from modeling.peaks import Peaks
 from modeling.peq import Floats
 
 # From a square root outwards: of equal supports the first, so the less extreme, wins.
@@ -42,14 +42,11 @@ class Tracks:
         Index of the layer's peak among the condition's peaks, −1 where it has none.
     frequencies_hz, bandwidths_hz : (C, m) ndarray
         The peak's own where there is one, else as the layer's other peaks foretell.
-    support : (m,) ndarray
-        Share of the conditions that have a peak, doubtful ones counting in part.
     """
 
     chosen: NDArray[np.intp]
     frequencies_hz: Floats
     bandwidths_hz: Floats
-    support: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,8 +227,7 @@ def _tracks(
         frequency[at, layer] = np.exp(votes.frequency[mine])
         bandwidth[at, layer] = np.exp(votes.bandwidth[mine])
     foretold = foretell(places, frequency, bandwidth, present=chosen >= 0)
-    support = np.array([votes.weight[owner == i].sum() for i in order]) / len(places)
-    return _with_edges(Tracks(chosen, *foretold, support), votes)
+    return _with_edges(Tracks(chosen, *foretold), votes)
 
 
 def _with_edges(tracks: Tracks, votes: _Votes) -> Tracks:
@@ -246,7 +242,7 @@ def _with_edges(tracks: Tracks, votes: _Votes) -> Tracks:
             chosen[row, layer] = votes.index[lowest]
             frequency[row, layer] = np.exp(votes.frequency[lowest])
             bandwidth[row, layer] = np.exp(votes.bandwidth[lowest])
-    return Tracks(chosen, frequency, bandwidth, tracks.support)
+    return Tracks(chosen, frequency, bandwidth)
 
 
 def foretell(

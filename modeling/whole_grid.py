@@ -11,18 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from modeling.coherent import CoherentFit, as_layers, coherent_fit, neighbouring_patterns
 from modeling.grid import Condition
-from modeling.joint import (
-    COHERENT_BY,
-    SILENCE,
-    CoherentFit,
-    Peaks,
-    as_layers,
-    coherent_fit,
-    find_peaks_jointly,
-    neighbouring_patterns,
-    power_sum_misfit,
-)
+from modeling.joint import COHERENT_BY
 from modeling.layers import Layers
 from modeling.likelihood import (
     Bins,
@@ -32,6 +23,7 @@ from modeling.likelihood import (
     centres_and_widths,
     signal_power,
 )
+from modeling.peaks import SILENCE, Peaks, find_peaks_jointly, power_sum_misfit
 from modeling.peq import Floats, clamp_bands
 from modeling.spectra import Spectrum
 from modeling.tracks import CLEAR_EVIDENCE, LEAST_SUPPORT, Tracks, find_tracks, foretell, strayed

@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
 from modeling import PEQ, InputError, Layers, Recording, find_layers, spectrum
-from modeling.joint import (
-    MOST_LAYERS,
-    PENALTY,
-    find_peaks_jointly,
-    fit_jointly,
-    neighbouring_patterns,
-    sign_patterns,
-)
+from modeling.coherent import neighbouring_patterns, sign_patterns
+from modeling.joint import fit_jointly
 from modeling.likelihood import signal_power
+from modeling.peaks import MOST_LAYERS, PENALTY, find_peaks_jointly
 from modeling.peq import Floats, band_response
 from modeling.spectra import spectrum_of_samples, subtract_floor
 

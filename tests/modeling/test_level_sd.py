@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from modeling import ESTIMATORS, PEQ, Layers, Spectrum, TextureModel, Threshold, simplify
+from modeling.coherent import CoherentFit, as_layers, refitted
 from modeling.estimators import (
     BANDWIDTH_PER_S,
     FWHM_PER_S,
@@ -18,7 +19,6 @@ from modeling.estimators import (
     fit_layers,
     noise_amount,
 )
-from modeling.joint import CoherentFit, as_layers, refitted
 from modeling.level_sd import smoothed_level_sd_db
 from modeling.likelihood import bins_near, signal_power
 from modeling.peq import band_rms

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfilt
 
 from modeling import PEQ
-from modeling.joint import find_peaks_jointly
 from modeling.likelihood import (
     Bins,
     Power,
@@ -27,6 +26,7 @@ from modeling.likelihood import (
     power_sum_of_peaks,
     signal_power,
 )
+from modeling.peaks import find_peaks_jointly
 from modeling.peq import Floats
 from modeling.spectra import Spectrum, mean_spectrum, spectrum_of_samples, subtract_floor
 
