@@ -99,7 +99,11 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
 
 
 def _score(measured: Spectrum, truth: RandomTruth, layers: Layers) -> dict[str, Any]:
-    return {**_likeness(measured, _peq(layers)), **_recovery(truth, layers), "seconds": np.nan}
+    return {
+        **_likeness(measured, layers.peq(rate_hz=RATE_HZ)),
+        **_recovery(truth, layers),
+        "seconds": np.nan,
+    }
 
 
 def _from_the_truth(measured: Spectrum, planted: PEQ) -> Layers:
@@ -130,16 +134,6 @@ def _likeness(measured: Spectrum, model: similarity.SpectralFilter) -> dict[str,
     return {name: getattr(report, name) for name in names}
 
 
-def _peq(layers: Layers) -> PEQ:
-    return PEQ(
-        noise_gain=layers.noise_gain,
-        frequencies_hz=layers.frequencies_hz,
-        bandwidths_hz=layers.bandwidths_hz,
-        gains=layers.gains,
-        rate_hz=RATE_HZ,
-    )
-
-
 def _recovery(truth: RandomTruth, found: Layers) -> dict[str, Any]:
     planted = truth.layers
     partner = match_layers(
@@ -151,7 +145,7 @@ def _recovery(truth: RandomTruth, found: Layers) -> dict[str, Any]:
         "matched": int((partner >= 0).sum()),
         "found": found.gains.size,
         "true": planted.gains.size,
-        "level_errors_db": _level_errors_db(truth, _peq(found), partner),
+        "level_errors_db": _level_errors_db(truth, found.peq(rate_hz=RATE_HZ), partner),
     }
 
 

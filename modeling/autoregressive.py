@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +12,9 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import freqz
 from scipy.signal.windows import tukey
 
-from modeling.errors import InputError, check_texture_name
-from modeling.fitting import only_unit, recording_spectra
-from modeling.grid import Cells, Condition, Floats, check_axes, fill_grid, grid_axes, within_grid
+from modeling.errors import InputError, check_rate, check_texture_name
+from modeling.fitting import only_unit, recording_spectra, spectra_by_condition
+from modeling.grid import Cells, Floats, check_axes, fill_grid, grid_axes, within_grid
 from modeling.line_spectral import (
     check_line_spectral,
     line_spectral_frequencies,
@@ -80,7 +80,7 @@ class ARFilter:
             )
         if not (np.isfinite(self.gain) and self.gain >= 0):
             raise InputError(f"expected a gain of at least 0, got {self.gain}; fix it.")
-        _check_rate(self.rate_hz)
+        check_rate(self.rate_hz)
 
     def response(self, frequency_hz: ArrayLike) -> Floats:
         """Magnitude response gain/|A| at (n,) frequencies of 0 … rate/2, in g per unit noise.
@@ -138,7 +138,7 @@ class ARModel(SavedModel):
 
     def __post_init__(self) -> None:
         check_texture_name(self.texture)
-        _check_rate(self.rate_hz)
+        check_rate(self.rate_hz)
         if self.unit not in UNITS or not isinstance(self.simulated, bool):
             raise InputError(
                 f"{self.texture}: expected a unit among {', '.join(UNITS)} and true or false for "
@@ -146,11 +146,7 @@ class ARModel(SavedModel):
             )
         if np.size(self.interpolated) == 0:
             object.__setattr__(self, "interpolated", np.zeros(np.shape(self.gains), dtype=bool))
-        for name in _ARRAYS:
-            kind = np.bool_ if name == "interpolated" else np.float64
-            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        self._freeze(_ARRAYS, booleans=("interpolated",))
         check_axes(self.speeds_mm_s, self.forces_n)
         self._check_arrays()
 
@@ -250,10 +246,8 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
     texture, unit = records.texture, only_unit(records)
-    by_condition: dict[Condition, list[Spectrum]] = {}
     faded = RecordingSet(tapered(record) for record in records)
-    for record, measured in recording_spectra(faded):
-        by_condition.setdefault(record.condition, []).append(measured)
+    by_condition = spectra_by_condition(recording_spectra(faded))
     _check_order(order, min(s.n_samples for found in by_condition.values() for s in found))
     speeds, forces = grid_axes(by_condition, texture)
     rows = {condition: _fit_row(found, order) for condition, found in by_condition.items()}
@@ -334,9 +328,3 @@ def _check_order(order: int, samples: int) -> None:
             f"expected a whole order of 1 to {highest} for records of {samples} samples, got "
             f"{order}; choose another."
         )
-
-
-def _check_rate(rate_hz: float) -> None:
-    number = isinstance(rate_hz, int | float) and not isinstance(rate_hz, bool)
-    if not (number and np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"expected a rate above 0 Hz, got {rate_hz!r}; give the rate.")

@@ -11,19 +11,20 @@ import numpy as np
 
 from modeling.layers import Layers
 from modeling.likelihood import (
+    WIDEST_LOG_GAIN,
     Bins,
     Bools,
     Power,
     centres_and_widths,
     coherent,
+    interference,
     limits_of,
     maximise,
     misfit_of,
     offsets,
-    power_of,
     split,
 )
-from modeling.peaks import Peaks
+from modeling.peaks import Peaks, theta_of
 from modeling.peq import Floats
 
 WIDTH_FACTOR = 5.0
@@ -69,25 +70,19 @@ def coherent_gains(
     Frequencies and widths stay those of the peaks.
     """
     noise, gain = peaks.noise_gain, peaks.gains
-    theta = np.concatenate((np.log([noise]), np.log(peaks.frequencies_hz)))
-    theta = np.concatenate((theta, np.log(peaks.bandwidths_hz)))
-    u, _, _ = offsets(theta, gain.size, bins)
+    u, _, _ = offsets(theta_of(peaks), gain.size, bins)
     real = 1 / (1 + u * u)
     imaginary = u * real
 
     def response(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
-        signed = np.exp(theta[1:]) * signs
-        in_phase, quadrature = np.exp(theta[0]) + signed @ real, signed @ imaginary
-        expected = power_of(in_phase, quadrature)
-        derivative = np.empty((theta.size, expected.size))
-        derivative[0] = 2 * np.exp(theta[0]) * in_phase
-        derivative[1:] = (real * in_phase + imaginary * quadrature) * (2 * signed)[:, None]
-        derivative /= expected
-        return expected, derivative
+        _, _, expected, by_gain = interference(
+            np.exp(theta[0]), np.exp(theta[1:]) * signs, real=real, imaginary=imaginary
+        )
+        return expected, by_gain / expected
 
     # At its peak alone, G_w + s·G has the power G_w² + gain².
     start = np.log(np.hstack((noise, np.hypot(noise, gain) - signs * noise)))
-    wide = np.full(start.size, 50.0)
+    wide = np.full(start.size, WIDEST_LOG_GAIN)
     return maximise(
         response, start, bins, m=gain.size, limits=(-wide, wide), steps=steps, enough=0.3
     )
@@ -126,8 +121,8 @@ def coherent_fit(
     """
     m = peaks.gains.size
     gains, _ = coherent_gains(peaks, bins, signs)
-    widths = np.log(peaks.bandwidths_hz)
-    theta = np.concatenate((gains[:1], np.log(peaks.frequencies_hz), widths, gains[1:]))
+    _, frequencies, widths, _, _ = split(theta_of(peaks), m)
+    theta = np.concatenate((gains[:1], frequencies, widths, gains[1:]))
     free = np.concatenate(([True], ~known & move, ~known, np.ones(m, dtype=bool)))
     low, high = limits_of(m, power, shaped=False)
     if move:
@@ -189,7 +184,10 @@ def as_layers(fitted: CoherentFit, power: Power, *, known: Bools | None = None) 
     level_sd_db = 20 / np.log(10) * np.where(lost, 1.0, level_sd)
     widths = np.exp(bandwidth)
     unresolved = lost | (widths < 2 * power.step_hz)
-    order = np.argsort(frequency)[~lost[np.argsort(frequency)]] if known is None else np.arange(m)
+    order = np.arange(m)
+    if known is None:
+        order = np.argsort(frequency)
+        order = order[~lost[order]]
     return Layers(
         power.scale * float(np.exp(noise[0])),
         np.exp(frequency)[order],

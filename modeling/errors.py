@@ -1,4 +1,7 @@
-"""The errors that users see."""
+"""The errors that users see, and the checks that all kinds of data share."""
+
+from math import isfinite
+from numbers import Real
 
 
 class InputError(ValueError):
@@ -15,3 +18,11 @@ def check_texture_name(name: object) -> None:
         raise InputError(
             f"expected a texture name of one line without tabs, got {name!r}; name it."
         )
+
+
+def check_rate(rate_hz: object) -> None:
+    """Refuse what cannot be a sampling rate: anything but a finite number above 0."""
+    number = isinstance(rate_hz, Real) and not isinstance(rate_hz, bool)
+    if not (number and isfinite(float(rate_hz)) and float(rate_hz) > 0):  # type: ignore[arg-type]
+        got = str(rate_hz) if number else repr(rate_hz)
+        raise InputError(f"expected a rate above 0 Hz, got {got}; give the rate.")

@@ -79,7 +79,8 @@ def fit_spectra(
     """
     chosen = check_estimator(estimator)
     first, spectrum_of_first = measured[0]
-    spectra = spectra_by_condition(measured)
+    repeats = spectra_by_condition(measured)
+    spectra = {condition: mean_spectrum(found) for condition, found in repeats.items()}
     speeds, forces = grid_axes(spectra, first.texture)
     if chosen == "joint":
         fitted = fit_grid_jointly(spectra)
@@ -106,25 +107,14 @@ def missing_conditions(model: TextureModel) -> list[Condition]:
     ]
 
 
-def condition_spectra(records: RecordingSet) -> dict[Condition, Spectrum]:
-    """One spectrum per condition of one texture, at one rate, floor subtracted, repeats averaged.
-
-    Raises
-    ------
-    InputError
-        If a record has contact but no speed, or none has contact.
-    """
-    return spectra_by_condition(recording_spectra(records))
-
-
 def spectra_by_condition(
     measured: Sequence[tuple[Recording, Spectrum]],
-) -> dict[Condition, Spectrum]:
-    """The spectrum of each condition, repeats averaged."""
+) -> dict[Condition, list[Spectrum]]:
+    """The spectra of each condition's repeats, conditions in order of their first recording."""
     by_condition: dict[Condition, list[Spectrum]] = {}
     for record, found in measured:
         by_condition.setdefault(record.condition, []).append(found)
-    return {condition: mean_spectrum(found) for condition, found in by_condition.items()}
+    return by_condition
 
 
 def recording_spectra(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.peq import Floats
+from modeling.peq import PEQ, Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,16 @@ class Layers:
     gains: Floats
     level_sd_db: Floats
     unresolved: NDArray[np.bool_]
+
+    def peq(self, *, rate_hz: float) -> PEQ:
+        """The equalizer of these layers at the rate of the spectrum they were found in."""
+        return PEQ(
+            noise_gain=self.noise_gain,
+            frequencies_hz=self.frequencies_hz,
+            bandwidths_hz=self.bandwidths_hz,
+            gains=self.gains,
+            rate_hz=rate_hz,
+        )
 
 
 def no_layers(noise_gain: float) -> Layers:

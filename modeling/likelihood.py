@@ -210,10 +210,32 @@ def power_sum(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
     return expected, derivative
 
 
-def power_of(in_phase: Floats, quadrature: Floats) -> Floats:
-    """Power of a sum, never quite 0, so that a bin where layers cancel stays comparable."""
-    power: Floats = np.maximum(in_phase * in_phase + quadrature * quadrature, LEAST_POWER)
-    return power
+def interference(
+    noise_gain: float, signed: Floats, *, real: Floats, imaginary: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The coherent sum G_w + Σ G_i·H_i, its power, and what that owes to each gain.
+
+    Parameters
+    ----------
+    noise_gain : float
+    signed : (m,) ndarray
+        Signed gains.
+    real, imaginary : (m, n) ndarray
+        Of the bands H_i.
+
+    Returns
+    -------
+    in_phase, quadrature, power : (n,) ndarray
+    by_gain : (m+1, n) ndarray
+        Derivatives of the power by the logarithms of the noise gain and of the layers' gains.
+    """
+    in_phase, quadrature = noise_gain + signed @ real, signed @ imaginary
+    by_gain = np.empty((signed.size + 1, in_phase.size))
+    by_gain[0] = 2 * noise_gain * in_phase
+    by_gain[1:] = (real * in_phase + imaginary * quadrature) * (2 * signed)[:, None]
+    # Never quite 0, so that a bin where layers cancel stays comparable.
+    power = np.maximum(in_phase * in_phase + quadrature * quadrature, LEAST_POWER)
+    return in_phase, quadrature, power, by_gain
 
 
 def coherent(signs: Floats) -> Response:
@@ -223,17 +245,17 @@ def coherent(signs: Floats) -> Response:
         noise, _, _, gain, _ = split(theta, m)
         u, by_frequency, by_width = offsets(theta, m, bins)
         real = 1 / (1 + u * u)
-        imaginary = u * real
         signed = np.exp(gain) * signs
-        in_phase, quadrature = np.exp(noise[0]) + signed @ real, signed @ imaginary
-        expected = power_of(in_phase, quadrature)
+        in_phase, quadrature, expected, by_gain = interference(
+            np.exp(noise[0]), signed, real=real, imaginary=u * real
+        )
         twice = (2 * signed)[:, None]
         by_u = ((1 - u * u) * quadrature - 2 * u * in_phase) * (real * real) * twice
         derivative = np.empty((theta.size, expected.size))
-        derivative[0] = 2 * np.exp(noise[0]) * in_phase
+        derivative[0] = by_gain[0]
         derivative[1 : 1 + m] = by_u * by_frequency
         derivative[1 + m : 1 + 2 * m] = by_u * by_width
-        derivative[1 + 2 * m :] = (real * in_phase + imaginary * quadrature) * twice
+        derivative[1 + 2 * m :] = by_gain[1:]
         derivative /= expected
         return expected, derivative
 

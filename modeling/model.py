@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.errors import InputError, check_texture_name
+from modeling.errors import InputError, check_rate, check_texture_name
 from modeling.grid import Cells, check_axes, within_grid
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
@@ -96,11 +96,7 @@ class TextureModel(SavedModel):
             if np.size(getattr(self, name)) == 0:
                 unmarked = np.zeros(shape[:2] if name == "interpolated" else shape, dtype=bool)
                 object.__setattr__(self, name, unmarked)
-        for name in _ARRAYS:
-            kind = np.bool_ if name in _BOOLEAN_ARRAYS else np.float64
-            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        self._freeze(_ARRAYS, booleans=_BOOLEAN_ARRAYS)
         self._check_axes()
         self._check_values()
 
@@ -128,7 +124,7 @@ class TextureModel(SavedModel):
             )
 
     def _check_values(self) -> None:
-        _check_rate(self.rate_hz)
+        check_rate(self.rate_hz)
         if self.unit not in UNITS:
             raise InputError(f"expected a unit among {', '.join(UNITS)}, got {self.unit!r}; fix.")
         for name in ("noise_gains", "gains", "level_sd_db"):
@@ -206,7 +202,7 @@ class TextureModel(SavedModel):
         The density of unit-variance noise falls as 1/rate, so gains grow as √(rate/old rate).
         The noise floor then reaches to the new Nyquist frequency.
         """
-        _check_rate(rate_hz)
+        check_rate(rate_hz)
         scale = np.sqrt(rate_hz / self.rate_hz)
         return replace(
             self,
@@ -230,11 +226,6 @@ _LAYER_ARRAYS = (
 )
 _ARRAYS = ("speeds_mm_s", "forces_n", "noise_gains", "interpolated", *_LAYER_ARRAYS)
 _BOOLEAN_ARRAYS = ("inherited", "unresolved", "interpolated")
-
-
-def _check_rate(rate_hz: float) -> None:
-    if not (np.isfinite(rate_hz) and rate_hz > 0):
-        raise InputError(f"expected a rate above 0 Hz, got {rate_hz}; give the rate.")
 
 
 def first_peq(at: Parameters, *, rate_hz: float) -> PEQ:

@@ -192,10 +192,11 @@ def _as_peaks(theta: Floats, m: int, power: Power) -> Peaks:
 
 def power_sum_misfit(peaks: Peaks, bins: Bins) -> float:
     """How well the sum of the peaks' powers fits."""
-    return misfit_of(bins, power_sum(_theta_of(peaks), peaks.gains.size, bins)[0])
+    return misfit_of(bins, power_sum(theta_of(peaks), peaks.gains.size, bins)[0])
 
 
-def _theta_of(peaks: Peaks) -> Floats:
+def theta_of(peaks: Peaks) -> Floats:
+    """The parameters of the power sum, (3m+2,); see `likelihood.split`."""
     parts = (peaks.noise_gain, peaks.frequencies_hz, peaks.bandwidths_hz, peaks.gains, peaks.shape)
     theta: Floats = np.log(np.hstack(parts))
     return theta

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.errors import InputError
+from modeling.errors import InputError, check_rate
 
 Floats = NDArray[np.float64]
 
@@ -176,8 +176,7 @@ class PEQ:
                 "expected one frequency, bandwidth and gain per layer, got shapes "
                 f"{sorted(shapes)}; give three arrays of one length."
             )
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(f"expected a rate above 0 Hz, got {self.rate_hz}; give the rate.")
+        check_rate(self.rate_hz)
         if not (np.isfinite(self.noise_gain) and self.noise_gain >= 0):
             raise InputError(f"expected a noise gain of at least 0, got {self.noise_gain}; fix it.")
         if not np.isfinite(self.gains).all():

@@ -90,10 +90,7 @@ class RegressedModel(SavedModel):
 
     def __post_init__(self) -> None:
         self._check_kinds()
-        for name in _ARRAYS:
-            value = np.array(getattr(self, name), dtype=np.float64)
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        self._freeze(_ARRAYS)
         check_axes(self.speeds_mm_s, self.forces_n)
         self._check_shapes()
         finite = all(np.isfinite(getattr(self, name)).all() for name in _COEFFICIENTS)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modeling.errors import InputError
 from modeling.files import write_text
@@ -60,6 +61,14 @@ class SavedModel(_Base):
         )
 
     __hash__ = None  # type: ignore[assignment]
+
+    def _freeze(self, names: Iterable[str], *, booleans: Container[str] = ()) -> None:
+        """Make these fields read-only arrays, of floats or, where named so, of booleans."""
+        for name in names:
+            kind = np.bool_ if name in booleans else np.float64
+            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
 
 
 def _plain(value: Any) -> Any:

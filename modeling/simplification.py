@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from modeling.coherent import neighbouring_patterns
@@ -163,8 +164,9 @@ def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureMode
     if len(keep) in (0, model.n_layers) or model.estimator in ("paper", "paper-consistent"):
         return fewer
     frequency = np.geomspace(LOWEST_HZ, HIGHEST_SHARE * model.rate_hz / 2, SIGN_POINTS)
-    conditions = [(v, f) for v in range(model.speeds_mm_s.size) for f in range(model.forces_n.size)]
-    full = [_response(model, at, frequency) for at in conditions]
+    conditions = list(np.ndindex(model.noise_gains.shape))
+    bands = [_bands(model, at, frequency) for at in conditions]
+    full = [_response(model, at, bands_at) for at, bands_at in zip(conditions, bands, strict=True)]
     amplitudes = np.abs(fewer.gains)
     # A layer's sign is one for the whole texture, but where it is silent it has none.
     signs = np.sign(fewer.gains.sum(axis=(0, 1)))
@@ -172,8 +174,8 @@ def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureMode
     for pattern in [signs, *neighbouring_patterns(np.median(fewer.frequencies_hz, axis=(0, 1)))]:
         tried = replace(fewer, gains=amplitudes * pattern)
         ratios = [
-            (whole / _response(tried, at, frequency)) ** 2
-            for at, whole in zip(conditions, full, strict=True)
+            (whole / _response(tried, at, bands_at[keep])) ** 2
+            for at, whole, bands_at in zip(conditions, full, bands, strict=True)
         ]
         misfit = sum(float(np.sum(r - 1 - np.log(r))) for r in ratios)
         if misfit < least:
@@ -181,14 +183,20 @@ def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureMode
     return best
 
 
-def _response(model: TextureModel, at: tuple[int, int], frequency_hz: Floats) -> Floats:
-    """Coherent response in one condition of the grid, never quite 0."""
-    bands = band_response(
+def _bands(
+    model: TextureModel, at: tuple[int, ...], frequency_hz: Floats
+) -> NDArray[np.complex128]:
+    """H_i of each layer in one condition of the grid, (m, n)."""
+    return band_response(
         frequency_hz,
         centres_hz=model.frequencies_hz[at],
         bandwidths_hz=model.bandwidths_hz[at],
         rate_hz=model.rate_hz,
     )
+
+
+def _response(model: TextureModel, at: tuple[int, ...], bands: NDArray[np.complex128]) -> Floats:
+    """Coherent response in one condition of the grid, never quite 0."""
     response: Floats = np.abs(model.noise_gains[at] + model.gains[at] @ bands)
     return np.maximum(response, TINY)
 

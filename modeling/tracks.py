@@ -30,6 +30,7 @@ ROUNDS = 3
 MERGING_DISTANCE = 3.0  # in tolerances
 STRAYED_SPREADS = 5.0
 RIDGE = (0.0, 0.1, 3.0, 3.0)
+HELD = np.array([1.0, 1.0, 0.0, 0.0])  # of an old law: level and power of the speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,16 +159,21 @@ def _fitted(votes: _Votes, mine: NDArray[np.bool_], law: Floats) -> Floats:
     """The law of these peaks by weighted least squares, held to the old one where they are few."""
     if not mine.any():
         return law
-    design = _design(votes.x[mine], votes.y[mine])
-    weight = votes.weight[mine]
     # A ridge in the units of one clear peak: two or three peaks must not bend a law.
-    normal = (design.T * weight) @ design + np.diag(np.array(RIDGE) + 1e-9)
-    misfit = votes.frequency[mine] - design @ law
-    keep = np.array([0.0, 0.0, law[2], law[3]])
-    fitted: Floats = law + np.linalg.solve(
-        normal, (design.T * weight) @ misfit - np.array(RIDGE) * keep
+    return _ridge_fit(
+        _design(votes.x[mine], votes.y[mine]),
+        votes.frequency[mine],
+        weight=votes.weight[mine],
+        towards=law * HELD,
     )
-    return fitted
+
+
+def _ridge_fit(design: Floats, values: Floats, *, weight: Floats, towards: Floats) -> Floats:
+    """Coefficients of a law by weighted least squares, drawn `towards` some by `RIDGE`."""
+    ridge = np.array(RIDGE) + 1e-9
+    normal = (design.T * weight) @ design + np.diag(ridge)
+    pull: Floats = (design.T * weight) @ values + ridge * towards
+    return np.asarray(np.linalg.solve(normal, pull), dtype=np.float64)
 
 
 def _owners(votes: _Votes, laws: list[Floats]) -> NDArray[np.intp]:
@@ -291,6 +297,6 @@ def _law_of(places: Floats, frequencies_hz: Floats, known: NDArray[np.bool_]) ->
     """Log frequency in every condition by the law of the known ones, (C,)."""
     design = _design(*(places - places.mean(axis=0)).T)
     log_f = np.log(frequencies_hz[known])
-    normal = design[known].T @ design[known] + np.diag(np.array(RIDGE) + 1e-9)
-    law: Floats = design @ np.linalg.solve(normal, design[known].T @ log_f)
-    return law
+    law = _ridge_fit(design[known], log_f, weight=np.ones(log_f.size), towards=np.zeros(4))
+    told: Floats = design @ law
+    return told

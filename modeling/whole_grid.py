@@ -222,7 +222,7 @@ def _holds(trial: _Trial, starts: list[_Start]) -> bool:
 
 
 def _spread(starts: list[_Start]) -> list[_Start]:
-    """A few conditions in all parts of the grid, whose order they come in."""
+    """A few conditions in all parts of the grid, given in the grid's order."""
     stride = max(1, round(0.382 * len(starts)))
     while np.gcd(stride, max(1, len(starts))) > 1:
         stride += 1

@@ -14,7 +14,6 @@ from scipy.signal import resample, resample_poly
 from analysis.findings import find_in
 from modeling import (
     ESTIMATORS,
-    PEQ,
     Recording,
     RecordingSet,
     find_layers,
@@ -41,13 +40,7 @@ def test_fit_of_a_record(
     benchmark.extra_info |= {"what": estimator}
     found = benchmark(lambda: [find_layers(s, estimator=estimator) for s in spectra])
     for layers, measured in zip(found, spectra, strict=True):
-        peq = PEQ(
-            noise_gain=layers.noise_gain,
-            frequencies_hz=layers.frequencies_hz,
-            bandwidths_hz=layers.bandwidths_hz,
-            gains=layers.gains,
-            rate_hz=measured.rate_hz,
-        )
+        peq = layers.peq(rate_hz=measured.rate_hz)
         assert np.isfinite(peq.response(measured.frequency_hz)).all()
 
 

@@ -21,13 +21,7 @@ def bump(centre_hz: float, s_hz: float, height: float) -> np.ndarray:
 
 
 def model_of(layers: Layers) -> PEQ:
-    return PEQ(
-        noise_gain=layers.noise_gain,
-        frequencies_hz=layers.frequencies_hz,
-        bandwidths_hz=layers.bandwidths_hz,
-        gains=layers.gains,
-        rate_hz=5000.0,
-    )
+    return layers.peq(rate_hz=5000.0)
 
 
 def truth(noise_gain: float, layers: list[tuple[float, float, float]]) -> Spectrum:

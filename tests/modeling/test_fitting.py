@@ -18,9 +18,10 @@ from modeling import (
     fit_texture,
     missing_conditions,
 )
-from modeling.fitting import condition_spectra
+from modeling.fitting import recording_spectra, spectra_by_condition
 from modeling.grid import fill_grid
 from modeling.recording import RecordingSet
+from modeling.spectra import mean_spectrum
 
 ModelMaker = Callable[..., TextureModel]
 RecordingMaker = Callable[..., Recording]
@@ -293,9 +294,9 @@ def test_repeats_are_averaged_per_condition(make_recording: RecordingMaker) -> N
         make_recording(level * rng.standard_normal(20000), repeat=repeat)
         for repeat, level in ((1, 0.2), (2, 0.6))
     ]
-    spectra = condition_spectra(RecordingSet(recordings))
+    spectra = spectra_by_condition(recording_spectra(RecordingSet(recordings)))
     assert list(spectra) == [(100.0, 1.0)]
-    assert spectra[100.0, 1.0].magnitude[100:].mean() == pytest.approx(0.4, rel=0.03)
+    assert mean_spectrum(spectra[100.0, 1.0]).magnitude[100:].mean() == pytest.approx(0.4, rel=0.03)
 
 
 def test_slow_data_give_a_model_at_their_rate(make_model: ModelMaker) -> None:
@@ -307,8 +308,8 @@ def test_slow_data_give_a_model_at_their_rate(make_model: ModelMaker) -> None:
 
 def test_lowest_rate_counts(make_recording: RecordingMaker) -> None:
     recordings = [make_recording(seed=1), make_recording(seed=2, rate_hz=1000.0, force_n=2.0)]
-    spectra = condition_spectra(RecordingSet(recordings))
-    assert {s.rate_hz for s in spectra.values()} == {1000.0}
+    spectra = recording_spectra(RecordingSet(recordings))
+    assert {s.rate_hz for _, s in spectra} == {1000.0}
 
 
 # --- a whole texture by `joint`

@@ -68,13 +68,7 @@ def model_of(layers: Layers, *, rate_hz: float = RATE_HZ) -> PEQ:
     assert np.isfinite(layers.level_sd_db).all()
     assert (layers.level_sd_db >= 0).all()
     assert (np.diff(layers.frequencies_hz) >= 0).all()
-    return PEQ(
-        noise_gain=layers.noise_gain,
-        frequencies_hz=layers.frequencies_hz,
-        bandwidths_hz=layers.bandwidths_hz,
-        gains=layers.gains,
-        rate_hz=rate_hz,
-    )
+    return layers.peq(rate_hz=rate_hz)
 
 
 def level_db(peq: PEQ) -> Floats:
