@@ -6,6 +6,7 @@ from modeling.errors import GridError, InputError
 from modeling.estimators import ESTIMATORS, find_layers
 from modeling.fitting import fit_texture, missing_conditions
 from modeling.layers import Layers
+from modeling.limits import Limits
 from modeling.model import TextureModel
 from modeling.peq import PEQ
 from modeling.recording import Recording, RecordingSet
@@ -25,6 +26,7 @@ __all__ = [
     "InputError",
     "LayerVerdict",
     "Layers",
+    "Limits",
     "Recording",
     "RecordingSet",
     "RegressedModel",

@@ -8,9 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_toeplitz
-from scipy.signal import freqz
-from scipy.signal.windows import tukey
 
 from modeling.errors import InputError, check_rate, check_texture_name
 from modeling.fitting import only_unit, recording_spectra, spectra_by_condition
@@ -87,6 +84,8 @@ class ARFilter:
 
         The one-sided power spectral density of the output is response² · 2/rate_hz (g²/Hz).
         """
+        from scipy.signal import freqz
+
         frequency = np.asarray(frequency_hz, dtype=np.float64)
         inverse = np.concatenate([[1.0], self.coefficients])
         _, response = freqz([self.gain], inverse, worN=frequency, fs=self.rate_hz)
@@ -271,6 +270,8 @@ def tapered(recording: Recording) -> Recording:
 
     What `fit_filter` should be given the spectrum of.
     """
+    from scipy.signal.windows import tukey
+
     window = tukey(recording.samples.size, _TAPERED_SHARE)
     window /= np.sqrt(np.mean(window**2))
     return replace(recording, samples=(recording.samples - recording.samples.mean()) * window)
@@ -286,6 +287,8 @@ def fit_filter(spectra: Sequence[Spectrum], *, order: int) -> ARFilter:
     order : int
         1 … 40, and below half the number of samples.
     """
+    from scipy.linalg import solve_toeplitz
+
     _check_order(order, min(s.n_samples for s in spectra))
     lags = np.array([_autocorrelation(s)[: order + 1] for s in spectra])
     r = np.average(lags, axis=0, weights=[s.n_samples for s in spectra])

@@ -12,8 +12,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.signal import find_peaks
 
 from modeling.errors import InputError
 from modeling.joint import fit_jointly
@@ -78,6 +76,8 @@ def find_peak_frequencies(spectrum: Spectrum) -> Floats:
     prominence exceeds the smoothed spectrum's standard deviation there (0.52/√(2√π·30 Hz·T),
     relative).
     """
+    from scipy.signal import find_peaks
+
     smoothed = spectrum.smoothed()
     relative_sd = RAYLEIGH_VARIATION / np.sqrt(
         2 * np.sqrt(np.pi) * SMOOTHING_HZ * spectrum.duration_s
@@ -160,6 +160,8 @@ def _gaussian_jacobian(shape: Floats, offset: Floats, values: Floats) -> Floats:
 
 def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> float:
     """Standard deviation s (Hz) of a Gaussian fitted within ±1.5·max(30 Hz, s); NaN on failure."""
+    from scipy.optimize import least_squares
+
     s = SMOOTHING_HZ
     for _ in range(2):
         reach = WINDOW_WIDTHS * max(SMOOTHING_HZ, s)

@@ -1,7 +1,8 @@
-"""What the renderer runs: the recursion of a model's filters under parameters that move.
+"""Rendering in Python: what `kernel.h` does, where there is no compiler, and the all-pole rival.
 
 Both filters pass white noise through orthogonal steps, so that their states keep unit variance (or
-lose some) at every sample, whatever the parameters do from one update to the next.
+lose some) at every sample, whatever the parameters do from one update to the next. Plain Python
+floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bits are the same.
 """
 
 from __future__ import annotations
@@ -9,30 +10,16 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.signal import firwin
 
 from modeling.autoregressive import ARModel
 from modeling.errors import InputError
 from modeling.line_spectral import prediction_coefficients, reflection_coefficients
-from modeling.model import Parameters
 from modeling.noise import white_noise
 from modeling.peq import Floats, band_coefficients, clamp_bands
+from modeling.plan import LayeredModel, RenderCounters, RenderPlan, noise_lowpass
 
-_EDGE_SHARE = 0.2
 # Rounding must not put a pole on the unit circle.
 _HIGHEST_REFLECTION = 1 - 1e-12
-
-
-class LayeredModel(Protocol):
-    """A model that gives PEQ parameters for any speed and force."""
-
-    @property
-    def rate_hz(self) -> float: ...
-
-    @property
-    def n_layers(self) -> int: ...
-
-    def parameters(self, speed_mm_s: Floats, force_n: Floats) -> Parameters: ...
 
 
 class StreamFilter(Protocol):
@@ -43,48 +30,95 @@ class StreamFilter(Protocol):
 
     clamped: int
 
-    def silence(self) -> Any:
-        """The setting before the first update."""
-
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
         """One setting for each of (n,) speeds and forces."""
+
+    def update(self, setting: Any) -> None:
+        """Put a setting into force."""
 
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
         """Its driving noise from position `start` on: one or more lists of `count` samples."""
 
-    def filter(self, setting: Any, *inputs: list[float]) -> list[float]:
+    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
         """The output for the next samples of its inputs."""
 
 
+class PythonEngine:
+    """Renders with any `StreamFilter`: updates, filters, compensates and limits."""
+
+    def __init__(self, stream_filter: StreamFilter, plan: RenderPlan, *, key: np.uint64) -> None:
+        self._filter, self._plan, self._key = stream_filter, plan, key
+        self._position = 0
+        self._lift_offs = 0
+        self._limiter = Limiter(plan)
+        self._compensator = Compensator(plan)
+
+    @property
+    def counters(self) -> RenderCounters:
+        """What had to be corrected so far."""
+        return RenderCounters(self._lift_offs, self._filter.clamped, *self._limiter.touched)
+
+    def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
+        """The next samples for (n,) speeds and forces."""
+        count, period = speed_mm_s.size, self._plan.update_samples
+        finite = np.isfinite(speed_mm_s) & np.isfinite(force_n)
+        self._lift_offs += count - int(np.count_nonzero(finite))
+        inputs = self._filter.inputs(self._key, self._position, count=count)
+        starts = list(range(-self._position % period, count, period))
+        bounds = [*starts, count]
+        output = self._filter.filter(
+            *(part[: bounds[0]] for part in inputs), since_update=self._position % period
+        )
+        settings = self._filter.settings(speed_mm_s[starts], force_n[starts])
+        for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
+            self._filter.update(setting)
+            output += self._filter.filter(*(part[start:stop] for part in inputs), since_update=0)
+        self._position += count
+        return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
+
+
 class BandFilter:
-    """A PEQ of m bands (METHOD 3) at the model's rate or above."""
+    """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
-    def __init__(self, model: LayeredModel, rate_hz: float) -> None:
-        if not (np.isfinite(rate_hz) and rate_hz >= model.rate_hz):
-            raise InputError(
-                f"expected a rendering rate of at least the model's {model.rate_hz:g} Hz, got "
-                f"{rate_hz:g}; render at that rate and resample."
-            )
+    Gains move in a straight line over the first half of the time to the next update, and at most
+    by the plan's slews; the first update sets them at once.
+    """
+
+    def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
         self.clamped = 0
-        self._model, self._rate_hz = model, rate_hz
-        self._state = [(0.0, 0.0)] * model.n_layers
-        self._lowpass = _lowpass(model.rate_hz, rate_hz)
-
-    def silence(self) -> Any:
-        """No noise and no band."""
-        return 0.0, [(0.0,) * 5] * self._model.n_layers
+        self._table, self._plan = model.table, plan
+        self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
+        self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
+        self._slews = plan.slews(self._table).tolist()
+        self._gains: list[float] = []
+        self._courses = [(0.0, 0.0)] * (1 + self._table.n_layers)
+        self._bands = [(0.0,) * 5] * self._table.n_layers
+        self._state = [(0.0, 0.0)] * self._table.n_layers
 
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
-        """Noise gain and coefficients of every band at each update."""
-        at = self._model.parameters(speed_mm_s, force_n)
+        """All gains that are wanted, and the coefficients of every band, at each update."""
+        at = self._table.at(speed_mm_s, force_n)
         frequency, bandwidth, clamped = clamp_bands(
-            at.frequencies_hz, at.bandwidths_hz, rate_hz=self._rate_hz
+            at.frequencies_hz, at.bandwidths_hz, rate_hz=self._plan.rate_hz
         )
         self.clamped += clamped
-        c = band_coefficients(frequency, bandwidth, rate_hz=self._rate_hz)
-        table = np.stack([c.a1, c.a2, c.a3, c.drive, at.gains * c.tap], axis=-1)
+        c = band_coefficients(frequency, bandwidth, rate_hz=self._plan.rate_hz)
+        gains = np.concatenate([at.noise_gain[:, None], at.gains], axis=1)
+        taps = np.concatenate([np.ones((gains.shape[0], 1)), c.tap], axis=1)
+        table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
         bands = [[tuple(band) for band in update] for update in table.tolist()]
-        return list(zip(at.noise_gain.tolist(), bands, strict=True))
+        return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
+
+    def update(self, setting: Any) -> None:
+        """Start every gain on its way to what is wanted now, as far as one update may go."""
+        wanted, taps, self._bands = setting
+        now = self._gains or wanted
+        self._gains = [_towards(*move) for move in zip(now, wanted, self._slews, strict=True)]
+        steps = self._plan.moving_samples
+        self._courses = [
+            (start * tap, (end - start) / steps * tap)
+            for start, end, tap in zip(now, self._gains, taps, strict=True)
+        ]
 
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
         """The next noise for the bands and, low-passed without delay, for the noise branch.
@@ -92,30 +126,124 @@ class BandFilter:
         The noise is known ahead, so the low-pass has zero phase and the sum stays coherent.
         """
         half = self._lowpass.size // 2
-        scale = np.sqrt(self._rate_hz / self._model.rate_hz)
-        wide = scale * white_noise(key, start - half, count + 2 * half)
+        wide = self._scale * white_noise(key, start - half, count + 2 * half)
         # Tap by tap: the order of additions, and so the result, is the same for any block size.
         floor_noise = np.zeros(count)
         for tap, weight in enumerate(self._lowpass):
             floor_noise += weight * wide[tap : tap + count]
         return wide[half : half + count].tolist(), floor_noise.tolist()
 
-    def filter(self, setting: Any, *inputs: list[float]) -> list[float]:
-        """The recursion of METHOD 3 with the parameters in force; plain floats are IEEE doubles."""
+    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
+        """The recursion of METHOD 3 with the parameters in force."""
         noise, floor_noise = inputs
-        noise_gain, bands = setting
-        output = [noise_gain * w for w in floor_noise]
-        for layer, (a1, a2, a3, drive, tap) in enumerate(bands):
+        moving = max(0, self._plan.moving_samples - since_update)
+        output = [
+            gain * w
+            for gain, w in zip(self._course(0, moving, len(noise)), floor_noise, strict=True)
+        ]
+        for layer, (p, q, r, b1, b2) in enumerate(self._bands):
             s1, s2 = self._state[layer]
+            course = self._course(1 + layer, moving, len(noise))
             for n, w in enumerate(noise):
-                v3 = drive * w - s2
-                v1 = a1 * s1 + a2 * v3
-                v2 = s2 + a2 * s1 + a3 * v3
-                s1 = 2.0 * v1 - s1
-                s2 = 2.0 * v2 - s2
-                output[n] += tap * v1
+                turned = p * s1 + b1 * w - q * s2
+                s2 = r * s2 + b2 * w + q * s1
+                output[n] += course[n] * (s1 + turned)
+                s1 = turned
             self._state[layer] = (s1, s2)
         return output
+
+    def _course(self, which: int, moving: int, count: int) -> list[float]:
+        """One gain, times its tap, at each of the next samples."""
+        now, step = self._courses[which]
+        course = []
+        for n in range(count):
+            if n < moving:
+                now += step
+            course.append(now)
+        self._courses[which] = (now, step)
+        return course
+
+
+def _towards(gain: float, wanted: float, slew: float) -> float:
+    change = wanted - gain
+    if change > slew:
+        return gain + slew
+    return gain - slew if change < -slew else wanted
+
+
+class Compensator:
+    """Eq. 7 on a stream: the signal less a share of it in the compensation's band."""
+
+    def __init__(self, plan: RenderPlan) -> None:
+        self._notch, self._state = plan.compensation, (0.0, 0.0)
+        if self._notch is not None:
+            c = band_coefficients(
+                self._notch.frequency_hz, self._notch.bandwidth_hz, rate_hz=plan.rate_hz
+            )
+            self._band = [float(x) for x in (c.p, c.q, c.r, c.b1, c.b2)]
+            self._gain = self._notch.band_share * float(c.tap)
+
+    def filter(self, signal: list[float]) -> list[float]:
+        """The next samples, compensated."""
+        if self._notch is None:
+            return signal
+        (p, q, r, b1, b2), (s1, s2) = self._band, self._state
+        output = []
+        for x in signal:
+            turned = p * s1 + b1 * x - q * s2
+            s2 = r * s2 + b2 * x + q * s1
+            output.append(x - self._gain * (s1 + turned))
+            s1 = turned
+        self._state = (s1, s2)
+        return output
+
+
+class Limiter:
+    """Keeps a stream within `Limits`, sample by sample."""
+
+    def __init__(self, plan: RenderPlan) -> None:
+        limits = plan.limits
+        self._limits, self._share = limits, plan.mean_share
+        self._longest = plan.samples(limits.duration_s)
+        self._pause = plan.samples(limits.pause_s)
+        self._mean_square = 0.0
+        self._sounding = self._silent = 0
+        # Samples that peak, RMS and duration limited.
+        self.touched = [0, 0, 0]
+
+    def limit(self, signal: list[float]) -> list[float]:
+        """The next samples, no louder than the limits allow."""
+        if self._longest:
+            signal = [self._within_duration(y) for y in signal]
+        if np.isfinite(self._limits.peak):
+            signal = [self._within_peak(y) for y in signal]
+        if np.isfinite(self._limits.rms):
+            signal = [self._within_rms(y) for y in signal]
+        return signal
+
+    def _within_duration(self, y: float) -> float:
+        self._silent = self._silent + 1 if y == 0 else 0
+        self._sounding = 0 if self._silent >= self._pause else self._sounding + 1
+        if self._sounding <= self._longest or y == 0:
+            return y
+        self.touched[2] += 1
+        return 0.0
+
+    def _within_peak(self, y: float) -> float:
+        peak = self._limits.peak
+        if -peak <= y <= peak:
+            return y
+        self.touched[0] += 1
+        return peak if y > 0 else -peak if y < 0 else 0.0
+
+    def _within_rms(self, y: float) -> float:
+        kept = (1 - self._share) * self._mean_square
+        room = (self._limits.rms**2 - kept) / self._share
+        if not y * y <= room:
+            self.touched[1] += 1
+            y = float(np.copysign(np.sqrt(room), y)) if y == y else 0.0
+        self._mean_square = kept + self._share * (y * y)
+        return y
 
 
 class LatticeFilter:
@@ -135,10 +263,7 @@ class LatticeFilter:
         self.clamped = 0
         self._model = model
         self._state = [0.0] * model.order
-
-    def silence(self) -> Any:
-        """No output; the stages only delay."""
-        return 0.0, [(0.0, 1.0)] * self._model.order
+        self._setting: Any = (0.0, [(0.0, 1.0)] * model.order)
 
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
         """Output RMS, and sine and cosine of every stage from the highest order down."""
@@ -151,13 +276,17 @@ class LatticeFilter:
         stages = [[tuple(stage) for stage in update] for update in table.tolist()]
         return list(zip(rms.tolist(), stages, strict=True))
 
+    def update(self, setting: Any) -> None:
+        """Put angles and RMS into force."""
+        self._setting = setting
+
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
         """The next noise, of unit variance."""
         return (white_noise(key, start, count).tolist(),)
 
-    def filter(self, setting: Any, *inputs: list[float]) -> list[float]:
-        """The lattice with the angles in force."""
-        rms, stages = setting
+    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
+        """The lattice with the angles in force, however long they have been."""
+        rms, stages = self._setting
         state, output = self._state, []
         highest = len(stages) - 1
         for forward in inputs[0]:
@@ -170,14 +299,3 @@ class LatticeFilter:
             state[0] = forward
             output.append(rms * forward)
         return output
-
-
-def _lowpass(model_rate_hz: float, rate_hz: float) -> Floats:
-    """Taps of a linear-phase low-pass at the model's Nyquist frequency; [1] at its own rate."""
-    if rate_hz == model_rate_hz:
-        return np.ones(1)
-    transition_hz = _EDGE_SHARE * model_rate_hz / 2
-    taps = 2 * round(1.65 * rate_hz / transition_hz) + 1  # Hamming: 3.3 fs/transition
-    cutoff_hz = min(model_rate_hz / 2, rate_hz / 2 * 0.999)
-    lowpass: Floats = firwin(taps, cutoff_hz, fs=rate_hz)
-    return lowpass

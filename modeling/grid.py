@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import griddata
-from scipy.spatial import QhullError
 
 from modeling.errors import GridError, InputError
 
@@ -158,6 +156,9 @@ def _count(levels: list[float], name: str) -> str:
 
 def _between(points: Floats, values: Floats, *, holes: Floats, texture: str) -> Floats:
     """Linear interpolation over (speed, force); beyond the outermost neighbours the nearest one."""
+    from scipy.interpolate import griddata
+    from scipy.spatial import QhullError
+
     try:
         linear = griddata(points, values, holes, method="linear", rescale=True)
     except (QhullError, ValueError):

@@ -12,7 +12,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
 
 from modeling.errors import InputError
 
@@ -84,6 +83,8 @@ def line_spectral_frequencies(coefficients: ArrayLike) -> Floats:
 
 def _divide(polynomial: Floats, factor: list[float]) -> Floats:
     """A polynomial without a factor that it is known to hold."""
+    from scipy.signal import lfilter
+
     quotient: Floats = lfilter([1.0], factor, polynomial)[: 1 - len(factor)]
     return quotient
 

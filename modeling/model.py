@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.errors import InputError, check_rate, check_texture_name
-from modeling.grid import Cells, check_axes, within_grid
+from modeling.grid import check_axes
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
 from modeling.saved import SavedModel
+from modeling.table import Parameters, ParameterTable
 
 if TYPE_CHECKING:
     from modeling.regressed import RegressedModel
@@ -23,15 +24,6 @@ DrivenBy = Literal["conditions", "centroid"]
 
 def _no_marks() -> Bools:
     return np.zeros(0, dtype=bool)
-
-
-class Parameters(NamedTuple):
-    """PEQ parameters at n points: noise gain (n,), frequency, bandwidth and gain (n, m)."""
-
-    noise_gain: Floats
-    frequencies_hz: Floats
-    bandwidths_hz: Floats
-    gains: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -161,13 +153,19 @@ class TextureModel(SavedModel):
         force_n : (n,) array_like
             Normal force; negative values count as lift-off.
         """
-        hand = within_grid(self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n)
-        cells = Cells(self.speeds_mm_s, self.forces_n, hand=hand)
-        return Parameters(
-            cells.blend(self.noise_gains) * hand.ramp,
-            cells.blend(self.frequencies_hz),
-            cells.blend(self.bandwidths_hz),
-            cells.blend(self.gains) * hand.ramp[:, None],
+        return self.table.at(speed_mm_s, force_n)
+
+    @property
+    def table(self) -> ParameterTable:
+        """The parameters as the renderer reads them."""
+        return ParameterTable(
+            speeds_mm_s=self.speeds_mm_s,
+            forces_n=self.forces_n,
+            values=np.concatenate(
+                [self.noise_gains[..., None], self.frequencies_hz, self.bandwidths_hz, self.gains],
+                axis=-1,
+            ),
+            signs=np.zeros(self.n_layers),
         )
 
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:

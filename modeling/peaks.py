@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import gammaincinv
 
 from modeling.likelihood import (
     FORGIVEN_MISFIT,
@@ -74,6 +73,8 @@ def find_peaks_jointly(power: Power) -> Peaks:
 
     Growth ends where no further peak raises the log likelihood by `PENALTY`.
     """
+    from scipy.special import gammaincinv
+
     # Where three in ten lines of noise alone would lie; above are peaks. Exponentially distributed
     # lines, or means of several.
     below = gammaincinv(power.records, 0.3) / power.records

@@ -18,11 +18,19 @@ LOWEST_BANDWIDTH_HZ = 0.1
 HIGHEST_BANDWIDTH_SHARE = 0.45
 
 
+def _half_tangent(angle: ArrayLike) -> tuple[Floats, Floats]:
+    """Numerator and denominator of tan(angle/2): the [9/8] Padé approximant (Lambert)."""
+    half = np.asarray(angle, dtype=np.float64) * 0.5
+    z = half * half
+    numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))))
+    denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)))
+    return numerator, denominator
+
+
 def rational_tan(angle: ArrayLike) -> Floats:
     """Tangent by one rational formula, the same in every implementation of the filter.
 
-    The [9/8] Padé approximant (Lambert's continued fraction) of tan(angle/2), then the
-    double-angle formula.
+    A rational approximant of tan(angle/2), then the double-angle formula.
 
     Parameters
     ----------
@@ -34,22 +42,19 @@ def rational_tan(angle: ArrayLike) -> Floats:
     ndarray
         Relative error at most 2e-14 over that range.
     """
-    half = np.asarray(angle, dtype=np.float64) * 0.5
-    z = half * half
-    numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))))
-    denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)))
-    tangent = numerator / denominator
-    result: Floats = 2 * tangent / ((1 - tangent) * (1 + tangent))
+    n, d = _half_tangent(angle)
+    result: Floats = 2 * n * d / ((d - n) * (d + n))
     return result
 
 
 class BandCoefficients(NamedTuple):
     """Coefficients of the unit-covariance state-variable filter (METHOD 3), one per band."""
 
-    a1: Floats
-    a2: Floats
-    a3: Floats
-    drive: Floats
+    p: Floats
+    q: Floats
+    r: Floats
+    b1: Floats
+    b2: Floats
     tap: Floats
 
 
@@ -67,17 +72,31 @@ def band_coefficients(
 
     Notes
     -----
-    With g = tan(πf/fs) and k = tan(πB/fs), METHOD's K = 2k/sin(2πf/fs) is k(1+g²)/g, hence
-    √(Kg) = √(k(1+g²)) (`tap`) and √(K/g) = tap/g (`drive`). The per-sample update is
-    v3 = drive·w − s2; v1 = a1·s1 + a2·v3; v2 = s2 + a2·s1 + a3·v3; s1 ← 2v1 − s1;
-    s2 ← 2v2 − s2; band = tap·v1.
+    METHOD's recursion with v1 and v2 eliminated: s1 ← p·s1 − q·s2 + b1·w, s2 ← q·s1 + r·s2 + b2·w,
+    band = tap·(s1 before + s1 after). With θ = πf/fs and k = tan(πB/fs): p = (cos 2θ − k)/(1+k),
+    r = (cos 2θ + k)/(1+k), q = sin 2θ/(1+k), (b1, b2) = 2√k/(1+k)·(cos θ, sin θ) and
+    tap = √k/(2 cos θ). Operation by operation as `tq_band_of` in `kernel.h`.
     """
-    g = rational_tan(np.pi / rate_hz * np.asarray(frequency_hz, dtype=np.float64))
-    k = rational_tan(np.pi / rate_hz * np.asarray(bandwidth_hz, dtype=np.float64))
-    tap = np.sqrt(k * (1 + g * g))
-    a1 = 1 / (1 + g * g + tap * tap)
-    a2 = g * a1
-    return BandCoefficients(a1, a2, g * a2, tap / g, tap)
+    n, d = _half_tangent(np.pi / rate_hz * np.asarray(frequency_hz, dtype=np.float64))
+    scale = 1 / (d * d + n * n)
+    cosine = (d - n) * (d + n) * scale
+    sine = 2 * n * d * scale
+    n, d = _half_tangent(np.pi / rate_hz * np.asarray(bandwidth_hz, dtype=np.float64))
+    k_n = 2 * n * d
+    k_d = (d - n) * (d + n)
+    scale = 1 / (k_d + k_n)
+    share = k_d * scale
+    damping = k_n * scale
+    turn = (cosine - sine) * (cosine + sine) * share
+    root = np.sqrt(k_n * k_d)
+    return BandCoefficients(
+        p=turn - damping,
+        q=2 * sine * cosine * share,
+        r=turn + damping,
+        b1=2 * root * scale * cosine,
+        b2=2 * root * scale * sine,
+        tap=root / (2 * k_d * cosine),
+    )
 
 
 def clamp_bands(

@@ -8,13 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.errors import InputError, check_texture_name
-from modeling.grid import check_axes, within_grid
-from modeling.model import (
-    DrivenBy,
-    Parameters,
-    TextureModel,
-    first_peq,
-)
+from modeling.grid import check_axes
+from modeling.model import DrivenBy, TextureModel, first_peq
 from modeling.peq import PEQ, Floats
 from modeling.recording import UNITS
 from modeling.regression import (
@@ -31,6 +26,7 @@ from modeling.regression import (
     reduced_regression,
 )
 from modeling.saved import SavedModel
+from modeling.table import Parameters, ParameterTable
 
 CENTROID = "centroid"
 _TERMS = {"conditions": TERMS, "centroid": (CENTROID,)}
@@ -154,30 +150,42 @@ class RegressedModel(SavedModel):
         force_n : (n,) array_like
             Normal force; negative values count as lift-off.
         """
-        hand = within_grid(self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n)
-        drive = self._drive(hand.speed_mm_s, hand.force_n)
+        return self.table.at(speed_mm_s, force_n)
 
-        def respond(coefficients: Floats) -> Floats:
-            # Term by term, not as a matrix product: its bits would depend on the number of points.
-            constant, *slopes = coefficients
-            shape = (hand.ramp.size, *coefficients.shape[1:])
-            response: Floats = np.broadcast_to(constant, shape)
-            for x, slope in zip(drive, slopes, strict=True):
-                response = response + x.reshape(-1, *(1,) * slope.ndim) * slope
-            return response
+    @property
+    def table(self) -> ParameterTable:
+        """The regressions at the four corners of the grid.
 
-        return Parameters(
-            np.maximum(respond(self.noise_gain), 0.0) * hand.ramp,
-            respond(self.frequencies_hz),
-            respond(self.bandwidths_hz),
-            self.signs * np.maximum(respond(self.amplitudes), 0.0) * hand.ramp[:, None],
+        All their terms are linear in speed and in force, so that between the corners bilinear
+        interpolation gives the regressions themselves, and the renderer needs to know no others.
+        """
+        speed, force = self.speeds_mm_s[:, None], self.forces_n[None, :]
+        drive = (
+            [self.centroid_hz[0] + self.centroid_hz[1] * speed + 0.0 * force]
+            if self.driven_by == CENTROID
+            else [speed + 0.0 * force, 0.0 * speed + force, speed * force]
         )
 
-    def _drive(self, speed_mm_s: Floats, force_n: Floats) -> list[Floats]:
-        """What the slopes are multiplied with, each (n,)."""
-        if self.driven_by == CENTROID:
-            return [self.centroid_hz[0] + self.centroid_hz[1] * speed_mm_s]
-        return [speed_mm_s, force_n, speed_mm_s * force_n]
+        def respond(coefficients: Floats) -> Floats:
+            # Term by term, not as a matrix product, whose bits depend on the machine.
+            constant, *slopes = coefficients
+            response: Floats = np.broadcast_to(constant, (2, 2, *constant.shape))
+            for x, slope in zip(drive, slopes, strict=True):
+                response = response + x.reshape(2, 2, *(1,) * slope.ndim) * slope
+            return response
+
+        values = [
+            respond(self.noise_gain)[..., None],
+            respond(self.frequencies_hz),
+            respond(self.bandwidths_hz),
+            self.signs * respond(self.amplitudes),
+        ]
+        return ParameterTable(
+            speeds_mm_s=self.speeds_mm_s,
+            forces_n=self.forces_n,
+            values=np.concatenate(values, axis=-1),
+            signs=self.signs,
+        )
 
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:
         """The PEQ at one speed (mm/s) and force (N), in the legal range."""

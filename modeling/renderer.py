@@ -1,33 +1,40 @@
-"""Rendering a texture model as a stroke goes on: the reference, sample by sample."""
+"""Rendering a texture model as a stroke goes on."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.autoregressive import ARModel
 from modeling.errors import InputError
-from modeling.filters import BandFilter, LatticeFilter, LayeredModel, StreamFilter
+from modeling.filters import BandFilter, LatticeFilter, PythonEngine
+from modeling.kernel import CompiledEngine, is_compiled
+from modeling.limits import Limits
 from modeling.noise import stream_key
 from modeling.peq import Floats
+from modeling.plan import UPDATE_S, LayeredModel, Notch, RenderCounters, RenderPlan
 
-UPDATE_S = 1e-3
 
+class Engine(Protocol):
+    """What runs the filters of one stream."""
 
-@dataclass
-class RenderCounters:
-    """What the renderer had to correct so far."""
+    @property
+    def counters(self) -> RenderCounters: ...
 
-    lift_offs: int = 0
-    clamped: int = 0
+    def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats: ...
 
 
 class Renderer:
     """Vibration of a texture model under a moving hand (eq. 1–2, METHOD 3, 4 and 9).
 
     The state carries on from call to call: rendering in blocks of any size gives the same bits.
+    Layered models run through the compiled kernel (`kernel.h`), or, where there is none, through
+    Python with the same bits; an ARModel always runs in Python.
+
+    Gains follow the hand without clicks: from one update to the next they move in a straight line,
+    and the largest of the model's gains takes 5 ms at least from silence or to it.
 
     Parameters
     ----------
@@ -40,11 +47,20 @@ class Renderer:
         ARModel is rendered at its own rate only.
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
+    update_samples : int, optional
+        Samples from one reading of speed and force to the next, at least 1; by default one
+        millisecond (5 at 5 kHz, METHOD 9).
+    limits : Limits, optional
+        Peak, RMS and duration that the output does not exceed; none by default.
+    compensation : Compensation, optional
+        Undoes the resonance of the vibrator that will play the output (eq. 7), before the limits;
+        made for this rate.
 
     Raises
     ------
     InputError
-        For a rate below the model's, or another one than an ARModel's.
+        For a rate below the model's, or another one than an ARModel's; for a compensation made for
+        another rate; for `update_samples` below 1.
     """
 
     def __init__(
@@ -54,20 +70,35 @@ class Renderer:
         rate_hz: float | None = None,
         seed: int = 0,
         stream: int = 0,
+        update_samples: int | None = None,
+        limits: Limits | None = None,
+        compensation: Notch | None = None,
     ) -> None:
         self.model = model
         self.rate_hz = model.rate_hz if rate_hz is None else float(rate_hz)
-        self._filter: StreamFilter = (
-            LatticeFilter(model, self.rate_hz)
-            if isinstance(model, ARModel)
-            else BandFilter(model, self.rate_hz)
+        key = stream_key(seed, stream)
+        if update_samples is None:
+            finite = np.isfinite(self.rate_hz)
+            update_samples = max(1, round(UPDATE_S * self.rate_hz)) if finite else 1
+        plan = RenderPlan(
+            rate_hz=self.rate_hz,
+            update_samples=update_samples,
+            limits=limits or Limits(),
+            compensation=compensation,
         )
-        # One parameter update per millisecond: 5 samples at 5 kHz (METHOD 9).
-        self.update_samples = max(1, round(UPDATE_S * self.rate_hz))
-        self.counters = RenderCounters()
-        self._key = stream_key(seed, stream)
-        self._position = 0
-        self._setting = self._filter.silence()
+        self.update_samples = plan.update_samples
+        self._engine: Engine
+        if isinstance(model, ARModel):
+            self._engine = PythonEngine(LatticeFilter(model, self.rate_hz), plan, key=key)
+        elif is_compiled():
+            self._engine = CompiledEngine(model, plan, key=key)
+        else:
+            self._engine = PythonEngine(BandFilter(model, plan), plan, key=key)
+
+    @property
+    def counters(self) -> RenderCounters:
+        """What the renderer had to correct so far."""
+        return self._engine.counters
 
     def render(
         self, speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None = None
@@ -92,28 +123,14 @@ class Renderer:
         InputError
             For arrays of different lengths, or scalars without `samples`.
         """
-        speed, force = _trajectory(speed_mm_s, force_n, samples)
-        count = speed.size
-        finite = np.isfinite(speed) & np.isfinite(force)
-        self.counters.lift_offs += count - int(np.count_nonzero(finite))
-        inputs = self._filter.inputs(self._key, self._position, count=count)
-        starts = list(range(-self._position % self.update_samples, count, self.update_samples))
-        self._position += count
-        bounds = [*starts, count]
-        output = self._filter.filter(self._setting, *(part[: bounds[0]] for part in inputs))
-        settings = self._filter.settings(speed[starts], force[starts])
-        self.counters.clamped = self._filter.clamped
-        for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
-            self._setting = setting
-            output += self._filter.filter(setting, *(part[start:stop] for part in inputs))
-        return np.array(output, dtype=np.float64)
+        return self._engine.render(*_trajectory(speed_mm_s, force_n, samples))
 
 
 def _trajectory(
     speed_mm_s: ArrayLike, force_n: ArrayLike, samples: int | None
 ) -> tuple[Floats, Floats]:
-    speed = np.asarray(speed_mm_s, dtype=np.float64)
-    force = np.asarray(force_n, dtype=np.float64)
+    speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
+    force = np.asarray(force_n, dtype=np.float64, order="C")
     if speed.ndim == force.ndim == 0 and samples is not None and samples >= 0:
         return np.full(samples, float(speed)), np.full(samples, float(force))
     if speed.ndim != 1 or speed.shape != force.shape or samples is not None:

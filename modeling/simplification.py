@@ -7,7 +7,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from modeling.coherent import neighbouring_patterns
 from modeling.errors import InputError
@@ -266,6 +265,8 @@ def _flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
     by √2 of it is made up for by selection: of several levels the one nearest to the threshold is
     there in part by its own error. Planted repeats turn about as often as said here.
     """
+    from scipy.special import ndtr
+
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         z = np.where(level_sd_db > 0, -distances / level_sd_db, np.copysign(np.inf, -distances))
     below = np.prod(ndtr(z), axis=0)

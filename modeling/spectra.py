@@ -7,8 +7,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import butter, resample, sosfilt
 
 from modeling.errors import InputError
 from modeling.peq import Floats
@@ -58,6 +56,8 @@ class Spectrum:
 
 def smooth(magnitude: Floats, sigma_hz: float, *, step_hz: float) -> Floats:
     """Gaussian smoothing of (…, n) magnitudes spaced by `step_hz`, reflected at the edges."""
+    from scipy.ndimage import gaussian_filter1d
+
     smoothed: Floats = gaussian_filter1d(magnitude, sigma_hz / step_hz, mode="reflect")
     return smoothed
 
@@ -76,6 +76,8 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     (n,) ndarray
         In the recording's unit, at min(rate_hz, recording.rate_hz).
     """
+    from scipy.signal import butter, resample, sosfilt
+
     target_hz = min(rate_hz, recording.rate_hz)
     if target_hz <= 2 * HIGH_PASS_HZ:
         raise InputError(

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from modeling.grid import Condition
 from modeling.likelihood import LOWEST_HZ
@@ -178,6 +177,8 @@ def _ridge_fit(design: Floats, values: Floats, *, weight: Floats, towards: Float
 
 def _owners(votes: _Votes, laws: list[Floats]) -> NDArray[np.intp]:
     """The law of each peak, −1 where none: within a condition each law has one peak at most."""
+    from scipy.optimize import linear_sum_assignment
+
     owner = np.full(votes.frequency.size, -1, dtype=np.intp)
     if not laws:
         return owner

@@ -47,16 +47,9 @@ def state_space(frequency_hz: float, bandwidth_hz: float) -> tuple[np.ndarray, .
 
 
 def states_of_code(frequency_hz: float, bandwidth_hz: float) -> tuple[np.ndarray, np.ndarray]:
-    """(A, b) that the code's coefficients give in METHOD's recursion."""
+    """(A, b) that the code's coefficients give."""
     c = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=RATE_HZ)
-    columns = []
-    for s1, s2, w in np.eye(3):
-        v3 = c.drive * w - s2
-        v1 = c.a1 * s1 + c.a2 * v3
-        v2 = s2 + c.a2 * s1 + c.a3 * v3
-        columns.append([2 * v1 - s1, 2 * v2 - s2])
-    step = np.array(columns).T
-    return step[:, :2], step[:, 2:]
+    return np.array([[c.p, -c.q], [c.q, c.r]]), np.array([[c.b1], [c.b2]])
 
 
 def test_rational_tan_is_the_tangent_to_2e_14() -> None:

@@ -1,0 +1,416 @@
+/* The rendering kernel: a texture under a moving hand, sample by sample (METHOD 3 and 9).
+
+   C99, no allocation, no globals, no call of the mathematical library but one square root per layer
+   and parameter update (and one per sample that the RMS limit touches). Define TQ_REAL as float
+   before including it for single precision. Compile with -ffp-contract=off, never with -ffast-math:
+   then double precision equals the Python renderer bit for bit wherever double arithmetic is IEEE 754
+   without excess precision (not on x87).
+
+   Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, taps) reals; then call
+   tq_render as often as you like, with blocks of any size.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_KERNEL_H
+#define TQ_KERNEL_H
+
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+#ifndef TQ_REAL
+#define TQ_REAL double
+#endif
+
+typedef TQ_REAL tq_real;
+
+#define TQ_CHUNK 64       /* samples that are filtered in one go */
+#define TQ_SIDE_BY_SIDE 4 /* layers whose recursions run side by side */
+
+/* Rows of the state's memory, each one value per layer; the noise follows them. */
+enum { TQ_S1, TQ_S2, TQ_GAIN, TQ_P, TQ_Q, TQ_R, TQ_B1, TQ_B2, TQ_NOW, TQ_STEP, TQ_ROWS };
+
+/* How many reals of memory a state needs; taps is 1 at the model's own rate. */
+#define TQ_MEMORY(layers, taps) (TQ_ROWS * (layers) + (taps) - 1 + TQ_CHUNK)
+
+/* What is rendered, and where: constant while it plays. */
+typedef struct {
+    /* Parameters over a grid of speeds x forces: noise gain, then all frequencies (Hz), all
+       bandwidths (Hz), all signed gains. A sign of 1 or -1 keeps a layer's gain from crossing 0
+       where the grid stands for a regression, 0 leaves it alone. */
+    int speeds, forces, layers;
+    const tq_real *speed_mm_s, *force_n; /* (speeds), (forces): rising, above 0, at least two each */
+    const tq_real *values;               /* (speeds, forces, 1 + 3 layers) */
+    const tq_real *signs;                /* (layers) */
+    /* Time. Noise of unit variance at the model's rate has noise_scale^2 = rate / model rate here. */
+    tq_real rate_hz, noise_scale;
+    int update_samples;    /* from one parameter update to the next, at least 1 */
+    const tq_real *slews;  /* (1 + layers): the furthest a gain moves in one update */
+    const tq_real *lowpass; /* (taps), odd and symmetric: the noise branch ends at the model's Nyquist */
+    int taps;
+    /* Vibrator compensation (eq. 7): out - share * band-pass(out); share 0 is none. */
+    tq_real notch_hz, notch_width_hz, notch_share;
+    /* Limits; 0 is none. The running mean square takes in mean_share of every new square. */
+    tq_real peak, mean_square, mean_share;
+    uint64_t longest, pause; /* samples of vibration without a pause; samples of silence that end it */
+} tq_texture;
+
+/* Coefficients of one unit-covariance band: s1' = p s1 - q s2 + b1 w, s2' = q s1 + r s2 + b2 w, and
+   the unit-gain band-pass is tap (s1 + s1'). */
+typedef struct {
+    tq_real p, q, r, b1, b2, tap;
+} tq_band;
+
+/* What was corrected: samples without a finite hand, parameter values moved into the legal range,
+   samples that each limit touched. */
+typedef struct {
+    uint64_t lift_offs, clamped, peak, rms, duration;
+} tq_counters;
+
+typedef struct {
+    uint64_t key, position;
+    int since_update;
+    tq_real floor_gain, floor_now, floor_step;
+    tq_real *memory;
+    tq_band notch;
+    tq_real notch_s1, notch_s2;
+    tq_real mean_square;
+    uint64_t sounding, silent;
+    tq_counters counters;
+} tq_state;
+
+static inline tq_real *tq_row(const tq_texture *t, const tq_state *s, int row)
+{
+    return s->memory + (size_t)row * (size_t)t->layers;
+}
+
+static inline tq_real tq_within(tq_real x, tq_real low, tq_real high)
+{
+    return x < low ? low : x > high ? high : x;
+}
+
+/* --- Noise ------------------------------------------------------------------------------------- */
+
+/* Sample `position` of a stream: SplitMix64 as a counter, uniform on +-sqrt 3. */
+static inline tq_real tq_noise(uint64_t key, uint64_t position)
+{
+    uint64_t z = key + (position + 1) * UINT64_C(0x9E3779B97F4A7C15);
+    z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+    z ^= z >> 31;
+    if (sizeof(tq_real) == sizeof(float)) /* 24 bits are exact in single precision, 53 in double */
+        return ((tq_real)(int32_t)(z >> 40) * (tq_real)0x1p-23 - 1) * (tq_real)1.7320508075688772;
+    return ((tq_real)(int64_t)(z >> 11) * (tq_real)0x1p-52 - 1) * (tq_real)1.7320508075688772;
+}
+
+/* --- Coefficients ------------------------------------------------------------------------------ */
+
+/* tan(angle / 2) = numerator / denominator, the [9/8] Pade approximant: 0 <= angle <= 0.49 pi. */
+static inline void tq_half_tangent(tq_real angle, tq_real *numerator, tq_real *denominator)
+{
+    tq_real half = angle * (tq_real)0.5, z = half * half;
+    *numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
+    *denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
+}
+
+/* The band of peak frequency f and -3 dB width B, from angles pi f / rate and pi B / rate. */
+static tq_band tq_band_of(tq_real frequency, tq_real bandwidth)
+{
+    tq_band band;
+    tq_real n, d, k_n, k_d, scale, cosine, sine, root, share, damping, turn;
+    tq_half_tangent(frequency, &n, &d);
+    scale = 1 / (d * d + n * n);
+    cosine = (d - n) * (d + n) * scale;
+    sine = 2 * n * d * scale;
+    tq_half_tangent(bandwidth, &n, &d);
+    k_n = 2 * n * d;
+    k_d = (d - n) * (d + n); /* tan(pi B / rate) = k_n / k_d */
+    scale = 1 / (k_d + k_n);
+    share = k_d * scale;
+    damping = k_n * scale;
+    turn = (cosine - sine) * (cosine + sine) * share;
+    root = (tq_real)sqrt(k_n * k_d);
+    band.p = turn - damping;
+    band.q = 2 * sine * cosine * share;
+    band.r = turn + damping;
+    band.b1 = 2 * root * scale * cosine;
+    band.b2 = 2 * root * scale * sine;
+    band.tap = root / (2 * k_d * cosine);
+    return band;
+}
+
+/* --- Parameter updates ------------------------------------------------------------------------- */
+
+/* The grid cell that holds x, which lies within the axis, and how far x is into it (0 to 1). */
+static inline int tq_cell(const tq_real *axis, int size, tq_real x, tq_real *share)
+{
+    int i = 0;
+    while (i < size - 2 && x >= axis[i + 1])
+        i++;
+    *share = (x - axis[i]) / (axis[i + 1] - axis[i]);
+    return i;
+}
+
+/* Where a hand is on the grid: the four corners around it, the place between them, and the share of
+   the level that is left below the lowest speed or force (0 at rest or lift-off). */
+typedef struct {
+    const tq_real *corner[4];
+    tq_real x, y, ramp;
+} tq_hand;
+
+static inline tq_hand tq_hand_at(const tq_texture *t, tq_real speed, tq_real force)
+{
+    tq_hand hand;
+    const tq_real *v = t->speed_mm_s, *f = t->force_n;
+    int width = 1 + 3 * t->layers, i, j;
+    if (!(speed - speed == 0 && force - force == 0)) /* NaN or infinite: lift-off */
+        speed = force = 0;
+    speed = speed < 0 ? -speed : speed;
+    hand.ramp = speed < v[0] ? speed / v[0] : 1;
+    hand.ramp *= tq_within(force / f[0], 0, 1);
+    i = tq_cell(v, t->speeds, tq_within(speed, v[0], v[t->speeds - 1]), &hand.x);
+    j = tq_cell(f, t->forces, tq_within(force, f[0], f[t->forces - 1]), &hand.y);
+    hand.corner[0] = t->values + ((size_t)i * (size_t)t->forces + (size_t)j) * (size_t)width;
+    hand.corner[1] = hand.corner[0] + (size_t)t->forces * (size_t)width;
+    hand.corner[2] = hand.corner[0] + width;
+    hand.corner[3] = hand.corner[1] + width;
+    return hand;
+}
+
+static inline tq_real tq_blend(const tq_hand *hand, int i)
+{
+    tq_real low = hand->corner[0][i] * (1 - hand->x) + hand->corner[1][i] * hand->x;
+    tq_real high = hand->corner[2][i] * (1 - hand->x) + hand->corner[3][i] * hand->x;
+    return low * (1 - hand->y) + high * hand->y;
+}
+
+/* The next gain: `wanted`, or as far towards it as one update may go. */
+static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
+{
+    tq_real change = wanted - gain;
+    if (change > slew)
+        return gain + slew;
+    return change < -slew ? gain - slew : wanted;
+}
+
+/* Parameters for the hand as it is now. Gains move in a straight line over the first half of the
+   time to the next update, so that nothing clicks; the first update sets them at once. */
+static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
+{
+    tq_hand hand = tq_hand_at(t, speed, force);
+    int m = t->layers, first = s->position == 0, i;
+    tq_real steps = (tq_real)((t->update_samples + 1) / 2), angle = (tq_real)3.141592653589793;
+    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
+    tq_real wanted = tq_blend(&hand, 0), next;
+    angle /= t->rate_hz;
+    wanted = (wanted < 0 ? 0 : wanted) * hand.ramp;
+    next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
+    s->floor_now = first ? next : s->floor_gain;
+    s->floor_step = (next - s->floor_now) / steps;
+    s->floor_gain = next;
+    for (i = 0; i < m; i++) {
+        tq_real f = tq_blend(&hand, 1 + i), b = tq_blend(&hand, 1 + m + i), now;
+        tq_real f_legal = tq_within(f, 1, highest), b_legal = tq_within(b, (tq_real)0.1, widest);
+        tq_band band = tq_band_of(angle * f_legal, angle * b_legal);
+        s->counters.clamped += (uint64_t)((f != f_legal) + (b != b_legal));
+        wanted = tq_blend(&hand, 1 + 2 * m + i);
+        wanted = (t->signs[i] * wanted < 0 ? 0 : wanted) * hand.ramp;
+        now = tq_row(t, s, TQ_GAIN)[i];
+        next = first ? wanted : tq_towards(now, wanted, t->slews[1 + i]);
+        now = first ? next : now;
+        tq_row(t, s, TQ_P)[i] = band.p;
+        tq_row(t, s, TQ_Q)[i] = band.q;
+        tq_row(t, s, TQ_R)[i] = band.r;
+        tq_row(t, s, TQ_B1)[i] = band.b1;
+        tq_row(t, s, TQ_B2)[i] = band.b2;
+        tq_row(t, s, TQ_NOW)[i] = now * band.tap;
+        tq_row(t, s, TQ_STEP)[i] = (next - now) / steps * band.tap;
+        tq_row(t, s, TQ_GAIN)[i] = next;
+    }
+}
+
+/* --- Filtering --------------------------------------------------------------------------------- */
+
+/* `width` layers from `first` on, added to `out`; gains move during the first `moving` samples. */
+static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int width,
+                             const tq_real *w, tq_real *out, int moving, int count)
+{
+    tq_real s1[TQ_SIDE_BY_SIDE], s2[TQ_SIDE_BY_SIDE], now[TQ_SIDE_BY_SIDE], step[TQ_SIDE_BY_SIDE];
+    tq_real p[TQ_SIDE_BY_SIDE], q[TQ_SIDE_BY_SIDE], r[TQ_SIDE_BY_SIDE];
+    tq_real b1[TQ_SIDE_BY_SIDE], b2[TQ_SIDE_BY_SIDE];
+    int n, i;
+    for (i = 0; i < width; i++) {
+        s1[i] = tq_row(t, s, TQ_S1)[first + i], s2[i] = tq_row(t, s, TQ_S2)[first + i];
+        p[i] = tq_row(t, s, TQ_P)[first + i], q[i] = tq_row(t, s, TQ_Q)[first + i];
+        r[i] = tq_row(t, s, TQ_R)[first + i];
+        b1[i] = tq_row(t, s, TQ_B1)[first + i], b2[i] = tq_row(t, s, TQ_B2)[first + i];
+        now[i] = tq_row(t, s, TQ_NOW)[first + i], step[i] = tq_row(t, s, TQ_STEP)[first + i];
+    }
+    for (n = 0; n < count; n++) {
+        tq_real x = w[n], y = out[n], band[TQ_SIDE_BY_SIDE];
+        if (n < moving)
+            for (i = 0; i < width; i++)
+                now[i] += step[i];
+        for (i = 0; i < width; i++) {
+            tq_real turned1 = p[i] * s1[i] + b1[i] * x - q[i] * s2[i];
+            tq_real turned2 = r[i] * s2[i] + b2[i] * x + q[i] * s1[i];
+            band[i] = now[i] * (s1[i] + turned1);
+            s1[i] = turned1;
+            s2[i] = turned2;
+        }
+        for (i = 0; i < width; i++)
+            y += band[i];
+        out[n] = y;
+    }
+    for (i = 0; i < width; i++) {
+        tq_row(t, s, TQ_S1)[first + i] = s1[i], tq_row(t, s, TQ_S2)[first + i] = s2[i];
+        tq_row(t, s, TQ_NOW)[first + i] = now[i];
+    }
+}
+
+/* All layers and the noise branch, between two updates. */
+static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const tq_real *floor,
+                      tq_real *out, int count)
+{
+    int moving = (t->update_samples + 1) / 2 - s->since_update, i = 0, n;
+    tq_real now = s->floor_now;
+    moving = moving < 0 ? 0 : moving > count ? count : moving;
+    for (n = 0; n < count; n++) {
+        if (n < moving)
+            now += s->floor_step;
+        out[n] = now * floor[n];
+    }
+    s->floor_now = now;
+    for (; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
+        tq_layers(t, s, i, TQ_SIDE_BY_SIDE, w, out, moving, count);
+    switch (t->layers - i) { /* a constant width lets the compiler unroll */
+    case 3: tq_layers(t, s, i, 3, w, out, moving, count); break;
+    case 2: tq_layers(t, s, i, 2, w, out, moving, count); break;
+    case 1: tq_layers(t, s, i, 1, w, out, moving, count); break;
+    default: break;
+    }
+    s->since_update += count;
+}
+
+/* The next noise: for the bands, and for the noise branch low-passed with zero phase, which is
+   possible because the noise to come is known. */
+static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor, int count)
+{
+    tq_real *wide = s->memory + TQ_ROWS * (size_t)t->layers, *fresh = wide + t->taps - 1;
+    int half = t->taps / 2, n, tap;
+    uint64_t ahead = s->position + (uint64_t)half;
+    for (n = 0; n < count; n++)
+        fresh[n] = t->noise_scale * tq_noise(s->key, ahead + (uint64_t)n);
+    for (n = 0; n < count; n++)
+        floor[n] = 0;
+    for (tap = 0; tap < t->taps; tap++)
+        for (n = 0; n < count; n++)
+            floor[n] += t->lowpass[tap] * wide[tap + n];
+    return wide + half;
+}
+
+/* Eq. 7: out - share * band-pass(out). */
+static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int count)
+{
+    tq_band b = s->notch;
+    tq_real s1 = s->notch_s1, s2 = s->notch_s2, gain = t->notch_share * b.tap;
+    int n;
+    for (n = 0; n < count; n++) {
+        tq_real turned1 = b.p * s1 + b.b1 * out[n] - b.q * s2;
+        tq_real turned2 = b.r * s2 + b.b2 * out[n] + b.q * s1;
+        out[n] -= gain * (s1 + turned1);
+        s1 = turned1;
+        s2 = turned2;
+    }
+    s->notch_s1 = s1;
+    s->notch_s2 = s2;
+}
+
+/* --- Limits ------------------------------------------------------------------------------------ */
+
+/* One sample that is no louder than the limits allow. After `longest` samples of vibration without
+   `pause` samples of silence: silence until such a pause. Then the peak; then the running mean square
+   of what leaves, which never exceeds its limit. */
+static inline tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
+{
+    if (t->longest) {
+        s->silent = y == 0 ? s->silent + 1 : 0;
+        s->sounding = s->silent >= t->pause ? 0 : s->sounding + 1;
+        if (s->sounding > t->longest && y != 0) {
+            y = 0;
+            s->counters.duration++;
+        }
+    }
+    if (t->peak > 0 && !(y <= t->peak && y >= -t->peak)) {
+        y = y > 0 ? t->peak : y < 0 ? -t->peak : 0; /* 0: not a number */
+        s->counters.peak++;
+    }
+    if (t->mean_square > 0) {
+        tq_real kept = (1 - t->mean_share) * s->mean_square;
+        tq_real room = (t->mean_square - kept) / t->mean_share;
+        if (!(y * y <= room)) {
+            y = y > 0 ? (tq_real)sqrt(room) : y < 0 ? -(tq_real)sqrt(room) : 0;
+            s->counters.rms++;
+        }
+        s->mean_square = kept + t->mean_share * (y * y);
+    }
+    return y;
+}
+
+/* --- The two calls ----------------------------------------------------------------------------- */
+
+/* Silence at position 0 of a noise stream. `memory` holds TQ_MEMORY(layers, taps) reals and must
+   live as long as the state. */
+static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t key)
+{
+    int n, half = t->taps / 2;
+    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz, *wide;
+    memset(s, 0, sizeof *s);
+    s->key = key;
+    s->memory = memory;
+    for (n = 0; n < TQ_MEMORY(t->layers, t->taps); n++)
+        memory[n] = 0;
+    wide = memory + TQ_ROWS * (size_t)t->layers;
+    for (n = 0; n < t->taps - 1; n++) /* the noise around the first sample, but what is still ahead */
+        wide[n] = t->noise_scale * tq_noise(key, (uint64_t)((int64_t)n - half));
+    if (t->notch_share != 0)
+        s->notch = tq_band_of(angle * t->notch_hz, angle * t->notch_width_hz);
+}
+
+/* The next `count` samples for a hand whose speed and force are given at each of them. */
+static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
+                      tq_real *out, size_t count)
+{
+    int limited = t->peak > 0 || t->mean_square > 0 || t->longest > 0;
+    while (count) {
+        tq_real floor[TQ_CHUNK];
+        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0, n;
+        const tq_real *w = tq_inputs(t, s, floor, chunk);
+        for (n = 0; n < chunk; n++)
+            s->counters.lift_offs += !(speed[n] - speed[n] == 0 && force[n] - force[n] == 0);
+        while (done < chunk) {
+            int left = t->update_samples - s->since_update, piece;
+            if (s->position == 0 || left == 0) {
+                tq_update(t, s, speed[done], force[done]);
+                s->since_update = 0;
+                left = t->update_samples;
+            }
+            piece = left < chunk - done ? left : chunk - done;
+            tq_filter(t, s, w + done, floor + done, out + done, piece);
+            s->position += (uint64_t)piece;
+            done += piece;
+        }
+        if (t->notch_share != 0)
+            tq_compensate(t, s, out, chunk);
+        if (limited)
+            for (n = 0; n < chunk; n++)
+                out[n] = tq_limit(t, s, out[n]);
+        if (t->taps > 1) /* the noise around the next sample */
+            memmove(s->memory + TQ_ROWS * (size_t)t->layers,
+                    s->memory + TQ_ROWS * (size_t)t->layers + chunk,
+                    (size_t)(t->taps - 1) * sizeof(tq_real));
+        speed += chunk, force += chunk, out += chunk, count -= (size_t)chunk;
+    }
+}
+
+#endif

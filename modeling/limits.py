@@ -1,0 +1,52 @@
+"""What a signal may be at most before it leaves: peak, RMS and duration (METHOD 9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from modeling.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Limits of what a renderer puts out; every sample that one of them touches is counted.
+
+    First the duration, then the peak, then the RMS: what leaves obeys all three.
+
+    Parameters
+    ----------
+    peak : float
+        Largest absolute value, in the model's unit; above 0, infinite for none (the default).
+    rms : float
+        Largest running RMS, in the model's unit: the root of the mean square weighted by
+        exp(−age/`rms_window_s`). A sample that would exceed it is reduced just so far that it does
+        not. Above 0, infinite for none.
+    rms_window_s : float
+        Above 0.
+    duration_s : float
+        Longest vibration without a pause; what follows is silence until a pause. Above 0, infinite
+        for none.
+    pause_s : float
+        Shortest silence that counts as a pause, above 0.
+
+    Raises
+    ------
+    InputError
+        For values of 0 or below, or NaN.
+    """
+
+    peak: float = np.inf
+    rms: float = np.inf
+    rms_window_s: float = 1.0
+    duration_s: float = np.inf
+    pause_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not value > 0 or (field.name in ("rms_window_s", "pause_s") and np.isinf(value)):
+                raise InputError(
+                    f"expected {field.name} above 0 for the limits, got {value}; correct it."
+                )

@@ -1,0 +1,141 @@
+"""What is rendered and how: all that the compiled and the Python renderer must agree on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from modeling.errors import InputError
+from modeling.limits import Limits
+from modeling.peq import Floats
+from modeling.table import ParameterTable
+
+UPDATE_S = 1e-3
+FADE_S = 5e-3
+_EDGE_SHARE = 0.2
+
+
+class LayeredModel(Protocol):
+    """A model that gives PEQ parameters for any speed and force."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def table(self) -> ParameterTable: ...
+
+
+class Notch(Protocol):
+    """A vibrator compensation (eq. 7): the signal less a share of it in a unit-gain band."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def frequency_hz(self) -> float: ...
+
+    @property
+    def bandwidth_hz(self) -> float: ...
+
+    @property
+    def band_share(self) -> float: ...
+
+
+@dataclass
+class RenderCounters:
+    """What a renderer had to correct so far.
+
+    `lift_offs`: samples with a speed or force that is not finite. `clamped`: parameter values
+    moved into the legal range. The rest: samples that each of the `Limits` touched.
+    """
+
+    lift_offs: int = 0
+    clamped: int = 0
+    limited_peak: int = 0
+    limited_rms: int = 0
+    limited_duration: int = 0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RenderPlan:
+    """How a stream is rendered.
+
+    Parameters
+    ----------
+    rate_hz : float
+    update_samples : int
+        From one parameter update to the next, at least 1.
+    limits : Limits
+    compensation : Notch, optional
+        At this rate.
+
+    Raises
+    ------
+    InputError
+        For an update period below one sample, or a compensation for another rate.
+    """
+
+    rate_hz: float
+    update_samples: int
+    limits: Limits
+    compensation: Notch | None
+
+    def __post_init__(self) -> None:
+        if self.update_samples < 1:
+            raise InputError(
+                "expected parameter updates every 1 or more samples, got "
+                f"{self.update_samples}; give a larger update_samples."
+            )
+        if self.compensation is not None and self.compensation.rate_hz != self.rate_hz:
+            raise InputError(
+                f"expected a vibrator compensation for {self.rate_hz:g} Hz, got one for "
+                f"{self.compensation.rate_hz:g} Hz; make it for the rate of rendering."
+            )
+
+    @property
+    def moving_samples(self) -> int:
+        """Gains move in a straight line over the first half of the time to the next update."""
+        return (self.update_samples + 1) // 2
+
+    @property
+    def mean_share(self) -> float:
+        """What a new square adds to the running mean square."""
+        return float(-np.expm1(-1 / (self.limits.rms_window_s * self.rate_hz)))
+
+    def slews(self, table: ParameterTable) -> Floats:
+        """How far the noise gain and every layer's gain move in one update at most, (1 + m,).
+
+        The largest gain of the grid takes 5 ms: no hand is faster, but sensors and lift-off are.
+        """
+        share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
+        return table.largest_gains * share
+
+    def samples(self, seconds: float) -> int:
+        """A limit's time in samples, at least 1; 0 stands for no limit."""
+        return 0 if np.isinf(seconds) else max(1, round(seconds * self.rate_hz))
+
+
+def noise_lowpass(model_rate_hz: float, rate_hz: float) -> Floats:
+    """Taps of a linear-phase low-pass at the model's Nyquist frequency; [1] at its own rate.
+
+    Raises
+    ------
+    InputError
+        For a rate below the model's, or not finite.
+    """
+    if not (np.isfinite(rate_hz) and rate_hz >= model_rate_hz):
+        raise InputError(
+            f"expected a rendering rate of at least the model's {model_rate_hz:g} Hz, got "
+            f"{rate_hz:g}; render at that rate and resample."
+        )
+    if rate_hz == model_rate_hz:
+        return np.ones(1)
+    from scipy.signal import firwin
+
+    transition_hz = _EDGE_SHARE * model_rate_hz / 2
+    taps = 2 * round(1.65 * rate_hz / transition_hz) + 1  # Hamming: 3.3 fs/transition
+    cutoff_hz = min(model_rate_hz / 2, rate_hz / 2 * 0.999)
+    lowpass: Floats = firwin(taps, cutoff_hz, fs=rate_hz)
+    return lowpass

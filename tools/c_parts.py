@@ -1,0 +1,48 @@
+"""The C parts of the project and their cffi bindings; run by setup.py, imports nothing of the project.
+
+`modeling._kernel` is the rendering kernel, `analysis._rivals` what the render bench compares it with.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from cffi import FFI
+
+ROOT = Path(__file__).resolve().parent.parent
+KERNEL = ROOT / "modeling" / "kernel.h"
+RIVALS = ROOT / "analysis" / "rivals.h"
+# For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
+COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
+
+
+def declarations(header: Path) -> str:
+    """Structures and functions of a header as cffi wants them: those that are not inline."""
+    text = header.read_text(encoding="utf-8")
+    structures = re.findall(r"^typedef struct \{.*?^\} \w+;$", text, re.DOTALL | re.MULTILINE)
+    calls = re.findall(r"^static (?!inline)[^;{}=]*?\([^)]*\)(?=\s*\{)", text, re.MULTILINE)
+    return "\n".join([*structures, *(f"{call};" for call in calls)])
+
+
+def binding(name: str, *headers: Path) -> FFI:
+    """A builder of extension `name` over these headers, the last one including the others."""
+    builder = FFI()
+    builder.cdef(
+        "typedef double tq_real; static const int TQ_CHUNK, TQ_ROWS;"
+        + "\n".join(declarations(header) for header in headers)
+    )
+    builder.set_source(
+        name,
+        f'#include "{headers[-1].name}"',
+        include_dirs=[str(header.parent) for header in headers],
+        depends=[str(header) for header in headers],
+        extra_compile_args=COMPILER_ARGUMENTS,
+        optional=True,  # no compiler: the Python renderer does the same, slower
+    )
+    return builder
+
+
+kernel = binding("modeling._kernel", KERNEL)
+if RIVALS.exists():
+    rivals = binding("analysis._rivals", KERNEL, RIVALS)
