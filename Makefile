@@ -14,12 +14,17 @@ PYTEST_FLAGS ?=
 
 install: .venv/installed
 
-.venv/installed: requirements.lock pyproject.toml
+.venv/packages: requirements.lock
 	@test -n "$(PYTHON)" || { echo "error: expected Python 3.11 or 3.12, got neither; install python3.11 and python3-venv (or make PYTHON=/path/to/python)." >&2; exit 1; }
 	@echo "Setting up .venv with $(PYTHON) (about 1.5 GB, a minute or two) ..."
 	@$(PYTHON) -m venv .venv || { echo "error: expected the venv module, got none; install python3-venv." >&2; exit 1; }
 	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	@touch $@
+
+# The project itself and its C parts; says so where there is no compiler.
+.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/kernel.h analysis/rivals.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+	@$(BIN)/python -c "from modeling.kernel import is_compiled; is_compiled()"
 	@touch $@
 
 demo: install
@@ -42,4 +47,4 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv demo build *.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv demo build *.egg-info modeling/_kernel.* analysis/_rivals.* .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -5,6 +5,7 @@ from modeling.autoregressive import ARFilter, ARModel, fit_ar
 from modeling.errors import GridError, InputError
 from modeling.estimators import ESTIMATORS, find_layers
 from modeling.fitting import fit_texture, missing_conditions
+from modeling.identification import identify_vibrator
 from modeling.layers import Layers
 from modeling.limits import Limits
 from modeling.model import TextureModel
@@ -15,6 +16,7 @@ from modeling.renderer import Renderer
 from modeling.simplification import CRITERIA, LayerVerdict, Simplification, simplify
 from modeling.spectra import Spectrum, spectrum
 from modeling.thresholds import Threshold
+from modeling.vibrator import Compensation, Vibrator, compensation_for, flat_band
 
 __all__ = [
     "CRITERIA",
@@ -22,6 +24,7 @@ __all__ = [
     "PEQ",
     "ARFilter",
     "ARModel",
+    "Compensation",
     "GridError",
     "InputError",
     "LayerVerdict",
@@ -35,9 +38,13 @@ __all__ = [
     "Spectrum",
     "TextureModel",
     "Threshold",
+    "Vibrator",
+    "compensation_for",
     "find_layers",
     "fit_ar",
     "fit_texture",
+    "flat_band",
+    "identify_vibrator",
     "missing_conditions",
     "similarity",
     "simplify",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -67,10 +67,12 @@ def _swap(fresh: Path, target: Path) -> None:
     shutil.rmtree(old)
 
 
-def check_replaceable(target: Path, *, index_name: str, what: str) -> None:
+def check_replaceable(
+    target: Path, *, index_name: str, what: str, beside: Collection[str] = ()
+) -> None:
     """Refuse to replace anything but an empty folder or a set with nothing beside its own files.
 
-    Its own are the index, the files that the index lists, and `provenance.json`.
+    Its own are the index, the files that the index lists, `provenance.json` and the names `beside`.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def check_replaceable(target: Path, *, index_name: str, what: str) -> None:
         raise InputError(f"expected a folder, got the file {target}; choose another name.")
     if not target.exists():
         return
-    own = {index_name, "provenance.json"}
+    own = {index_name, "provenance.json", *beside}
     if (target / index_name).is_file():
         own |= {row["file"] for row in read_table(target / index_name, ("file",))}
     foreign = sorted({path.name for path in target.iterdir()} - own)

@@ -80,7 +80,8 @@ class PythonEngine:
 class BandFilter:
     """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
-    Gains move in a straight line over the first half of the time to the next update, and at most
+    Parameters are those for the hand as it will be amid the time to the next update: those for the
+    hand as it is would be late by half that time. Gains move in a straight line over the first half of the time to the next update, and at most
     by the plan's slews; the first update sets them at once.
     """
 
@@ -90,6 +91,7 @@ class BandFilter:
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
         self._slews = plan.slews(self._table).tolist()
+        self._hand = np.full((2, 1), np.nan)
         self._gains: list[float] = []
         self._courses = [(0.0, 0.0)] * (1 + self._table.n_layers)
         self._bands = [(0.0,) * 5] * self._table.n_layers
@@ -97,7 +99,7 @@ class BandFilter:
 
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
         """All gains that are wanted, and the coefficients of every band, at each update."""
-        at = self._table.at(speed_mm_s, force_n)
+        at = self._table.at(*self._ahead(np.stack([speed_mm_s, force_n])))
         frequency, bandwidth, clamped = clamp_bands(
             at.frequencies_hz, at.bandwidths_hz, rate_hz=self._plan.rate_hz
         )
@@ -108,6 +110,18 @@ class BandFilter:
         table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
         bands = [[tuple(band) for band in update] for update in table.tolist()]
         return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
+
+    def _ahead(self, hand: Floats) -> Floats:
+        """Where the (2, n) readings will be amid the time to the next ones, if they go on so."""
+        before = np.concatenate([self._hand, hand[:, :-1]], axis=1)[:, : hand.shape[1]]
+        if hand.size:
+            self._hand = hand[:, -1:]
+        period = self._plan.update_samples
+        with np.errstate(over="ignore", invalid="ignore"):
+            change = hand - before
+            ahead = hand + change * ((period - 1) / (2 * period))
+        furthest = np.array(self._plan.hand_changes)[:, None]
+        return np.where(np.abs(change) <= furthest, ahead, hand)
 
     def update(self, setting: Any) -> None:
         """Start every gain on its way to what is wanted now, as far as one update may go."""

@@ -44,10 +44,11 @@ typedef struct {
     const tq_real *signs;                /* (layers) */
     /* Time. Noise of unit variance at the model's rate has noise_scale^2 = rate / model rate here. */
     tq_real rate_hz, noise_scale;
-    int update_samples;    /* from one parameter update to the next, at least 1 */
-    const tq_real *slews;  /* (1 + layers): the furthest a gain moves in one update */
     const tq_real *lowpass; /* (taps), odd and symmetric: the noise branch ends at the model's Nyquist */
     int taps;
+    int update_samples; /* from one parameter update to the next, at least 1 */
+    tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
+    const tq_real *slews; /* (1 + layers): the furthest a gain moves in one update */
     /* Vibrator compensation (eq. 7): out - share * band-pass(out); share 0 is none. */
     tq_real notch_hz, notch_width_hz, notch_share;
     /* Limits; 0 is none. The running mean square takes in mean_share of every new square. */
@@ -70,6 +71,7 @@ typedef struct {
 typedef struct {
     uint64_t key, position;
     int since_update;
+    tq_real speed, force; /* as last read */
     tq_real floor_gain, floor_now, floor_step;
     tq_real *memory;
     tq_band notch;
@@ -184,6 +186,15 @@ static inline tq_real tq_blend(const tq_hand *hand, int i)
     return low * (1 - hand->y) + high * hand->y;
 }
 
+/* Where a reading that was `last` and is `now` will be amid the time to the next one, if it goes on as
+   it did. What changed further than a hand can is a step, which does not go on. */
+static inline tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, int update_samples)
+{
+    tq_real share = (tq_real)(update_samples - 1) / (tq_real)(2 * update_samples);
+    tq_real change = now - last;
+    return change <= furthest && change >= -furthest ? now + change * share : now;
+}
+
 /* The next gain: `wanted`, or as far towards it as one update may go. */
 static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
 {
@@ -193,16 +204,22 @@ static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
     return change < -slew ? gain - slew : wanted;
 }
 
-/* Parameters for the hand as it is now. Gains move in a straight line over the first half of the
-   time to the next update, so that nothing clicks; the first update sets them at once. */
+/* Parameters for the hand as it will be amid the time to the next update: those for the hand as it
+   is now would be late by half that time. Gains move in a straight line over the first half of it, so
+   that nothing clicks; the first update sets them at once. */
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
-    tq_hand hand = tq_hand_at(t, speed, force);
     int m = t->layers, first = s->position == 0, i;
-    tq_real steps = (tq_real)((t->update_samples + 1) / 2), angle = (tq_real)3.141592653589793;
+    int every = t->update_samples;
+    tq_hand hand = first ? tq_hand_at(t, speed, force)
+                         : tq_hand_at(t, tq_ahead(s->speed, speed, t->speed_change, every),
+                                      tq_ahead(s->force, force, t->force_change, every));
+    tq_real steps = (tq_real)((every + 1) / 2), angle = (tq_real)3.141592653589793;
     tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
     tq_real wanted = tq_blend(&hand, 0), next;
     angle /= t->rate_hz;
+    s->speed = speed;
+    s->force = force;
     wanted = (wanted < 0 ? 0 : wanted) * hand.ramp;
     next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
     s->floor_now = first ? next : s->floor_gain;

@@ -64,6 +64,8 @@ class CompiledEngine:
             "noise_scale": float(np.sqrt(plan.rate_hz / model.rate_hz)),
             "update_samples": plan.update_samples,
             "taps": taps,
+            "speed_change": plan.hand_changes[0],
+            "force_change": plan.hand_changes[1],
             "peak": limits.peak if np.isfinite(limits.peak) else 0.0,
             "mean_square": limits.rms**2 if np.isfinite(limits.rms) else 0.0,
             "mean_share": plan.mean_share,

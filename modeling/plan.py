@@ -14,6 +14,9 @@ from modeling.table import ParameterTable
 
 UPDATE_S = 1e-3
 FADE_S = 5e-3
+# A reading that changes faster is a step of the device, not a hand's motion (2 g; a sharp tap).
+FASTEST_SPEED_CHANGE_MM_S2 = 2e4
+FASTEST_FORCE_CHANGE_N_S = 200.0
 _EDGE_SHARE = 0.2
 
 
@@ -98,6 +101,12 @@ class RenderPlan:
     def moving_samples(self) -> int:
         """Gains move in a straight line over the first half of the time to the next update."""
         return (self.update_samples + 1) // 2
+
+    @property
+    def hand_changes(self) -> tuple[float, float]:
+        """The furthest that a hand's speed (mm/s) and force (N) get in one update."""
+        update_s = self.update_samples / self.rate_hz
+        return FASTEST_SPEED_CHANGE_MM_S2 * update_s, FASTEST_FORCE_CHANGE_N_S * update_s
 
     @property
     def mean_share(self) -> float:

@@ -45,8 +45,8 @@ class SavedModel(_Base):
         if set(values) != names:
             wrong = ", ".join(sorted(names ^ set(values)))
             raise InputError(
-                f"expected the fields of a texture model in {path}, got too few or too many "
-                f"({wrong}); fit the model again."
+                f"expected the fields of a {cls.FORMAT} in {path}, got too few or too many "
+                f"({wrong}); make the file again."
             )
         try:
             return cls(**values)

@@ -1,4 +1,4 @@
-"""WAV files of one axis, and what their full scale stands for."""
+"""WAV files of one axis or several, and what their full scale stands for."""
 
 from __future__ import annotations
 
@@ -18,12 +18,28 @@ def full_scale(value_g: float, file: str) -> float:
 
 
 def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
-    """Samples (1 = full scale) and rate (Hz) of a mono WAV file.
+    """Samples (n,), 1 = full scale, and rate (Hz) of a mono WAV file.
 
     Raises
     ------
     InputError
         If the file is no readable WAV, has several channels, or is shorter than it says.
+    """
+    samples, rate_hz = read_wav_channels(path)
+    if samples.shape[1] != 1:
+        raise InputError(
+            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
+        )
+    return samples[:, 0], rate_hz
+
+
+def read_wav_channels(path: Path) -> tuple[NDArray[np.float64], float]:
+    """Samples (n, channels), 1 = full scale, and rate (Hz) of a WAV file.
+
+    Raises
+    ------
+    InputError
+        If the file is no readable WAV, or is shorter than it says.
     """
     import soundfile  # late: loads a shared library that most uses never need
 
@@ -31,10 +47,6 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
         samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
     except (soundfile.LibsndfileError, OSError) as error:
         raise InputError(f"expected a WAV file, got {path} ({error}); convert it.") from None
-    if samples.shape[1] != 1:
-        raise InputError(
-            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
-        )
     with path.open("rb") as file:
         form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
     # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
@@ -43,4 +55,4 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
             f"expected {announced} bytes in {path}, as its header says, got "
             f"{path.stat().st_size}; the file is truncated, copy or record it again."
         )
-    return samples[:, 0], float(rate_hz)
+    return samples, float(rate_hz)
