@@ -1,4 +1,4 @@
-"""The C parts, built by the ordinary install; without a compiler the install goes on without them."""
+"""The C parts, built by the ordinary install; without a compiler it goes on without them."""
 
 from setuptools import setup
 

@@ -81,8 +81,8 @@ class BandFilter:
     """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
     Parameters are those for the hand as it will be amid the time to the next update: those for the
-    hand as it is would be late by half that time. Gains move in a straight line over the first half of the time to the next update, and at most
-    by the plan's slews; the first update sets them at once.
+    hand as it is would be late by half that time. Gains move in a straight line over the first half
+    of it, and at most by the plan's slews; the first update sets them at once.
     """
 
     def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
@@ -252,7 +252,7 @@ class Limiter:
 
     def _within_rms(self, y: float) -> float:
         kept = (1 - self._share) * self._mean_square
-        room = (self._limits.rms**2 - kept) / self._share
+        room = (self._limits.mean_square - kept) / self._share
         if not y * y <= room:
             self.touched[1] += 1
             y = float(np.copysign(np.sqrt(room), y)) if y == y else 0.0

@@ -67,7 +67,7 @@ class CompiledEngine:
             "speed_change": plan.hand_changes[0],
             "force_change": plan.hand_changes[1],
             "peak": limits.peak if np.isfinite(limits.peak) else 0.0,
-            "mean_square": limits.rms**2 if np.isfinite(limits.rms) else 0.0,
+            "mean_square": limits.mean_square if np.isfinite(limits.rms) else 0.0,
             "mean_share": plan.mean_share,
             "longest": plan.samples(limits.duration_s),
             "pause": plan.samples(limits.pause_s),

@@ -24,17 +24,17 @@ class Limits:
         exp(−age/`rms_window_s`). A sample that would exceed it is reduced just so far that it does
         not. Above 0, infinite for none.
     rms_window_s : float
-        Above 0.
+        Above 0 and finite.
     duration_s : float
         Longest vibration without a pause; what follows is silence until a pause. Above 0, infinite
         for none.
     pause_s : float
-        Shortest silence that counts as a pause, above 0.
+        Shortest silence that counts as a pause; above 0 and finite.
 
     Raises
     ------
     InputError
-        For values of 0 or below, or NaN.
+        For values out of range, or so small (1e-162) that their square is 0.
     """
 
     peak: float = np.inf
@@ -46,7 +46,15 @@ class Limits:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not value > 0 or (field.name in ("rms_window_s", "pause_s") and np.isinf(value)):
+            endless = field.name in ("rms_window_s", "pause_s") and np.isinf(value)
+            # A square below the smallest double would be a limit of 0, which stands for none.
+            if endless or not (value > 0 and value * value > 0):
+                finite = " and finite" if endless else ""
                 raise InputError(
-                    f"expected {field.name} above 0 for the limits, got {value}; correct it."
+                    f"expected {field.name} above 0{finite} for the limits, got {value}; correct it."
                 )
+
+    @property
+    def mean_square(self) -> float:
+        """The square of `rms`."""
+        return self.rms * self.rms

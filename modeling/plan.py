@@ -18,6 +18,8 @@ FADE_S = 5e-3
 FASTEST_SPEED_CHANGE_MM_S2 = 2e4
 FASTEST_FORCE_CHANGE_N_S = 200.0
 _EDGE_SHARE = 0.2
+_LONGEST_UPDATE = 1_000_000
+_FOR_EVER = 2**62
 
 
 class LayeredModel(Protocol):
@@ -69,7 +71,7 @@ class RenderPlan:
     ----------
     rate_hz : float
     update_samples : int
-        From one parameter update to the next, at least 1.
+        From one parameter update to the next, 1 … 1 000 000.
     limits : Limits
     compensation : Notch, optional
         At this rate.
@@ -77,7 +79,7 @@ class RenderPlan:
     Raises
     ------
     InputError
-        For an update period below one sample, or a compensation for another rate.
+        For an update period out of range, or a compensation for another rate.
     """
 
     rate_hz: float
@@ -86,10 +88,11 @@ class RenderPlan:
     compensation: Notch | None
 
     def __post_init__(self) -> None:
-        if self.update_samples < 1:
+        whole = isinstance(self.update_samples, int | np.integer)
+        if not (whole and 1 <= self.update_samples <= _LONGEST_UPDATE):
             raise InputError(
-                "expected parameter updates every 1 or more samples, got "
-                f"{self.update_samples}; give a larger update_samples."
+                f"expected parameter updates every 1 to {_LONGEST_UPDATE} samples, got "
+                f"{self.update_samples!r}; give a whole number of update_samples in that range."
             )
         if self.compensation is not None and self.compensation.rate_hz != self.rate_hz:
             raise InputError(
@@ -123,7 +126,7 @@ class RenderPlan:
 
     def samples(self, seconds: float) -> int:
         """A limit's time in samples, at least 1; 0 stands for no limit."""
-        return 0 if np.isinf(seconds) else max(1, round(seconds * self.rate_hz))
+        return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))
 
 
 def noise_lowpass(model_rate_hz: float, rate_hz: float) -> Floats:

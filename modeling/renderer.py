@@ -34,9 +34,9 @@ class Renderer:
     Python with the same bits; an ARModel always runs in Python.
 
     At each update parameters are those for where the hand will be amid the time to the next one, if
-    it goes on as it did since the last (a change beyond any hand's, 20 m/s² or 200 N/s, is a step and
-    does not go on). Gains move there in a straight line over half that time, and the largest of the
-    model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
+    it goes on as it did since the last (a change beyond any hand's, 20 m/s² or 200 N/s, is a step
+    and does not go on). Gains move there in a straight line over half that time, and the largest of
+    the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class Renderer:
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
-        Samples from one reading of speed and force to the next, at least 1; by default one
+        Samples from one reading of speed and force to the next, 1 … 1 000 000; by default one
         millisecond (5 at 5 kHz, METHOD 9).
     limits : Limits, optional
         Peak, RMS and duration that the output does not exceed; none by default.
@@ -62,7 +62,7 @@ class Renderer:
     ------
     InputError
         For a rate below the model's, or another one than an ARModel's; for a compensation made for
-        another rate; for `update_samples` below 1.
+        another rate; for `update_samples` out of range.
     """
 
     def __init__(

@@ -1,6 +1,6 @@
-"""The C parts of the project and their cffi bindings; run by setup.py, imports nothing of the project.
+"""The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
-`modeling._kernel` is the rendering kernel, `analysis._rivals` what the render bench compares it with.
+`modeling._kernel` is the rendering kernel, `analysis._rivals` what its bench compares it with.
 """
 
 from __future__ import annotations
@@ -37,6 +37,7 @@ def binding(name: str, *headers: Path) -> FFI:
         f'#include "{headers[-1].name}"',
         include_dirs=[str(header.parent) for header in headers],
         depends=[str(header) for header in headers],
+        define_macros=[("TQ_FLAGS", f'"{" ".join(COMPILER_ARGUMENTS)}"')],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,  # no compiler: the Python renderer does the same, slower
     )
@@ -44,5 +45,4 @@ def binding(name: str, *headers: Path) -> FFI:
 
 
 kernel = binding("modeling._kernel", KERNEL)
-if RIVALS.exists():
-    rivals = binding("analysis._rivals", KERNEL, RIVALS)
+rivals = binding("analysis._rivals", KERNEL, RIVALS)

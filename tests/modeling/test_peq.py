@@ -59,6 +59,20 @@ def test_rational_tan_is_the_tangent_to_2e_14() -> None:
     assert rational_tan(0.0) == 0.0
 
 
+@given(st.floats(1, 0.49 * RATE_HZ), st.floats(0.1, 0.45 * RATE_HZ))
+def test_coefficients_are_those_of_the_closed_forms(frequency: float, bandwidth: float) -> None:
+    """In extended precision; of numbers that may be close to 0, the absolute error."""
+    theta = np.longdouble(np.pi) * np.longdouble(frequency) / RATE_HZ
+    k = np.tan(np.longdouble(np.pi) * np.longdouble(bandwidth) / RATE_HZ)
+    c = band_coefficients(frequency, bandwidth, rate_hz=RATE_HZ)
+    assert abs(c.p - (np.cos(2 * theta) - k) / (1 + k)) < 1e-14
+    assert abs(c.r - (np.cos(2 * theta) + k) / (1 + k)) < 1e-14
+    assert abs(c.q / (np.sin(2 * theta) / (1 + k)) - 1) < 1e-13
+    assert abs(c.b1 / (2 * np.sqrt(k) / (1 + k) * np.cos(theta)) - 1) < 1e-13
+    assert abs(c.b2 / (2 * np.sqrt(k) / (1 + k) * np.sin(theta)) - 1) < 1e-13
+    assert abs(c.tap / (np.sqrt(k) / (2 * np.cos(theta))) - 1) < 1e-13
+
+
 @pytest.mark.parametrize(("frequency", "bandwidth"), CORNERS)
 def test_peak_gain_is_one_and_width_is_b_at_the_range_edges(
     frequency: float, bandwidth: float

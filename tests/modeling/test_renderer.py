@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from modeling import PEQ, ARModel, InputError, Renderer, TextureModel
+from modeling import PEQ, ARModel, InputError, Limits, Renderer, TextureModel
 from modeling.kernel import SWITCH, is_compiled
 from modeling.line_spectral import line_spectral_frequencies
 
@@ -289,6 +289,52 @@ def test_mismatched_trajectories_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="two arrays of one length"):
         Renderer(moving_model()).render(speed, force, samples=samples)
+
+
+@pytest.mark.parametrize("update_samples", [0, -1, 2.5, 2**31])
+def test_update_periods_out_of_range_are_refused(update_samples: int) -> None:
+    with pytest.raises(InputError, match="updates every 1 to 1000000 samples"):
+        Renderer(moving_model(), update_samples=update_samples)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, 1e-200])
+@pytest.mark.parametrize("name", ["peak", "rms", "rms_window_s", "duration_s", "pause_s"])
+def test_limits_that_limit_nothing_or_all_are_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=f"expected {name} above 0"):
+        Limits(**{name: value})
+
+
+@pytest.mark.parametrize("name", ["rms_window_s", "pause_s"])
+def test_times_of_limits_are_finite(name: str) -> None:
+    with pytest.raises(InputError, match=f"expected {name} above 0 and finite"):
+        Limits(**{name: np.inf})
+
+
+def test_limits_that_are_never_reached_touch_nothing() -> None:
+    speed, force = trajectory(1200)
+    renderer = Renderer(moving_model(), limits=Limits(peak=1e150, rms=1e150, duration_s=1e300))
+    assert np.array_equal(
+        renderer.render(speed, force), Renderer(moving_model()).render(speed, force)
+    )
+    counters = renderer.counters
+    assert counters.limited_peak == counters.limited_rms == counters.limited_duration == 0
+
+
+def test_a_compensation_for_another_rate_is_refused() -> None:
+    class Notch:
+        rate_hz, frequency_hz, bandwidth_hz, band_share = 48000.0, 80.0, 20.0, 0.5
+
+    with pytest.raises(InputError, match="compensation for 5000 Hz, got one for 48000 Hz"):
+        Renderer(moving_model(), compensation=Notch())
+
+
+def test_arrays_of_any_layout_and_kind_are_taken() -> None:
+    speed, force = trajectory(600)
+    expected = Renderer(moving_model()).render(speed[::2].copy(), force[::-2].copy())
+    speed.setflags(write=False)
+    assert np.array_equal(Renderer(moving_model()).render(speed[::2], force[::-2]), expected)
+    whole = Renderer(moving_model()).render([100, 200], np.array([1, 2], dtype=np.int16))
+    assert np.array_equal(whole, Renderer(moving_model()).render([100.0, 200.0], [1.0, 2.0]))
 
 
 # --- autoregressive models
