@@ -19,7 +19,7 @@ from modeling.likelihood import (
     signal_power,
     split,
 )
-from modeling.peq import PEQ, Floats
+from modeling.peq import PEQ, Floats, clamp_bands
 from modeling.spectra import Spectrum
 
 _WIDTH_SHARES = (0.5, 1.0)
@@ -58,10 +58,14 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
     _, theta, signs = min(fits, key=lambda fit: fit[0])
     noise, frequency, bandwidth, gain, _ = split(theta, count)
     order = np.argsort(frequency)
+    # At a limit, the exponential of its logarithm may be a rounding error beyond it.
+    frequencies_hz, bandwidths_hz, _ = clamp_bands(
+        np.exp(frequency), np.exp(bandwidth), rate_hz=spectrum.rate_hz
+    )
     return PEQ(
         noise_gain=power.scale * float(np.exp(noise[0])),
-        frequencies_hz=np.exp(frequency)[order],
-        bandwidths_hz=np.exp(bandwidth)[order],
+        frequencies_hz=frequencies_hz[order],
+        bandwidths_hz=bandwidths_hz[order],
         gains=power.scale * (signs * np.exp(gain))[order],
         rate_hz=spectrum.rate_hz,
     )

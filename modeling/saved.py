@@ -76,14 +76,17 @@ def _plain(value: Any) -> Any:
 
 
 def dump_json(values: dict[str, Any]) -> str:
-    """JSON with one line per field and, in nested arrays, one line per row of the grid."""
+    """JSON with one line per field and, in nested arrays, one line per row of the grid.
+
+    Likewise in lists of objects, one line per object.
+    """
     lines = [f"  {json.dumps(key)}: {_rows(value)}" for key, value in values.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
 def _rows(value: Any) -> str:
     encode: Callable[[Any], str] = lambda v: json.dumps(v, allow_nan=False)  # noqa: E731
-    if isinstance(value, list) and value and isinstance(value[0], list):
+    if isinstance(value, list) and value and isinstance(value[0], list | dict):
         return "[\n    " + ",\n    ".join(map(encode, value)) + "\n  ]"
     return encode(value)
 
