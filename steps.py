@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from modeling.simplification import CriterionName
     from rig.hatt import HattTexture
     from rig.importing import Label
+    from stimuli.sources import AnyModel
 
 
 def write_provenance(
@@ -132,15 +133,16 @@ def check_own_model(start: Path, command: str) -> None:
         )
 
 
-def tell_clamped(name: str, model: TextureModel, conditions: Sequence[tuple[float, float]]) -> None:
-    """Say where a stimulus asks for more than was recorded."""
-    fastest, strongest = float(model.speeds_mm_s[-1]), float(model.forces_n[-1])
-    for speed, force in conditions:
-        if speed > fastest or force > strongest:
-            print(
-                f"note: {name} was recorded up to {fastest:g} mm/s and {strongest:g} N; "
-                f"{speed:g} mm/s at {force:g} N is rendered as its nearest edge."
-            )
+def check_own_file(out: Path, command: str) -> Path:
+    """Refuse to replace a file that is not the same command's; where its provenance goes."""
+    marker = Path(f"{out}_provenance.json")
+    maker = _read_object(marker).get("command") if marker.is_file() else None
+    if out.exists() and maker != f"tactileq {command}":
+        raise ValueError(
+            f"expected a new file or an earlier result of tactileq {command} at {out}, got "
+            "something else; choose another name with --out."
+        )
+    return marker
 
 
 def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:
@@ -262,7 +264,7 @@ def clipping_warnings(records: RecordingSet) -> list[str]:
     ]
 
 
-def simulated_note(model: TextureModel) -> str:
+def simulated_note(model: AnyModel) -> str:
     """What a printed line says of a model that nobody recorded."""
     return " (simulated)" if model.simulated else ""
 
@@ -383,21 +385,3 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     others = (fit_texture(records, estimator="paper"),)
     return TextureResult(records, full, simplification, truth, others)
-
-
-def demo_stimuli(folder: Path, results: Sequence[TextureResult], seed: int) -> None:
-    """One second of every full and simplified model of the demo at 150 mm/s and 1.5 N."""
-    from stimuli.sets import write_set
-
-    models = [("full", r.model) for r in results]
-    models += [("simplified", r.simplification.model) for r in results]
-    with progress("Rendering stimuli", len(models)) as advance:
-        write_set(
-            folder,
-            models,
-            conditions=[(150.0, 1.5)],
-            rate_hz=48000.0,
-            duration_s=1.0,
-            seed=seed,
-            progress=advance,
-        )

@@ -10,11 +10,21 @@ from typing import Annotated, Literal
 import typer
 
 from modeling_steps import draw_condition, model_textures, tell_verdicts
+from rendering_steps import (
+    bench_rendering_into,
+    demo_recipe,
+    export_c_header,
+    export_peq_json,
+    export_wav_file,
+    identify_from,
+    recipe_from,
+    render_set,
+    render_stimuli,
+)
 from steps import (
     add_to_set,
     check_own_model,
     check_own_results,
-    demo_stimuli,
     demo_texture,
     labels_of,
     load_models,
@@ -28,7 +38,6 @@ from steps import (
     simulated_note,
     study_from,
     tell_beyond_hull,
-    tell_clamped,
     threshold_named,
     write_provenance,
 )
@@ -47,6 +56,18 @@ imports = typer.Typer(
     help="Take in recordings that other equipment made.",
 )
 app.add_typer(imports, name="import")
+exports = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Give a model to other programs.",
+)
+app.add_typer(exports, name="export")
+benches = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Time what runs beside what would run instead.",
+)
+app.add_typer(benches, name="bench")
 
 Out = Annotated[Path, typer.Option("--out", help="Where the results go.")]
 Seed = Annotated[int, typer.Option(min=0, max=2**31, help="Seed of everything that is random.")]
@@ -68,6 +89,7 @@ Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")
 Simplified = Annotated[Path, typer.Option("--simplified", help="Folder of simplified models.")]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 
+ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file (JSON).")]
 SurfaceName = Annotated[
     str | None, typer.Option("--texture", help="Name of the surface; the name of --out without it.")
 ]
@@ -248,7 +270,7 @@ def model(
 
 @app.command()
 def simplify(
-    model_file: Annotated[Path, typer.Argument(metavar="MODEL", help="A model file (JSON).")],
+    model_file: ModelFile,
     out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("simplified"),
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
@@ -295,42 +317,132 @@ def simplify(
 
 @app.command()
 def stimuli(
-    models: Annotated[list[Path], typer.Argument(help="Model files (JSON).")],
+    named: Annotated[
+        list[Path],
+        typer.Argument(metavar="SET.toml|MODEL…", help="A recipe, or model files (JSON)."),
+    ],
     out: Out = Path("stimuli-set"),
-    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated.")] = None,
-    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated.")] = None,
-    rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 48000.0,
-    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per file.")] = 1.0,
-    seed: Seed = 0,
+    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated. [150]")] = None,
+    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated. [1.5]")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Sampling rate in Hz. [48000]")
+    ] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", help="Seconds per file. [1]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=2**31, help="Seed of the noise. [0]")
+    ] = None,
 ) -> None:
-    """Render models to WAV files (samples in g) with a manifest.
+    """Render a set of stimuli to WAV files, with a manifest and a picture of all spectra.
 
-    The manifest's column model holds the folder that each model came from.
+    A recipe (TOML) names models, trajectories (constant speed, or a hand's as CSV), seeds, rates,
+    24-bit or float samples, and the level: as modelled, one RMS, or matched in loudness. All its
+    keys are described at the top of stimuli/recipe.py. The set holds its own recipe.toml with
+    copies of the models, from which it can be made again bit for bit.
+
+    The options are for model files without a recipe; there the manifest's column model holds the
+    folder that each model came from, and samples are g.
+
+    Example: tactileq stimuli set.toml --out stimuli-set
 
     Example: tactileq stimuli models/*.json simplified/*.json --speed 150 --force 1.5
     """
-    from modeling import TextureModel
-    from stimuli.sets import write_set
+    recipe = recipe_from(
+        named,
+        out,
+        speeds=speed,
+        forces=force,
+        rate_hz=rate_hz,
+        duration_s=duration_s,
+        seed=seed,
+    )
+    render_stimuli(recipe, out, inputs=[path for path in named if path.suffix == ".toml"])
 
-    # models/*.json names what the models came from, too.
-    paths = [path for path in models if not path.name.endswith("provenance.json")]
-    chosen = [(path.resolve().parent.name, TextureModel.load(path)) for path in paths]
-    conditions = [(v, f) for v in speed or [150.0] for f in force or [1.5]]
-    settings = {"conditions": conditions, "rate_hz": rate_hz, "duration_s": duration_s}
-    with progress("Rendering", len(chosen) * len(conditions)) as advance:
-        manifest = write_set(
-            out,
-            chosen,
-            conditions=conditions,
-            rate_hz=rate_hz,
-            duration_s=duration_s,
-            seed=seed,
-            progress=advance,
-        )
-    write_provenance(out / "provenance.json", "stimuli", settings, seed=seed, inputs=models)
-    for label, chosen_model in chosen:
-        tell_clamped(f"{chosen_model.texture} ({label})", chosen_model, conditions)
-    print(f"{len(manifest)} files: {out / 'manifest.tsv'}")
+
+@app.command()
+def vibrator(
+    test: Annotated[Path, typer.Argument(metavar="TEST", help="WAV: drive, acceleration.")],
+    out: Annotated[Path, typer.Option("--out", help="File of what is found.")] = Path(
+        "vibrator.json"
+    ),
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="PNG: response before and after, coherence.")
+    ] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="The test was simulated: say so wherever it goes.")
+    ] = False,
+) -> None:
+    """Identify a vibrator from a white-noise test, to compensate its resonance.
+
+    TEST has two channels recorded at once, the drive and the acceleration, for 8.25 s at least. A
+    poor coherence of the two is refused.
+
+    Example: tactileq vibrator white-noise.wav --out vibrator.json --plot vibrator.png
+    """
+    identify_from(test, out, plot=plot, simulated=simulated)
+
+
+@exports.command("c")
+def export_c(
+    model_file: ModelFile,
+    out: Annotated[Path | None, typer.Option("--out", help="Header. [TEXTURE.h]")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Output rate in Hz; the model's without it.")
+    ] = None,
+    single: Annotated[bool, typer.Option("--single", help="Single precision.")] = False,
+    seed: Seed = 0,
+) -> None:
+    """Write a model and the renderer as one C99 header that needs nothing else.
+
+    A comment on top of it shows a whole program. In double precision it renders what this program
+    renders, bit for bit.
+
+    Example: tactileq export c models/canvas.json --rate 48000 --out canvas.h
+    """
+    export_c_header(model_file, out, rate_hz=rate_hz, seed=seed, single=single)
+
+
+@exports.command("wav")
+def export_wav(
+    model_file: ModelFile,
+    speed: Annotated[float, typer.Option("--speed", help="mm/s.")],
+    force: Annotated[float, typer.Option("--force", help="N.")],
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds.")] = 1.0,
+    rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 48000.0,
+    seed: Seed = 0,
+    out: Annotated[Path | None, typer.Option("--out", help="WAV file. [TEXTURE.wav]")] = None,
+) -> None:
+    """Write the vibration at one speed and force as a WAV file (32-bit float samples in g).
+
+    Example: tactileq export wav models/canvas.json --speed 150 --force 1 --duration 2 --out x.wav
+    """
+    export_wav_file(
+        model_file,
+        out,
+        speed=speed,
+        force=force,
+        rate_hz=rate_hz,
+        duration_s=duration_s,
+        seed=seed,
+    )
+
+
+@exports.command("json")
+def export_json(
+    model_file: ModelFile,
+    speed: Annotated[float | None, typer.Option("--speed", help="With --force: mm/s.")] = None,
+    force: Annotated[float | None, typer.Option("--force", help="With --speed: N.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="File. [TEXTURE_peq.json]")] = None,
+) -> None:
+    """Write a model's equalizer as JSON: one condition, or all of the grid.
+
+    Each condition has its noise gain and its layers with frequency, bandwidth, gain and the
+    coefficients of a biquad; the file says what the numbers mean.
+
+    Example: tactileq export json models/canvas.json --speed 150 --force 1 --out canvas_peq.json
+    """
+    export_peq_json(model_file, out, speed=speed, force=force)
 
 
 # --- From models to answers, and to the verdict -----------------------------------------------
@@ -481,6 +593,22 @@ def analyze(
     print((out / "report.html").resolve())
 
 
+@benches.command("render")
+def bench_render(
+    out: Out = Path("bench-render"),
+    quick: Annotated[bool, typer.Option("--quick", help="Measure briefly and roughly.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the times.")] = False,
+) -> None:
+    """Time rendering per sample beside other filters in C and scipy's sosfilt, noise included.
+
+    Writes times.tsv, layers.tsv and aims.tsv, with --plot also rendering.png. The machine should
+    have nothing else to do.
+
+    Example: tactileq bench render --plot
+    """
+    bench_rendering_into(out, quick=quick, plot=plot)
+
+
 @app.command()
 def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     """The whole study in silico: record, model, simplify, render, ask, analyze.
@@ -507,7 +635,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             ):
                 results.append(result)
                 advance(result.texture)
-        demo_stimuli(fresh / "stimuli", results, seed)
+        render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         full = {r.texture: r.model for r in results}
         fewer = {r.texture: r.simplification.model for r in results}
         real = {r.texture: r.truth for r in results if r.truth is not None}

@@ -1,173 +1,285 @@
-"""Stimulus sets: WAV files rendered from models, and the manifest that says what they are."""
+"""Stimulus sets: WAV files rendered from a recipe, and the manifest that says what they are."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from math import ceil, floor, log10
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.io import wavfile
 
-from modeling import InputError, Renderer, TextureModel
-from modeling.files import check_replaceable, file_stem, replace_folder, write_table
+from modeling import InputError
+from modeling.files import check_replaceable, file_stem, replace_folder
+from stimuli.loudness import sensation_level
+from stimuli.manifest import (
+    COLUMNS_FILE,
+    MANIFEST,
+    Stimulus,
+    level_db,
+    measured,
+    write_manifest,
+)
+from stimuli.recipe import Recipe, TrajectoryEntry
+from stimuli.rendering import (
+    BITS,
+    Floats,
+    at_rate,
+    highest_peak,
+    margin_samples,
+    render_with_margins,
+    steady_part,
+    wav_bytes,
+)
+from stimuli.sources import FOLDER, RECIPE, LabelledModel, Sources, copy_sources, load_sources
+from stimuli.trajectories import Trajectory
 
-SETTLING_S = 0.5
-FADE_S = 0.01
-LONGEST_S = 3600.0
+CONTACT_SHEET = "spectra.png"
+# 48 bits: few enough that a spreadsheet keeps them all.
+STREAM_BYTES = 6
 
 
-@dataclass(frozen=True)
-class Stimulus:
-    """One rendered file: the manifest's row. Levels in dB re 1 g (or re 1 where arbitrary)."""
+@dataclass(frozen=True, eq=False)
+class _Take:
+    """One model on one trajectory with one noise; every rate makes a file of it."""
 
-    file: str
-    texture: str
-    model: str
-    layers: int
-    speed_mm_s: float
-    force_n: float
-    rate_hz: float
-    duration_s: float
+    source: LabelledModel
+    entry: TrajectoryEntry
+    trajectory: Trajectory
     seed: int
-    unit: str
-    rms: float
-    level_db: float
-    peak: float
-    sha256: str
-    simulated: str
+    stream: int
+    settling_s: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.source.model.texture}_{self.source.label}_{self.entry.name}"
+
+    def render(self) -> Floats:
+        """At the model's rate, with margins."""
+        return render_with_margins(
+            self.source.model,
+            self.trajectory,
+            seed=self.seed,
+            stream=self.stream,
+            settling_s=self.settling_s,
+        )
+
+    def steady(self) -> Floats:
+        """What its level is measured over, at the model's rate."""
+        rate_hz, vibration = self.source.model.rate_hz, self.render()
+        margin = margin_samples(rate_hz)
+        return steady_part(vibration[margin : vibration.size - margin], rate_hz)
 
 
-def render_stimulus(
-    model: TextureModel,
-    speed_mm_s: float,
-    *,
-    force_n: float,
-    rate_hz: float,
-    duration_s: float,
-    seed: int,
-) -> NDArray[np.float64]:
-    """Steady vibration at one speed and force, faded in and out over 10 ms; (n,) in g.
+class _Gain(NamedTuple):
+    """What brings a take to its level, and its sensation level then where that was matched."""
 
-    The first half second, while the filters settle, is left out.
-    """
-    settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
-    renderer = Renderer(model, rate_hz=rate_hz, seed=seed)
-    vibration = renderer.render(speed_mm_s, force_n, samples=settling + samples)[settling:]
-    fade = min(round(FADE_S * rate_hz), samples // 2)
-    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(fade) + 0.5) / max(fade, 1))
-    vibration[:fade] *= ramp
-    vibration[samples - fade :] *= ramp[::-1]
-    return vibration
+    gain_db: float = 0.0
+    sensation_level_db: float | None = None
+    share_without_threshold: float | None = None
 
 
 def write_set(
-    folder: str | Path,
-    models: Sequence[tuple[str, TextureModel]],
-    *,
-    conditions: Sequence[tuple[float, float]],
-    rate_hz: float,
-    duration_s: float,
-    seed: int,
-    progress: Callable[[str], None] | None = None,
+    folder: str | Path, recipe: Recipe, *, progress: Callable[[str], None] | None = None
 ) -> tuple[Stimulus, ...]:
-    """Render every model in every condition to a WAV file and write `manifest.tsv`.
+    """Render every model on every trajectory with every seed, at every rate, to a WAV file.
 
-    Files are 32-bit float WAV whose samples are g (or the model's arbitrary unit), so nothing is
-    scaled or clipped. The same arguments give the same bytes.
+    Beside the files: `manifest.tsv` with `manifest.json`, which describes its columns, and
+    `recipe.toml` with copies of all that it names in `sources`, from which the same set is made
+    again. The same recipe and sources give the same bytes (with one version of everything on one
+    kind of processor; elsewhere the last bit of a sample may differ).
 
     Parameters
     ----------
     folder : path
         Appears whole or not at all; replaced if it was a stimulus set, refused if it was not.
-    models : sequence of (label, TextureModel)
-        The label ("full", "simplified", …) goes into the manifest's column `model`.
-    conditions : sequence of (speed_mm_s, force_n)
-        Finite, at least 0.
-    rate_hz, duration_s : float
-        Rate a whole number and at least every model's; duration one sample to one hour.
-    seed : int
+    recipe : Recipe
     progress : callable, optional
         Called with the file's name after each file.
+
+    Returns
+    -------
+    tuple of Stimulus
+        The manifest's rows.
 
     Raises
     ------
     InputError
-        For anything outside these ranges; then nothing is written.
+        For a recipe whose sources cannot be used, a silent stimulus that is to be brought to a
+        level, two stimuli of one name, samples beyond the full scale of 24-bit files, or a disk
+        that takes no more; then nothing is written.
     """
     target = Path(folder)
-    _check_options(conditions, rate_hz, duration_s)
-    check_replaceable(target, index_name="manifest.tsv", what="a stimulus set")
-    manifest: list[Stimulus] = []
-    with replace_folder(target) as fresh:
-        for label, model in models:
-            for speed, force in conditions:
-                vibration = render_stimulus(
-                    model, speed, force_n=force, rate_hz=rate_hz, duration_s=duration_s, seed=seed
-                )
-                name = file_stem(f"{model.texture}_{label}_{speed:g}mms_{force:g}N") + ".wav"
-                if (fresh / name).exists():
-                    raise InputError(
-                        f"expected each texture, model and condition once, got {name} twice; "
-                        "remove one or rename it."
-                    )
-                wavfile.write(fresh / name, round(rate_hz), vibration.astype(np.float32))
-                manifest.append(
-                    _row(fresh / name, model, label, (speed, force), rate_hz, seed, vibration)
-                )
-                if progress:
-                    progress(name)
-        columns = [f.name for f in fields(Stimulus)]
-        rows = [[getattr(stimulus, c) for c in columns] for stimulus in manifest]
-        write_table(fresh / "manifest.tsv", columns, rows)
-    return tuple(manifest)
-
-
-def _check_options(
-    conditions: Sequence[tuple[float, float]], rate_hz: float, duration_s: float
-) -> None:
-    if not (np.isfinite(rate_hz) and rate_hz > 0 and float(rate_hz).is_integer()):
-        raise InputError(f"expected a whole rate in Hz for WAV files, got {rate_hz}; round it.")
-    if not (np.isfinite(duration_s) and round(duration_s * rate_hz) >= 1):
-        raise InputError(f"expected a duration above 0 s, got {duration_s}; give a longer one.")
-    if duration_s > LONGEST_S:
+    _check_target(target)
+    sources = load_sources(recipe)
+    takes = list(_takes(recipe, sources))
+    gains = _gains(takes, recipe, sources)
+    try:
+        with replace_folder(target) as fresh:
+            text = copy_sources(recipe, sources, folder=fresh)
+            writer = _Writer(fresh, recipe, hashlib.sha256(text.encode()).hexdigest())
+            stimuli = []
+            for take, gain in zip(takes, gains, strict=True):
+                for stimulus in writer.write(take, gain):
+                    stimuli.append(stimulus)
+                    if progress:
+                        progress(stimulus.file)
+            _check_clipping(stimuli)
+            write_manifest(fresh, stimuli)
+    except OSError as error:
+        where = f" at {error.filename}" if error.filename else ""
         raise InputError(
-            f"expected a duration of at most {LONGEST_S:g} s, got {duration_s}; give a shorter one."
+            f"expected to write a stimulus set to {target}, got {error.strerror or error}{where}; "
+            "check the path, its permissions and the space on the disk."
+        ) from None
+    return tuple(stimuli)
+
+
+def _check_target(target: Path) -> None:
+    """Refuse a folder that holds anything but a set: its files and the copies of its sources."""
+    own = (RECIPE, COLUMNS_FILE, CONTACT_SHEET, FOLDER)
+    check_replaceable(target, index_name=MANIFEST, what="a stimulus set", beside=own)
+    if not (target / FOLDER).is_dir():
+        return
+    named = Recipe.load(target / RECIPE).files()
+    foreign = sorted(set((target / FOLDER).iterdir()) - set(named))
+    if foreign:
+        raise InputError(
+            f"expected a new folder or a stimulus set, got {target} with a file in it that its "
+            f"recipe does not name ({foreign[0]}); choose another folder."
         )
-    for condition in conditions:
-        if not all(np.isfinite(value) and value >= 0 for value in condition):
-            raise InputError(
-                "expected speeds (mm/s) and forces (N) of at least 0, got "
-                f"{condition[0]} mm/s at {condition[1]} N; correct them."
+
+
+def _takes(recipe: Recipe, sources: Sources) -> Iterator[_Take]:
+    for source in sources.models:
+        for entry, trajectory in zip(recipe.trajectories, sources.trajectories, strict=True):
+            label = "" if recipe.noise == "frozen" else source.label
+            stream = _stream(source.model.texture, label, trajectory=entry.name)
+            for seed in recipe.seeds:
+                yield _Take(source, entry, trajectory, seed, stream, recipe.settling_s)
+
+
+def _stream(texture: str, label: str, *, trajectory: str) -> int:
+    """A stream by name, so that a stimulus stays the same when others are added to its set."""
+    digest = hashlib.sha256("\n".join((texture, label, trajectory)).encode()).digest()
+    return int.from_bytes(digest[:STREAM_BYTES], "big")
+
+
+def _gains(takes: Sequence[_Take], recipe: Recipe, sources: Sources) -> list[_Gain]:
+    """One gain for each take. Rendered for this alone: keeping all takes would fill the memory."""
+    if recipe.level.mode == "as modelled":
+        return [_Gain() for _ in takes]
+    if recipe.level.rms_db is not None:
+        return [_Gain(recipe.level.rms_db - _audible_level_db(take)) for take in takes]
+    return _loudness_gains(takes, sources, wanted_db=recipe.level.sensation_level_db)
+
+
+def _audible_level_db(take: _Take) -> float:
+    level = level_db(float(np.sqrt(np.mean(take.steady() ** 2))))
+    if level == -np.inf:
+        raise InputError(
+            f"expected vibration to bring to a level, got silence in {take.name}; leave this "
+            "stimulus out or render the set as modelled."
+        )
+    return level
+
+
+def _loudness_gains(
+    takes: Sequence[_Take], sources: Sources, *, wanted_db: float | None
+) -> list[_Gain]:
+    """All takes to one sensation level: the wanted one, or the median of what they have."""
+    assert sources.threshold is not None  # a recipe that matches loudness names one
+    found = []
+    for take in takes:
+        rate_hz = take.source.model.rate_hz
+        try:
+            found.append(sensation_level(take.steady(), rate_hz, threshold=sources.threshold))
+        except InputError as error:
+            raise InputError(f"{take.name}: {error}") from None
+    if wanted_db is None:
+        wanted_db = float(np.median([sensation.level_db for sensation in found]))
+    return [_Gain(wanted_db - s.level_db, wanted_db, s.share_without_threshold) for s in found]
+
+
+@dataclass(frozen=True)
+class _Writer:
+    """Writes the files of a recipe's takes into a folder."""
+
+    folder: Path
+    recipe: Recipe
+    recipe_sha256: str
+
+    def write(self, take: _Take, gain: _Gain) -> Iterator[Stimulus]:
+        """The files of one take, one per rate, each with its row of the manifest."""
+        with_margins = take.render() * 10 ** (gain.gain_db / 20)
+        duration_s = take.trajectory.duration_s
+        for rate_hz in self.recipe.rates_hz:
+            vibration = at_rate(
+                with_margins, take.source.model.rate_hz, rate_hz=rate_hz, duration_s=duration_s
+            )
+            data = wav_bytes(vibration, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
+            path = self.folder / self._file_name(take, rate_hz)
+            if path.exists():
+                raise InputError(
+                    f"expected each stimulus to have a name of its own, got {path.name} twice; "
+                    "rename a texture, label or trajectory."
+                )
+            path.write_bytes(data)
+            yield Stimulus(
+                file=path.name,
+                rate_hz=rate_hz,
+                duration_s=vibration.size / rate_hz,
+                sha256=hashlib.sha256(data).hexdigest(),
+                **gain._asdict(),
+                **measured(vibration, rate_hz),
+                **self._description(take),
             )
 
+    def _file_name(self, take: _Take, rate_hz: int) -> str:
+        """Seed and rate stand in the name only where there are several."""
+        seed = f"_seed{take.seed}" if len(self.recipe.seeds) > 1 else ""
+        rate = f"_{rate_hz}Hz" if len(self.recipe.rates_hz) > 1 else ""
+        return file_stem(take.name + seed + rate) + ".wav"
 
-def _row(
-    path: Path,
-    model: TextureModel,
-    label: str,
-    condition: tuple[float, float],
-    rate_hz: float,
-    seed: int,
-    vibration: NDArray[np.float64],
-) -> Stimulus:
-    rms = float(np.sqrt(np.mean(vibration**2)))
-    return Stimulus(
-        file=path.name,
-        texture=model.texture,
-        model=label,
-        layers=model.n_layers,
-        speed_mm_s=condition[0],
-        force_n=condition[1],
-        rate_hz=rate_hz,
-        duration_s=vibration.size / rate_hz,
-        seed=seed,
-        unit=model.unit,
-        rms=rms,
-        level_db=20 * float(np.log10(rms)) if rms > 0 else -np.inf,
-        peak=float(np.abs(vibration).max()),
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        simulated=str(model.simulated).lower(),
-    )
+    def _description(self, take: _Take) -> dict[str, Any]:
+        """What all files of a take have in common."""
+        model, recipe = take.source.model, self.recipe
+        return {
+            "texture": model.texture,
+            "model": take.source.label,
+            "layers": getattr(model, "n_layers", None),
+            "model_rate_hz": model.rate_hz,
+            "trajectory": take.entry.name,
+            "speed_mm_s": take.entry.speed_mm_s,
+            "force_n": take.entry.force_n,
+            "seed": take.seed,
+            "stream": take.stream,
+            # Brought to a level in dB re 1 g, samples are g whatever they were before.
+            "unit": "g" if recipe.level.mode == "rms" else model.unit,
+            "format": recipe.format,
+            "bits": BITS[recipe.format],
+            "full_scale_g": recipe.level.full_scale_g,
+            "model_sha256": take.source.sha256,
+            "recipe_sha256": self.recipe_sha256,
+            "simulated": str(model.simulated).lower(),
+        }
+
+
+def _check_clipping(stimuli: Sequence[Stimulus]) -> None:
+    """Refuse a set of 24-bit files of which one does not hold its samples."""
+    loudest = max(stimuli, key=lambda stimulus: stimulus.peak)
+    full_scale_g = loudest.full_scale_g
+    if full_scale_g is not None and loudest.peak > highest_peak(full_scale_g):
+        least = _rounded_up(loudest.peak * full_scale_g / highest_peak(full_scale_g))
+        raise InputError(
+            f"expected samples within the full scale of {full_scale_g:g} g, got a peak of "
+            f"{loudest.peak:.4g} g in {loudest.file}; set full_scale_g to {least:g} or more."
+        )
+
+
+def _rounded_up(value: float) -> float:
+    """To four significant digits."""
+    unit = 10.0 ** (floor(log10(value)) - 3)
+    return ceil(value / unit) * unit

@@ -62,8 +62,9 @@ def test_modeling_starts_without_what_only_some_of_it_needs() -> None:
 def test_every_command_has_an_example() -> None:
     import tactileq
 
-    commands = tactileq.app.registered_commands + tactileq.imports.registered_commands
-    assert len(commands) == 11
+    groups = (tactileq.app, tactileq.imports, tactileq.benches, tactileq.exports)
+    commands = [command for group in groups for command in group.registered_commands]
+    assert len(commands) == 16
     for command in commands:
         assert command.callback is not None
         assert "Example: tactileq " in (command.callback.__doc__ or ""), command.callback

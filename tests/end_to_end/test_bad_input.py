@@ -108,7 +108,7 @@ def test_options_without_meaning(run, tmp_path: Path) -> None:
         ("simplify", "m.json", "--threshold", "tongue"): "codec, pen-hold or a TSV file",
         ("simplify", "m.json", "--threshold", "my.tsv"): "expected a table at my.tsv",
         ("stimuli", "m.json", "--rate", "1000"): "rendering rate of at least the model's",
-        ("stimuli", "m.json", "--duration", "0"): "duration above 0 s",
+        ("stimuli", "m.json", "--duration", "0"): "to 3600 for duration_s, got 0.0",
         ("record", "new", "--texture", "silk"): "expected a planted texture among",
         ("record", "new", "--texture", "canvas", "--duration", "-1"): "expected",
         ("import", "wav", "a.wav"): "give both, or --labels",

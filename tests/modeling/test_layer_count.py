@@ -56,6 +56,15 @@ def test_the_count_is_kept_whatever_the_spectrum(count: int) -> None:
     assert (np.diff(fitted.frequencies_hz) >= 0).all()
 
 
+@pytest.mark.parametrize("rate_hz", [200.0, 1000.0, 5000.0])
+def test_a_spectrum_that_rises_to_its_end_has_a_legal_layer(rate_hz: float) -> None:
+    frequency_hz = np.linspace(0.0, rate_hz / 2, 2501)
+    rising = Spectrum(frequency_hz, 2 * frequency_hz / rate_hz, rate_hz, 5000)
+    fitted = fit_layer_count(rising, 1)
+    assert fitted.frequencies_hz == pytest.approx([0.49 * rate_hz], rel=1e-6)
+    assert fitted.frequencies_hz[0] <= 0.49 * rate_hz
+
+
 def test_silence_and_no_layers_are_refused() -> None:
     silent = Spectrum(FREQUENCY_HZ, np.zeros(2501), 5000.0, 5000)
     with pytest.raises(InputError, match="spectrum with power and a layer or more, got silence"):

@@ -1,0 +1,125 @@
+"""The contact sheet: spectra as they were planted, and a figure that shows all of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from analysis.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
+from analysis.figures_stimuli import figure_contact_sheet, plot_stimuli
+from modeling import TextureModel
+from stimuli.planted import planted_texture
+from stimuli.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets import write_set
+
+GRID = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+TEXTURES = ("PVC", "canvas")
+CONDITIONS = ((100.0, 1.0), (250.0, 2.5))
+
+
+def recipe_of(folder: Path, **changes: object) -> Recipe:
+    models = {name: planted_texture(name, **GRID) for name in TEXTURES}
+    for name, model in models.items():
+        model.save(folder / f"full/{name}.json")
+    models["canvas"].with_layers([0]).save(folder / "simplified/canvas.json")
+    values: dict[str, object] = {
+        "name": "two of seven",
+        "models": tuple(ModelEntry(folder / label, label) for label in ("full", "simplified")),
+        "trajectories": tuple(TrajectoryEntry.constant(*c) for c in CONDITIONS),
+        "rates_hz": (48_000, 8000),
+        "seeds": (1, 2, 3),
+        "duration_s": 2.0,
+        **changes,
+    }
+    return Recipe(**values)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> ContactSheet:
+    folder = tmp_path_factory.mktemp("sheet")
+    write_set(folder / "set", recipe_of(folder))
+    return contact_sheet(folder / "set")
+
+
+def test_names_and_gaps(sheet: ContactSheet) -> None:
+    assert (sheet.name, sheet.textures, sheet.models) == (
+        "two of seven",
+        TEXTURES,
+        ("full", "simplified"),
+    )
+    assert sheet.trajectories == ("100mms_1N", "250mms_2.5N")
+    assert (sheet.unit, sheet.simulated.tolist()) == ("g", [True, True])
+    assert sheet.frequency_hz.tolist() == np.arange(0, 2501, LINE_HZ).tolist()
+    # Only canvas has a simplified model.
+    assert np.isnan(sheet.density_db[0, :, 1]).all()
+    assert np.isnan(sheet.level_db[0, :, 1]).all()
+    assert np.isfinite(np.delete(sheet.density_db.reshape(4, 2, -1), [0, 1], axis=0)).all()
+
+
+def test_spectra_are_the_models(sheet: ContactSheet) -> None:
+    """Density = response²·2/rate, in bands of 200 Hz and overall."""
+    for row, name in enumerate(TEXTURES):
+        for column, condition in enumerate(CONDITIONS):
+            peq = planted_texture(name, **GRID).peq(*condition)
+            expected = 10 * np.log10(peq.response(sheet.frequency_hz) ** 2 * 2 / 5000)
+            error = (sheet.density_db[row, column, 0] - expected)[50:240]
+            assert np.abs(error.reshape(-1, 19).mean(axis=1)).max() < 1.0
+            rms = np.sqrt(np.mean(peq.response(np.arange(2500.0)) ** 2))
+            assert sheet.level_db[row, column, 0] == pytest.approx(20 * np.log10(rms), abs=0.6)
+
+
+def test_24_bit_files_have_the_same_spectra(tmp_path: Path) -> None:
+    few = {"seeds": (1,), "rates_hz": (8000,), "duration_s": 0.3}
+    write_set(tmp_path / "float", recipe_of(tmp_path, **few))
+    made = recipe_of(tmp_path, format="pcm24", level=Level(full_scale_g=2.0), **few)
+    write_set(tmp_path / "pcm", made)
+    a, b = (contact_sheet(tmp_path / name) for name in ("float", "pcm"))
+    assert np.nanmax(np.abs(a.density_db - b.density_db)) < 0.01
+
+
+def test_silence_and_names_like_missing_values(tmp_path: Path) -> None:
+    truth = planted_texture("PVC", **GRID)
+    values = {name: getattr(truth, name) for name in truth.__dataclass_fields__}
+    TextureModel(**{**values, "texture": "NA"}).save(tmp_path / "full/na.json")
+    made = recipe_of(
+        tmp_path,
+        models=(ModelEntry(tmp_path / "full/na.json", "null"),),
+        trajectories=(TrajectoryEntry.constant(0.0, 1.0),),
+        rates_hz=(5000,),
+        duration_s=0.05,
+    )
+    write_set(tmp_path / "set", made)
+    sheet = contact_sheet(tmp_path / "set")
+    assert (sheet.textures, sheet.models) == (("NA",), ("null",))
+    assert (sheet.level_db == -np.inf).all()
+    figure_contact_sheet(sheet).savefig(tmp_path / "sheet.png")
+    assert (tmp_path / "sheet.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_figure_shows_every_stimulus(sheet: ContactSheet) -> None:
+    figure = figure_contact_sheet(sheet)
+    assert isinstance(figure, Figure)
+    assert len(figure.axes) == 4
+    for number, ax in enumerate(figure.axes):
+        row, column = divmod(number, 2)
+        for model, line in enumerate(ax.get_lines()):
+            drawn = np.asarray(line.get_ydata())
+            assert np.array_equal(drawn, sheet.density_db[row, column, model], equal_nan=True)
+        assert ax.get_ylim() == figure.axes[0].get_ylim()
+        assert ax.get_xlim() == (10, 2500)
+    assert figure.axes[0].get_ylabel() == "PVC"
+    assert figure.axes[2].get_xlabel() == "frequency (Hz)"
+    stamps = [text.get_text() for ax in figure.axes for text in ax.texts]
+    assert stamps.count("SIMULATED") == 2
+    assert any(text.endswith(" / none") for text in stamps)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["full", "simplified"]
+    assert "dB re 1 g²/Hz" in figure.get_supylabel()
+
+
+def test_one_panel_alone(sheet: ContactSheet) -> None:
+    ax = plot_stimuli(sheet, 1, column=0)
+    assert len(ax.get_lines()) == 2
