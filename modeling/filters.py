@@ -159,8 +159,8 @@ class BandFilter:
             s1, s2 = self._state[layer]
             course = self._course(1 + layer, moving, len(noise))
             for n, w in enumerate(noise):
-                turned = p * s1 + b1 * w - q * s2
-                s2 = r * s2 + b2 * w + q * s1
+                turned = (s1 + b1 * w) + (p * s1 - q * s2)
+                s2 = (s2 + b2 * w) + (r * s2 + q * s1)
                 output[n] += course[n] * (s1 + turned)
                 s1 = turned
             self._state[layer] = (s1, s2)
@@ -204,8 +204,8 @@ class Compensator:
         (p, q, r, b1, b2), (s1, s2) = self._band, self._state
         output = []
         for x in signal:
-            turned = p * s1 + b1 * x - q * s2
-            s2 = r * s2 + b2 * x + q * s1
+            turned = (s1 + b1 * x) + (p * s1 - q * s2)
+            s2 = (s2 + b2 * x) + (r * s2 + q * s1)
             output.append(x - self._gain * (s1 + turned))
             s1 = turned
         self._state = (s1, s2)

@@ -60,8 +60,8 @@ def within_grid(
     force = np.atleast_1d(np.asarray(force_n, dtype=np.float64))
     contact = np.isfinite(speed) & np.isfinite(force)
     speed, force = np.where(contact, speed, 0.0), np.where(contact, force, 0.0)
-    ramp = np.minimum(speed / speeds_mm_s[0], 1.0)
-    ramp = ramp * np.clip(force / forces_n[0], 0.0, 1.0)
+    ramp = np.minimum(speed, speeds_mm_s[0]) / speeds_mm_s[0]
+    ramp = ramp * (np.clip(force, 0.0, forces_n[0]) / forces_n[0])
     return Hand(
         np.clip(speed, speeds_mm_s[0], speeds_mm_s[-1]),
         np.clip(force, forces_n[0], forces_n[-1]),

@@ -56,8 +56,9 @@ typedef struct {
     uint64_t longest, pause; /* samples of vibration without a pause; samples of silence that end it */
 } tq_texture;
 
-/* Coefficients of one unit-covariance band: s1' = p s1 - q s2 + b1 w, s2' = q s1 + r s2 + b2 w, and
-   the unit-gain band-pass is tap (s1 + s1'). */
+/* Coefficients of one unit-covariance band: s1' = s1 + p s1 - q s2 + b1 w, s2' = s2 + q s1 + r s2 +
+   b2 w, and the unit-gain band-pass is tap (s1 + s1'). At high rates p and r are small: 1 + p in single
+   precision would lose what tells a narrow band from none. */
 typedef struct {
     tq_real p, q, r, b1, b2, tap;
 } tq_band;
@@ -111,15 +112,15 @@ static inline tq_real tq_noise(uint64_t key, uint64_t position)
 static inline void tq_half_tangent(tq_real angle, tq_real *numerator, tq_real *denominator)
 {
     tq_real half = angle * (tq_real)0.5, z = half * half;
-    *numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
-    *denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
+    *numerator = half * ((tq_real)34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
+    *denominator = (tq_real)34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
 }
 
 /* The band of peak frequency f and -3 dB width B, from angles pi f / rate and pi B / rate. */
 static tq_band tq_band_of(tq_real frequency, tq_real bandwidth)
 {
     tq_band band;
-    tq_real n, d, k_n, k_d, scale, cosine, sine, root, share, damping, turn;
+    tq_real n, d, k_n, k_d, scale, cosine, sine, root, share;
     tq_half_tangent(frequency, &n, &d);
     scale = 1 / (d * d + n * n);
     cosine = (d - n) * (d + n) * scale;
@@ -129,12 +130,10 @@ static tq_band tq_band_of(tq_real frequency, tq_real bandwidth)
     k_d = (d - n) * (d + n); /* tan(pi B / rate) = k_n / k_d */
     scale = 1 / (k_d + k_n);
     share = k_d * scale;
-    damping = k_n * scale;
-    turn = (cosine - sine) * (cosine + sine) * share;
     root = (tq_real)sqrt(k_n * k_d);
-    band.p = turn - damping;
+    band.r = -2 * sine * sine * share;
+    band.p = band.r - 2 * k_n * scale;
     band.q = 2 * sine * cosine * share;
-    band.r = turn + damping;
     band.b1 = 2 * root * scale * cosine;
     band.b2 = 2 * root * scale * sine;
     band.tap = root / (2 * k_d * cosine);
@@ -269,8 +268,8 @@ static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int wi
             for (i = 0; i < width; i++)
                 now[i] += step[i];
         for (i = 0; i < width; i++) {
-            tq_real turned1 = p[i] * s1[i] + b1[i] * x - q[i] * s2[i];
-            tq_real turned2 = r[i] * s2[i] + b2[i] * x + q[i] * s1[i];
+            tq_real turned1 = (s1[i] + b1[i] * x) + (p[i] * s1[i] - q[i] * s2[i]);
+            tq_real turned2 = (s2[i] + b2[i] * x) + (r[i] * s2[i] + q[i] * s1[i]);
             band[i] = now[i] * (s1[i] + turned1);
             s1[i] = turned1;
             s2[i] = turned2;
@@ -333,8 +332,8 @@ static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int co
     tq_real s1 = s->notch_s1, s2 = s->notch_s2, gain = t->notch_share * b.tap;
     int n;
     for (n = 0; n < count; n++) {
-        tq_real turned1 = b.p * s1 + b.b1 * out[n] - b.q * s2;
-        tq_real turned2 = b.r * s2 + b.b2 * out[n] + b.q * s1;
+        tq_real turned1 = (s1 + b.b1 * out[n]) + (b.p * s1 - b.q * s2);
+        tq_real turned2 = (s2 + b.b2 * out[n]) + (b.r * s2 + b.q * s1);
         out[n] -= gain * (s1 + turned1);
         s1 = turned1;
         s2 = turned2;

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import warnings
-from typing import Any
 
 import numpy as np
 
 from modeling.peq import Floats
-from modeling.plan import LayeredModel, RenderCounters, RenderPlan, noise_lowpass
+from modeling.plan import LayeredModel, RenderCounters, RenderPlan
 
 try:
     from modeling._kernel import ffi, lib
@@ -36,47 +35,19 @@ class CompiledEngine:
     """Renders layered models; bit for bit the same as `modeling.filters.PythonEngine`."""
 
     def __init__(self, model: LayeredModel, plan: RenderPlan, *, key: np.uint64) -> None:
-        table, lowpass = model.table, noise_lowpass(model.rate_hz, plan.rate_hz)
-        self._arrays = {
-            "speed_mm_s": table.speeds_mm_s,
-            "force_n": table.forces_n,
-            "values": table.values,
-            "signs": table.signs,
-            "slews": plan.slews(table),
-            "lowpass": lowpass,
-        }
-        self._texture = ffi.new("tq_texture *", self._numbers(model, plan, lowpass.size))
-        for name, array in self._arrays.items():
-            self._arrays[name] = np.ascontiguousarray(array, dtype=np.float64)
-            setattr(self._texture, name, ffi.from_buffer("double[]", self._arrays[name]))
-        reals = lib.TQ_ROWS * table.n_layers + lowpass.size - 1 + lib.TQ_CHUNK
+        self._texture = ffi.new("tq_texture *")
+        self._arrays = []  # which the structure only points at
+        for name, value in plan.texture(model).items():
+            field = value
+            if isinstance(value, np.ndarray):
+                self._arrays.append(np.ascontiguousarray(value, dtype=np.float64))
+                field = ffi.from_buffer("double[]", self._arrays[-1])
+            setattr(self._texture, name, field)
+        layers, taps = self._texture.layers, self._texture.taps
+        reals = lib.TQ_ROWS * layers + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
         self._memory = ffi.new("double[]", reals)
         self._state = ffi.new("tq_state *")
         lib.tq_start(self._texture, self._state, self._memory, int(key))
-
-    def _numbers(self, model: LayeredModel, plan: RenderPlan, taps: int) -> dict[str, Any]:
-        table, limits = model.table, plan.limits
-        numbers: dict[str, Any] = {
-            "speeds": table.speeds_mm_s.size,
-            "forces": table.forces_n.size,
-            "layers": table.n_layers,
-            "rate_hz": plan.rate_hz,
-            "noise_scale": float(np.sqrt(plan.rate_hz / model.rate_hz)),
-            "update_samples": plan.update_samples,
-            "taps": taps,
-            "speed_change": plan.hand_changes[0],
-            "force_change": plan.hand_changes[1],
-            "peak": limits.peak if np.isfinite(limits.peak) else 0.0,
-            "mean_square": limits.mean_square if np.isfinite(limits.rms) else 0.0,
-            "mean_share": plan.mean_share,
-            "longest": plan.samples(limits.duration_s),
-            "pause": plan.samples(limits.pause_s),
-        }
-        if plan.compensation is not None:
-            numbers["notch_hz"] = plan.compensation.frequency_hz
-            numbers["notch_width_hz"] = plan.compensation.bandwidth_hz
-            numbers["notch_share"] = plan.compensation.band_share
-        return numbers
 
     @property
     def counters(self) -> RenderCounters:

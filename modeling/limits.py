@@ -51,7 +51,7 @@ class Limits:
             if endless or not (value > 0 and value * value > 0):
                 finite = " and finite" if endless else ""
                 raise InputError(
-                    f"expected {field.name} above 0{finite} for the limits, got {value}; correct it."
+                    f"expected {field.name} above 0{finite} for limits, got {value}; correct it."
                 )
 
     @property

@@ -72,10 +72,11 @@ def band_coefficients(
 
     Notes
     -----
-    METHOD's recursion with v1 and v2 eliminated: s1 ← p·s1 − q·s2 + b1·w, s2 ← q·s1 + r·s2 + b2·w,
-    band = tap·(s1 before + s1 after). With θ = πf/fs and k = tan(πB/fs): p = (cos 2θ − k)/(1+k),
-    r = (cos 2θ + k)/(1+k), q = sin 2θ/(1+k), (b1, b2) = 2√k/(1+k)·(cos θ, sin θ) and
-    tap = √k/(2 cos θ). Operation by operation as `tq_band_of` in `kernel.h`.
+    METHOD's recursion with v1 and v2 eliminated: s1 ← s1 + p·s1 − q·s2 + b1·w,
+    s2 ← s2 + q·s1 + r·s2 + b2·w, band = tap·(s1 before + s1 after). With θ = πf/fs and
+    k = tan(πB/fs): p = −2(sin²θ + k)/(1+k), r = −2 sin²θ/(1+k), q = sin 2θ/(1+k),
+    (b1, b2) = 2√k/(1+k)·(cos θ, sin θ) and tap = √k/(2 cos θ). Operation by operation as
+    `tq_band_of` in `kernel.h`.
     """
     n, d = _half_tangent(np.pi / rate_hz * np.asarray(frequency_hz, dtype=np.float64))
     scale = 1 / (d * d + n * n)
@@ -86,13 +87,12 @@ def band_coefficients(
     k_d = (d - n) * (d + n)
     scale = 1 / (k_d + k_n)
     share = k_d * scale
-    damping = k_n * scale
-    turn = (cosine - sine) * (cosine + sine) * share
     root = np.sqrt(k_n * k_d)
+    r = -2 * sine * sine * share
     return BandCoefficients(
-        p=turn - damping,
+        p=r - 2 * k_n * scale,
         q=2 * sine * cosine * share,
-        r=turn + damping,
+        r=r,
         b1=2 * root * scale * cosine,
         b2=2 * root * scale * sine,
         tap=root / (2 * k_d * cosine),

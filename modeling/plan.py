@@ -124,6 +124,46 @@ class RenderPlan:
         share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
         return table.largest_gains * share
 
+    def texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
+        """Everything that `tq_texture` in `kernel.h` holds, by name and in its order."""
+        table, lowpass = model.table, noise_lowpass(model.rate_hz, self.rate_hz)
+        speed_change, force_change = self.hand_changes
+        fields: dict[str, int | float | Floats] = {
+            "speeds": table.speeds_mm_s.size,
+            "forces": table.forces_n.size,
+            "layers": table.n_layers,
+            "speed_mm_s": table.speeds_mm_s,
+            "force_n": table.forces_n,
+            "values": table.values.reshape(-1, table.values.shape[-1]),
+            "signs": table.signs,
+            "rate_hz": self.rate_hz,
+            "noise_scale": float(np.sqrt(self.rate_hz / model.rate_hz)),
+            "lowpass": lowpass,
+            "taps": lowpass.size,
+            "update_samples": self.update_samples,
+            "speed_change": speed_change,
+            "force_change": force_change,
+            "slews": self.slews(table),
+        }
+        if self.compensation is not None:
+            fields["notch_hz"] = self.compensation.frequency_hz
+            fields["notch_width_hz"] = self.compensation.bandwidth_hz
+            fields["notch_share"] = self.compensation.band_share
+        return fields | self._limits()
+
+    def _limits(self) -> dict[str, int | float | Floats]:
+        """Those that there are; without them the structure's zeros stand for none."""
+        fields: dict[str, int | float | Floats] = {}
+        if np.isfinite(self.limits.peak):
+            fields["peak"] = self.limits.peak
+        if np.isfinite(self.limits.rms):
+            fields["mean_square"] = self.limits.mean_square
+            fields["mean_share"] = self.mean_share
+        if np.isfinite(self.limits.duration_s):
+            fields["longest"] = self.samples(self.limits.duration_s)
+            fields["pause"] = self.samples(self.limits.pause_s)
+        return fields
+
     def samples(self, seconds: float) -> int:
         """A limit's time in samples, at least 1; 0 stands for no limit."""
         return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))

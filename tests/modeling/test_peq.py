@@ -49,7 +49,7 @@ def state_space(frequency_hz: float, bandwidth_hz: float) -> tuple[np.ndarray, .
 def states_of_code(frequency_hz: float, bandwidth_hz: float) -> tuple[np.ndarray, np.ndarray]:
     """(A, b) that the code's coefficients give."""
     c = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=RATE_HZ)
-    return np.array([[c.p, -c.q], [c.q, c.r]]), np.array([[c.b1], [c.b2]])
+    return np.array([[1 + c.p, -c.q], [c.q, 1 + c.r]]), np.array([[c.b1], [c.b2]])
 
 
 def test_rational_tan_is_the_tangent_to_2e_14() -> None:
@@ -65,8 +65,8 @@ def test_coefficients_are_those_of_the_closed_forms(frequency: float, bandwidth:
     theta = np.longdouble(np.pi) * np.longdouble(frequency) / RATE_HZ
     k = np.tan(np.longdouble(np.pi) * np.longdouble(bandwidth) / RATE_HZ)
     c = band_coefficients(frequency, bandwidth, rate_hz=RATE_HZ)
-    assert abs(c.p - (np.cos(2 * theta) - k) / (1 + k)) < 1e-14
-    assert abs(c.r - (np.cos(2 * theta) + k) / (1 + k)) < 1e-14
+    assert abs(c.p / (-2 * (np.sin(theta) ** 2 + k) / (1 + k)) - 1) < 1e-13
+    assert abs(c.r / (-2 * np.sin(theta) ** 2 / (1 + k)) - 1) < 1e-13
     assert abs(c.q / (np.sin(2 * theta) / (1 + k)) - 1) < 1e-13
     assert abs(c.b1 / (2 * np.sqrt(k) / (1 + k) * np.cos(theta)) - 1) < 1e-13
     assert abs(c.b2 / (2 * np.sqrt(k) / (1 + k) * np.sin(theta)) - 1) < 1e-13

@@ -1,0 +1,341 @@
+"""Models for other programs: a C99 header that renders, a WAV file, the equalizer as JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tempfile
+import textwrap
+from collections.abc import Mapping
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling import ARModel, InputError, Limits, RegressedModel, Renderer, TextureModel
+from modeling.files import write_bytes, write_text
+from modeling.noise import stream_key
+from modeling.peq import PEQ, Floats
+from modeling.plan import RenderPlan
+from modeling.saved import dump_json
+from stimuli.manifest import Stimulus
+from stimuli.recipe import Recipe
+from stimuli.sets import write_set
+from stimuli.sources import AnyModel
+
+Layered = TextureModel | RegressedModel
+
+JSON_FORMAT = "tactileq.peq"
+JSON_VERSION = 1
+DEFINITION = (
+    "output = noise_gain*w + the sum over layers of gain*H(w), in unit; one white noise w of unit "
+    "variance at rate_hz drives all branches; H(z) = (b0 + b1/z + b2/z^2) / (a0 + a1/z + a2/z^2) "
+    "is the band-pass of peak gain 1 at frequency_hz and -3 dB width bandwidth_hz; gains are "
+    "signed; at another rate w needs the variance rate/rate_hz, the noise_gain branch a low-pass "
+    "at rate_hz/2, and H new coefficients; b and a are for a condition that is held"
+)
+
+
+def check_layered(model: AnyModel) -> Layered:
+    """A model with layers; InputError for an autoregressive one."""
+    if isinstance(model, ARModel):
+        raise InputError(
+            f"expected a model with layers, got the autoregressive one of {model.texture}; export "
+            "a texture model, or this one as WAV."
+        )
+    return model
+
+
+# --- C ----------------------------------------------------------------------------------------
+
+
+def write_c_header(
+    path: str | Path,
+    model: AnyModel,
+    *,
+    rate_hz: float | None = None,
+    seed: int = 0,
+    single: bool = False,
+) -> str:
+    """Write one C99 header that renders a model and needs nothing else: tables and kernel.
+
+    It defines `NAME` (a `tq_texture` without limits and compensation), `NAME_memory` (how many
+    reals of memory a state needs) and `NAME_key` (of the noise); a comment on top shows their use.
+    In double precision its output is that of `Renderer(model, rate_hz=rate_hz, seed=seed)` bit for
+    bit; in single precision it differs by rounding. Headers of several textures go into one
+    program.
+
+    Parameters
+    ----------
+    path : path
+        The header; there whole or not at all.
+    model : TextureModel or RegressedModel
+    rate_hz : float, optional
+        Output rate, at least the model's (the default).
+    seed : int
+    single : bool
+        Single precision: tables as the nearest floats, and TQ_REAL is float unless the program
+        defines it otherwise.
+
+    Returns
+    -------
+    str
+        NAME, from the texture's.
+
+    Raises
+    ------
+    InputError
+        For an autoregressive model, a rate below the model's, or, in single precision, numbers
+        that it cannot hold or tell apart.
+    """
+    layered = check_layered(model)
+    name = c_identifier(layered.texture)
+    renderer = Renderer(layered, rate_hz=rate_hz, seed=seed)
+    plan = RenderPlan(
+        rate_hz=renderer.rate_hz,
+        update_samples=renderer.update_samples,
+        limits=Limits(),
+        compensation=None,
+    )
+    members: Mapping[str, Any] = plan.texture(layered)
+    if single:
+        members = {member: _in_single(member, value) for member, value in members.items()}
+    kernel = files("modeling").joinpath("kernel.h").read_text(encoding="utf-8")
+    precision = "#ifndef TQ_REAL\n#define TQ_REAL float\n#endif\n\n" if single else ""
+    tables = _tables(name, members)
+    key = f"static const uint64_t {name}_key = UINT64_C({int(stream_key(seed)):#x});\n"
+    comment = _comment(layered, plan, name=name, file_name=Path(path).name, seed=seed)
+    # Two exports of one name in one program: the same twice is one, others the compiler refuses.
+    guard = f"{name}_{hashlib.sha256((tables + key).encode()).hexdigest()[:16]}"
+    opening, closing = f"#ifndef {guard}\n#define {guard}\n\n", "\n#endif\n"
+    text = "".join([comment, opening, precision, kernel, "\n", tables, key, closing])
+    write_text(path, text)
+    return name
+
+
+def c_identifier(texture: str) -> str:
+    """A texture's name as an identifier in C: texture_, letters, digits, _ for all else."""
+    return "texture_" + re.sub("[^A-Za-z0-9]", "_", texture)
+
+
+def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | NDArray[np.float32]:
+    """A member of `tq_texture` in single precision; counts stay as they are."""
+    if isinstance(value, int):
+        return value
+    with np.errstate(over="ignore"):
+        rounded = np.asarray(value, dtype=np.float32)
+    axis = member in ("speed_mm_s", "force_n")
+    if not np.isfinite(rounded).all() or (axis and not (np.diff(rounded, prepend=0) > 0).all()):
+        raise InputError(
+            f"expected numbers that single precision can hold and tell apart, got others in "
+            f"{member}; export in double precision."
+        )
+    return rounded[()]  # a scalar where it was one
+
+
+def _tables(name: str, members: Mapping[str, Any]) -> str:
+    """The arrays of a texture, the texture itself and the memory that it needs, in C."""
+    arrays = {member: value for member, value in members.items() if np.ndim(value)}
+    scalars = {
+        member: str(value) if isinstance(value, int) else _literal(value)
+        for member, value in members.items()
+        if member not in arrays
+    }
+    entries = [f"    .{m} = {scalars.get(m, f'{name}_{m}')},\n" for m in members]
+    return "".join(
+        [
+            *(_array(f"{name}_{member}", value) for member, value in arrays.items()),
+            f"static const tq_texture {name} = {{\n{''.join(entries)}}};\n\n",
+            f"enum {{ {name}_memory = TQ_MEMORY({scalars['layers']}, {scalars['taps']}) }};\n",
+        ]
+    )
+
+
+def _array(name: str, values: NDArray[Any]) -> str:
+    """An array in C; each row of a table begins further to the left than its other lines."""
+    rows = np.atleast_2d(values) if values.size else np.zeros((1, 1))  # C has no empty arrays
+    fill = partial(textwrap.fill, width=100, initial_indent=" " * 4, subsequent_indent=" " * 8)
+    lines = "".join(f"{fill(', '.join(map(_literal, row)))},\n" for row in rows)
+    return f"static const tq_real {name}[] = {{\n{lines}}};\n\n"
+
+
+def _literal(number: float | np.float32) -> str:
+    """The shortest constant in C that is exactly this number."""
+    return f"{number!s}f" if isinstance(number, np.float32) else repr(float(number))
+
+
+def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, seed: int) -> str:
+    speeds, forces = model.table.speeds_mm_s, model.table.forces_n
+    made = "simulated" if model.simulated else "from recordings"
+    return f"""\
+/* Texture {_quoted(model.texture)}, {made}, for rendering in C99: output in {model.unit} at \
+{plan.rate_hz:g} Hz, seed {seed}.
+
+   {model.n_layers} layers ({_quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} \
+to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N.
+
+   cc -std=c99 -O2 -ffp-contract=off PROGRAM.c -lm, never with -ffast-math. A program:
+
+       #include <stdio.h>
+       #include {_quoted(file_name)}
+       int main(void)
+       {{
+           static tq_real memory[{name}_memory], speed[500], force[500], out[500];
+           static tq_state state;
+           int n;
+           for (n = 0; n < 500; n++) speed[n] = {speeds[0]:g}, force[n] = (tq_real){forces[0]:g};
+           tq_start(&{name}, &state, memory, {name}_key);
+           tq_render(&{name}, &state, speed, force, out, 500);
+           for (n = 0; n < 500; n++) printf("%.9g\\n", (double)out[n]);
+           return 0;
+       }}
+
+   Limits and vibrator compensation are fields of tq_texture, to be set in a copy of {name}.
+
+   SPDX-License-Identifier: GPL-3.0-or-later (the kernel below) */
+
+"""
+
+
+def _quoted(text: str) -> str:
+    """Any text within quotes and within a comment in C."""
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", json.dumps(text))
+
+
+# --- WAV --------------------------------------------------------------------------------------
+
+
+def write_wav(path: str | Path, recipe: Recipe) -> Stimulus:
+    """Write the only stimulus of a recipe to a WAV file, by default 32-bit floats in g.
+
+    Parameters
+    ----------
+    path : path
+        The very file that the recipe's set would hold (`write_set`); there whole or not at all.
+    recipe : Recipe
+        Of one model, trajectory, rate and seed.
+
+    Returns
+    -------
+    Stimulus
+        The file's row of a manifest: unit, rms, level_db (dB re 1 g), peak and so on.
+
+    Raises
+    ------
+    InputError
+        For a recipe of several stimuli, or one that `write_set` refuses.
+    """
+    with tempfile.TemporaryDirectory() as place:
+        stimuli = write_set(Path(place, "set"), recipe)
+        if len(stimuli) != 1:
+            raise InputError(
+                f"expected a recipe of one stimulus, got one of {len(stimuli)}; choose one model, "
+                "or make a stimulus set."
+            )
+        write_bytes(path, Path(place, "set", stimuli[0].file).read_bytes())
+    return stimuli[0]
+
+
+# --- JSON -------------------------------------------------------------------------------------
+
+
+def write_peq_json(
+    path: str | Path,
+    model: AnyModel,
+    *,
+    speed_mm_s: float | None = None,
+    force_n: float | None = None,
+) -> int:
+    """Write a model's equalizer as plain JSON that any program can use.
+
+    Fields: `format`, `version`; `texture`, `estimator`, `simulated`; `unit` of the output ("g" or
+    "arbitrary"); `rate_hz`, at which the noise w has unit variance and the filters run;
+    `definition`, what the numbers mean, in words; `conditions`, each an object with `speed_mm_s`,
+    `force_n`, `noise_gain` (G_w, unit per unit noise) and `layers`. A layer has `frequency_hz`,
+    `bandwidth_hz` (−3 dB), `gain` (G_i, signed) and the coefficients `b` (b0, b1, b2) and `a` (a0,
+    a1, a2) of its unit-gain band-pass as a biquad at `rate_hz`. The filter is that of METHOD 3, but
+    a biquad does not share its safety while parameters move.
+
+    Parameters
+    ----------
+    path : path
+        The file; there whole or not at all.
+    model : TextureModel or RegressedModel
+    speed_mm_s, force_n : float, optional
+        One condition, interpolated as in rendering: at least 0 and not above the grid, where the
+        renderer would stay at the edge. Without both, every condition of the model's grid (of a
+        RegressedModel its four corners, between which every parameter is bilinear).
+
+    Returns
+    -------
+    int
+        Number of conditions written.
+
+    Raises
+    ------
+    InputError
+        For an autoregressive model, a condition out of range, or only one of speed and force.
+    """
+    layered = check_layered(model)
+    conditions = _conditions(layered, speed_mm_s, force_n)
+    values = {
+        "format": JSON_FORMAT,
+        "version": JSON_VERSION,
+        "texture": layered.texture,
+        "estimator": layered.estimator,
+        "simulated": layered.simulated,
+        "unit": layered.unit,
+        "rate_hz": layered.rate_hz,
+        "definition": DEFINITION,
+        "conditions": [
+            {"speed_mm_s": v, "force_n": f, **_equalizer(layered.peq(v, f))} for v, f in conditions
+        ],
+    }
+    write_text(path, dump_json(values))
+    return len(conditions)
+
+
+def _conditions(
+    model: Layered, speed_mm_s: float | None, force_n: float | None
+) -> list[tuple[float, float]]:
+    """The condition asked for, or all of the grid."""
+    speeds, forces = model.speeds_mm_s.tolist(), model.forces_n.tolist()
+    if speed_mm_s is None and force_n is None:
+        return [(v, f) for v in speeds for f in forces]
+    if speed_mm_s is None or force_n is None:
+        raise InputError(
+            f"expected a speed and a force, or neither for the whole grid, got {speed_mm_s} mm/s "
+            f"and {force_n} N; give both."
+        )
+    if not (0 <= speed_mm_s <= speeds[-1] and 0 <= force_n <= forces[-1]):
+        raise InputError(
+            f"expected a condition within 0…{speeds[-1]:g} mm/s and 0…{forces[-1]:g} N, as far as "
+            f"{model.texture} was recorded, got {speed_mm_s:g} mm/s and {force_n:g} N; above the "
+            "grid the renderer keeps to its edge, so ask for that."
+        )
+    return [(float(speed_mm_s), float(force_n))]
+
+
+def _equalizer(peq: PEQ) -> dict[str, Any]:
+    """Noise gain and layers of one condition."""
+    from scipy.signal import iirpeak  # late: slow to load
+
+    layers = []
+    for frequency_hz, bandwidth_hz, gain in zip(
+        peq.frequencies_hz.tolist(), peq.bandwidths_hz.tolist(), peq.gains.tolist(), strict=True
+    ):
+        b, a = iirpeak(frequency_hz, frequency_hz / bandwidth_hz, fs=peq.rate_hz)
+        layers.append(
+            {
+                "frequency_hz": frequency_hz,
+                "bandwidth_hz": bandwidth_hz,
+                "gain": gain,
+                "b": b.tolist(),
+                "a": a.tolist(),
+            }
+        )
+    return {"noise_gain": peq.noise_gain, "layers": layers}
