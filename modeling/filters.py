@@ -39,7 +39,7 @@ class StreamFilter(Protocol):
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
         """Its driving noise from position `start` on: one or more lists of `count` samples."""
 
-    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
+    def filter(self, *inputs: list[float]) -> list[float]:
         """The output for the next samples of its inputs."""
 
 
@@ -66,13 +66,11 @@ class PythonEngine:
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))
         bounds = [*starts, count]
-        output = self._filter.filter(
-            *(part[: bounds[0]] for part in inputs), since_update=self._position % period
-        )
+        output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
         settings = self._filter.settings(speed_mm_s[starts], force_n[starts])
         for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
             self._filter.update(setting)
-            output += self._filter.filter(*(part[start:stop] for part in inputs), since_update=0)
+            output += self._filter.filter(*(part[start:stop] for part in inputs))
         self._position += count
         return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
 
@@ -80,9 +78,10 @@ class PythonEngine:
 class BandFilter:
     """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
-    Parameters are those for the hand as it will be amid the time to the next update: those for the
-    hand as it is would be late by half that time. Gains move in a straight line over the first half
-    of it, and at most by the plan's slews; the first update sets them at once.
+    Parameters are those for the hand as it will be: those for the hand as it is read would be
+    late. Frequencies and bandwidths are set for the middle of the time to the next update; gains
+    move in a straight line to those for its last sample, and at most by the plan's slews. The first
+    update sets all at once.
     """
 
     def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
@@ -99,36 +98,41 @@ class BandFilter:
 
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
         """All gains that are wanted, and the coefficients of every band, at each update."""
-        at = self._table.at(*self._ahead(np.stack([speed_mm_s, force_n])))
+        amid, end = (self._table.at(*hand) for hand in self._ahead(speed_mm_s, force_n))
         frequency, bandwidth, clamped = clamp_bands(
-            at.frequencies_hz, at.bandwidths_hz, rate_hz=self._plan.rate_hz
+            amid.frequencies_hz, amid.bandwidths_hz, rate_hz=self._plan.rate_hz
         )
         self.clamped += clamped
         c = band_coefficients(frequency, bandwidth, rate_hz=self._plan.rate_hz)
-        gains = np.concatenate([at.noise_gain[:, None], at.gains], axis=1)
+        gains = np.concatenate([end.noise_gain[:, None], end.gains], axis=1)
         taps = np.concatenate([np.ones((gains.shape[0], 1)), c.tap], axis=1)
         table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
         bands = [[tuple(band) for band in update] for update in table.tolist()]
         return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
 
-    def _ahead(self, hand: Floats) -> Floats:
-        """Where the (2, n) readings will be amid the time to the next ones, if they go on so."""
-        before = np.concatenate([self._hand, hand[:, :-1]], axis=1)[:, : hand.shape[1]]
+    def _ahead(self, speed_mm_s: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+        """The hand (2, n) amid the time to the next readings, and at the last sample before them.
+
+        It goes on as it did since the reading before, but for steps and what has come to rest.
+        """
+        hand = np.stack([speed_mm_s, force_n])
+        before = np.concatenate([self._hand, hand], axis=1)[:, :-1]
         if hand.size:
             self._hand = hand[:, -1:]
-        period = self._plan.update_samples
+        furthest = np.array(self._plan.hand_changes)[:, None]
         with np.errstate(over="ignore", invalid="ignore"):
             change = hand - before
-            ahead = hand + change * ((period - 1) / (2 * period))
-        furthest = np.array(self._plan.hand_changes)[:, None]
-        return np.where(np.abs(change) <= furthest, ahead, hand)
+            goes_on = (np.abs(change) <= furthest) & (hand != 0)
+            to_end = (self._plan.update_samples - 1) / self._plan.update_samples
+            amid = np.where(goes_on, hand + change * (to_end / 2), hand)
+            return amid, np.where(goes_on, hand + change * to_end, hand)
 
     def update(self, setting: Any) -> None:
         """Start every gain on its way to what is wanted now, as far as one update may go."""
         wanted, taps, self._bands = setting
         now = self._gains or wanted
         self._gains = [_towards(*move) for move in zip(now, wanted, self._slews, strict=True)]
-        steps = self._plan.moving_samples
+        steps = self._plan.update_samples
         self._courses = [
             (start * tap, (end - start) / steps * tap)
             for start, end, tap in zip(now, self._gains, taps, strict=True)
@@ -147,17 +151,15 @@ class BandFilter:
             floor_noise += weight * wide[tap : tap + count]
         return wide[half : half + count].tolist(), floor_noise.tolist()
 
-    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
+    def filter(self, *inputs: list[float]) -> list[float]:
         """The recursion of METHOD 3 with the parameters in force."""
         noise, floor_noise = inputs
-        moving = max(0, self._plan.moving_samples - since_update)
         output = [
-            gain * w
-            for gain, w in zip(self._course(0, moving, len(noise)), floor_noise, strict=True)
+            gain * w for gain, w in zip(self._course(0, len(noise)), floor_noise, strict=True)
         ]
         for layer, (p, q, r, b1, b2) in enumerate(self._bands):
             s1, s2 = self._state[layer]
-            course = self._course(1 + layer, moving, len(noise))
+            course = self._course(1 + layer, len(noise))
             for n, w in enumerate(noise):
                 turned = (s1 + b1 * w) + (p * s1 - q * s2)
                 s2 = (s2 + b2 * w) + (r * s2 + q * s1)
@@ -166,13 +168,12 @@ class BandFilter:
             self._state[layer] = (s1, s2)
         return output
 
-    def _course(self, which: int, moving: int, count: int) -> list[float]:
+    def _course(self, which: int, count: int) -> list[float]:
         """One gain, times its tap, at each of the next samples."""
         now, step = self._courses[which]
         course = []
-        for n in range(count):
-            if n < moving:
-                now += step
+        for _ in range(count):
+            now += step
             course.append(now)
         self._courses[which] = (now, step)
         return course
@@ -298,8 +299,8 @@ class LatticeFilter:
         """The next noise, of unit variance."""
         return (white_noise(key, start, count).tolist(),)
 
-    def filter(self, *inputs: list[float], since_update: int) -> list[float]:
-        """The lattice with the angles in force, however long they have been."""
+    def filter(self, *inputs: list[float]) -> list[float]:
+        """The lattice with the angles in force."""
         rms, stages = self._setting
         state, output = self._state, []
         highest = len(stages) - 1

@@ -185,13 +185,13 @@ static inline tq_real tq_blend(const tq_hand *hand, int i)
     return low * (1 - hand->y) + high * hand->y;
 }
 
-/* Where a reading that was `last` and is `now` will be amid the time to the next one, if it goes on as
-   it did. What changed further than a hand can is a step, which does not go on. */
-static inline tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, int update_samples)
+/* Where a reading that was `last` and is `now` will be after `share` of the time to the next one, if it
+   goes on as it did. A change beyond what a hand can do is a step, which does not go on; nor does what
+   has come to rest. */
+static inline tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, tq_real share)
 {
-    tq_real share = (tq_real)(update_samples - 1) / (tq_real)(2 * update_samples);
     tq_real change = now - last;
-    return change <= furthest && change >= -furthest ? now + change * share : now;
+    return change <= furthest && change >= -furthest && now != 0 ? now + change * share : now;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -203,34 +203,35 @@ static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
     return change < -slew ? gain - slew : wanted;
 }
 
-/* Parameters for the hand as it will be amid the time to the next update: those for the hand as it
-   is now would be late by half that time. Gains move in a straight line over the first half of it, so
-   that nothing clicks; the first update sets them at once. */
+/* Parameters for the hand as it will be: those for the hand as it is read would be late. Frequencies
+   and bandwidths are set for the middle of the time to the next update; gains move in a straight line
+   to those for its last sample, so that nothing clicks. The first update sets all at once. */
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
     int m = t->layers, first = s->position == 0, i;
-    int every = t->update_samples;
-    tq_hand hand = first ? tq_hand_at(t, speed, force)
-                         : tq_hand_at(t, tq_ahead(s->speed, speed, t->speed_change, every),
-                                      tq_ahead(s->force, force, t->force_change, every));
-    tq_real steps = (tq_real)((every + 1) / 2), angle = (tq_real)3.141592653589793;
+    tq_real last_speed = first ? speed : s->speed, last_force = first ? force : s->force;
+    tq_real steps = (tq_real)t->update_samples, to_end = (steps - 1) / steps;
+    tq_hand amid = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end / 2),
+                              tq_ahead(last_force, force, t->force_change, to_end / 2));
+    tq_hand end = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end),
+                             tq_ahead(last_force, force, t->force_change, to_end));
+    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
     tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
-    tq_real wanted = tq_blend(&hand, 0), next;
-    angle /= t->rate_hz;
+    tq_real wanted = tq_blend(&end, 0), next;
     s->speed = speed;
     s->force = force;
-    wanted = (wanted < 0 ? 0 : wanted) * hand.ramp;
+    wanted = (wanted < 0 ? 0 : wanted) * end.ramp;
     next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
     s->floor_now = first ? next : s->floor_gain;
     s->floor_step = (next - s->floor_now) / steps;
     s->floor_gain = next;
     for (i = 0; i < m; i++) {
-        tq_real f = tq_blend(&hand, 1 + i), b = tq_blend(&hand, 1 + m + i), now;
+        tq_real f = tq_blend(&amid, 1 + i), b = tq_blend(&amid, 1 + m + i), now;
         tq_real f_legal = tq_within(f, 1, highest), b_legal = tq_within(b, (tq_real)0.1, widest);
         tq_band band = tq_band_of(angle * f_legal, angle * b_legal);
         s->counters.clamped += (uint64_t)((f != f_legal) + (b != b_legal));
-        wanted = tq_blend(&hand, 1 + 2 * m + i);
-        wanted = (t->signs[i] * wanted < 0 ? 0 : wanted) * hand.ramp;
+        wanted = tq_blend(&end, 1 + 2 * m + i);
+        wanted = (t->signs[i] * wanted < 0 ? 0 : wanted) * end.ramp;
         now = tq_row(t, s, TQ_GAIN)[i];
         next = first ? wanted : tq_towards(now, wanted, t->slews[1 + i]);
         now = first ? next : now;
@@ -247,9 +248,9 @@ static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real f
 
 /* --- Filtering --------------------------------------------------------------------------------- */
 
-/* `width` layers from `first` on, added to `out`; gains move during the first `moving` samples. */
+/* `width` layers from `first` on, added to `out`. */
 static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int width,
-                             const tq_real *w, tq_real *out, int moving, int count)
+                             const tq_real *w, tq_real *out, int count)
 {
     tq_real s1[TQ_SIDE_BY_SIDE], s2[TQ_SIDE_BY_SIDE], now[TQ_SIDE_BY_SIDE], step[TQ_SIDE_BY_SIDE];
     tq_real p[TQ_SIDE_BY_SIDE], q[TQ_SIDE_BY_SIDE], r[TQ_SIDE_BY_SIDE];
@@ -264,12 +265,10 @@ static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int wi
     }
     for (n = 0; n < count; n++) {
         tq_real x = w[n], y = out[n], band[TQ_SIDE_BY_SIDE];
-        if (n < moving)
-            for (i = 0; i < width; i++)
-                now[i] += step[i];
         for (i = 0; i < width; i++) {
             tq_real turned1 = (s1[i] + b1[i] * x) + (p[i] * s1[i] - q[i] * s2[i]);
             tq_real turned2 = (s2[i] + b2[i] * x) + (r[i] * s2[i] + q[i] * s1[i]);
+            now[i] += step[i];
             band[i] = now[i] * (s1[i] + turned1);
             s1[i] = turned1;
             s2[i] = turned2;
@@ -288,21 +287,19 @@ static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int wi
 static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const tq_real *floor,
                       tq_real *out, int count)
 {
-    int moving = (t->update_samples + 1) / 2 - s->since_update, i = 0, n;
+    int i = 0, n;
     tq_real now = s->floor_now;
-    moving = moving < 0 ? 0 : moving > count ? count : moving;
     for (n = 0; n < count; n++) {
-        if (n < moving)
-            now += s->floor_step;
+        now += s->floor_step;
         out[n] = now * floor[n];
     }
     s->floor_now = now;
     for (; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
-        tq_layers(t, s, i, TQ_SIDE_BY_SIDE, w, out, moving, count);
+        tq_layers(t, s, i, TQ_SIDE_BY_SIDE, w, out, count);
     switch (t->layers - i) { /* a constant width lets the compiler unroll */
-    case 3: tq_layers(t, s, i, 3, w, out, moving, count); break;
-    case 2: tq_layers(t, s, i, 2, w, out, moving, count); break;
-    case 1: tq_layers(t, s, i, 1, w, out, moving, count); break;
+    case 3: tq_layers(t, s, i, 3, w, out, count); break;
+    case 2: tq_layers(t, s, i, 2, w, out, count); break;
+    case 1: tq_layers(t, s, i, 1, w, out, count); break;
     default: break;
     }
     s->since_update += count;

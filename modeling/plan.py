@@ -101,11 +101,6 @@ class RenderPlan:
             )
 
     @property
-    def moving_samples(self) -> int:
-        """Gains move in a straight line over the first half of the time to the next update."""
-        return (self.update_samples + 1) // 2
-
-    @property
     def hand_changes(self) -> tuple[float, float]:
         """The furthest that a hand's speed (mm/s) and force (N) get in one update."""
         update_s = self.update_samples / self.rate_hz
@@ -122,6 +117,7 @@ class RenderPlan:
         The largest gain of the grid takes 5 ms: no hand is faster, but sensors and lift-off are.
         """
         share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
+        share *= 1 + 1e-12  # five fifths are to be a whole, whatever they round to
         return table.largest_gains * share
 
     def texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:

@@ -33,10 +33,10 @@ class Renderer:
     Layered models run through the compiled kernel (`kernel.h`), or, where there is none, through
     Python with the same bits; an ARModel always runs in Python.
 
-    At each update parameters are those for where the hand will be amid the time to the next one, if
-    it goes on as it did since the last (a change beyond any hand's, 20 m/s² or 200 N/s, is a step
-    and does not go on). Gains move there in a straight line over half that time, and the largest of
-    the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
+    At each update the hand is taken to go on as it did since the last (but a change beyond any
+    hand's, 20 m/s² or 200 N/s, is a step): frequencies and bandwidths are those for the middle of
+    the time to the next update, and gains move in a straight line to those for its end. The largest
+    of the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
 
     Parameters
     ----------

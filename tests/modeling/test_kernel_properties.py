@@ -99,11 +99,8 @@ def test_at_rest_it_fades_within_5_ms_and_is_exactly_silent(
     rate_hz: float,
     update_samples: int,
 ) -> None:
-    """5 ms after the update that sees rest for what it is, in whole updates, nothing is left.
-
-    At the first one after a motion it might still be a reversal.
-    """
-    seen_at = update_samples + -(-hand.shape[1] // update_samples) * update_samples
+    """5 ms after the update that sees it, in whole updates, nothing is left."""
+    seen_at = -(-hand.shape[1] // update_samples) * update_samples
     fade = int(np.ceil(FADE_S * rate_hz / update_samples)) * update_samples
     renderer = Renderer(model, rate_hz=rate_hz, update_samples=update_samples)
     renderer.render(*hand)
@@ -261,10 +258,10 @@ def realised_bands(frequency_hz: Floats, bandwidth_hz: Floats, rate_hz: float) -
 def power_response(angle: Floats, bands: Floats) -> Floats:
     """|H|² of the state equations at (n,) angles 2πf/rate, one for each of n bands.
 
-    band = tap·(s1 + s1′) with (zI − A)·s = b·w.
+    band = tap·(s1 + s1′) with (zI − A)·s = b·w and A = I + (p, −q; q, r).
     """
     p, q, r, b1, b2, tap = bands
-    beyond = 2j * np.sin(angle / 2) * np.exp(0.5j * angle)
+    beyond = 2j * np.sin(angle / 2) * np.exp(0.5j * angle)  # z − 1, without cancellation
     to_p, to_r = beyond - p, beyond - r
     s1 = (to_r * b1 - q * b2) / (to_p * to_r + q * q)
     response: Floats = np.abs(tap * (1 + np.exp(1j * angle)) * s1) ** 2

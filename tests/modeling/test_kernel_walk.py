@@ -15,9 +15,9 @@ HERE = Path(__file__).parent
 KERNEL_FOLDER = Path(modeling.__file__).parent
 SAMPLES = 10_000_000
 PRECISIONS = ("double", "float")
-# Each of the five coefficients is right to a few units in the last place, which are twice as large
-# for those that reach −2 near the Nyquist frequency; each new state is the sum of four terms.
-FEW_EPSILONS = 32
+# Each coefficient is right to a few units in the last place of numbers up to 2, and counts twice in
+# a square; a new state is the sum of four terms.
+FEW_EPSILONS = 24
 
 Build = Callable[[str, str], Path]
 
