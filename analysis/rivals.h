@@ -1,3 +1,314 @@
-/* Filters that the render bench compares the kernel with, in equally good C. */
+/* What the render bench compares the kernel with, in equally good C.
+
+   The same noise, the same interpolation of the grid, updates every `update_samples`, chunks of
+   TQ_CHUNK samples and compiler flags as the kernel; but none of its safety: no value is moved into
+   a legal range, no gain glides, nothing is limited, the rate is the model's own.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_RIVALS_H
+#define TQ_RIVALS_H
+
+/* In a file of so many filters the compiler's budget, not the filter, would say what is inlined. */
+#ifdef __GNUC__
+#define inline inline __attribute__((always_inline))
+#endif
 
 #include "kernel.h"
+
+#ifndef TQ_FLAGS
+#define TQ_FLAGS "flags unknown"
+#endif
+
+#define TQ_ORDER 20 /* of the autoregressive rival; even */
+
+/* The rivals. */
+enum { TQ_DIRECT, TQ_TPT, TQ_PREDICTOR };
+
+/* The state of any rival; all zeros, but for kind and key, is silence at position 0. */
+typedef struct {
+    int kind, since_update;
+    uint64_t key, position;
+    tq_real floor;       /* the noise gain now; the gain of the autoregressive rival */
+    tq_real before[2];   /* the last two samples of noise */
+    tq_real rows[6][20]; /* filter states and coefficients, one value per layer or lag */
+} tq_rival;
+
+typedef void tq_rival_layers(tq_rival *s, int first, int width, const tq_real *w, tq_real *out,
+                             int count);
+
+/* As the kernel does: the noise branch, then four layers side by side, then the rest. */
+static inline void tq_all_layers(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
+                                 int count, tq_rival_layers *layers)
+{
+    int i = 0, n;
+    for (n = 0; n < count; n++)
+        out[n] = s->floor * w[n];
+    for (; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
+        layers(s, i, TQ_SIDE_BY_SIDE, w, out, count);
+    switch (t->layers - i) { /* a constant width lets the compiler unroll */
+    case 3: layers(s, i, 3, w, out, count); break;
+    case 2: layers(s, i, 2, w, out, count); break;
+    case 1: layers(s, i, 1, w, out, count); break;
+    default: break;
+    }
+}
+
+/* As tq_blend does; an index that cannot wrap lets the compiler take layers together. */
+static inline tq_real tq_blend_at(const tq_hand *hand, size_t i)
+{
+    tq_real low = hand->corner[0][i] * (1 - hand->x) + hand->corner[1][i] * hand->x;
+    tq_real high = hand->corner[2][i] * (1 - hand->x) + hand->corner[3][i] * hand->x;
+    return low * (1 - hand->y) + high * hand->y;
+}
+
+/* tan(angle / 2) = numerator / denominator, by the kernel's formula. */
+static inline void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *denominator)
+{
+    tq_real half = angle * (tq_real)0.5, z = half * half;
+    *numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
+    *denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
+}
+
+/* --- Direct form ------------------------------------------------------------------------------- */
+
+/* y = b (x - x'') - a1 y' - a2 y''. With k = tan(pi B / rate): b = k / (1 + k),
+   a1 = -2 cos(2 pi f / rate) / (1 + k), a2 = (1 - k) / (1 + k); the gain is part of b. */
+enum { TQ_Y1, TQ_Y2, TQ_A1, TQ_A2, TQ_B };
+
+static inline void tq_direct_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+{
+    size_t m = (size_t)t->layers, i;
+    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
+    s->floor = tq_blend(hand, 0) * hand->ramp;
+    for (i = 0; i < m; i++) {
+        tq_real n, d, k_n, k_d, whole, cosine, scale;
+        tq_tangent_parts(angle * tq_blend_at(hand, 1 + i), &n, &d);
+        whole = d * d + n * n;
+        cosine = (d - n) * (d + n); /* cos(pi f / rate) = cosine / whole */
+        tq_tangent_parts(angle * tq_blend_at(hand, 1 + m + i), &n, &d);
+        k_n = 2 * n * d;
+        k_d = (d - n) * (d + n); /* k = k_n / k_d */
+        scale = 1 / (whole * (k_d + k_n)); /* one division serves both */
+        cosine *= scale * (k_d + k_n);
+        scale *= whole;
+        s->rows[TQ_A1][i] = (2 - 4 * cosine * cosine) * k_d * scale;
+        s->rows[TQ_A2][i] = (k_d - k_n) * scale;
+        s->rows[TQ_B][i] = k_n * scale * tq_blend_at(hand, 1 + 2 * m + i) * hand->ramp;
+    }
+}
+
+/* Form I: one x - x'' serves all bands, which makes it cheaper than the transposed form II. */
+static inline void tq_direct_layers(tq_rival *s, int first, int width, const tq_real *w,
+                                    tq_real *out, int count)
+{
+    tq_real y1[TQ_SIDE_BY_SIDE], y2[TQ_SIDE_BY_SIDE];
+    tq_real a1[TQ_SIDE_BY_SIDE], a2[TQ_SIDE_BY_SIDE], b[TQ_SIDE_BY_SIDE];
+    int n, i;
+    for (i = 0; i < width; i++) {
+        y1[i] = s->rows[TQ_Y1][first + i], y2[i] = s->rows[TQ_Y2][first + i];
+        a1[i] = s->rows[TQ_A1][first + i], a2[i] = s->rows[TQ_A2][first + i];
+        b[i] = s->rows[TQ_B][first + i];
+    }
+    for (n = 0; n < count; n++) {
+        tq_real x = w[n] - w[n - 2], sum = out[n];
+        for (i = 0; i < width; i++) {
+            tq_real y = b[i] * x - a2[i] * y2[i] - a1[i] * y1[i];
+            y2[i] = y1[i];
+            y1[i] = y;
+        }
+        for (i = 0; i < width; i++)
+            sum += y1[i];
+        out[n] = sum;
+    }
+    for (i = 0; i < width; i++)
+        s->rows[TQ_Y1][first + i] = y1[i], s->rows[TQ_Y2][first + i] = y2[i];
+}
+
+/* --- Topology-preserving state-variable filter ------------------------------------------------- */
+
+/* Zavalishin's trapezoidal integrators as Simper solves them: with g = tan(pi f / rate),
+   K = k (1 + g^2) / g, a1 = 1 / (1 + g (g + K)), a2 = g a1, a3 = g a2 and e = x - s2,
+   s1' = (2 a1 - 1) s1 + 2 a2 e, s2' = s2 + 2 a2 s1 + 2 a3 e, band = K (s1 + s1') / 2. */
+enum { TQ_T1, TQ_T2, TQ_TURN, TQ_CROSS, TQ_FEED, TQ_TAP };
+
+static inline void tq_tpt_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+{
+    size_t m = (size_t)t->layers, i;
+    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
+    s->floor = tq_blend(hand, 0) * hand->ramp;
+    for (i = 0; i < m; i++) {
+        tq_real n, d, k_n, k_d, scale, cosine, sine, share;
+        tq_tangent_parts(angle * tq_blend_at(hand, 1 + i), &n, &d);
+        scale = 1 / (d * d + n * n);
+        cosine = (d - n) * (d + n) * scale;
+        sine = 2 * n * d * scale;
+        tq_tangent_parts(angle * tq_blend_at(hand, 1 + m + i), &n, &d);
+        k_n = 2 * n * d;
+        k_d = (d - n) * (d + n);
+        share = 2 * k_d / (k_d + k_n);
+        s->rows[TQ_TURN][i] = cosine * cosine * share - 1;
+        s->rows[TQ_CROSS][i] = sine * cosine * share;
+        s->rows[TQ_FEED][i] = sine * sine * share;
+        s->rows[TQ_TAP][i] =
+            tq_blend_at(hand, 1 + 2 * m + i) * hand->ramp * k_n / (2 * k_d * sine * cosine);
+    }
+}
+
+static inline void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w, tq_real *out,
+                                 int count)
+{
+    tq_real s1[TQ_SIDE_BY_SIDE], s2[TQ_SIDE_BY_SIDE], turn[TQ_SIDE_BY_SIDE];
+    tq_real cross[TQ_SIDE_BY_SIDE], feed[TQ_SIDE_BY_SIDE], tap[TQ_SIDE_BY_SIDE];
+    int n, i;
+    for (i = 0; i < width; i++) {
+        s1[i] = s->rows[TQ_T1][first + i], s2[i] = s->rows[TQ_T2][first + i];
+        turn[i] = s->rows[TQ_TURN][first + i], cross[i] = s->rows[TQ_CROSS][first + i];
+        feed[i] = s->rows[TQ_FEED][first + i], tap[i] = s->rows[TQ_TAP][first + i];
+    }
+    for (n = 0; n < count; n++) {
+        tq_real sum = out[n], band[TQ_SIDE_BY_SIDE];
+        for (i = 0; i < width; i++) {
+            tq_real e = w[n] - s2[i], next = turn[i] * s1[i] + cross[i] * e;
+            s2[i] += cross[i] * s1[i] + feed[i] * e;
+            band[i] = tap[i] * (s1[i] + next);
+            s1[i] = next;
+        }
+        for (i = 0; i < width; i++)
+            sum += band[i];
+        out[n] = sum;
+    }
+    for (i = 0; i < width; i++)
+        s->rows[TQ_T1][first + i] = s1[i], s->rows[TQ_T2][first + i] = s2[i];
+}
+
+/* --- Autoregressive, by line spectral frequencies ---------------------------------------------- */
+
+/* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + TQ_ORDER columns, the gain and the
+   line spectral frequencies (radians per sample), then anything. */
+enum { TQ_PAST, TQ_WEIGHTS };
+
+/* cos(angle), 0 <= angle <= pi, to 1e-15: minus the sine's series about pi / 2. */
+static inline tq_real tq_cosine(tq_real angle)
+{
+    tq_real x = angle - (tq_real)1.5707963267948966, z = x * x;
+    tq_real high = (tq_real)1.6059043836821613e-10 +
+                   z * ((tq_real)-7.647163731819816e-13 +
+                        z * ((tq_real)2.8114572543455206e-15 - z * (tq_real)8.22063524662433e-18));
+    tq_real low = (tq_real)2.7557319223985893e-6 + z * ((tq_real)-2.505210838544172e-8 + z * high);
+    low = (tq_real)8.333333333333333e-3 + z * ((tq_real)-1.984126984126984e-4 + z * low);
+    return -x * (1 + z * ((tq_real)-0.16666666666666666 + z * low));
+}
+
+/* A(z) from half of the coefficients of its symmetric and its antisymmetric part, each the product
+   of factors 1 - 2 cos(w) / z + 1 / z^2; the two products run side by side. */
+static inline void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand)
+{
+    tq_real middle[TQ_ORDER], half[TQ_ORDER / 2 + 1][2], *a = s->rows[TQ_WEIGHTS];
+    int i, j, k;
+    s->floor = tq_blend(hand, 0) * hand->ramp;
+    for (i = 0; i < TQ_ORDER; i++)
+        middle[i] = -2 * tq_cosine(tq_blend_at(hand, 1 + i));
+    for (k = 0; k < 2; k++)
+        half[0][k] = 1, half[1][k] = middle[k];
+    for (i = 2; i <= TQ_ORDER / 2; i++) {
+        const tq_real *b = middle + 2 * (i - 1);
+        for (k = 0; k < 2; k++)
+            half[i][k] = b[k] * half[i - 1][k] + 2 * half[i - 2][k];
+        for (j = i - 1; j > 1; j--)
+            for (k = 0; k < 2; k++)
+                half[j][k] += b[k] * half[j - 1][k] + half[j - 2][k];
+        for (k = 0; k < 2; k++)
+            half[1][k] += b[k];
+    }
+    for (i = 1; i <= TQ_ORDER / 2; i++) {
+        tq_real symmetric = half[i][0] + half[i - 1][0], anti = half[i][1] - half[i - 1][1];
+        a[i - 1] = (symmetric + anti) / 2;
+        a[TQ_ORDER - i] = (symmetric - anti) / 2;
+    }
+}
+
+/* Four samples at once as far as the past goes, then one after the other. */
+static inline void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+{
+    tq_real past[TQ_ORDER + TQ_CHUNK], a[TQ_ORDER + 1], *y = past + TQ_ORDER;
+    int n = 0, i, lag;
+    memcpy(past, s->rows[TQ_PAST], TQ_ORDER * sizeof(tq_real));
+    memcpy(a + 1, s->rows[TQ_WEIGHTS], TQ_ORDER * sizeof(tq_real));
+    for (; n + 4 <= count; n += 4) {
+        tq_real sum[4];
+        for (i = 0; i < 4; i++)
+            sum[i] = s->floor * w[n + i];
+        for (lag = TQ_ORDER; lag > 3; lag--)
+            for (i = 0; i < 4; i++)
+                sum[i] -= a[lag] * y[n + i - lag];
+        for (i = 0; i < 4; i++)
+            y[n + i] = sum[i] - a[3] * y[n + i - 3] - a[2] * y[n + i - 2] - a[1] * y[n + i - 1];
+    }
+    for (; n < count; n++) {
+        tq_real sum = s->floor * w[n];
+        for (lag = TQ_ORDER; lag > 0; lag--)
+            sum -= a[lag] * y[n - lag];
+        y[n] = sum;
+    }
+    memcpy(out, y, (size_t)count * sizeof(tq_real));
+    memcpy(s->rows[TQ_PAST], y + count - TQ_ORDER, TQ_ORDER * sizeof(tq_real));
+}
+
+/* --- The call ---------------------------------------------------------------------------------- */
+
+static inline void tq_rival_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+{
+    switch (s->kind) {
+    case TQ_DIRECT: tq_direct_update(t, s, hand); break;
+    case TQ_TPT: tq_tpt_update(t, s, hand); break;
+    default: tq_predictor_update(s, hand); break;
+    }
+}
+
+static inline void tq_rival_filter(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
+                                   int count)
+{
+    switch (s->kind) {
+    case TQ_DIRECT: tq_all_layers(t, s, w, out, count, tq_direct_layers); break;
+    case TQ_TPT: tq_all_layers(t, s, w, out, count, tq_tpt_layers); break;
+    default: tq_predictor_filter(s, w, out, count); break;
+    }
+}
+
+/* The next `count` samples for a hand whose speed and force are given at each of them. */
+static void tq_rival_render(const tq_texture *t, tq_rival *s, const tq_real *speed,
+                            const tq_real *force, tq_real *out, size_t count)
+{
+    while (count) {
+        tq_real noise[TQ_CHUNK + 2], *w = noise + 2;
+        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0, n;
+        noise[0] = s->before[0], noise[1] = s->before[1];
+        for (n = 0; n < chunk; n++)
+            w[n] = tq_noise(s->key, s->position + (uint64_t)n);
+        s->before[0] = noise[chunk], s->before[1] = noise[chunk + 1];
+        while (done < chunk) {
+            int left = t->update_samples - s->since_update, piece;
+            if (s->position == 0 || left == 0) {
+                tq_hand hand = tq_hand_at(t, speed[done], force[done]);
+                tq_rival_update(t, s, &hand);
+                s->since_update = 0;
+                left = t->update_samples;
+            }
+            piece = left < chunk - done ? left : chunk - done;
+            tq_rival_filter(t, s, w + done, out + done, piece);
+            s->position += (uint64_t)piece;
+            s->since_update += piece;
+            done += piece;
+        }
+        speed += chunk, force += chunk, out += chunk, count -= (size_t)chunk;
+    }
+}
+
+/* How this file and the kernel were compiled. */
+static const char *tq_build(void)
+{
+    return TQ_FLAGS;
+}
+
+#endif
