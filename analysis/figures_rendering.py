@@ -32,9 +32,15 @@ from analysis.rendering import (
     UPDATES,
     RenderingBench,
 )
-from analysis.rivals import AR, DIRECT, KERNEL, TPT
+from analysis.rivals import AR, DIRECT, KERNEL, TPT, TRANSPOSED
 
-FILTER_COLOURS = {KERNEL: BLUE, DIRECT: ORANGE, TPT: GREEN, AR: PURPLE}
+FILTER_COLOURS = {
+    KERNEL: BLUE,
+    DIRECT: ORANGE,
+    TRANSPOSED: VERMILLION,
+    TPT: GREEN,
+    AR: PURPLE,
+}
 BLOCK_COLOURS = {ONE_CALL: BLUE, CALLS: BLACK, RENDERER: SKY_BLUE, SOSFILT: VERMILLION}
 _BARS_SHARE = 0.84
 
@@ -54,7 +60,7 @@ def figure_rendering(bench: RenderingBench) -> Figure:
         ax.set_title(f"from Python, an update every block of {block}", fontsize=10)
         ax.set_ylim(1, 20000)
     plot_sweep(bench, ax=panels[1, 2])
-    shared_legend(figure, [panels[0, 0], panels[1, 0]], ncols=8)
+    shared_legend(figure, [panels[0, 0], panels[1, 0]], ncols=9)
     figure.supxlabel(f"noise included; {bench.machine}", fontsize=9, color=GREY)
     return figure
 
@@ -76,7 +82,7 @@ def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None =
         at = groups + (number - (len(colours) - 1) / 2) * width
         bars = ax.bar(at, rows[name], width=width, color=colour, label=name)
         shown = [f"{ns:.0f}" if ns >= 10 else f"{ns:.1f}" for ns in rows[name]]
-        ax.bar_label(bars, shown, fontsize=7, padding=1)
+        ax.bar_label(bars, shown, fontsize=6.5, padding=1)
     ax.set_yscale("log")
     ax.set_xticks(groups, [f"{layers:.0f}" for layers in rows["layers"]])
     ax.set_xlabel("layers")

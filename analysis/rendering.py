@@ -19,7 +19,7 @@ from scipy.stats import linregress
 from analysis.rivals import (
     AR,
     COMPILED,
-    DIRECT,
+    FORMS,
     KERNEL,
     RATE_HZ,
     CompiledStream,
@@ -109,10 +109,11 @@ class RenderingBench:
 
     @property
     def filters(self) -> pd.DataFrame:
-        """Filters in C in one call: layers, update_samples, ns per filter, and two ratios."""
+        """Filters in C in one call: layers, update_samples, ns per filter, and ratios."""
         in_one_call = self.times[self.times["filter"].isin(COMPILED)]
         wide = _wide(in_one_call, "update_samples", COMPILED)
-        wide["kernel / direct form"] = wide[KERNEL] / wide[DIRECT]
+        for name in FORMS:
+            wide[f"{KERNEL} / {name}"] = wide[KERNEL] / wide[name]
         wide[f"{AR} / kernel"] = wide[AR] / wide[KERNEL]
         return wide
 
@@ -134,7 +135,8 @@ class RenderingBench:
     def aims(self) -> pd.DataFrame:
         """Every aim beside what was measured: what, where, aim, measured, met."""
         rows = [
-            _aim("kernel / direct form", at, row["kernel / direct form"], most=1.5)
+            _aim(f"{KERNEL} / {name}", at, row[f"{KERNEL} / {name}"], most=1.5)
+            for name in FORMS
             for at, row in _places(self.filters, "update_samples")
         ]
         rows += [

@@ -9,11 +9,6 @@
 #ifndef TQ_RIVALS_H
 #define TQ_RIVALS_H
 
-/* In a file of so many filters the compiler's budget, not the filter, would say what is inlined. */
-#ifdef __GNUC__
-#define inline inline __attribute__((always_inline))
-#endif
-
 #include "kernel.h"
 
 #ifndef TQ_FLAGS
@@ -23,7 +18,10 @@
 #define TQ_ORDER 20 /* of the autoregressive rival; even */
 
 /* The rivals. */
-enum { TQ_DIRECT, TQ_TPT, TQ_PREDICTOR };
+enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_PREDICTOR };
+
+/* Lanes that run side by side. */
+enum { TQ_GROUPS = TQ_SIDE_BY_SIDE / TQ_LANES };
 
 /* The state of any rival; all zeros, but for kind and key, is silence at position 0. */
 typedef struct {
@@ -38,7 +36,7 @@ typedef void tq_rival_layers(tq_rival *s, int first, int width, const tq_real *w
                              int count);
 
 /* As the kernel does: the noise branch, then four layers side by side, then the rest. */
-static inline void tq_all_layers(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
+TQ_INLINE void tq_all_layers(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
                                  int count, tq_rival_layers *layers)
 {
     int i = 0, n;
@@ -55,7 +53,7 @@ static inline void tq_all_layers(const tq_texture *t, tq_rival *s, const tq_real
 }
 
 /* As tq_blend does; an index that cannot wrap lets the compiler take layers together. */
-static inline tq_real tq_blend_at(const tq_hand *hand, size_t i)
+TQ_INLINE tq_real tq_blend_at(const tq_hand *hand, size_t i)
 {
     tq_real low = hand->corner[0][i] * (1 - hand->x) + hand->corner[1][i] * hand->x;
     tq_real high = hand->corner[2][i] * (1 - hand->x) + hand->corner[3][i] * hand->x;
@@ -63,7 +61,7 @@ static inline tq_real tq_blend_at(const tq_hand *hand, size_t i)
 }
 
 /* tan(angle / 2) = numerator / denominator, by the kernel's formula. */
-static inline void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *denominator)
+TQ_INLINE void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *denominator)
 {
     tq_real half = angle * (tq_real)0.5, z = half * half;
     *numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
@@ -76,7 +74,7 @@ static inline void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *
    a1 = -2 cos(2 pi f / rate) / (1 + k), a2 = (1 - k) / (1 + k); the gain is part of b. */
 enum { TQ_Y1, TQ_Y2, TQ_A1, TQ_A2, TQ_B };
 
-static inline void tq_direct_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_direct_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
 {
     size_t m = (size_t)t->layers, i;
     tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
@@ -98,8 +96,8 @@ static inline void tq_direct_update(const tq_texture *t, tq_rival *restrict s, c
     }
 }
 
-/* Form I: one x - x'' serves all bands, which makes it cheaper than the transposed form II. */
-static inline void tq_direct_layers(tq_rival *s, int first, int width, const tq_real *w,
+/* Form I: one x - x'' serves all bands, which makes it the cheapest; two layers at a time it is no faster. */
+TQ_INLINE void tq_direct_layers(tq_rival *s, int first, int width, const tq_real *w,
                                     tq_real *out, int count)
 {
     tq_real y1[TQ_SIDE_BY_SIDE], y2[TQ_SIDE_BY_SIDE];
@@ -125,6 +123,36 @@ static inline void tq_direct_layers(tq_rival *s, int first, int width, const tq_
         s->rows[TQ_Y1][first + i] = y1[i], s->rows[TQ_Y2][first + i] = y2[i];
 }
 
+/* The transposed form II, as scipy.signal.sosfilt has it. */
+TQ_INLINE void tq_transposed_layers(tq_rival *s, int first, int width, const tq_real *w,
+                                    tq_real *out, int count)
+{
+    tq_lanes z1[TQ_GROUPS], z2[TQ_GROUPS], a1[TQ_GROUPS], a2[TQ_GROUPS], b[TQ_GROUPS];
+    int groups = (width + TQ_LANES - 1) / TQ_LANES, n, i;
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        z1[i] = tq_load(s->rows[TQ_Y1] + at), z2[i] = tq_load(s->rows[TQ_Y2] + at);
+        a1[i] = tq_load(s->rows[TQ_A1] + at), a2[i] = tq_load(s->rows[TQ_A2] + at);
+        b[i] = tq_load(s->rows[TQ_B] + at);
+    }
+    for (n = 0; n < count; n++) {
+        tq_real x = w[n], sum = out[n], band[TQ_SIDE_BY_SIDE];
+        for (i = 0; i < groups; i++) {
+            tq_lanes fed = b[i] * x, y = fed + z1[i];
+            z1[i] = z2[i] - a1[i] * y;
+            z2[i] = -fed - a2[i] * y;
+            tq_store(band + i * TQ_LANES, y);
+        }
+        for (i = 0; i < width; i++)
+            sum += band[i];
+        out[n] = sum;
+    }
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        tq_store(s->rows[TQ_Y1] + at, z1[i]), tq_store(s->rows[TQ_Y2] + at, z2[i]);
+    }
+}
+
 /* --- Topology-preserving state-variable filter ------------------------------------------------- */
 
 /* Zavalishin's trapezoidal integrators as Simper solves them: with g = tan(pi f / rate),
@@ -132,7 +160,7 @@ static inline void tq_direct_layers(tq_rival *s, int first, int width, const tq_
    s1' = (2 a1 - 1) s1 + 2 a2 e, s2' = s2 + 2 a2 s1 + 2 a3 e, band = K (s1 + s1') / 2. */
 enum { TQ_T1, TQ_T2, TQ_TURN, TQ_CROSS, TQ_FEED, TQ_TAP };
 
-static inline void tq_tpt_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_tpt_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
 {
     size_t m = (size_t)t->layers, i;
     tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
@@ -155,31 +183,34 @@ static inline void tq_tpt_update(const tq_texture *t, tq_rival *restrict s, cons
     }
 }
 
-static inline void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w, tq_real *out,
-                                 int count)
+TQ_INLINE void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w, tq_real *out,
+                             int count)
 {
-    tq_real s1[TQ_SIDE_BY_SIDE], s2[TQ_SIDE_BY_SIDE], turn[TQ_SIDE_BY_SIDE];
-    tq_real cross[TQ_SIDE_BY_SIDE], feed[TQ_SIDE_BY_SIDE], tap[TQ_SIDE_BY_SIDE];
-    int n, i;
-    for (i = 0; i < width; i++) {
-        s1[i] = s->rows[TQ_T1][first + i], s2[i] = s->rows[TQ_T2][first + i];
-        turn[i] = s->rows[TQ_TURN][first + i], cross[i] = s->rows[TQ_CROSS][first + i];
-        feed[i] = s->rows[TQ_FEED][first + i], tap[i] = s->rows[TQ_TAP][first + i];
+    tq_lanes s1[TQ_GROUPS], s2[TQ_GROUPS], turn[TQ_GROUPS];
+    tq_lanes cross[TQ_GROUPS], feed[TQ_GROUPS], tap[TQ_GROUPS];
+    int groups = (width + TQ_LANES - 1) / TQ_LANES, n, i;
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        s1[i] = tq_load(s->rows[TQ_T1] + at), s2[i] = tq_load(s->rows[TQ_T2] + at);
+        turn[i] = tq_load(s->rows[TQ_TURN] + at), cross[i] = tq_load(s->rows[TQ_CROSS] + at);
+        feed[i] = tq_load(s->rows[TQ_FEED] + at), tap[i] = tq_load(s->rows[TQ_TAP] + at);
     }
     for (n = 0; n < count; n++) {
         tq_real sum = out[n], band[TQ_SIDE_BY_SIDE];
-        for (i = 0; i < width; i++) {
-            tq_real e = w[n] - s2[i], next = turn[i] * s1[i] + cross[i] * e;
+        for (i = 0; i < groups; i++) {
+            tq_lanes e = w[n] - s2[i], next = turn[i] * s1[i] + cross[i] * e;
             s2[i] += cross[i] * s1[i] + feed[i] * e;
-            band[i] = tap[i] * (s1[i] + next);
+            tq_store(band + i * TQ_LANES, tap[i] * (s1[i] + next));
             s1[i] = next;
         }
         for (i = 0; i < width; i++)
             sum += band[i];
         out[n] = sum;
     }
-    for (i = 0; i < width; i++)
-        s->rows[TQ_T1][first + i] = s1[i], s->rows[TQ_T2][first + i] = s2[i];
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        tq_store(s->rows[TQ_T1] + at, s1[i]), tq_store(s->rows[TQ_T2] + at, s2[i]);
+    }
 }
 
 /* --- Autoregressive, by line spectral frequencies ---------------------------------------------- */
@@ -189,7 +220,7 @@ static inline void tq_tpt_layers(tq_rival *s, int first, int width, const tq_rea
 enum { TQ_PAST, TQ_WEIGHTS };
 
 /* cos(angle), 0 <= angle <= pi, to 1e-15: minus the sine's series about pi / 2. */
-static inline tq_real tq_cosine(tq_real angle)
+TQ_INLINE tq_real tq_cosine(tq_real angle)
 {
     tq_real x = angle - (tq_real)1.5707963267948966, z = x * x;
     tq_real high = (tq_real)1.6059043836821613e-10 +
@@ -202,7 +233,7 @@ static inline tq_real tq_cosine(tq_real angle)
 
 /* A(z) from half of the coefficients of its symmetric and its antisymmetric part, each the product
    of factors 1 - 2 cos(w) / z + 1 / z^2; the two products run side by side. */
-static inline void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand)
 {
     tq_real middle[TQ_ORDER], half[TQ_ORDER / 2 + 1][2], *a = s->rows[TQ_WEIGHTS];
     int i, j, k;
@@ -229,7 +260,7 @@ static inline void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand
 }
 
 /* Four samples at once as far as the past goes, then one after the other. */
-static inline void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+TQ_INLINE void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
 {
     tq_real past[TQ_ORDER + TQ_CHUNK], a[TQ_ORDER + 1], *y = past + TQ_ORDER;
     int n = 0, i, lag;
@@ -257,20 +288,22 @@ static inline void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *o
 
 /* --- The call ---------------------------------------------------------------------------------- */
 
-static inline void tq_rival_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_rival_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
 {
     switch (s->kind) {
-    case TQ_DIRECT: tq_direct_update(t, s, hand); break;
+    case TQ_DIRECT:
+    case TQ_TRANSPOSED: tq_direct_update(t, s, hand); break;
     case TQ_TPT: tq_tpt_update(t, s, hand); break;
     default: tq_predictor_update(s, hand); break;
     }
 }
 
-static inline void tq_rival_filter(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
+TQ_INLINE void tq_rival_filter(const tq_texture *t, tq_rival *s, const tq_real *w, tq_real *out,
                                    int count)
 {
     switch (s->kind) {
     case TQ_DIRECT: tq_all_layers(t, s, w, out, count, tq_direct_layers); break;
+    case TQ_TRANSPOSED: tq_all_layers(t, s, w, out, count, tq_transposed_layers); break;
     case TQ_TPT: tq_all_layers(t, s, w, out, count, tq_tpt_layers); break;
     default: tq_predictor_filter(s, w, out, count); break;
     }

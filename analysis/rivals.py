@@ -23,9 +23,11 @@ from stimuli.planted import FORCES_N, SPEEDS_MM_S
 
 RATE_HZ = 5000.0
 ORDER = 20
-KERNEL, DIRECT, TPT, AR = "kernel", "direct form", "TPT", f"AR({ORDER})"
-COMPILED = (KERNEL, DIRECT, TPT, AR)
-_KINDS = {DIRECT: 0, TPT: 1, AR: 2}
+KERNEL, DIRECT, TRANSPOSED = "kernel", "direct form I", "direct form II"
+TPT, AR = "TPT", f"AR({ORDER})"
+FORMS = (DIRECT, TRANSPOSED)
+COMPILED = (KERNEL, DIRECT, TRANSPOSED, TPT, AR)
+_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3}
 _SPECTRUM_SAMPLES = 5000
 
 

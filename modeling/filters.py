@@ -132,9 +132,9 @@ class BandFilter:
         wanted, taps, self._bands = setting
         now = self._gains or wanted
         self._gains = [_towards(*move) for move in zip(now, wanted, self._slews, strict=True)]
-        steps = self._plan.update_samples
+        per_sample = 1 / self._plan.update_samples
         self._courses = [
-            (start * tap, (end - start) / steps * tap)
+            (start * tap, (end - start) * per_sample * tap)
             for start, end, tap in zip(now, self._gains, taps, strict=True)
         ]
 

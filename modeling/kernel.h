@@ -24,14 +24,29 @@
 
 typedef TQ_REAL tq_real;
 
-#define TQ_CHUNK 64       /* samples that are filtered in one go */
-#define TQ_SIDE_BY_SIDE 4 /* layers whose recursions run side by side */
+/* Where the compiler knows how: inlined whatever it thinks of it, since constant widths are what makes
+   the loops fast; and two layers in one operation. */
+#ifdef __GNUC__
+#define TQ_INLINE static inline __attribute__((always_inline))
+#define TQ_LANES 2
+typedef tq_real tq_lanes __attribute__((vector_size(2 * sizeof(tq_real))));
+#define TQ_PACK(x) ((tq_lanes){(x)[0], (x)[1]}) /* of values just written, faster than tq_load */
+#else
+#define TQ_INLINE static inline
+#define TQ_LANES 1
+typedef tq_real tq_lanes;
+#define TQ_PACK(x) ((x)[0])
+#endif
 
-/* Rows of the state's memory, each one value per layer; the noise follows them. */
+#define TQ_CHUNK 64       /* samples that are filtered in one go */
+#define TQ_SIDE_BY_SIDE 4 /* layers whose recursions run side by side, a multiple of TQ_LANES */
+
+/* Rows of the state's memory, each one value per layer, filled up to whole lanes; the noise follows. */
 enum { TQ_S1, TQ_S2, TQ_GAIN, TQ_P, TQ_Q, TQ_R, TQ_B1, TQ_B2, TQ_NOW, TQ_STEP, TQ_ROWS };
+#define TQ_ROW(layers) (((layers) + TQ_LANES - 1) / TQ_LANES * TQ_LANES)
 
 /* How many reals of memory a state needs; taps is 1 at the model's own rate. */
-#define TQ_MEMORY(layers, taps) (TQ_ROWS * (layers) + (taps) - 1 + TQ_CHUNK)
+#define TQ_MEMORY(layers, taps) (TQ_ROWS * TQ_ROW(layers) + (taps) - 1 + TQ_CHUNK)
 
 /* What is rendered, and where: constant while it plays. */
 typedef struct {
@@ -73,6 +88,7 @@ typedef struct {
     uint64_t key, position;
     int since_update;
     tq_real speed, force; /* as last read */
+    tq_real angle, per_sample, to_end; /* pi / rate; one sample and all but one of an update's time */
     tq_real floor_gain, floor_now, floor_step;
     tq_real *memory;
     tq_band notch;
@@ -82,12 +98,18 @@ typedef struct {
     tq_counters counters;
 } tq_state;
 
-static inline tq_real *tq_row(const tq_texture *t, const tq_state *s, int row)
+TQ_INLINE tq_real *tq_row(const tq_texture *t, const tq_state *s, int row)
 {
-    return s->memory + (size_t)row * (size_t)t->layers;
+    return s->memory + (size_t)row * (size_t)TQ_ROW(t->layers);
 }
 
-static inline tq_real tq_within(tq_real x, tq_real low, tq_real high)
+/* The noise around the next sample, taps - 1 of it, then that for a chunk. */
+TQ_INLINE tq_real *tq_wide(const tq_texture *t, const tq_state *s)
+{
+    return tq_row(t, s, TQ_ROWS);
+}
+
+TQ_INLINE tq_real tq_within(tq_real x, tq_real low, tq_real high)
 {
     return x < low ? low : x > high ? high : x;
 }
@@ -95,7 +117,7 @@ static inline tq_real tq_within(tq_real x, tq_real low, tq_real high)
 /* --- Noise ------------------------------------------------------------------------------------- */
 
 /* Sample `position` of a stream: SplitMix64 as a counter, uniform on +-sqrt 3. */
-static inline tq_real tq_noise(uint64_t key, uint64_t position)
+TQ_INLINE tq_real tq_noise(uint64_t key, uint64_t position)
 {
     uint64_t z = key + (position + 1) * UINT64_C(0x9E3779B97F4A7C15);
     z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
@@ -108,42 +130,83 @@ static inline tq_real tq_noise(uint64_t key, uint64_t position)
 
 /* --- Coefficients ------------------------------------------------------------------------------ */
 
-/* tan(angle / 2) = numerator / denominator, the [9/8] Pade approximant: 0 <= angle <= 0.49 pi. */
-static inline void tq_half_tangent(tq_real angle, tq_real *numerator, tq_real *denominator)
+TQ_INLINE tq_lanes tq_load(const tq_real *from)
 {
-    tq_real half = angle * (tq_real)0.5, z = half * half;
-    *numerator = half * ((tq_real)34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
-    *denominator = (tq_real)34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
+    tq_lanes lanes;
+    memcpy(&lanes, from, sizeof lanes);
+    return lanes;
 }
 
-/* The band of peak frequency f and -3 dB width B, from angles pi f / rate and pi B / rate. */
+TQ_INLINE void tq_store(tq_real *to, tq_lanes lanes)
+{
+    memcpy(to, &lanes, sizeof lanes);
+}
+
+TQ_INLINE tq_lanes tq_root(tq_lanes x)
+{
+    tq_real each[TQ_LANES];
+    int i;
+    tq_store(each, x);
+    for (i = 0; i < TQ_LANES; i++)
+        each[i] = (tq_real)sqrt(each[i]);
+    return TQ_PACK(each);
+}
+
+/* tan(angle / 2) = numerator / denominator, the [9/8] Pade approximant: 0 <= angle <= 0.49 pi. */
+TQ_INLINE void tq_half_tangent(tq_lanes angle, tq_lanes *numerator, tq_lanes *denominator)
+{
+    const tq_real n[] = {(tq_real)34459425, -4729725, 135135, -990};
+    const tq_real d[] = {(tq_real)34459425, -16216200, 945945, -13860, 45};
+    tq_lanes half = angle * (tq_real)0.5, z = half * half;
+    *numerator = half * (n[0] + z * (n[1] + z * (n[2] + z * (n[3] + z))));
+    *denominator = d[0] + z * (d[1] + z * (d[2] + z * (d[3] + z * d[4])));
+}
+
+/* Bands of peak frequency f and -3 dB width B, from angles pi f / rate and pi B / rate: p, q, r, b1,
+   b2 and tap of tq_band. */
+TQ_INLINE void tq_bands_of(tq_lanes frequency, tq_lanes bandwidth, tq_lanes band[6])
+{
+    const tq_real one = 1, two = 2;
+    tq_lanes n, d, k_n, k_d, scale, cosine, sine, root, share;
+    tq_half_tangent(frequency, &n, &d);
+    scale = one / (d * d + n * n);
+    cosine = (d - n) * (d + n) * scale;
+    sine = two * n * d * scale;
+    tq_half_tangent(bandwidth, &n, &d);
+    k_n = two * n * d;
+    k_d = (d - n) * (d + n); /* tan(pi B / rate) = k_n / k_d */
+    scale = one / (k_d + k_n);
+    share = k_d * scale;
+    root = tq_root(k_n * k_d);
+    band[2] = -two * sine * sine * share;
+    band[0] = band[2] - two * k_n * scale;
+    band[1] = two * sine * cosine * share;
+    band[3] = two * root * scale * cosine;
+    band[4] = two * root * scale * sine;
+    band[5] = root / (two * k_d * cosine);
+}
+
+/* The same for one band. */
 static tq_band tq_band_of(tq_real frequency, tq_real bandwidth)
 {
-    tq_band band;
-    tq_real n, d, k_n, k_d, scale, cosine, sine, root, share;
-    tq_half_tangent(frequency, &n, &d);
-    scale = 1 / (d * d + n * n);
-    cosine = (d - n) * (d + n) * scale;
-    sine = 2 * n * d * scale;
-    tq_half_tangent(bandwidth, &n, &d);
-    k_n = 2 * n * d;
-    k_d = (d - n) * (d + n); /* tan(pi B / rate) = k_n / k_d */
-    scale = 1 / (k_d + k_n);
-    share = k_d * scale;
-    root = (tq_real)sqrt(k_n * k_d);
-    band.r = -2 * sine * sine * share;
-    band.p = band.r - 2 * k_n * scale;
-    band.q = 2 * sine * cosine * share;
-    band.b1 = 2 * root * scale * cosine;
-    band.b2 = 2 * root * scale * sine;
-    band.tap = root / (2 * k_d * cosine);
-    return band;
+    tq_real f[TQ_LANES], b[TQ_LANES], each[6][TQ_LANES];
+    tq_lanes band[6];
+    tq_band one;
+    int i;
+    for (i = 0; i < TQ_LANES; i++)
+        f[i] = frequency, b[i] = bandwidth;
+    tq_bands_of(tq_load(f), tq_load(b), band);
+    for (i = 0; i < 6; i++)
+        tq_store(each[i], band[i]);
+    one.p = each[0][0], one.q = each[1][0], one.r = each[2][0];
+    one.b1 = each[3][0], one.b2 = each[4][0], one.tap = each[5][0];
+    return one;
 }
 
 /* --- Parameter updates ------------------------------------------------------------------------- */
 
 /* The grid cell that holds x, which lies within the axis, and how far x is into it (0 to 1). */
-static inline int tq_cell(const tq_real *axis, int size, tq_real x, tq_real *share)
+TQ_INLINE int tq_cell(const tq_real *axis, int size, tq_real x, tq_real *share)
 {
     int i = 0;
     while (i < size - 2 && x >= axis[i + 1])
@@ -159,7 +222,7 @@ typedef struct {
     tq_real x, y, ramp;
 } tq_hand;
 
-static inline tq_hand tq_hand_at(const tq_texture *t, tq_real speed, tq_real force)
+TQ_INLINE tq_hand tq_hand_at(const tq_texture *t, tq_real speed, tq_real force)
 {
     tq_hand hand;
     const tq_real *v = t->speed_mm_s, *f = t->force_n;
@@ -168,7 +231,8 @@ static inline tq_hand tq_hand_at(const tq_texture *t, tq_real speed, tq_real for
         speed = force = 0;
     speed = speed < 0 ? -speed : speed;
     hand.ramp = speed < v[0] ? speed / v[0] : 1;
-    hand.ramp *= tq_within(force / f[0], 0, 1);
+    if (force < f[0])
+        hand.ramp *= force > 0 ? force / f[0] : 0;
     i = tq_cell(v, t->speeds, tq_within(speed, v[0], v[t->speeds - 1]), &hand.x);
     j = tq_cell(f, t->forces, tq_within(force, f[0], f[t->forces - 1]), &hand.y);
     hand.corner[0] = t->values + ((size_t)i * (size_t)t->forces + (size_t)j) * (size_t)width;
@@ -178,24 +242,39 @@ static inline tq_hand tq_hand_at(const tq_texture *t, tq_real speed, tq_real for
     return hand;
 }
 
-static inline tq_real tq_blend(const tq_hand *hand, int i)
+TQ_INLINE tq_real tq_blend(const tq_hand *hand, int i)
 {
     tq_real low = hand->corner[0][i] * (1 - hand->x) + hand->corner[1][i] * hand->x;
     tq_real high = hand->corner[2][i] * (1 - hand->x) + hand->corner[3][i] * hand->x;
     return low * (1 - hand->y) + high * hand->y;
 }
 
+/* Values `first` ... first + width - 1. */
+TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *to)
+{
+    tq_real x = hand->x, y = hand->y;
+    int i = 0;
+    for (; i + TQ_LANES <= width; i += TQ_LANES) {
+        int at = first + i;
+        tq_lanes low = tq_load(hand->corner[0] + at) * (1 - x) + tq_load(hand->corner[1] + at) * x;
+        tq_lanes high = tq_load(hand->corner[2] + at) * (1 - x) + tq_load(hand->corner[3] + at) * x;
+        tq_store(to + i, low * (1 - y) + high * y);
+    }
+    for (; i < width; i++)
+        to[i] = tq_blend(hand, first + i);
+}
+
 /* Where a reading that was `last` and is `now` will be after `share` of the time to the next one, if it
    goes on as it did. A change beyond what a hand can do is a step, which does not go on; nor does what
    has come to rest. */
-static inline tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, tq_real share)
+TQ_INLINE tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, tq_real share)
 {
     tq_real change = now - last;
     return change <= furthest && change >= -furthest && now != 0 ? now + change * share : now;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
-static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
+TQ_INLINE tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
 {
     tq_real change = wanted - gain;
     if (change > slew)
@@ -203,73 +282,99 @@ static inline tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
     return change < -slew ? gain - slew : wanted;
 }
 
+/* Of `width` layers from `from` on: coefficients, and the way that gains go until the next update. */
+TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand *amid,
+                                const tq_hand *end, int from, int width)
+{
+    tq_real f[TQ_SIDE_BY_SIDE], b[TQ_SIDE_BY_SIDE], now[TQ_SIDE_BY_SIDE], next[TQ_SIDE_BY_SIDE];
+    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
+    tq_real *gain = tq_row(t, s, TQ_GAIN) + from;
+    int first = s->position == 0, m = t->layers, row, i;
+    tq_blend_all(amid, 1 + from, width, f);
+    tq_blend_all(amid, 1 + m + from, width, b);
+    tq_blend_all(end, 1 + 2 * m + from, width, next);
+    for (i = 0; i < width; i++) {
+        tq_real f_legal = tq_within(f[i], 1, highest), b_legal = tq_within(b[i], (tq_real)0.1, widest);
+        tq_real wanted = (t->signs[from + i] * next[i] < 0 ? 0 : next[i]) * end->ramp;
+        if (f[i] != f_legal || b[i] != b_legal)
+            s->counters.clamped += (uint64_t)((f[i] != f_legal) + (b[i] != b_legal));
+        f[i] = s->angle * f_legal;
+        b[i] = s->angle * b_legal;
+        if (first)
+            gain[i] = wanted;
+        now[i] = gain[i];
+        next[i] = gain[i] = tq_towards(now[i], wanted, t->slews[1 + from + i]);
+    }
+    for (; i % TQ_LANES; i++) /* a lane without a layer does as the first does, in silence */
+        f[i] = f[0], b[i] = b[0], now[i] = next[i] = 0;
+    for (i = 0; i < width; i += TQ_LANES) {
+        tq_lanes band[6], start = TQ_PACK(now + i), change = TQ_PACK(next + i) - start;
+        tq_bands_of(TQ_PACK(f + i), TQ_PACK(b + i), band);
+        for (row = 0; row < 5; row++)
+            tq_store(tq_row(t, s, TQ_P + row) + from + i, band[row]);
+        tq_store(tq_row(t, s, TQ_NOW) + from + i, start * band[5]);
+        tq_store(tq_row(t, s, TQ_STEP) + from + i, change * s->per_sample * band[5]);
+    }
+}
+
 /* Parameters for the hand as it will be: those for the hand as it is read would be late. Frequencies
    and bandwidths are set for the middle of the time to the next update; gains move in a straight line
    to those for its last sample, so that nothing clicks. The first update sets all at once. */
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
-    int m = t->layers, first = s->position == 0, i;
+    int first = s->position == 0, i;
     tq_real last_speed = first ? speed : s->speed, last_force = first ? force : s->force;
-    tq_real steps = (tq_real)t->update_samples, to_end = (steps - 1) / steps;
+    tq_real to_end = s->to_end;
     tq_hand amid = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end / 2),
                               tq_ahead(last_force, force, t->force_change, to_end / 2));
-    tq_hand end = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end),
-                             tq_ahead(last_force, force, t->force_change, to_end));
-    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
-    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
-    tq_real wanted = tq_blend(&end, 0), next;
+    tq_hand end = amid;
+    tq_real wanted, next;
+    if (to_end > 0)
+        end = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end),
+                         tq_ahead(last_force, force, t->force_change, to_end));
+    wanted = tq_blend(&end, 0);
     s->speed = speed;
     s->force = force;
     wanted = (wanted < 0 ? 0 : wanted) * end.ramp;
     next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
     s->floor_now = first ? next : s->floor_gain;
-    s->floor_step = (next - s->floor_now) / steps;
+    s->floor_step = (next - s->floor_now) * s->per_sample;
     s->floor_gain = next;
-    for (i = 0; i < m; i++) {
-        tq_real f = tq_blend(&amid, 1 + i), b = tq_blend(&amid, 1 + m + i), now;
-        tq_real f_legal = tq_within(f, 1, highest), b_legal = tq_within(b, (tq_real)0.1, widest);
-        tq_band band = tq_band_of(angle * f_legal, angle * b_legal);
-        s->counters.clamped += (uint64_t)((f != f_legal) + (b != b_legal));
-        wanted = tq_blend(&end, 1 + 2 * m + i);
-        wanted = (t->signs[i] * wanted < 0 ? 0 : wanted) * end.ramp;
-        now = tq_row(t, s, TQ_GAIN)[i];
-        next = first ? wanted : tq_towards(now, wanted, t->slews[1 + i]);
-        now = first ? next : now;
-        tq_row(t, s, TQ_P)[i] = band.p;
-        tq_row(t, s, TQ_Q)[i] = band.q;
-        tq_row(t, s, TQ_R)[i] = band.r;
-        tq_row(t, s, TQ_B1)[i] = band.b1;
-        tq_row(t, s, TQ_B2)[i] = band.b2;
-        tq_row(t, s, TQ_NOW)[i] = now * band.tap;
-        tq_row(t, s, TQ_STEP)[i] = (next - now) / steps * band.tap;
-        tq_row(t, s, TQ_GAIN)[i] = next;
+    for (i = 0; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
+        tq_update_layers(t, s, &amid, &end, i, TQ_SIDE_BY_SIDE);
+    switch (t->layers - i) { /* a constant width lets the compiler unroll */
+    case 3: tq_update_layers(t, s, &amid, &end, i, 3); break;
+    case 2: tq_update_layers(t, s, &amid, &end, i, 2); break;
+    case 1: tq_update_layers(t, s, &amid, &end, i, 1); break;
+    default: break;
     }
 }
 
 /* --- Filtering --------------------------------------------------------------------------------- */
 
 /* `width` layers from `first` on, added to `out`. */
-static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int width,
-                             const tq_real *w, tq_real *out, int count)
+TQ_INLINE void tq_layers(const tq_texture *t, tq_state *s, int first, int width, const tq_real *w,
+                         tq_real *out, int count)
 {
-    tq_real s1[TQ_SIDE_BY_SIDE], s2[TQ_SIDE_BY_SIDE], now[TQ_SIDE_BY_SIDE], step[TQ_SIDE_BY_SIDE];
-    tq_real p[TQ_SIDE_BY_SIDE], q[TQ_SIDE_BY_SIDE], r[TQ_SIDE_BY_SIDE];
-    tq_real b1[TQ_SIDE_BY_SIDE], b2[TQ_SIDE_BY_SIDE];
-    int n, i;
-    for (i = 0; i < width; i++) {
-        s1[i] = tq_row(t, s, TQ_S1)[first + i], s2[i] = tq_row(t, s, TQ_S2)[first + i];
-        p[i] = tq_row(t, s, TQ_P)[first + i], q[i] = tq_row(t, s, TQ_Q)[first + i];
-        r[i] = tq_row(t, s, TQ_R)[first + i];
-        b1[i] = tq_row(t, s, TQ_B1)[first + i], b2[i] = tq_row(t, s, TQ_B2)[first + i];
-        now[i] = tq_row(t, s, TQ_NOW)[first + i], step[i] = tq_row(t, s, TQ_STEP)[first + i];
+    enum { MOST = TQ_SIDE_BY_SIDE / TQ_LANES };
+    tq_lanes s1[MOST], s2[MOST], now[MOST], step[MOST];
+    tq_lanes p[MOST], q[MOST], r[MOST], b1[MOST], b2[MOST];
+    int groups = (width + TQ_LANES - 1) / TQ_LANES, n, i;
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        s1[i] = tq_load(tq_row(t, s, TQ_S1) + at), s2[i] = tq_load(tq_row(t, s, TQ_S2) + at);
+        p[i] = tq_load(tq_row(t, s, TQ_P) + at), q[i] = tq_load(tq_row(t, s, TQ_Q) + at);
+        r[i] = tq_load(tq_row(t, s, TQ_R) + at);
+        b1[i] = tq_load(tq_row(t, s, TQ_B1) + at), b2[i] = tq_load(tq_row(t, s, TQ_B2) + at);
+        now[i] = tq_load(tq_row(t, s, TQ_NOW) + at), step[i] = tq_load(tq_row(t, s, TQ_STEP) + at);
     }
     for (n = 0; n < count; n++) {
         tq_real x = w[n], y = out[n], band[TQ_SIDE_BY_SIDE];
-        for (i = 0; i < width; i++) {
-            tq_real turned1 = (s1[i] + b1[i] * x) + (p[i] * s1[i] - q[i] * s2[i]);
-            tq_real turned2 = (s2[i] + b2[i] * x) + (r[i] * s2[i] + q[i] * s1[i]);
+        for (i = 0; i < groups; i++) {
+            tq_lanes turned1 = (s1[i] + b1[i] * x) + (p[i] * s1[i] - q[i] * s2[i]);
+            tq_lanes turned2 = (s2[i] + b2[i] * x) + (r[i] * s2[i] + q[i] * s1[i]);
             now[i] += step[i];
-            band[i] = now[i] * (s1[i] + turned1);
+            tq_store(band + i * TQ_LANES, now[i] * (s1[i] + turned1));
             s1[i] = turned1;
             s2[i] = turned2;
         }
@@ -277,9 +382,11 @@ static inline void tq_layers(const tq_texture *t, tq_state *s, int first, int wi
             y += band[i];
         out[n] = y;
     }
-    for (i = 0; i < width; i++) {
-        tq_row(t, s, TQ_S1)[first + i] = s1[i], tq_row(t, s, TQ_S2)[first + i] = s2[i];
-        tq_row(t, s, TQ_NOW)[first + i] = now[i];
+    for (i = 0; i < groups; i++) {
+        int at = first + i * TQ_LANES;
+        tq_store(tq_row(t, s, TQ_S1) + at, s1[i]);
+        tq_store(tq_row(t, s, TQ_S2) + at, s2[i]);
+        tq_store(tq_row(t, s, TQ_NOW) + at, now[i]);
     }
 }
 
@@ -309,11 +416,15 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const 
    possible because the noise to come is known. */
 static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor, int count)
 {
-    tq_real *wide = s->memory + TQ_ROWS * (size_t)t->layers, *fresh = wide + t->taps - 1;
+    tq_real *wide = tq_wide(t, s), *fresh = wide + t->taps - 1;
     int half = t->taps / 2, n, tap;
     uint64_t ahead = s->position + (uint64_t)half;
     for (n = 0; n < count; n++)
         fresh[n] = t->noise_scale * tq_noise(s->key, ahead + (uint64_t)n);
+    if (t->taps == 1) { /* the model's own rate: nothing to take away */
+        memcpy(floor, wide, (size_t)count * sizeof(tq_real));
+        return wide;
+    }
     for (n = 0; n < count; n++)
         floor[n] = 0;
     for (tap = 0; tap < t->taps; tap++)
@@ -344,7 +455,7 @@ static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int co
 /* One sample that is no louder than the limits allow. After `longest` samples of vibration without
    `pause` samples of silence: silence until such a pause. Then the peak; then the running mean square
    of what leaves, which never exceeds its limit. */
-static inline tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
+TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 {
     if (t->longest) {
         s->silent = y == 0 ? s->silent + 1 : 0;
@@ -377,17 +488,20 @@ static inline tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t key)
 {
     int n, half = t->taps / 2;
-    tq_real angle = (tq_real)3.141592653589793 / t->rate_hz, *wide;
+    tq_real *wide;
     memset(s, 0, sizeof *s);
     s->key = key;
+    s->angle = (tq_real)3.141592653589793 / t->rate_hz;
+    s->per_sample = 1 / (tq_real)t->update_samples;
+    s->to_end = (tq_real)(t->update_samples - 1) / (tq_real)t->update_samples;
     s->memory = memory;
     for (n = 0; n < TQ_MEMORY(t->layers, t->taps); n++)
         memory[n] = 0;
-    wide = memory + TQ_ROWS * (size_t)t->layers;
+    wide = tq_wide(t, s);
     for (n = 0; n < t->taps - 1; n++) /* the noise around the first sample, but what is still ahead */
         wide[n] = t->noise_scale * tq_noise(key, (uint64_t)((int64_t)n - half));
     if (t->notch_share != 0)
-        s->notch = tq_band_of(angle * t->notch_hz, angle * t->notch_width_hz);
+        s->notch = tq_band_of(s->angle * t->notch_hz, s->angle * t->notch_width_hz);
 }
 
 /* The next `count` samples for a hand whose speed and force are given at each of them. */
@@ -399,7 +513,10 @@ static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, co
         tq_real floor[TQ_CHUNK];
         int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0, n;
         const tq_real *w = tq_inputs(t, s, floor, chunk);
+        tq_real lost = 0; /* stays 0 while every reading is finite, else is not a number */
         for (n = 0; n < chunk; n++)
+            lost += (speed[n] - speed[n]) + (force[n] - force[n]);
+        for (n = 0; lost != 0 && n < chunk; n++)
             s->counters.lift_offs += !(speed[n] - speed[n] == 0 && force[n] - force[n] == 0);
         while (done < chunk) {
             int left = t->update_samples - s->since_update, piece;
@@ -418,10 +535,8 @@ static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, co
         if (limited)
             for (n = 0; n < chunk; n++)
                 out[n] = tq_limit(t, s, out[n]);
-        if (t->taps > 1) /* the noise around the next sample */
-            memmove(s->memory + TQ_ROWS * (size_t)t->layers,
-                    s->memory + TQ_ROWS * (size_t)t->layers + chunk,
-                    (size_t)(t->taps - 1) * sizeof(tq_real));
+        if (t->taps > 1)
+            memmove(tq_wide(t, s), tq_wide(t, s) + chunk, (size_t)(t->taps - 1) * sizeof(tq_real));
         speed += chunk, force += chunk, out += chunk, count -= (size_t)chunk;
     }
 }

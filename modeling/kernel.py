@@ -44,7 +44,8 @@ class CompiledEngine:
                 field = ffi.from_buffer("double[]", self._arrays[-1])
             setattr(self._texture, name, field)
         layers, taps = self._texture.layers, self._texture.taps
-        reals = lib.TQ_ROWS * layers + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
+        self._row = -(-layers // lib.TQ_LANES) * lib.TQ_LANES
+        reals = lib.TQ_ROWS * self._row + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
         self._memory = ffi.new("double[]", reals)
         self._state = ffi.new("tq_state *")
         lib.tq_start(self._texture, self._state, self._memory, int(key))
@@ -65,7 +66,8 @@ class CompiledEngine:
     def states(self) -> Floats:
         """The filters' states now, (m, 2)."""
         memory = np.frombuffer(ffi.buffer(self._memory))
-        return memory[: 2 * self._texture.layers].reshape(2, -1).T.copy()
+        rows = memory[: 2 * self._row].reshape(2, -1)
+        return rows[:, : self._texture.layers].T.copy()
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""

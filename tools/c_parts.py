@@ -29,7 +29,7 @@ def binding(name: str, *headers: Path) -> FFI:
     """A builder of extension `name` over these headers, the last one including the others."""
     builder = FFI()
     builder.cdef(
-        "typedef double tq_real; static const int TQ_CHUNK, TQ_ROWS;"
+        "typedef double tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS;"
         + "\n".join(declarations(header) for header in headers)
     )
     builder.set_source(

@@ -27,7 +27,7 @@ from analysis.rendering import (
     bench_rendering,
     stroke,
 )
-from analysis.rivals import AR, COMPILED, DIRECT, KERNEL, RATE_HZ
+from analysis.rivals import AR, COMPILED, DIRECT, FORMS, KERNEL, RATE_HZ, TRANSPOSED
 
 PARTS_TOLD: list[str] = []
 
@@ -40,8 +40,8 @@ def bench() -> RenderingBench:
 
 
 def planted() -> RenderingBench:
-    """A bench of known times: kernel 3 ns per layer and direct form 2.5, AR 18, sosfilt 600."""
-    ns = {KERNEL: 3.0, DIRECT: 2.5, "TPT": 2.7, AR: 18.0}
+    """A bench of known times: kernel 3 ns a layer, direct forms 2.5 and 1.5, AR 18, sosfilt 600."""
+    ns = {KERNEL: 3.0, DIRECT: 2.5, TRANSPOSED: 1.5, "TPT": 2.7, AR: 18.0}
     rows = [
         (name, m, update, ns[name] * (1 if name == AR else m))
         for name, m, update in product(COMPILED, LAYERS, UPDATES)
@@ -88,7 +88,8 @@ def test_tables_and_aims_cover_every_combination(bench: RenderingBench) -> None:
     assert np.isfinite(filters.to_numpy()).all()
     assert np.isfinite(blocks.to_numpy()).all()
     counts = bench.aims["what"].value_counts()
-    assert counts["kernel / direct form"] == len(LAYERS) * len(UPDATES)
+    for name in FORMS:
+        assert counts[f"kernel / {name}"] == len(LAYERS) * len(UPDATES)
     assert counts["AR(20) / kernel"] == len(UPDATES)
     for name in (RENDERER, CALLS, ONE_CALL):
         assert counts[f"sosfilt / {name}"] == len(LAYERS) * len(BLOCKS)
@@ -96,7 +97,8 @@ def test_tables_and_aims_cover_every_combination(bench: RenderingBench) -> None:
 
 def test_ratios_and_verdicts_of_known_times() -> None:
     bench = planted()
-    assert bench.filters["kernel / direct form"].to_numpy() == pytest.approx(1.2)
+    assert bench.filters["kernel / direct form I"].to_numpy() == pytest.approx(1.2)
+    assert bench.filters["kernel / direct form II"].to_numpy() == pytest.approx(2.0)
     assert bench.filters["AR(20) / kernel"].to_numpy() == pytest.approx(
         np.repeat([6.0, 2.0, 0.75], 3)
     )
@@ -105,7 +107,8 @@ def test_ratios_and_verdicts_of_known_times() -> None:
     assert bench.blocks["sosfilt / kernel in one call"].to_numpy() == pytest.approx(150.0)
     assert bench.python_ns == 1500.0
     verdicts = bench.aims.set_index(["what", "where"])["met"]
-    assert verdicts["kernel / direct form"].all()
+    assert verdicts["kernel / direct form I"].all()
+    assert not verdicts["kernel / direct form II"].any()
     assert not verdicts["AR(20) / kernel"].any()
     for layers in LAYERS:
         assert not verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 32"]

@@ -12,10 +12,12 @@ from analysis.rivals import (
     AR,
     COMPILED,
     DIRECT,
+    FORMS,
     KERNEL,
     ORDER,
     RATE_HZ,
     TPT,
+    TRANSPOSED,
     CompiledStream,
     SosfiltStream,
     compiled_parts,
@@ -66,7 +68,7 @@ def test_all_layered_filters_agree_while_the_hand_is_held(
     expected = Renderer(texture, seed=3, update_samples=update).render(*hand)
     assert np.array_equal(stream(KERNEL, texture, update).render(*hand), expected)
     scale = expected.std()
-    for name in (DIRECT, TPT):
+    for name in (*FORMS, TPT):
         found = stream(name, texture, update).render(*hand)
         assert np.abs(found - expected).max() <= 1e-9 * scale
     sosfilt = SosfiltStream(texture, np.random.default_rng(0))
@@ -107,6 +109,19 @@ def simper(texture: TextureModel, update: int) -> list[float]:
     return output
 
 
+def transposed(texture: TextureModel, update: int) -> list[float]:
+    """The same band-pass in the transposed form II, its two states carried on."""
+    z1 = z2 = np.zeros(texture.n_layers)
+    output = []
+    for noise, g, k, gains, noise_gain in at_updates(texture, update):
+        b0, a1, a2 = gains * k / (1 + k), -2 * np.cos(2 * np.arctan(g)) / (1 + k), (1 - k) / (1 + k)
+        for x in noise:
+            y = b0 * x + z1
+            z1, z2 = z2 - a1 * y, -b0 * x - a2 * y
+            output.append(noise_gain * x + y.sum())
+    return output
+
+
 def cookbook(texture: TextureModel, update: int) -> list[float]:
     """Form I of the audio cookbook's band-pass of peak 0 dB, α = sin(ω) / 2Q = k."""
     x1 = x2 = 0.0
@@ -122,7 +137,9 @@ def cookbook(texture: TextureModel, update: int) -> list[float]:
 
 
 @pytest.mark.parametrize("update", [1, 5, 32])
-@pytest.mark.parametrize(("name", "textbook"), [(TPT, simper), (DIRECT, cookbook)])
+@pytest.mark.parametrize(
+    ("name", "textbook"), [(TPT, simper), (DIRECT, cookbook), (TRANSPOSED, transposed)]
+)
 def test_layered_rivals_follow_a_moving_hand_as_in_the_textbook(
     name: str, textbook, update: int
 ) -> None:

@@ -132,7 +132,7 @@ typedef struct {
 
 static long double held(const walk *k, int layer)
 {
-    long double s1 = k->memory[layer], s2 = k->memory[k->texture.layers + layer];
+    long double s1 = k->memory[layer], s2 = k->memory[TQ_ROW(k->texture.layers) + layer];
     return s1 * s1 + s2 * s2;
 }
 
