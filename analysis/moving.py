@@ -20,6 +20,7 @@ from analysis.stability import (
     simulate,
 )
 from modeling import Limits, Recording, Renderer, TextureModel, similarity
+from modeling.filters import Foresight
 from modeling.noise import stream_key, white_noise
 from modeling.peq import band_rms
 from modeling.plan import RenderPlan
@@ -30,6 +31,11 @@ FASTEST_MM_S = 300.0
 FORCE_N = 2.0
 HELD_MM_S = 200.0
 UPDATES_SAMPLES = (1, 5, 32)
+# How often the speed is read (Hz), and the noise of a reading (mm/s).
+READINGS = (
+    *((1000.0, noise) for noise in (0.0, 1.0, 2.0, 5.0, 10.0)),
+    *((rate, 2.0) for rate in (500.0, 250.0, 125.0)),
+)
 
 
 class Hand(NamedTuple):
@@ -47,12 +53,36 @@ def stroke(rate_hz: float, *, duration_s: float = 1.0) -> Hand:
 
 
 def update_error_db(
-    model: TextureModel, hand: Hand, update_samples: int, *, seed: int = 0
+    model: TextureModel,
+    hand: Hand,
+    update_samples: int,
+    *,
+    seed: int = 0,
+    readings: Hand | None = None,
 ) -> float:
-    """RMS difference from a rendering with an update at every sample, dB re that rendering."""
-    rendered = Renderer(model, seed=seed, update_samples=update_samples).render(*hand)
+    """RMS difference from a rendering with an update at every sample, dB re that rendering.
+
+    `readings` are what is known of the hand where that is not the hand itself.
+    """
+    rendered = Renderer(model, seed=seed, update_samples=update_samples).render(*(readings or hand))
     exact = Renderer(model, seed=seed, update_samples=1).render(*hand)
     return float(10 * np.log10(np.mean((rendered - exact) ** 2) / np.mean(exact**2)))
+
+
+def reading_rows(model: TextureModel) -> list[dict[str, object]]:
+    """Errors where the speed is read with noise, or seldom, with updates every 1 and 5 samples."""
+    hand, rows = stroke(model.rate_hz), list[dict[str, object]]()
+    noise = np.random.default_rng(0).normal(0, 1, hand.speed_mm_s.size)
+    at = np.arange(noise.size)
+    for reading_hz, noise_mm_s in READINGS:
+        period = round(model.rate_hz / reading_hz)
+        speed = (hand.speed_mm_s + noise_mm_s * noise)[at // period * period]
+        readings = Hand(speed, hand.force_n)
+        row: dict[str, object] = {"reading_hz": reading_hz, "noise_mm_s": noise_mm_s}
+        for name, update in (("every_1", 1), ("every_5", 5), ("as_read", period)):
+            row[f"error_db_{name}"] = update_error_db(model, hand, update, readings=readings)
+        rows.append(row | {"simulated": True})
+    return rows
 
 
 def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) -> Parameters:
@@ -66,8 +96,8 @@ def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) ->
         limits=Limits(),
         compensation=None,
     )
-    to_end = (update_samples - 1) / update_samples
-    amid, end = (model.parameters(*_foreseen(hand, plan, share)) for share in (to_end / 2, to_end))
+    readings = (reading[::update_samples] for reading in hand)
+    amid, end = (model.parameters(*foreseen) for foreseen in Foresight(plan)(*readings))
     gains = np.column_stack([end.noise_gain, end.gains])
     reached = [gains[0], *gains]
     for n in range(1, len(reached)):
@@ -83,17 +113,6 @@ def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) ->
         amid.bandwidths_hz[held],
         course[:count, 1:],
     )
-
-
-def _foreseen(hand: Hand, plan: RenderPlan, share: float) -> Hand:
-    """Where the hand will be after a share of the time to the next update, at each update."""
-    foreseen = []
-    for reading, furthest in zip(hand, plan.hand_changes, strict=True):
-        read = reading[:: plan.update_samples]
-        change = np.diff(read, prepend=read[:1])
-        goes_on = (np.abs(change) <= furthest) & (read != 0)
-        foreseen.append(read + np.where(goes_on, share * change, 0.0))
-    return Hand(*foreseen)
 
 
 class LevelErrors(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,8 +26,8 @@ def write_text(path: str | Path, text: str) -> None:
 
 
 def write_bytes(path: str | Path, data: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    target = Path(path)
+    """Write a file so that it is there whole or not at all; a link keeps leading to it."""
+    target = _behind_links(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
     try:
@@ -39,13 +40,49 @@ def write_bytes(path: str | Path, data: bytes) -> None:
         raise
 
 
+def _behind_links(path: str | Path) -> Path:
+    """Where something written to `path` belongs: what a link leads to, so that the link stays."""
+    target = Path(path)
+    if not target.is_symlink():
+        return target
+    if not target.exists():
+        raise InputError(
+            f"expected a place to write to, got the link {target}, which leads nowhere (to "
+            f"{target.readlink()}); make what it leads to, or remove it."
+        )
+    return target.resolve()
+
+
+def folder_behind(path: str | Path) -> Path:
+    """The folder that `replace_folder` would replace, behind links.
+
+    Raises
+    ------
+    InputError
+        For a link that leads nowhere, and for a folder that this process is in: a program that
+        stands in a folder is left in the old one when that is replaced.
+    """
+    target = _behind_links(path)
+    if Path.cwd().is_relative_to(target.resolve()):
+        raise InputError(
+            f"expected a folder that can be replaced as a whole, got {path}, which you are in; "
+            "name another one, or go to the folder above it."
+        )
+    return target
+
+
 @contextmanager
 def replace_folder(path: str | Path) -> Iterator[Path]:
     """A fresh folder to fill, which takes the place of `path` when the block ends well.
 
-    After an exception nothing has changed at `path`.
+    After an exception nothing has changed at `path`. Of a link, what it leads to is replaced.
+
+    Raises
+    ------
+    InputError
+        For a `path` that `folder_behind` refuses.
     """
-    target = Path(path)
+    target = folder_behind(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     fresh = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}."))
     try:
@@ -58,7 +95,10 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
 
 
 def _swap(fresh: Path, target: Path) -> None:
-    """Put `fresh` at `target`; what was there is deleted only once that has worked."""
+    """Put `fresh` at `target`; what was there is deleted only once that has worked.
+
+    What cannot be deleted then is no reason to fail: the new folder is in its place.
+    """
     if not target.exists():
         fresh.rename(target)
         return
@@ -69,7 +109,13 @@ def _swap(fresh: Path, target: Path) -> None:
     except BaseException:
         old.rename(target)
         raise
-    shutil.rmtree(old)
+    shutil.rmtree(old, ignore_errors=True)
+    if old.exists():
+        warnings.warn(
+            f"expected to delete what was at {target} before, got a refusal; the new folder is "
+            f"there, remove {old} yourself.",
+            stacklevel=4,
+        )
 
 
 def check_replaceable(
@@ -82,8 +128,10 @@ def check_replaceable(
     Raises
     ------
     InputError
-        If `target` is a file, or a folder with other contents.
+        If `target` is a file, a folder with other contents, or one that cannot be replaced
+        (`folder_behind`).
     """
+    folder_behind(target)
     if target.is_file():
         raise InputError(f"expected a folder, got the file {target}; choose another name.")
     if not target.exists():

@@ -75,6 +75,40 @@ class PythonEngine:
         return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
 
 
+class Foresight:
+    """Where a hand will be, if it goes on as it did lately.
+
+    The change from reading to reading is smoothed, since the noise of readings goes on no more than
+    a step does: a change beyond what a hand can do, or what has come to rest.
+    """
+
+    def __init__(self, plan: RenderPlan) -> None:
+        self._furthest, self._share = plan.hand_changes, plan.slope_share
+        self._to_end = (plan.update_samples - 1) / plan.update_samples
+        self._last: list[float] = []
+        self._slopes = [0.0, 0.0]
+
+    def __call__(self, speed_mm_s: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+        """The hand (2, n) amid the time to the next readings, and just before them."""
+        hand = np.stack([speed_mm_s, force_n])
+        slopes = np.array([self._slopes_at(now) for now in hand.T.tolist()]).reshape(-1, 2).T
+        with np.errstate(over="ignore"):
+            return hand + slopes * (self._to_end / 2), hand + slopes * self._to_end
+
+    def _slopes_at(self, now: list[float]) -> list[float]:
+        """The smoothed changes per update of speed and force with the next reading."""
+        if self._last:
+            readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
+            self._slopes = [self._slope(*reading) for reading in readings]
+        self._last = now
+        return self._slopes
+
+    def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
+        change = now - last
+        goes_on = -furthest <= change <= furthest and now != 0
+        return slope + self._share * (change - slope) if goes_on else 0.0
+
+
 class BandFilter:
     """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
@@ -90,7 +124,7 @@ class BandFilter:
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
         self._slews = plan.slews(self._table).tolist()
-        self._hand = np.full((2, 1), np.nan)
+        self._foresight = Foresight(plan)
         self._gains: list[float] = []
         self._courses = [(0.0, 0.0)] * (1 + self._table.n_layers)
         self._bands = [(0.0,) * 5] * self._table.n_layers
@@ -98,7 +132,7 @@ class BandFilter:
 
     def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
         """All gains that are wanted, and the coefficients of every band, at each update."""
-        amid, end = (self._table.at(*hand) for hand in self._ahead(speed_mm_s, force_n))
+        amid, end = (self._table.at(*hand) for hand in self._foresight(speed_mm_s, force_n))
         frequency, bandwidth, clamped = clamp_bands(
             amid.frequencies_hz, amid.bandwidths_hz, rate_hz=self._plan.rate_hz
         )
@@ -109,23 +143,6 @@ class BandFilter:
         table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
         bands = [[tuple(band) for band in update] for update in table.tolist()]
         return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
-
-    def _ahead(self, speed_mm_s: Floats, force_n: Floats) -> tuple[Floats, Floats]:
-        """The hand (2, n) amid the time to the next readings, and at the last sample before them.
-
-        It goes on as it did since the reading before, but for steps and what has come to rest.
-        """
-        hand = np.stack([speed_mm_s, force_n])
-        before = np.concatenate([self._hand, hand], axis=1)[:, :-1]
-        if hand.size:
-            self._hand = hand[:, -1:]
-        furthest = np.array(self._plan.hand_changes)[:, None]
-        with np.errstate(over="ignore", invalid="ignore"):
-            change = hand - before
-            goes_on = (np.abs(change) <= furthest) & (hand != 0)
-            to_end = (self._plan.update_samples - 1) / self._plan.update_samples
-            amid = np.where(goes_on, hand + change * (to_end / 2), hand)
-            return amid, np.where(goes_on, hand + change * to_end, hand)
 
     def update(self, setting: Any) -> None:
         """Start every gain on its way to what is wanted now, as far as one update may go."""
@@ -204,11 +221,14 @@ class Compensator:
             return signal
         (p, q, r, b1, b2), (s1, s2) = self._band, self._state
         output = []
-        for x in signal:
-            turned = (s1 + b1 * x) + (p * s1 - q * s2)
-            s2 = (s2 + b2 * x) + (r * s2 + q * s1)
-            output.append(x - self._gain * (s1 + turned))
-            s1 = turned
+        for y in signal:
+            x = y if np.isfinite(y) else 0.0
+            turned1 = (s1 + b1 * x) + (p * s1 - q * s2)
+            turned2 = (s2 + b2 * x) + (r * s2 + q * s1)
+            if x == 0 and turned1 * turned1 + turned2 * turned2 < 1e-30:
+                turned1 = turned2 = 0.0
+            output.append(x - self._gain * (s1 + turned1))
+            s1, s2 = turned1, turned2
         self._state = (s1, s2)
         return output
 
@@ -237,8 +257,10 @@ class Limiter:
         return signal
 
     def _within_duration(self, y: float) -> float:
-        self._silent = self._silent + 1 if y == 0 else 0
-        self._sounding = 0 if self._silent >= self._pause else self._sounding + 1
+        quiet = abs(y) <= self._limits.silence
+        self._silent = self._silent + 1 if quiet else 0
+        begun = self._sounding > 0 or not quiet
+        self._sounding = 0 if self._silent >= self._pause else self._sounding + begun
         if self._sounding <= self._longest or y == 0:
             return y
         self.touched[2] += 1

@@ -63,12 +63,14 @@ typedef struct {
     int taps;
     int update_samples; /* from one parameter update to the next, at least 1 */
     tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
+    tq_real slope_share;  /* how much of a new change from update to update counts at once, up to 1 */
     const tq_real *slews; /* (1 + layers): the furthest a gain moves in one update */
     /* Vibrator compensation (eq. 7): out - share * band-pass(out); share 0 is none. */
     tq_real notch_hz, notch_width_hz, notch_share;
     /* Limits; 0 is none. The running mean square takes in mean_share of every new square. */
     tq_real peak, mean_square, mean_share;
     uint64_t longest, pause; /* samples of vibration without a pause; samples of silence that end it */
+    tq_real silence;         /* the largest absolute value that counts as silence */
 } tq_texture;
 
 /* Coefficients of one unit-covariance band: s1' = s1 + p s1 - q s2 + b1 w, s2' = s2 + q s1 + r s2 +
@@ -88,6 +90,7 @@ typedef struct {
     uint64_t key, position;
     int since_update;
     tq_real speed, force; /* as last read */
+    tq_real speed_slope, force_slope; /* their change per update, smoothed */
     tq_real angle, per_sample, to_end; /* pi / rate; one sample and all but one of an update's time */
     tq_real floor_gain, floor_now, floor_step;
     tq_real *memory;
@@ -264,13 +267,14 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
         to[i] = tq_blend(hand, first + i);
 }
 
-/* Where a reading that was `last` and is `now` will be after `share` of the time to the next one, if it
-   goes on as it did. A change beyond what a hand can do is a step, which does not go on; nor does what
+/* How far a reading will have changed by the next one, if it goes on as it did lately; smoothed, since
+   the noise of readings goes on no more than a step does: a change beyond what a hand can do, or what
    has come to rest. */
-TQ_INLINE tq_real tq_ahead(tq_real last, tq_real now, tq_real furthest, tq_real share)
+TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real furthest, tq_real share)
 {
     tq_real change = now - last;
-    return change <= furthest && change >= -furthest && now != 0 ? now + change * share : now;
+    int goes_on = change <= furthest && change >= -furthest && now != 0;
+    return goes_on ? slope + share * (change - slope) : 0;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -280,6 +284,13 @@ TQ_INLINE tq_real tq_towards(tq_real gain, tq_real wanted, tq_real slew)
     if (change > slew)
         return gain + slew;
     return change < -slew ? gain - slew : wanted;
+}
+
+/* Whether a value was moved by more than the rounding of an interpolation between legal ones. */
+TQ_INLINE int tq_moved(tq_real value, tq_real legal)
+{
+    tq_real by = value - legal;
+    return (by < 0 ? -by : by) > (tq_real)1e-6 * legal;
 }
 
 /* Of `width` layers from `from` on: coefficients, and the way that gains go until the next update. */
@@ -297,7 +308,7 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
         tq_real f_legal = tq_within(f[i], 1, highest), b_legal = tq_within(b[i], (tq_real)0.1, widest);
         tq_real wanted = (t->signs[from + i] * next[i] < 0 ? 0 : next[i]) * end->ramp;
         if (f[i] != f_legal || b[i] != b_legal)
-            s->counters.clamped += (uint64_t)((f[i] != f_legal) + (b[i] != b_legal));
+            s->counters.clamped += (uint64_t)(tq_moved(f[i], f_legal) + tq_moved(b[i], b_legal));
         f[i] = s->angle * f_legal;
         b[i] = s->angle * b_legal;
         if (first)
@@ -323,18 +334,20 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
     int first = s->position == 0, i;
-    tq_real last_speed = first ? speed : s->speed, last_force = first ? force : s->force;
-    tq_real to_end = s->to_end;
-    tq_hand amid = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end / 2),
-                              tq_ahead(last_force, force, t->force_change, to_end / 2));
-    tq_hand end = amid;
-    tq_real wanted, next;
-    if (to_end > 0)
-        end = tq_hand_at(t, tq_ahead(last_speed, speed, t->speed_change, to_end),
-                         tq_ahead(last_force, force, t->force_change, to_end));
-    wanted = tq_blend(&end, 0);
+    tq_real to_end = s->to_end, wanted, next;
+    tq_hand amid, end;
+    if (!first) {
+        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share);
+        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share);
+    }
     s->speed = speed;
     s->force = force;
+    end = tq_hand_at(t, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
+    amid = end;
+    if (to_end > 0)
+        amid = tq_hand_at(t, speed + s->speed_slope * (to_end / 2),
+                          force + s->force_slope * (to_end / 2));
+    wanted = tq_blend(&end, 0);
     wanted = (wanted < 0 ? 0 : wanted) * end.ramp;
     next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
     s->floor_now = first ? next : s->floor_gain;
@@ -433,16 +446,20 @@ static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor
     return wide + half;
 }
 
-/* Eq. 7: out - share * band-pass(out). */
+/* Eq. 7: out - share * band-pass(out). What is not finite would stay in the state for ever and counts
+   as silence; what has died away is not left to ring among the smallest numbers. */
 static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int count)
 {
     tq_band b = s->notch;
     tq_real s1 = s->notch_s1, s2 = s->notch_s2, gain = t->notch_share * b.tap;
     int n;
     for (n = 0; n < count; n++) {
-        tq_real turned1 = (s1 + b.b1 * out[n]) + (b.p * s1 - b.q * s2);
-        tq_real turned2 = (s2 + b.b2 * out[n]) + (b.r * s2 + b.q * s1);
-        out[n] -= gain * (s1 + turned1);
+        tq_real x = out[n] - out[n] == 0 ? out[n] : 0;
+        tq_real turned1 = (s1 + b.b1 * x) + (b.p * s1 - b.q * s2);
+        tq_real turned2 = (s2 + b.b2 * x) + (b.r * s2 + b.q * s1);
+        if (x == 0 && turned1 * turned1 + turned2 * turned2 < (tq_real)1e-30)
+            turned1 = turned2 = 0;
+        out[n] = x - gain * (s1 + turned1);
         s1 = turned1;
         s2 = turned2;
     }
@@ -458,8 +475,9 @@ static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int co
 TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 {
     if (t->longest) {
-        s->silent = y == 0 ? s->silent + 1 : 0;
-        s->sounding = s->silent >= t->pause ? 0 : s->sounding + 1;
+        int quiet = y <= t->silence && y >= -t->silence;
+        s->silent = quiet ? s->silent + 1 : 0;
+        s->sounding = s->silent >= t->pause ? 0 : s->sounding + (s->sounding || !quiet);
         if (s->sounding > t->longest && y != 0) {
             y = 0;
             s->counters.duration++;

@@ -30,6 +30,10 @@ class Limits:
         for none.
     pause_s : float
         Shortest silence that counts as a pause; above 0 and finite.
+    silence : float
+        Largest absolute value that counts as silence, in the model's unit; above 0 and finite. By
+        default 0.001 (1 mg, far below what anybody feels): noise of the hand's readings at rest
+        does not count as vibration.
 
     Raises
     ------
@@ -42,11 +46,12 @@ class Limits:
     rms_window_s: float = 1.0
     duration_s: float = np.inf
     pause_s: float = 0.1
+    silence: float = 1e-3
 
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            endless = field.name in ("rms_window_s", "pause_s") and np.isinf(value)
+            endless = field.name in ("rms_window_s", "pause_s", "silence") and np.isinf(value)
             # A square below the smallest double would be a limit of 0, which stands for none.
             if endless or not (value > 0 and value * value > 0):
                 finite = " and finite" if endless else ""

@@ -28,8 +28,9 @@ def _mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
 def stream_key(seed: int, stream: int = 0) -> np.uint64:
     """The key of one noise stream; `seed` and `stream` are 0 … 2⁶⁴ − 1, else InputError."""
     for name, value in (("seed", seed), ("stream", stream)):
-        if not 0 <= value < 2**64:
-            raise InputError(f"expected a {name} of 0 … 2⁶⁴ − 1, got {value}; choose another.")
+        whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+        if not (whole and 0 <= value < 2**64):
+            raise InputError(f"expected a {name} of 0 … 2⁶⁴ − 1, got {value!r}; choose another.")
     pair = np.array([seed, stream], dtype=np.uint64)
     first = _mix(pair[:1] + _GOLDEN)
     return np.uint64(_mix((first ^ pair[1:]) + _GOLDEN)[0])

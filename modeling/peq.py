@@ -16,6 +16,7 @@ LOWEST_FREQUENCY_HZ = 1.0
 HIGHEST_FREQUENCY_SHARE = 0.49
 LOWEST_BANDWIDTH_HZ = 0.1
 HIGHEST_BANDWIDTH_SHARE = 0.45
+_ROUNDING = 1e-6
 
 
 def _half_tangent(angle: ArrayLike) -> tuple[Floats, Floats]:
@@ -102,11 +103,15 @@ def band_coefficients(
 def clamp_bands(
     frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
 ) -> tuple[Floats, Floats, int]:
-    """Frequencies and widths moved into the legal range, and how many values had to move."""
+    """Frequencies and widths moved into the legal range, and how many values had to move.
+
+    What an interpolation between legal values misses by rounding (a millionth) is moved, but not
+    counted.
+    """
     frequency = np.clip(frequency_hz, LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz)
     bandwidth = np.clip(bandwidth_hz, LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * rate_hz)
-    moved = np.count_nonzero(frequency != frequency_hz)
-    moved += np.count_nonzero(bandwidth != bandwidth_hz)
+    moved = np.count_nonzero(np.abs(frequency - frequency_hz) > _ROUNDING * frequency)
+    moved += np.count_nonzero(np.abs(bandwidth - bandwidth_hz) > _ROUNDING * bandwidth)
     return frequency, bandwidth, int(moved)
 
 

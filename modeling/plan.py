@@ -14,6 +14,8 @@ from modeling.table import ParameterTable
 
 UPDATE_S = 1e-3
 FADE_S = 5e-3
+# Over which the slope of a reading is smoothed before the hand is foreseen by it.
+SLOPE_S = 4e-3
 # A reading that changes faster is a step of the device, not a hand's motion (2 g; a sharp tap).
 FASTEST_SPEED_CHANGE_MM_S2 = 2e4
 FASTEST_FORCE_CHANGE_N_S = 200.0
@@ -107,6 +109,11 @@ class RenderPlan:
         return FASTEST_SPEED_CHANGE_MM_S2 * update_s, FASTEST_FORCE_CHANGE_N_S * update_s
 
     @property
+    def slope_share(self) -> float:
+        """How much of a new change of a reading counts at once towards its smoothed slope."""
+        return min(1.0, self.update_samples / (SLOPE_S * self.rate_hz))
+
+    @property
     def mean_share(self) -> float:
         """What a new square adds to the running mean square."""
         return float(-np.expm1(-1 / (self.limits.rms_window_s * self.rate_hz)))
@@ -139,6 +146,7 @@ class RenderPlan:
             "update_samples": self.update_samples,
             "speed_change": speed_change,
             "force_change": force_change,
+            "slope_share": self.slope_share,
             "slews": self.slews(table),
         }
         if self.compensation is not None:
@@ -158,6 +166,7 @@ class RenderPlan:
         if np.isfinite(self.limits.duration_s):
             fields["longest"] = self.samples(self.limits.duration_s)
             fields["pause"] = self.samples(self.limits.pause_s)
+            fields["silence"] = self.limits.silence
         return fields
 
     def samples(self, seconds: float) -> int:

@@ -33,7 +33,7 @@ def render_with_margins(
 
     Rendering begins `settling_s` earlier still, with the first condition held, while the filters
     settle; that part is left out. Not rendered at the file's rate, since a filter warps less there
-    and its far skirts rise by up to 1 dB (METHOD 3): so every rate has the same spectrum.
+    and skirts near the model's Nyquist frequency rise (METHOD 9): so every rate has one spectrum.
 
     Returns
     -------

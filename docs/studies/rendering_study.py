@@ -3,7 +3,7 @@
 Simulated: moving parameters, strokes and steps of the hand are made up, the textures planted.
 
 Example: python docs/studies/rendering_study.py writes rendering_study_stability.tsv and .png,
-rendering_study_accuracy.tsv, rendering_study_clicks.tsv and .png beside this file.
+rendering_study_accuracy.tsv, _readings.tsv, rendering_study_clicks.tsv and .png beside this file.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from analysis.moving import (
     accuracy_row,
     click_table,
     level_above_click_hz,
+    reading_rows,
     step_signals,
 )
 from analysis.stability import (
@@ -73,6 +74,7 @@ def main() -> None:
     tables = {
         "stability": stability(target),
         "accuracy": pd.DataFrame([accuracy_row(planted_texture(name)) for name in TEXTURES]),
+        "readings": pd.DataFrame(reading_rows(planted_texture("canvas"))),
         "clicks": clicks(target),
     }
     for name, table in tables.items():

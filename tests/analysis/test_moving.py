@@ -8,6 +8,7 @@ import pytest
 
 from analysis.figures_stability import figure_clicks
 from analysis.moving import (
+    READINGS,
     STEADY,
     STEPS,
     THIS_RENDERER,
@@ -18,6 +19,7 @@ from analysis.moving import (
     held_gfc30,
     hum,
     level_above_click_hz,
+    reading_rows,
     rendered_parameters,
     step_signals,
     stroke,
@@ -78,6 +80,16 @@ def test_level_is_the_models_own_at_every_speed_of_the_stroke(
     assert accuracy.loc[texture, "level_error_db_every_1"] <= 0.01
     # Towards rest: of the level at the lowest speed; a millisecond of this stroke is 8 % of it.
     assert accuracy.loc[texture, "level_error_below_grid_every_5"] <= 0.1
+
+
+def test_readings_with_noise_or_seldom_are_no_worse_than_used_as_they_are() -> None:
+    rows = pd.DataFrame(reading_rows(planted_texture("canvas")))
+    assert rows["simulated"].all()
+    assert list(zip(rows["reading_hz"], rows["noise_mm_s"], strict=True)) == list(READINGS)
+    clean = rows.iloc[0]
+    assert clean["error_db_every_5"] < -50
+    assert (rows["error_db_every_5"] <= rows["error_db_every_1"] + 1).all()
+    assert (rows["error_db_as_read"] <= rows["error_db_every_5"] + 0.01).all()
 
 
 @pytest.mark.parametrize("texture", TEXTURES)

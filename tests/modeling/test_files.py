@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import re
 from pathlib import Path
 
 import pytest
@@ -9,7 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
-from modeling.files import file_stem, read_table, replace_folder, write_table, write_text
+from modeling.files import (
+    check_replaceable,
+    file_stem,
+    read_table,
+    replace_folder,
+    write_table,
+    write_text,
+)
 
 
 @pytest.mark.parametrize(
@@ -84,3 +93,80 @@ def test_folder_appears_whole_or_not_at_all(tmp_path: Path) -> None:
             (fresh / content).write_text("x")
         assert [p.name for p in target.iterdir()] == [content]
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["folder"]
+
+
+def linked(folder: Path, *, content: str = "old") -> tuple[Path, Path]:
+    """A folder elsewhere with one file in it, and a link that leads there."""
+    (folder / "disk/sets").mkdir(parents=True)
+    (folder / "disk/sets" / content).write_text("x")
+    (folder / "link").symlink_to(Path("disk", "sets"))
+    return folder / "link", folder / "disk/sets"
+
+
+def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
+    link, place = linked(tmp_path)
+    with replace_folder(link) as fresh:
+        (fresh / "new").write_text("x")
+    assert link.is_symlink()
+    assert [p.name for p in place.iterdir()] == ["new"]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["disk", "link"]
+    assert [p.name for p in (tmp_path / "disk").iterdir()] == ["sets"]
+
+
+def test_a_file_is_written_through_its_link(tmp_path: Path) -> None:
+    (tmp_path / "disk").mkdir()
+    (tmp_path / "disk/a.txt").write_text("old")
+    (tmp_path / "a.txt").symlink_to("disk/a.txt")
+    write_text(tmp_path / "a.txt", "new")
+    assert (tmp_path / "a.txt").is_symlink()
+    assert (tmp_path / "disk/a.txt").read_text() == "new"
+    assert [p.name for p in (tmp_path / "disk").iterdir()] == ["a.txt"]
+
+
+@pytest.mark.parametrize("to", ["nowhere", "link"])
+def test_links_that_lead_nowhere_are_refused(tmp_path: Path, to: str) -> None:
+    """Those that lead to themselves, too."""
+    (tmp_path / "link").symlink_to(to)
+    for write in (
+        lambda path: write_text(path, "x"),
+        lambda path: replace_folder(path).__enter__(),
+        lambda path: check_replaceable(path, index_name="index.tsv", what="a set"),
+    ):
+        with pytest.raises(InputError, match=rf"link, which leads nowhere \(to {to}\); make"):
+            write(tmp_path / "link")
+    assert [p.name for p in tmp_path.iterdir()] == ["link"]
+
+
+@pytest.mark.parametrize("name", [".", "..", "../inner", "../../link"])
+def test_the_folder_that_one_is_in_is_not_replaced(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    (tmp_path / "outer/inner").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("outer")
+    monkeypatch.chdir(tmp_path / "outer/inner")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=re.escape(f"got {name}, which you are in; name")):
+        replace_folder(name).__enter__()
+    with pytest.raises(InputError, match="which you are in"):
+        check_replaceable(Path(name), index_name="index.tsv", what="a set")
+    assert sorted(tmp_path.rglob("*")) == before
+    with replace_folder("beside"):
+        pass
+    assert (tmp_path / "outer/inner/beside").is_dir()
+
+
+def test_an_old_folder_that_stays_does_not_undo_the_new_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    link, place = linked(tmp_path)
+
+    def busy(*_: object, **__: object) -> None:
+        raise OSError(errno.EBUSY, "Device or resource busy")
+
+    monkeypatch.setattr("os.rmdir", busy)
+    warned = pytest.warns(UserWarning, match=r"remove .*\.sets\..*\.old yourself")
+    with warned, replace_folder(link) as fresh:
+        (fresh / "new").write_text("x")
+    monkeypatch.undo()
+    assert [p.name for p in place.iterdir()] == ["new"]
+    assert link.is_symlink()

@@ -151,8 +151,9 @@ with warnings.catch_warnings(record=True) as told:
     warnings.simplefilter("default")
     from modeling import Renderer
     from stimuli.planted import planted_texture
-    for _ in range(3):
-        signal = Renderer(planted_texture("canvas")).render(100.0, 1.0, samples=400)
+    Renderer(planted_texture("MDF"))
+    Renderer(planted_texture("PVC"))
+    signal = Renderer(planted_texture("canvas")).render(100.0, 1.0, samples=400)
 print(len(told), "expected the compiled rendering kernel, got none" in str(told[0].message))
 print(signal.tobytes().hex())
 """

@@ -144,10 +144,13 @@ def mean_squares(signal: Floats, window_s: float) -> Floats:
 
 def longest_vibration(signal: Floats, unlimited: Floats, pause: int) -> int:
     """Samples from the start of a vibration to its last sound; a pause of the input ends it."""
-    heard = "".join("1" if sample else "0" for sample in unlimited)
-    pauses = [(0, 0), *(m.span() for m in re.finditer(f"0{{{pause},}}", heard)), (len(heard), 0)]
-    spans = [(end, start) for (_, end), (start, _) in pairwise(pauses)]
-    sounds = [np.flatnonzero(signal[start:stop]) for start, stop in spans]
+    heard = "".join("1" if abs(sample) > SILENCE else "0" for sample in unlimited)
+    begin = len(heard) - len(heard.lstrip("0"))
+    pauses = [m.span() for m in re.finditer(f"0{{{pause},}}", heard) if m.end() > begin]
+    spans = [
+        (end, start) for (_, end), (start, _) in pairwise([(0, begin), *pauses, (len(heard), 0)])
+    ]
+    sounds = [np.flatnonzero(np.abs(signal[start:stop]) > SILENCE) for start, stop in spans]
     return max((int(sound[-1]) + 1 for sound in sounds if sound.size), default=0)
 
 
@@ -162,6 +165,7 @@ def check_within(signal: Floats, unlimited: Floats, limits: Limits) -> None:
         assert longest_vibration(signal, unlimited, pause) <= longest
 
 
+SILENCE = Limits().silence
 LEVELS = st.floats(-3, 1).map(lambda exponent: 10**exponent)
 SECONDS = st.floats(1e-4, 0.1)
 

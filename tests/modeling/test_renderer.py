@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -11,9 +12,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
-from modeling import PEQ, ARModel, InputError, Limits, Renderer, TextureModel
+from modeling import (
+    PEQ,
+    ARModel,
+    Compensation,
+    InputError,
+    Limits,
+    RegressedModel,
+    Renderer,
+    TextureModel,
+)
 from modeling.kernel import SWITCH, is_compiled
 from modeling.line_spectral import line_spectral_frequencies
+from stimuli.planted import CATALOGUE, planted_texture
 
 
 @pytest.fixture(scope="module", autouse=True, params=["compiled", "python"])
@@ -27,6 +38,27 @@ def engine(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 ModelMaker = Callable[..., TextureModel]
+
+
+def falling(**changes: object) -> RegressedModel:
+    """Noise gain and amplitude reach 0 at 200 mm/s."""
+    values: dict[str, object] = {
+        "texture": "falling",
+        "rate_hz": 5000.0,
+        "driven_by": "conditions",
+        "speeds_mm_s": [50.0, 350.0],
+        "forces_n": [0.5, 3.5],
+        "noise_gain": [0.2, -1e-3, 0, 0],
+        "frequencies_hz": [[100.0], [0], [0], [0]],
+        "bandwidths_hz": [[20.0], [0], [0], [0]],
+        "amplitudes": [[2.0], [-1e-2], [0], [0]],
+        "signs": [-1],
+        "centroid_hz": [],
+        "estimator": "planted",
+    }
+    return RegressedModel(**(values | changes))
+
+
 LAYERS = [(80.0, 25.0, 0.5), (300.0, 40.0, -0.3), (900.0, 120.0, 0.4)]
 
 
@@ -69,6 +101,22 @@ def test_blocks_of_any_size_are_bit_identical(rate_hz: float, size: int) -> None
     parts = in_blocks(Renderer(moving_model(), rate_hz=rate_hz, seed=5), speed, force, size)
     assert np.array_equal(whole, parts)
     assert np.ptp(whole) > 0
+
+
+@pytest.mark.parametrize("size", [1, 7, 256])
+def test_blocks_are_bit_identical_behind_compensation_and_limits(size: int) -> None:
+    def limited() -> Renderer:
+        limits = Limits(peak=0.5, rms=0.2, rms_window_s=0.02, duration_s=0.1, pause_s=0.01)
+        notch = Compensation(frequency_hz=80.0, bandwidth_hz=60.0, height=3.0, rate_hz=5000.0)
+        return Renderer(moving_model(), seed=5, limits=limits, compensation=notch)
+
+    speed, force = np.full(1500, 200.0), np.full(1500, 2.0)
+    force[700:900] = 0.0
+    whole, parts = limited(), limited()
+    assert np.array_equal(whole.render(speed, force), in_blocks(parts, speed, force, size))
+    assert whole.counters == parts.counters
+    assert whole.counters.limited_peak * whole.counters.limited_rms > 0
+    assert whole.counters.limited_duration > 0
 
 
 @settings(deadline=None, max_examples=30)
@@ -173,6 +221,25 @@ def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: fl
     assert abs(level_db(10, 2400, at_model_rate)) < 0.3
     # Above the model's Nyquist frequency nothing but the bands' skirts is left.
     assert level_db(3000, 10000, here) < -10
+
+
+def test_how_far_third_octaves_at_48_khz_are_from_the_models_own() -> None:
+    """What the docstring of `Renderer` says, calculated at the planted textures' corners."""
+    frequency = np.arange(5.0, 2250.0)
+    octaves, whole = [], []
+    for texture in CATALOGUE:
+        model = planted_texture(texture)
+        for speed, force in product(model.speeds_mm_s[[0, -1]], model.forces_n[[0, -1]]):
+            own = model.peq(speed, force)
+            wide = replace(own, rate_hz=48_000.0)
+            power, wide_power = own.response(frequency) ** 2, wide.response(frequency) ** 2
+            whole.append(wide_power.sum() / power.sum())
+            for centre in 1000 * 2.0 ** (np.arange(-12, 4) / 3):
+                inside = np.abs(np.log2(frequency / centre)) < 1 / 6
+                octaves.append(wide_power[inside].sum() / power[inside].sum())
+    assert 10 * np.log10(min(octaves)) == pytest.approx(-0.7, abs=0.1)
+    assert 10 * np.log10(max(octaves)) == pytest.approx(3.2, abs=0.1)
+    assert 0.1 < 10 * np.log10(max(whole)) <= 0.15
 
 
 @pytest.mark.parametrize("rate_hz", [5000.0, 44100.0, 48000.0])
@@ -304,7 +371,7 @@ def test_limits_that_limit_nothing_or_all_are_refused(name: str, value: float) -
         Limits(**{name: value})
 
 
-@pytest.mark.parametrize("name", ["rms_window_s", "pause_s"])
+@pytest.mark.parametrize("name", ["rms_window_s", "pause_s", "silence"])
 def test_times_of_limits_are_finite(name: str) -> None:
     with pytest.raises(InputError, match=f"expected {name} above 0 and finite"):
         Limits(**{name: np.inf})
@@ -326,6 +393,102 @@ def test_a_compensation_for_another_rate_is_refused() -> None:
 
     with pytest.raises(InputError, match="compensation for 5000 Hz, got one for 48000 Hz"):
         Renderer(moving_model(), compensation=Notch())
+
+
+@pytest.mark.parametrize("noise_mm_s", [0.0, 0.01])
+def test_a_device_that_was_muted_sounds_again_after_a_rest(noise_mm_s: float) -> None:
+    """With a compensation that rings on, and speeds that are never quite 0."""
+    notch = Compensation(frequency_hz=80.0, bandwidth_hz=60.0, height=3.0, rate_hz=5000.0)
+    limits = Limits(duration_s=0.5, pause_s=0.1)
+    renderer = Renderer(moving_model(), limits=limits, compensation=notch)
+    assert np.ptp(renderer.render(150.0, 2.0, samples=2500)) > 0
+    assert not renderer.render(150.0, 2.0, samples=2500).any()
+    touched = renderer.counters.limited_duration
+    assert touched >= 2500 - 1
+    rest = np.random.default_rng(0).normal(0, 1, 2000) * noise_mm_s
+    renderer.render(rest, np.full(2000, 2.0))
+    assert np.ptp(renderer.render(150.0, 2.0, samples=2000)) > 0.1
+    renderer.render(0.0, 2.0, samples=20_000)
+    assert not renderer.render(0.0, 2.0, samples=100).any()  # no ringing among subnormal numbers
+
+
+def test_the_clock_of_the_duration_starts_with_the_sound() -> None:
+    renderer = Renderer(moving_model(), limits=Limits(duration_s=0.2, pause_s=0.1))
+    renderer.render(0.0, 2.0, samples=400)  # shorter than a pause
+    heard = renderer.render(150.0, 2.0, samples=2000)
+    assert np.flatnonzero(heard)[-1] - np.flatnonzero(np.abs(heard) > Limits().silence)[0] == 999
+
+
+def test_an_overflow_does_not_stay_in_the_compensation() -> None:
+    model = moving_model()
+    loud = replace(model, gains=model.gains * 1e308, noise_gains=model.noise_gains * 1e308)
+    notch = Compensation(frequency_hz=80.0, bandwidth_hz=60.0, height=3.0, rate_hz=5000.0)
+    renderer = Renderer(loud, limits=Limits(peak=1.0), compensation=notch)
+    with np.errstate(over="ignore"):
+        signal = renderer.render(150.0, 2.0, samples=3000)
+    assert np.isfinite(signal).all()
+    after = renderer.render(0.0, 2.0, samples=200_000)
+    assert not after[-100:].any()
+
+
+def test_noise_of_the_readings_is_not_carried_on() -> None:
+    """2 mm/s of it, read at every update or 125 times a second; against the clean stroke."""
+    time_s = np.arange(10_000) / 5000
+    clean = 300 * np.sin(4 * np.pi * time_s)
+    noisy = clean + np.random.default_rng(1).normal(0, 2, clean.size)
+    force = np.full(clean.size, 1.5)
+    exact = Renderer(moving_model(), update_samples=1).render(clean, force)
+
+    def error_db(speed: np.ndarray, update_samples: int = 5) -> float:
+        renderer = Renderer(moving_model(), update_samples=update_samples)
+        rendered = renderer.render(speed, force)
+        return float(20 * np.log10(np.std(rendered - exact) / np.std(exact)))
+
+    assert error_db(clean) < -50
+    assert error_db(noisy) < -34
+    held = noisy[np.arange(clean.size) // 40 * 40]  # a device that reads 125 times a second
+    assert error_db(held) < error_db(held, update_samples=1) + 0.5
+    assert error_db(held, update_samples=40) < error_db(held) - 5
+
+
+def test_a_steady_hand_with_noise_is_as_loud_as_without() -> None:
+    speed = 150 + np.random.default_rng(2).normal(0, 5, 50_000)
+    force = np.full(speed.size, 1.5)
+    noisy = Renderer(moving_model()).render(speed, force)
+    assert np.std(noisy) == pytest.approx(
+        np.std(Renderer(moving_model()).render(150.0, 1.5, samples=speed.size)), rel=0.02
+    )
+
+
+@pytest.mark.parametrize("edge", [1.0, 2450.0])
+def test_legal_edges_are_not_counted_as_clamped(edge: float) -> None:
+    model = moving_model()
+    frequencies = np.full_like(model.frequencies_hz, edge)
+    renderer = Renderer(replace(model, frequencies_hz=frequencies))
+    renderer.render(*np.abs(trajectory(3000)))
+    assert renderer.counters.clamped == 0
+
+
+def test_a_gain_that_its_regression_stops_at_0_fades_as_slowly_as_others() -> None:
+    """What the corners of the table have beyond 0 is never reached and makes no fade faster."""
+    table = falling().table
+    assert table.values[..., 0].min() < -0.1
+    assert table.largest_gains == pytest.approx([0.15, 1.5])
+
+
+def test_a_table_of_parameters_that_overflow_is_refused() -> None:
+    huge = falling(amplitudes=[[1e308], [1e308], [0], [0]])
+    with (
+        pytest.raises(InputError, match="expected finite parameters over the grid"),
+        np.errstate(over="ignore"),
+    ):
+        Renderer(huge)
+
+
+@pytest.mark.parametrize("seed", [1.5, -1, 2**64, "a", True])
+def test_seeds_are_whole_numbers(seed: object) -> None:
+    with pytest.raises(InputError, match="expected a seed of"):
+        Renderer(moving_model(), seed=seed)
 
 
 def test_arrays_of_any_layout_and_kind_are_taken() -> None:
