@@ -106,7 +106,7 @@ def test_blocks_of_any_size_are_bit_identical(rate_hz: float, size: int) -> None
 @pytest.mark.parametrize("size", [1, 7, 256])
 def test_blocks_are_bit_identical_behind_compensation_and_limits(size: int) -> None:
     def limited() -> Renderer:
-        limits = Limits(peak=0.5, rms=0.2, rms_window_s=0.02, duration_s=0.1, pause_s=0.01)
+        limits = Limits(peak=0.2, rms=0.08, rms_window_s=0.02, duration_s=0.1, pause_s=0.01)
         notch = Compensation(frequency_hz=80.0, bandwidth_hz=60.0, height=3.0, rate_hz=5000.0)
         return Renderer(moving_model(), seed=5, limits=limits, compensation=notch)
 
