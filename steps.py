@@ -103,6 +103,9 @@ def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
 
 def check_own_results(out: Path, command: str, *, contents: set[str]) -> None:
     """Refuse to replace a folder unless an earlier run of the same command made all of it."""
+    from modeling.files import folder_behind
+
+    folder_behind(out)
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return
     foreign = "a file"

@@ -336,7 +336,7 @@ static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real f
     int first = s->position == 0, i;
     tq_real to_end = s->to_end, wanted, next;
     tq_hand amid, end;
-    if (!first) {
+    if (!first && to_end > 0) {
         s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share);
         s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share);
     }

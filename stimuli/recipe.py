@@ -12,6 +12,7 @@ A recipe is a TOML file; its paths are relative to it, and unknown keys are refu
     noise = "independent"           # "frozen": the models of a texture share their noise
     duration_s = 1.0                # of trajectories of constant speed (1)
     settling_s = 0.5                # rendered before the start and left out (0.5)
+    vibrator = "vibrator.json"      # each file is the drive for this one (none)
 
     [level]
     mode = "as modelled"            # "rms", "loudness"
@@ -47,6 +48,7 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modeling import InputError
+from stimuli.checks import check_choice, check_name, check_number, check_whole
 
 SampleFormat = Literal["float32", "pcm24"]
 Noise = Literal["independent", "frozen"]
@@ -63,7 +65,9 @@ HIGHEST_FORCE_N = 1e4
 LEVELS_DB = (-200.0, 200.0)
 FULL_SCALES_G = (1e-9, 1e9)
 _SECTIONS = {
-    "set": ("name", "rate_hz", "format", "seeds", "noise", "duration_s", "settling_s"),
+    "set": (
+        *("name", "rate_hz", "format", "seeds", "noise", "duration_s", "settling_s", "vibrator"),
+    ),
     "level": ("mode", "rms_db", "threshold", "sensation_level_db", "full_scale_g"),
     "model": ("path", "label"),
     "trajectory": ("name", "speed_mm_s", "force_n", "file"),
@@ -78,7 +82,7 @@ class ModelEntry:
     label: str
 
     def __post_init__(self) -> None:
-        _check_name("label of a model", self.label)
+        check_name("label of a model", self.label)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,26 +95,30 @@ class TrajectoryEntry:
     file: Path | None = None
 
     def __post_init__(self) -> None:
-        _check_name("name of a trajectory", self.name)
-        constant = self.speed_mm_s is not None and self.force_n is not None
-        neither = self.speed_mm_s is None and self.force_n is None
-        if not (constant if self.file is None else neither):
-            raise InputError(
-                f"expected speed_mm_s and force_n, or a file, in the trajectory {self.name!r}, got "
-                "others; give the two numbers or the file."
-            )
-        if constant:
-            where = f"the trajectory {self.name!r}"
-            _check_number(f"speed_mm_s in {where}", self.speed_mm_s, high=HIGHEST_SPEED_MM_S)
-            _check_number(f"force_n in {where}", self.force_n, high=HIGHEST_FORCE_N)
+        check_name("name of a trajectory", self.name)
+        where = f"the trajectory {self.name!r}"
+        _check_given((n for n, value in vars(self).items() if value is not None), where=where)
+        if self.file is None:
+            check_number(f"speed_mm_s in {where}", self.speed_mm_s, high=HIGHEST_SPEED_MM_S)
+            check_number(f"force_n in {where}", self.force_n, high=HIGHEST_FORCE_N)
 
     @staticmethod
     def constant(speed_mm_s: float, force_n: float) -> TrajectoryEntry:
         """A constant speed and force, named after them."""
-        _check_number("speed_mm_s", speed_mm_s, high=HIGHEST_SPEED_MM_S)
-        _check_number("force_n", force_n, high=HIGHEST_FORCE_N)
+        check_number("speed_mm_s", speed_mm_s, high=HIGHEST_SPEED_MM_S)
+        check_number("force_n", force_n, high=HIGHEST_FORCE_N)
         name = f"{speed_mm_s:g}mms_{force_n:g}N"
         return TrajectoryEntry(name=name, speed_mm_s=float(speed_mm_s), force_n=float(force_n))
+
+
+def _check_given(given: Iterable[str], *, where: str) -> None:
+    """Refuse a trajectory with anything but a speed and a force, or a file."""
+    values = [name for name in given if name != "name"]
+    if set(values) not in ({"speed_mm_s", "force_n"}, {"file"}):
+        raise InputError(
+            f"expected speed_mm_s and force_n, or a file, in {where}, got "
+            f"{', '.join(values) or 'none of them'}; give the two numbers or the file."
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +152,7 @@ class Level:
     full_scale_g: float | None = None
 
     def __post_init__(self) -> None:
-        _check_choice("mode under [level]", self.mode, get_args(LevelMode))
+        check_choice("mode under [level]", self.mode, get_args(LevelMode))
         uses = {"rms": ("rms_db",), "loudness": ("threshold", "sensation_level_db")}
         for mode, names in uses.items():
             for name in names:
@@ -154,13 +162,13 @@ class Level:
                         f'"{self.mode}"; remove it or change the mode.'
                     )
         if self.mode == "rms" or self.rms_db is not None:
-            _check_number("rms_db", self.rms_db, low=LEVELS_DB[0], high=LEVELS_DB[1])
+            check_number("rms_db", self.rms_db, low=LEVELS_DB[0], high=LEVELS_DB[1])
         if self.sensation_level_db is not None:
             low, high = LEVELS_DB
-            _check_number("sensation_level_db", self.sensation_level_db, low=low, high=high)
+            check_number("sensation_level_db", self.sensation_level_db, low=low, high=high)
         if self.full_scale_g is not None:
             low, high = FULL_SCALES_G
-            _check_number("full_scale_g", self.full_scale_g, low=low, high=high)
+            check_number("full_scale_g", self.full_scale_g, low=low, high=high)
         if self.mode == "loudness" and self.threshold is None:
             object.__setattr__(self, "threshold", "codec")
 
@@ -193,6 +201,9 @@ class Recipe:
         0 … 60; how long the first condition is held before the start, while the filters settle
         (a band of B Hz takes about 1/B s).
     level : Level
+    vibrator : Path, optional
+        File of a vibrator (`tactileq vibrator`) that is to play the set: each file is the drive
+        whose vibration is the one meant.
 
     Raises
     ------
@@ -210,15 +221,16 @@ class Recipe:
     duration_s: float = 1.0
     settling_s: float = 0.5
     level: Level = field(default_factory=Level)
+    vibrator: Path | None = None
 
     def __post_init__(self) -> None:
-        _check_name("name of the set", self.name)
+        check_name("name of the set", self.name)
         self._check_lists()
-        _check_choice("format", self.format, get_args(SampleFormat))
-        _check_choice("noise", self.noise, get_args(Noise))
+        check_choice("format", self.format, get_args(SampleFormat))
+        check_choice("noise", self.noise, get_args(Noise))
         shortest = 1 / min(self.rates_hz)
-        _check_number("duration_s", self.duration_s, low=shortest, high=LONGEST_S)
-        _check_number("settling_s", self.settling_s, high=LONGEST_SETTLING_S)
+        check_number("duration_s", self.duration_s, low=shortest, high=LONGEST_S)
+        check_number("settling_s", self.settling_s, high=LONGEST_SETTLING_S)
         if (self.format == "pcm24") != (self.level.full_scale_g is not None):
             raise InputError(
                 'expected full_scale_g under [level] with format = "pcm24" and only there, got '
@@ -228,7 +240,7 @@ class Recipe:
 
     def _check_lists(self) -> None:
         names = [entry.name for entry in self.trajectories]
-        lists = {"rate_hz": self.rates_hz, "seeds": self.seeds, "trajectory": names}
+        lists = {"rate_hz": self.rates_hz, "seed": self.seeds, "trajectory": names}
         for what, values in {**lists, "model": self.models}.items():
             if not values:
                 raise InputError(f"expected at least one {what} in the recipe, got none; add one.")
@@ -239,9 +251,9 @@ class Recipe:
                     "remove or rename one."
                 )
         for rate_hz in self.rates_hz:
-            _check_whole("rate_hz", rate_hz, low=1, high=HIGHEST_RATE_HZ)
+            check_whole("rate_hz", rate_hz, low=1, high=HIGHEST_RATE_HZ)
         for seed in self.seeds:
-            _check_whole("seed", seed, low=0, high=HIGHEST_SEED)
+            check_whole("seed", seed, low=0, high=HIGHEST_SEED)
 
     @staticmethod
     def load(path: str | Path) -> Recipe:
@@ -271,8 +283,10 @@ class Recipe:
 
     def files(self) -> list[Path]:
         """Every file or folder that the recipe names."""
-        named = [*(m.path for m in self.models), *(t.file for t in self.trajectories)]
-        return [path for path in (*named, self.level.threshold) if isinstance(path, Path)]
+        named: list[Path | str | None] = [entry.path for entry in self.models]
+        named += [entry.file for entry in self.trajectories]
+        named += [self.level.threshold, self.vibrator]
+        return [path for path in named if isinstance(path, Path)]
 
     def to_toml(self) -> str:
         """The recipe as text with every key that applies; `load` makes it again."""
@@ -284,6 +298,7 @@ class Recipe:
             "noise": self.noise,
             "duration_s": self.duration_s,
             "settling_s": self.settling_s,
+            "vibrator": self.vibrator,
         }
         parts = [f"version = {VERSION}\n", _section("[set]", settings)]
         parts.append(_section("[level]", vars(self.level)))
@@ -308,6 +323,8 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
         settings["rates_hz"] = _listed("rate_hz", settings.pop("rate_hz"))
     if "seeds" in settings:
         settings["seeds"] = _listed("seeds", settings["seeds"])
+    if "vibrator" in settings:
+        settings["vibrator"] = folder / _text(settings["vibrator"], "vibrator under [set]")
     if Path(_text(level.get("threshold", ""), "threshold")).suffix:
         level["threshold"] = folder / level["threshold"]
     return Recipe(
@@ -337,10 +354,10 @@ def _trajectory_entry(values: dict[str, Any], folder: Path) -> TrajectoryEntry:
     if "file" in values:
         file = folder / _text(values["file"], "file under [[trajectory]]")
         return TrajectoryEntry(**{"name": file.stem, **values, "file": file})
-    if {"speed_mm_s", "force_n"} <= set(values):
-        entry = TrajectoryEntry.constant(values["speed_mm_s"], values["force_n"])
-        return TrajectoryEntry(**{**vars(entry), "name": values.get("name", entry.name)})
-    return TrajectoryEntry(**{"name": "without a name", **values})
+    named = f"the trajectory {values['name']!r}" if "name" in values else "each [[trajectory]]"
+    _check_given(values, where=named)
+    entry = TrajectoryEntry.constant(values["speed_mm_s"], values["force_n"])
+    return TrajectoryEntry(**{**vars(entry), "name": values.get("name", entry.name)})
 
 
 def _table(values: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -391,35 +408,6 @@ def _text(value: object, name: str) -> str:
     return value
 
 
-def _check_name(what: str, name: object) -> None:
-    if not isinstance(name, str) or not name.strip() or not name.isprintable():
-        raise InputError(f"expected printable text in one line as {what}, got {name!r}; rename it.")
-
-
-def _check_choice(what: str, value: object, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InputError(f"expected {what} to be {_either(choices)}, got {value!r}; choose one.")
-
-
-def _either(choices: tuple[str, ...]) -> str:
-    return " or ".join(f'"{choice}"' for choice in choices)
-
-
-def _check_number(what: str, value: object, *, low: float = 0.0, high: float) -> None:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (number and low <= value <= high):  # type: ignore[operator]
-        raise InputError(
-            f"expected a number from {low:g} to {high:g} for {what}, got {value!r}; correct it."
-        )
-
-
-def _check_whole(what: str, value: object, *, low: int, high: int) -> None:
-    if not (isinstance(value, int) and not isinstance(value, bool) and low <= value <= high):
-        raise InputError(
-            f"expected a whole number from {low} to {high} for {what}, got {value!r}; correct it."
-        )
-
-
 def _shown(value: object) -> str:
     return f"{value.path} ({value.label})" if isinstance(value, ModelEntry) else repr(value)
 
@@ -435,5 +423,5 @@ def _toml(value: object) -> str:
     if isinstance(value, int | float):
         return repr(value)
     text = value.as_posix() if isinstance(value, Path) else str(value)
-    # A JSON string is a TOML string, too.
-    return json.dumps(text, ensure_ascii=False)
+    # A JSON string is a TOML string, too, but that TOML wants DEL escaped like all controls.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
