@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from modeling import Recording, TextureModel
+from modeling import Recording, RegressedModel, TextureModel
 
 
 def make_model(
@@ -47,6 +47,30 @@ def make_recording(
         samples = np.random.default_rng(seed).standard_normal(1000)
     named = {"speed_mm_s": 100.0, "force_n": 1.0, "texture": "planted", **labels}
     return Recording(samples, rate_hz, **named)  # type: ignore[arg-type]
+
+
+def make_falling(**changes: object) -> RegressedModel:
+    """Noise gain and amplitude reach 0 at 200 mm/s; the layer is negative."""
+    values: dict[str, object] = {
+        "texture": "falling",
+        "rate_hz": 5000.0,
+        "driven_by": "conditions",
+        "speeds_mm_s": [50.0, 350.0],
+        "forces_n": [0.5, 3.5],
+        "noise_gain": [0.2, -1e-3, 0, 0],
+        "frequencies_hz": [[100.0], [0], [0], [0]],
+        "bandwidths_hz": [[20.0], [0], [0], [0]],
+        "amplitudes": [[2.0], [-1e-2], [0], [0]],
+        "signs": [-1],
+        "centroid_hz": [],
+        "estimator": "planted",
+    }
+    return RegressedModel(**(values | changes))
+
+
+@pytest.fixture(name="make_falling", scope="session")
+def _make_falling() -> Callable[..., RegressedModel]:
+    return make_falling
 
 
 @pytest.fixture(name="make_model", scope="session")

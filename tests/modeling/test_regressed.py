@@ -16,6 +16,7 @@ from modeling import InputError, RegressedModel, Renderer, TextureModel
 from modeling.model import DrivenBy
 
 ModelMaker = Callable[..., TextureModel]
+FallingMaker = Callable[..., RegressedModel]
 SPEEDS, FORCES = np.array([50.0, 120.0, 350.0]), np.array([0.5, 1.5, 3.5])
 V, F = SPEEDS[:, None], FORCES[None, :]
 ANY_SPEED = st.floats(width=32) | st.floats(-500, 500)
@@ -138,37 +139,18 @@ def test_neither_without_layers_nor_by_another_word(bilinear) -> None:
         bilinear.regressed(by="speed")
 
 
-def falling(**changes: object) -> RegressedModel:
-    """Noise gain and amplitude reach 0 at 200 mm/s; the layer is negative."""
-    values: dict[str, object] = {
-        "texture": "falling",
-        "rate_hz": 5000.0,
-        "driven_by": "conditions",
-        "speeds_mm_s": [50.0, 350.0],
-        "forces_n": [0.5, 3.5],
-        "noise_gain": [0.2, -1e-3, 0, 0],
-        "frequencies_hz": [[100.0], [0], [0], [0]],
-        "bandwidths_hz": [[20.0], [0], [0], [0]],
-        "amplitudes": [[2.0], [-1e-2], [0], [0]],
-        "signs": [-1],
-        "centroid_hz": [],
-        "estimator": "planted",
-    }
-    return RegressedModel(**(values | changes))
-
-
 @settings(deadline=None)
 @given(v=st.floats(0, 400), f=st.floats(0, 5))
-def test_gains_never_turn_round(v: float, f: float) -> None:
-    at = falling().parameters(v, f)
+def test_gains_never_turn_round(v: float, f: float, make_falling: FallingMaker) -> None:
+    at = make_falling().parameters(v, f)
     assert at.noise_gain >= 0
     assert at.gains <= 0
     if v >= 200:
         assert (at.noise_gain[0], at.gains[0, 0]) == (0, 0)
 
 
-def test_what_leaves_the_legal_range_is_clamped() -> None:
-    wild = falling(
+def test_what_leaves_the_legal_range_is_clamped(make_falling: FallingMaker) -> None:
+    wild = make_falling(
         frequencies_hz=[[-500.0], [20.0], [0], [0]], bandwidths_hz=[[50.0], [-1], [0], [0]]
     )
     low, high = wild.peq(20.0, 1.0), wild.peq(350.0, 1.0)

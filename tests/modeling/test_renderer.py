@@ -38,25 +38,7 @@ def engine(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 ModelMaker = Callable[..., TextureModel]
-
-
-def falling(**changes: object) -> RegressedModel:
-    """Noise gain and amplitude reach 0 at 200 mm/s."""
-    values: dict[str, object] = {
-        "texture": "falling",
-        "rate_hz": 5000.0,
-        "driven_by": "conditions",
-        "speeds_mm_s": [50.0, 350.0],
-        "forces_n": [0.5, 3.5],
-        "noise_gain": [0.2, -1e-3, 0, 0],
-        "frequencies_hz": [[100.0], [0], [0], [0]],
-        "bandwidths_hz": [[20.0], [0], [0], [0]],
-        "amplitudes": [[2.0], [-1e-2], [0], [0]],
-        "signs": [-1],
-        "centroid_hz": [],
-        "estimator": "planted",
-    }
-    return RegressedModel(**(values | changes))
+FallingMaker = Callable[..., RegressedModel]
 
 
 LAYERS = [(80.0, 25.0, 0.5), (300.0, 40.0, -0.3), (900.0, 120.0, 0.4)]
@@ -469,15 +451,17 @@ def test_legal_edges_are_not_counted_as_clamped(edge: float) -> None:
     assert renderer.counters.clamped == 0
 
 
-def test_a_gain_that_its_regression_stops_at_0_fades_as_slowly_as_others() -> None:
+def test_a_gain_that_its_regression_stops_at_0_fades_as_slowly_as_others(
+    make_falling: FallingMaker,
+) -> None:
     """What the corners of the table have beyond 0 is never reached and makes no fade faster."""
-    table = falling().table
+    table = make_falling().table
     assert table.values[..., 0].min() < -0.1
     assert table.largest_gains == pytest.approx([0.15, 1.5])
 
 
-def test_a_table_of_parameters_that_overflow_is_refused() -> None:
-    huge = falling(amplitudes=[[1e308], [1e308], [0], [0]])
+def test_a_table_of_parameters_that_overflow_is_refused(make_falling: FallingMaker) -> None:
+    huge = make_falling(amplitudes=[[1e308], [1e308], [0], [0]])
     with (
         pytest.raises(InputError, match="expected finite parameters over the grid"),
         np.errstate(over="ignore"),
