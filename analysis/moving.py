@@ -20,7 +20,7 @@ from analysis.stability import (
     simulate,
 )
 from modeling import Limits, Recording, Renderer, TextureModel, similarity
-from modeling.filters import Foresight
+from modeling.motion import Foresight
 from modeling.noise import stream_key, white_noise
 from modeling.peq import band_rms
 from modeling.plan import RenderPlan
@@ -101,7 +101,7 @@ def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) ->
     gains = np.column_stack([end.noise_gain, end.gains])
     reached = [gains[0], *gains]
     for n in range(1, len(reached)):
-        slews = plan.slews(model.table)
+        slews = plan.slews(model.table.largest_gains)
         reached[n] = reached[n - 1] + np.clip(reached[n] - reached[n - 1], -slews, slews)
     passed = np.arange(1, update_samples + 1)[:, None] / update_samples
     course = np.concatenate([a + (b - a) * passed for a, b in pairwise(reached)])

@@ -1,6 +1,6 @@
-"""Rendering in Python: what `kernel.h` does, where there is no compiler, and the all-pole rival.
+"""Rendering in Python: what `kernel.h` does, where there is no compiler; and of all-pole models.
 
-Both filters pass white noise through orthogonal steps, so that their states keep unit variance (or
+The filters pass white noise through orthogonal steps, so that their states keep unit variance (or
 lose some) at every sample, whatever the parameters do from one update to the next. Plain Python
 floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bits are the same.
 """
@@ -11,15 +11,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from modeling.autoregressive import ARModel
-from modeling.errors import InputError
-from modeling.line_spectral import prediction_coefficients, reflection_coefficients
+from modeling.limiter import Compensator, Limiter
+from modeling.motion import Foresight, GainCourses
 from modeling.noise import white_noise
 from modeling.peq import Floats, band_coefficients, clamp_bands
 from modeling.plan import LayeredModel, RenderCounters, RenderPlan, noise_lowpass
-
-# Rounding must not put a pole on the unit circle.
-_HIGHEST_REFLECTION = 1 - 1e-12
 
 
 class StreamFilter(Protocol):
@@ -75,40 +71,6 @@ class PythonEngine:
         return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
 
 
-class Foresight:
-    """Where a hand will be, if it goes on as it did lately.
-
-    The change from reading to reading is smoothed, since the noise of readings goes on no more than
-    a step does: a change beyond what a hand can do, or what has come to rest.
-    """
-
-    def __init__(self, plan: RenderPlan) -> None:
-        self._furthest, self._share = plan.hand_changes, plan.slope_share
-        self._to_end = (plan.update_samples - 1) / plan.update_samples
-        self._last: list[float] = []
-        self._slopes = [0.0, 0.0]
-
-    def __call__(self, speed_mm_s: Floats, force_n: Floats) -> tuple[Floats, Floats]:
-        """The hand (2, n) amid the time to the next readings, and just before them."""
-        hand = np.stack([speed_mm_s, force_n])
-        slopes = np.array([self._slopes_at(now) for now in hand.T.tolist()]).reshape(-1, 2).T
-        with np.errstate(over="ignore"):
-            return hand + slopes * (self._to_end / 2), hand + slopes * self._to_end
-
-    def _slopes_at(self, now: list[float]) -> list[float]:
-        """The smoothed changes per update of speed and force with the next reading."""
-        if self._last:
-            readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
-            self._slopes = [self._slope(*reading) for reading in readings]
-        self._last = now
-        return self._slopes
-
-    def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
-        change = now - last
-        goes_on = -furthest <= change <= furthest and now != 0
-        return slope + self._share * (change - slope) if goes_on else 0.0
-
-
 class BandFilter:
     """A PEQ of m bands (METHOD 3) at the model's rate or above.
 
@@ -123,10 +85,8 @@ class BandFilter:
         self._table, self._plan = model.table, plan
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
-        self._slews = plan.slews(self._table).tolist()
         self._foresight = Foresight(plan)
-        self._gains: list[float] = []
-        self._courses = [(0.0, 0.0)] * (1 + self._table.n_layers)
+        self._gains = GainCourses(plan, self._table.largest_gains)
         self._bands = [(0.0,) * 5] * self._table.n_layers
         self._state = [(0.0, 0.0)] * self._table.n_layers
 
@@ -145,15 +105,9 @@ class BandFilter:
         return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
 
     def update(self, setting: Any) -> None:
-        """Start every gain on its way to what is wanted now, as far as one update may go."""
+        """Put coefficients into force, and start every gain on its way to what is wanted."""
         wanted, taps, self._bands = setting
-        now = self._gains or wanted
-        self._gains = [_towards(*move) for move in zip(now, wanted, self._slews, strict=True)]
-        per_sample = 1 / self._plan.update_samples
-        self._courses = [
-            (start * tap, (end - start) * per_sample * tap)
-            for start, end, tap in zip(now, self._gains, taps, strict=True)
-        ]
+        self._gains.update(wanted, taps)
 
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
         """The next noise for the bands and, low-passed without delay, for the noise branch.
@@ -171,168 +125,15 @@ class BandFilter:
     def filter(self, *inputs: list[float]) -> list[float]:
         """The recursion of METHOD 3 with the parameters in force."""
         noise, floor_noise = inputs
-        output = [
-            gain * w for gain, w in zip(self._course(0, len(noise)), floor_noise, strict=True)
-        ]
+        floor_gains = self._gains.course(0, len(noise))
+        output = [gain * w for gain, w in zip(floor_gains, floor_noise, strict=True)]
         for layer, (p, q, r, b1, b2) in enumerate(self._bands):
             s1, s2 = self._state[layer]
-            course = self._course(1 + layer, len(noise))
+            course = self._gains.course(1 + layer, len(noise))
             for n, w in enumerate(noise):
                 turned = (s1 + b1 * w) + (p * s1 - q * s2)
                 s2 = (s2 + b2 * w) + (r * s2 + q * s1)
                 output[n] += course[n] * (s1 + turned)
                 s1 = turned
             self._state[layer] = (s1, s2)
-        return output
-
-    def _course(self, which: int, count: int) -> list[float]:
-        """One gain, times its tap, at each of the next samples."""
-        now, step = self._courses[which]
-        course = []
-        for _ in range(count):
-            now += step
-            course.append(now)
-        self._courses[which] = (now, step)
-        return course
-
-
-def _towards(gain: float, wanted: float, slew: float) -> float:
-    change = wanted - gain
-    if change > slew:
-        return gain + slew
-    return gain - slew if change < -slew else wanted
-
-
-class Compensator:
-    """Eq. 7 on a stream: the signal less a share of it in the compensation's band."""
-
-    def __init__(self, plan: RenderPlan) -> None:
-        self._notch, self._state = plan.compensation, (0.0, 0.0)
-        if self._notch is not None:
-            c = band_coefficients(
-                self._notch.frequency_hz, self._notch.bandwidth_hz, rate_hz=plan.rate_hz
-            )
-            self._band = [float(x) for x in (c.p, c.q, c.r, c.b1, c.b2)]
-            self._gain = self._notch.band_share * float(c.tap)
-
-    def filter(self, signal: list[float]) -> list[float]:
-        """The next samples, compensated."""
-        if self._notch is None:
-            return signal
-        (p, q, r, b1, b2), (s1, s2) = self._band, self._state
-        output = []
-        for y in signal:
-            x = y if np.isfinite(y) else 0.0
-            turned1 = (s1 + b1 * x) + (p * s1 - q * s2)
-            turned2 = (s2 + b2 * x) + (r * s2 + q * s1)
-            if x == 0 and turned1 * turned1 + turned2 * turned2 < 1e-30:
-                turned1 = turned2 = 0.0
-            output.append(x - self._gain * (s1 + turned1))
-            s1, s2 = turned1, turned2
-        self._state = (s1, s2)
-        return output
-
-
-class Limiter:
-    """Keeps a stream within `Limits`, sample by sample."""
-
-    def __init__(self, plan: RenderPlan) -> None:
-        limits = plan.limits
-        self._limits, self._share = limits, plan.mean_share
-        self._longest = plan.samples(limits.duration_s)
-        self._pause = plan.samples(limits.pause_s)
-        self._mean_square = 0.0
-        self._sounding = self._silent = 0
-        # Samples that peak, RMS and duration limited.
-        self.touched = [0, 0, 0]
-
-    def limit(self, signal: list[float]) -> list[float]:
-        """The next samples, no louder than the limits allow."""
-        if self._longest:
-            signal = [self._within_duration(y) for y in signal]
-        if np.isfinite(self._limits.peak):
-            signal = [self._within_peak(y) for y in signal]
-        if np.isfinite(self._limits.rms):
-            signal = [self._within_rms(y) for y in signal]
-        return signal
-
-    def _within_duration(self, y: float) -> float:
-        quiet = abs(y) <= self._limits.silence
-        self._silent = self._silent + 1 if quiet else 0
-        begun = self._sounding > 0 or not quiet
-        self._sounding = 0 if self._silent >= self._pause else self._sounding + begun
-        if self._sounding <= self._longest or y == 0:
-            return y
-        self.touched[2] += 1
-        return 0.0
-
-    def _within_peak(self, y: float) -> float:
-        peak = self._limits.peak
-        if -peak <= y <= peak:
-            return y
-        self.touched[0] += 1
-        return peak if y > 0 else -peak if y < 0 else 0.0
-
-    def _within_rms(self, y: float) -> float:
-        kept = (1 - self._share) * self._mean_square
-        room = (self._limits.mean_square - kept) / self._share
-        if not y * y <= room:
-            self.touched[1] += 1
-            y = float(np.copysign(np.sqrt(room), y)) if y == y else 0.0
-        self._mean_square = kept + self._share * (y * y)
-        return y
-
-
-class LatticeFilter:
-    """An all-pole filter as a normalised lattice (Gray and Markel 1975), at the model's rate.
-
-    Every stage turns (its input, its state) by an angle, so with white noise of unit variance all
-    states and the unscaled output have unit variance too; the gain is applied behind it. A direct
-    form, stable as each of its filters is, can grow without bound when they change.
-    """
-
-    def __init__(self, model: ARModel, rate_hz: float) -> None:
-        if rate_hz != model.rate_hz:
-            raise InputError(
-                f"expected the AR model's own rate of {model.rate_hz:g} Hz, got {rate_hz:g} (an "
-                "all-pole filter has no equal at another rate); render at that rate and resample."
-            )
-        self.clamped = 0
-        self._model = model
-        self._state = [0.0] * model.order
-        self._setting: Any = (0.0, [(0.0, 1.0)] * model.order)
-
-    def settings(self, speed_mm_s: Floats, force_n: Floats) -> list[Any]:
-        """Output RMS, and sine and cosine of every stage from the highest order down."""
-        at = self._model.parameters(speed_mm_s, force_n)
-        sine = reflection_coefficients(prediction_coefficients(at.line_spectral_frequencies))
-        sine = np.nan_to_num(np.clip(sine, -_HIGHEST_REFLECTION, _HIGHEST_REFLECTION))
-        cosine = np.sqrt((1 - sine) * (1 + sine))
-        rms = at.gain / cosine.prod(axis=-1)
-        table = np.stack([sine, cosine], axis=-1)[:, ::-1]
-        stages = [[tuple(stage) for stage in update] for update in table.tolist()]
-        return list(zip(rms.tolist(), stages, strict=True))
-
-    def update(self, setting: Any) -> None:
-        """Put angles and RMS into force."""
-        self._setting = setting
-
-    def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
-        """The next noise, of unit variance."""
-        return (white_noise(key, start, count).tolist(),)
-
-    def filter(self, *inputs: list[float]) -> list[float]:
-        """The lattice with the angles in force."""
-        rms, stages = self._setting
-        state, output = self._state, []
-        highest = len(stages) - 1
-        for forward in inputs[0]:
-            for stage, (sine, cosine) in enumerate(stages):
-                held = state[highest - stage]
-                backward = sine * forward + cosine * held
-                forward = cosine * forward - sine * held
-                if stage:
-                    state[highest - stage + 1] = backward
-            state[0] = forward
-            output.append(rms * forward)
         return output

@@ -118,14 +118,14 @@ class RenderPlan:
         """What a new square adds to the running mean square."""
         return float(-np.expm1(-1 / (self.limits.rms_window_s * self.rate_hz)))
 
-    def slews(self, table: ParameterTable) -> Floats:
-        """How far the noise gain and every layer's gain move in one update at most, (1 + m,).
+    def slews(self, largest_gains: Floats) -> Floats:
+        """How far each of (k,) gains moves in one update at most, (k,), given the largest it has.
 
-        The largest gain of the grid takes 5 ms: no hand is faster, but sensors and lift-off are.
+        The largest takes 5 ms: no hand is faster, but sensors and lift-off are.
         """
         share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
         share *= 1 + 1e-12  # five fifths are to be a whole, whatever they round to
-        return table.largest_gains * share
+        return largest_gains * share
 
     def texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
         """Everything that `tq_texture` in `kernel.h` holds, by name and in its order."""
@@ -147,7 +147,7 @@ class RenderPlan:
             "speed_change": speed_change,
             "force_change": force_change,
             "slope_share": self.slope_share,
-            "slews": self.slews(table),
+            "slews": self.slews(table.largest_gains),
         }
         if self.compensation is not None:
             fields["notch_hz"] = self.compensation.frequency_hz

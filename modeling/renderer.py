@@ -9,8 +9,9 @@ from numpy.typing import ArrayLike
 
 from modeling.autoregressive import ARModel
 from modeling.errors import InputError
-from modeling.filters import BandFilter, LatticeFilter, PythonEngine
+from modeling.filters import BandFilter, PythonEngine
 from modeling.kernel import CompiledEngine, is_compiled
+from modeling.lattice import LatticeFilter
 from modeling.limits import Limits
 from modeling.noise import stream_key
 from modeling.peq import Floats
@@ -36,8 +37,7 @@ class Renderer:
     At each update the hand is taken to go on as it did over the last 4 ms (but a change beyond any
     hand's, 20 m/s² or 200 N/s, is a step): frequencies and bandwidths are those for the middle of
     the time to the next update, and gains move in a straight line to those for its end. The largest
-    of the model's gains takes 5 ms at least from silence or to it, so that nothing clicks. An
-    ARModel's parameters are held from update to update as they are read.
+    of the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Renderer:
         self.update_samples = plan.update_samples
         self._engine: Engine
         if isinstance(model, ARModel):
-            self._engine = PythonEngine(LatticeFilter(model, self.rate_hz), plan, key=key)
+            self._engine = PythonEngine(LatticeFilter(model, plan), plan, key=key)
         elif is_compiled():
             self._engine = CompiledEngine(model, plan, key=key)
         else:
