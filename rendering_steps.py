@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from steps import (
     check_own_file,
-    check_own_model,
     check_own_results,
     progress,
     simulated_note,
@@ -30,9 +30,9 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     test : Path
         WAV of two channels: drive, acceleration.
     out : Path
-        A JSON file; provenance goes beside it.
+        A JSON file.
     plot : Path, optional
-        A PNG file.
+        A PNG file. Beside either file goes its provenance, by which a later run knows its own.
     simulated : bool
         Whether the test was simulated.
     """
@@ -42,11 +42,11 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     from modeling import identify_vibrator
     from modeling.wav import read_wav_channels
 
-    for path, ending in ((out, ".json"), (plot, ".png")):
-        if path is not None and path.suffix.lower() != ending:
+    files = {path: ending for path, ending in ((out, ".json"), (plot, ".png")) if path is not None}
+    for path, ending in files.items():
+        if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
-    start = out.with_suffix("")
-    check_own_model(start, "vibrator")
+    markers = {path: check_own_file(path, "vibrator") for path in files}
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:
         raise ValueError(
@@ -58,11 +58,17 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
         identify_vibrator(drive, acceleration, rate_hz=rate_hz, simulated=simulated)
     )
     shown.vibrator.save(out)
-    settings = {"simulated": simulated}
-    write_provenance(Path(f"{start}_provenance.json"), "vibrator", settings, inputs=[test])
+    tell_origin = partial(
+        write_provenance,
+        command="vibrator",
+        settings={"simulated": simulated},
+        inputs=[test],
+    )
+    tell_origin(markers[out])
     if plot is not None:
         plot.parent.mkdir(parents=True, exist_ok=True)
         figure_vibrator(shown).savefig(plot, dpi=DOTS_PER_INCH)
+        tell_origin(markers[plot])
     print(f"{_found(shown)}: {out}")
 
 
@@ -87,57 +93,80 @@ def recipe_from(
     rate_hz: float | None,
     duration_s: float | None,
     seed: int | None,
+    vibrator: Path | None,
 ) -> Recipe:
     """The recipe of this file, or the one that model files and options make."""
     from stimuli.recipe import Recipe, TrajectoryEntry, model_entry, whole_or_as_it_is
 
     recipes = [path for path in named if path.suffix.lower() == ".toml"]
+    options = {rate_hz, duration_s, seed, vibrator}
     if recipes:
-        if len(named) > 1 or any((speeds, forces)) or {rate_hz, duration_s, seed} != {None}:
+        if len(named) > 1 or any((speeds, forces)) or options != {None}:
             raise ValueError(
                 "expected one recipe and --out, or model files with options, got both; write all "
                 f"that {recipes[0]} lacks into it."
             )
         return Recipe.load(recipes[0])
-    # models/*.json names what the models came from, too.
-    models = [path for path in named if not path.name.endswith("provenance.json")]
     return Recipe(
         name=out.resolve().name,
-        models=tuple(map(model_entry, models)),
+        models=tuple(map(model_entry, _models_among(named))),
         trajectories=tuple(
             TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]
         ),
         rates_hz=(48_000 if rate_hz is None else whole_or_as_it_is(rate_hz),),
         seeds=(seed or 0,),
         duration_s=1.0 if duration_s is None else duration_s,
+        vibrator=vibrator,
     )
+
+
+def _models_among(named: Sequence[Path]) -> list[Path]:
+    """Without what else models/*.json names: provenance, vibrators, exported equalizers."""
+    from stimuli.sources import is_something_else
+
+    files = [path for path in named if not path.name.endswith("provenance.json")]
+    others = [path for path in files if is_something_else(path)]
+    tell_passed_over(others)
+    return [path for path in files if path not in others]
+
+
+def tell_passed_over(others: Sequence[Path]) -> None:
+    """Name the JSON files among models that hold something else."""
+    for path in others:
+        print(f"note: {path} says that it is no model and is passed over.")
 
 
 def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
     """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
-    from stimuli.sources import load_sources
-
-    count = render_set(recipe, out)
+    sources, count = render_set(recipe, out)
     settings = {"recipe": recipe.to_toml()}
     inputs = [*inputs, *recipe.files()]
     write_provenance(out / "provenance.json", "stimuli", settings, inputs=inputs)
-    tell_beyond_grid(load_sources(recipe))
+    tell_passed_over(sources.passed_over)
+    tell_beyond_grid(sources)
     print(f"{count} files: {out / 'manifest.tsv'}")
 
 
-def render_set(recipe: Recipe, out: Path) -> int:
-    """Write a stimulus set with its contact sheet, behind a progress bar; how many files it has."""
+def render_set(recipe: Recipe, out: Path) -> tuple[Sources, int]:
+    """Write a stimulus set with its contact sheet, behind a progress bar.
+
+    Returns what it was rendered from and how many files it has.
+    """
+    from stimuli.sets import CONTACT_SHEET, check_place, stimulus_count, write_set
+    from stimuli.sources import load_sources
+
+    # Wrong input is refused before there is a bar, and before what draws is loaded.
+    check_place(out)
+    sources = load_sources(recipe)
+    count = stimulus_count(recipe, sources)
     from analysis.contact_sheet import contact_sheet
     from analysis.figures_stimuli import figure_contact_sheet
     from analysis.findings import DOTS_PER_INCH
-    from stimuli.sets import CONTACT_SHEET, write_set
-    from stimuli.sources import model_files
 
-    takes = len(model_files(recipe)) * len(recipe.trajectories) * len(recipe.seeds)
-    with progress("Rendering stimuli", takes * len(recipe.rates_hz)) as advance:
-        stimuli = write_set(out, recipe, progress=advance)
+    with progress("Rendering stimuli", count) as advance:
+        write_set(out, recipe, sources=sources, progress=advance)
     figure_contact_sheet(contact_sheet(out)).savefig(out / CONTACT_SHEET, dpi=DOTS_PER_INCH)
-    return len(stimuli)
+    return sources, count
 
 
 def tell_beyond_grid(sources: Sources) -> None:
@@ -169,9 +198,20 @@ def demo_recipe(folder: Path, *, seed: int) -> Recipe:
 
 
 def export_c_header(
-    model_file: Path, out: Path | None, *, rate_hz: float | None, seed: int, single: bool
+    model_file: Path,
+    out: Path | None,
+    *,
+    rate_hz: float | None,
+    seed: int,
+    single: bool,
+    vibrator: Path | None,
+    limits: Mapping[str, float | None],
 ) -> None:
-    """Write a model and the kernel as one C header, with provenance."""
+    """Write a model and the kernel as one C header, with provenance.
+
+    `limits` are those of `modeling.Limits`, None for none.
+    """
+    from modeling import Limits, Vibrator, compensation_for
     from modeling.files import file_stem
     from stimuli.exports import write_c_header
     from stimuli.sources import load_model
@@ -179,10 +219,25 @@ def export_c_header(
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.h")
     marker = check_own_file(target, "export c")
-    name = write_c_header(target, model, rate_hz=rate_hz, seed=seed, single=single)
-    settings = {"rate_hz": rate_hz or model.rate_hz, "single": single}
-    write_provenance(marker, "export c", settings, seed=seed, inputs=[model_file])
-    print(f"{name}{simulated_note(model)}: {target}")
+    rate_hz = model.rate_hz if rate_hz is None else rate_hz
+    compensation, played_by = None, ""
+    if vibrator is not None:
+        found = Vibrator.load(vibrator)
+        compensation = compensation_for(found, rate_hz=rate_hz)
+        played_by = f" for a vibrator{' (simulated)' if found.simulated else ''}"
+    name = write_c_header(
+        target,
+        model,
+        rate_hz=rate_hz,
+        seed=seed,
+        single=single,
+        limits=Limits(**{what: value for what, value in limits.items() if value is not None}),
+        compensation=compensation,
+    )
+    settings = {"rate_hz": rate_hz, "single": single, "limits": dict(limits)}
+    inputs = [path for path in (model_file, vibrator) if path is not None]
+    write_provenance(marker, "export c", settings, seed=seed, inputs=inputs)
+    print(f"{name}{simulated_note(model)}{played_by}: {target}")
 
 
 def export_wav_file(
@@ -194,6 +249,7 @@ def export_wav_file(
     rate_hz: float,
     duration_s: float,
     seed: int,
+    vibrator: Path | None,
 ) -> None:
     """Write a model's vibration at one speed and force, with provenance, and tell its level."""
     from modeling.files import file_stem
@@ -211,15 +267,18 @@ def export_wav_file(
         rate_hz=rate_hz,
         duration_s=duration_s,
         seed=seed,
+        vibrator=vibrator,
     )
     stimulus = write_wav(target, recipe)
     settings = {"recipe": recipe.to_toml()}
-    write_provenance(marker, "export wav", settings, seed=seed, inputs=[model_file])
+    write_provenance(marker, "export wav", settings, seed=seed, inputs=recipe.files())
     tell_beyond_grid(load_sources(recipe))
+    drive = "" if vibrator is None else ", as drive for the vibrator"
+    simulated = " (simulated)" if stimulus.simulated == "true" else ""
     print(
-        f"{model.texture}{simulated_note(model)}, {stimulus.duration_s:g} s at {stimulus.rate_hz} "
+        f"{model.texture}{simulated}, {stimulus.duration_s:g} s at {stimulus.rate_hz} "
         f"Hz, {stimulus.level_db:.1f} dB re 1 {stimulus.unit} (RMS), peak {stimulus.peak:.3g} "
-        f"{stimulus.unit}: {target}"
+        f"{stimulus.unit}{drive}: {target}"
     )
 
 

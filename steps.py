@@ -143,7 +143,7 @@ def check_own_file(out: Path, command: str) -> Path:
     if out.exists() and maker != f"tactileq {command}":
         raise ValueError(
             f"expected a new file or an earlier result of tactileq {command} at {out}, got "
-            "something else; choose another name with --out."
+            "something else; choose another name."
         )
     return marker
 

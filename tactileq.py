@@ -95,6 +95,10 @@ SurfaceName = Annotated[
 ]
 SpeedOfAll = Annotated[float | None, typer.Option("--speed", help="Speed of all files, mm/s.")]
 ForceOfAll = Annotated[float | None, typer.Option("--force", help="Force of all files, N.")]
+VibratorFile = Annotated[
+    Path | None,
+    typer.Option("--vibrator", help="File from tactileq vibrator: compensate its resonance."),
+]
 LabelTable = Annotated[
     Path | None, typer.Option("--labels", help="TSV: file, speed_mm_s, force_n (texture, repeat).")
 ]
@@ -333,13 +337,18 @@ def stimuli(
     seed: Annotated[
         int | None, typer.Option(min=0, max=2**31, help="Seed of the noise. [0]")
     ] = None,
+    vibrator: VibratorFile = None,
 ) -> None:
     """Render a set of stimuli to WAV files, with a manifest and a picture of all spectra.
 
     A recipe (TOML) names models, trajectories (constant speed, or a hand's as CSV), seeds, rates,
-    24-bit or float samples, and the level: as modelled, one RMS, or matched in loudness. All its
-    keys are described at the top of stimuli/recipe.py. The set holds its own recipe.toml with
-    copies of the models, from which it can be made again bit for bit.
+    24-bit or float samples, the level (as modelled, one RMS, or matched in loudness) and the
+    vibrator that plays it, for which it then holds the drive. The set holds its own recipe.toml
+    with copies of the models, from which it can be made again bit for bit.
+
+    Start from docs/stimuli.toml. A recipe needs version = 1; a name under [set]; for each model, or
+    folder of them, a path under [[model]]; for each stroke under [[trajectory]] speed_mm_s and
+    force_n, or a file (CSV: time_s, speed_mm_s, force_n).
 
     The options are for model files without a recipe; there the manifest's column model holds the
     folder that each model came from, and samples are g.
@@ -356,6 +365,7 @@ def stimuli(
         rate_hz=rate_hz,
         duration_s=duration_s,
         seed=seed,
+        vibrator=vibrator,
     )
     render_stimuli(recipe, out, inputs=[path for path in named if path.suffix == ".toml"])
 
@@ -376,7 +386,8 @@ def vibrator(
     """Identify a vibrator from a white-noise test, to compensate its resonance.
 
     TEST has two channels recorded at once, the drive and the acceleration, for 8.25 s at least. A
-    poor coherence of the two is refused.
+    poor coherence of the two is refused. What is found goes into a recipe (vibrator under [set]) or
+    to --vibrator of tactileq stimuli, export wav and export c.
 
     Example: tactileq vibrator white-noise.wav --out vibrator.json --plot vibrator.png
     """
@@ -392,15 +403,29 @@ def export_c(
     ] = None,
     single: Annotated[bool, typer.Option("--single", help="Single precision.")] = False,
     seed: Seed = 0,
+    vibrator: VibratorFile = None,
+    peak: Annotated[float | None, typer.Option("--peak", help="Largest sample, g.")] = None,
+    rms: Annotated[float | None, typer.Option("--rms", help="Largest running RMS, g.")] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", help="Longest vibration without a pause, s.")
+    ] = None,
 ) -> None:
     """Write a model and the renderer as one C99 header that needs nothing else.
 
     A comment on top of it shows a whole program. In double precision it renders what this program
-    renders, bit for bit.
+    renders, bit for bit. Without --peak, --rms and --duration it has no limits.
 
-    Example: tactileq export c models/canvas.json --rate 48000 --out canvas.h
+    Example: tactileq export c models/canvas.json --rate 48000 --peak 5 --out canvas.h
     """
-    export_c_header(model_file, out, rate_hz=rate_hz, seed=seed, single=single)
+    export_c_header(
+        model_file,
+        out,
+        rate_hz=rate_hz,
+        seed=seed,
+        single=single,
+        vibrator=vibrator,
+        limits={"peak": peak, "rms": rms, "duration_s": duration_s},
+    )
 
 
 @exports.command("wav")
@@ -411,6 +436,7 @@ def export_wav(
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds.")] = 1.0,
     rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 48000.0,
     seed: Seed = 0,
+    vibrator: VibratorFile = None,
     out: Annotated[Path | None, typer.Option("--out", help="WAV file. [TEXTURE.wav]")] = None,
 ) -> None:
     """Write the vibration at one speed and force as a WAV file (32-bit float samples in g).
@@ -425,6 +451,7 @@ def export_wav(
         rate_hz=rate_hz,
         duration_s=duration_s,
         seed=seed,
+        vibrator=vibrator,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from stimuli.manifest import MANIFEST
+from stimuli.manifest import COMPENSATED, MANIFEST
 from stimuli.recipe import Recipe
 from stimuli.rendering import steady_part
 from stimuli.sources import RECIPE
@@ -38,6 +38,8 @@ class ContactSheet:
         "g", or "arbitrary" where any model's is.
     simulated : (T,) ndarray of bool
         Whether anything of a texture was simulated.
+    compensated : bool
+        Whether spectra are those of a vibrator's drive; levels are always those at the hand.
     """
 
     name: str
@@ -49,6 +51,7 @@ class ContactSheet:
     level_db: Floats
     unit: str
     simulated: NDArray[np.bool_]
+    compensated: bool
 
 
 def contact_sheet(folder: str | Path) -> ContactSheet:
@@ -91,6 +94,7 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
         level_db=level_db,
         unit="g" if (chosen["unit"] == "g").all() else "arbitrary",
         simulated=simulated.to_numpy(dtype=bool),
+        compensated=bool((chosen["vibrator"] == COMPENSATED).all()),
     )
 
 

@@ -27,9 +27,8 @@ RANGE_DB = 45.0
 def figure_contact_sheet(sheet: ContactSheet) -> Figure:
     """One panel per texture (rows) and trajectory (columns), the models overlaid."""
     rows, columns = len(sheet.textures), len(sheet.trajectories)
-    figure = Figure(
-        figsize=(max(2.7 * columns + 1.2, 5.0), 1.45 * rows + 1.6), layout="constrained"
-    )
+    size = (max(2.7 * columns + 1.2, 6.0), 1.45 * rows + 2.0)
+    figure = Figure(figsize=size, layout="constrained")
     axes = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for row in range(rows):
         for column in range(columns):
@@ -40,16 +39,22 @@ def figure_contact_sheet(sheet: ContactSheet) -> Figure:
     for column, trajectory in enumerate(sheet.trajectories):
         axes[0, column].set_title(trajectory, loc="left", fontsize=9)
     shared_legend(figure, [axes[0, 0]], loc="outside lower center", ncols=4)
-    reference = "g²/Hz" if sheet.unit == "g" else "Hz⁻¹, arbitrary unit"
+    reference = "g²/Hz" if sheet.unit == "g" else "Hz⁻¹, arbitrary"
+    of_what = " of the drive" if sheet.compensated else ""
+    # In two lines: no longer than a figure of one row is high.
     figure.supylabel(
-        f"power spectral density (dB re 1 {reference}), {LINE_HZ:g} Hz lines", fontsize=10
+        f"power spectral density{of_what}\n(dB re 1 {reference}), {LINE_HZ:g} Hz lines", fontsize=9
     )
-    unit = "1 g" if sheet.unit == "g" else "1, arbitrary unit"
-    figure.suptitle(
-        f"Stimulus set {sheet.name}\nnumbers: RMS level (dB re {unit}), in the legend's order",
-        fontsize=11,
-    )
+    figure.suptitle(_title(sheet), fontsize=10)
     return figure
+
+
+def _title(sheet: ContactSheet) -> str:
+    lines = [f"Stimulus set {sheet.name}"]
+    if sheet.compensated:
+        lines.append("compensated for its vibrator; levels are those meant at the hand")
+    unit = "1 g" if sheet.unit == "g" else "1, arbitrary unit"
+    return "\n".join([*lines, f"numbers: RMS level (dB re {unit}), in the legend's order"])
 
 
 def plot_stimuli(sheet: ContactSheet, texture: int, *, column: int, ax: Axes | None = None) -> Axes:

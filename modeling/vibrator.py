@@ -26,6 +26,8 @@ from modeling.peq import (
 from modeling.saved import SavedModel
 
 FLAT_WITHIN_DB = 3.0
+# What is left of a filter's past is negligible: −60 dB.
+_SETTLED = 1e-3
 _CURVES = ("curve_hz", "curve_response", "curve_coherence")
 _NUMBERS = ("rate_hz", "frequency_hz", "bandwidth_hz", "height", "flat_gain", "coherence")
 
@@ -157,22 +159,30 @@ class Compensation:
         response: NDArray[np.complex128] = 1 - self.band_share * band
         return response
 
-    def apply(self, signal: ArrayLike) -> Floats:
-        """What to send to the vibrator for (n,) samples at `rate_hz`; begins at rest.
+    @property
+    def settling_s(self) -> float:
+        """Time after which a thousandth at most (−60 dB) is left of what the band held."""
+        slowest = np.abs(np.roots(self._coefficients()[1])).max()
+        return float(np.log(_SETTLED) / np.log(slowest) / self.rate_hz)
 
-        Notes
-        -----
+    def apply(self, signal: ArrayLike) -> Floats:
+        """What to send to the vibrator for (n,) samples at `rate_hz`; begins at rest."""
+        from scipy.signal import lfilter  # late: takes longer to load than all of modeling
+
+        samples = np.asarray(signal, dtype=np.float64)
+        return np.asarray(lfilter(*self._coefficients(), samples))
+
+    def _coefficients(self) -> tuple[Floats, Floats]:
+        """Numerator and denominator in z⁻¹.
+
         With t = (1 − z⁻¹)/(1 + z⁻¹), g = tan(πf/fs) and k = tan(πB/fs) the band is
         H_BP = k(1+g²)t/(g² + k(1+g²)t + t²), the transfer function of METHOD 3's filter.
         """
-        from scipy.signal import lfilter  # late: takes longer to load than all of modeling
-
         g = float(rational_tan(np.pi / self.rate_hz * self.frequency_hz))
         damping = float(rational_tan(np.pi / self.rate_hz * self.bandwidth_hz)) * (1 + g * g)
         band = np.array([damping, 0.0, -damping])
         whole = np.array([1 + g * g + damping, 2 * (g * g - 1), 1 + g * g - damping])
-        samples = np.asarray(signal, dtype=np.float64)
-        return np.asarray(lfilter(whole - self.band_share * band, whole, samples))
+        return whole - self.band_share * band, whole
 
 
 def compensation_for(vibrator: Vibrator, *, rate_hz: float | None = None) -> Compensation:

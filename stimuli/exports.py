@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import tempfile
 import textwrap
 from collections.abc import Mapping
 from functools import partial
@@ -16,16 +15,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling import ARModel, InputError, Limits, RegressedModel, Renderer, TextureModel
+from modeling import (
+    ARModel,
+    Compensation,
+    InputError,
+    Limits,
+    RegressedModel,
+    Renderer,
+    TextureModel,
+)
 from modeling.files import write_bytes, write_text
 from modeling.noise import stream_key
 from modeling.peq import PEQ, Floats
 from modeling.plan import RenderPlan
 from modeling.saved import dump_json
 from stimuli.manifest import Stimulus
-from stimuli.recipe import Recipe
-from stimuli.sets import write_set
-from stimuli.sources import AnyModel
+from stimuli.recipe import HIGHEST_RATE_HZ, Recipe
+from stimuli.sets import check_clipping, rendered, stimulus_count
+from stimuli.sources import AnyModel, load_sources
 
 Layered = TextureModel | RegressedModel
 
@@ -60,14 +67,15 @@ def write_c_header(
     rate_hz: float | None = None,
     seed: int = 0,
     single: bool = False,
+    limits: Limits | None = None,
+    compensation: Compensation | None = None,
 ) -> str:
     """Write one C99 header that renders a model and needs nothing else: tables and kernel.
 
-    It defines `NAME` (a `tq_texture` without limits and compensation), `NAME_memory` (how many
-    reals of memory a state needs) and `NAME_key` (of the noise); a comment on top shows their use.
-    In double precision its output is that of `Renderer(model, rate_hz=rate_hz, seed=seed)` bit for
-    bit; in single precision it differs by rounding. Headers of several textures go into one
-    program.
+    It defines `NAME` (a `tq_texture`), `NAME_memory` (how many reals of memory a state needs) and
+    `NAME_key` (of the noise); a comment on top shows their use. In double precision its output is
+    that of a `Renderer` with the same arguments bit for bit; in single precision it differs by
+    rounding. Headers of several textures go into one program.
 
     Parameters
     ----------
@@ -75,11 +83,15 @@ def write_c_header(
         The header; there whole or not at all.
     model : TextureModel or RegressedModel
     rate_hz : float, optional
-        Output rate, at least the model's (the default).
+        Output rate, from the model's (the default) to 768 000 Hz.
     seed : int
     single : bool
         Single precision: tables as the nearest floats, and TQ_REAL is float unless the program
         defines it otherwise.
+    limits : Limits, optional
+        None by default.
+    compensation : Compensation, optional
+        Of the vibrator that plays the output, at its rate.
 
     Returns
     -------
@@ -89,18 +101,12 @@ def write_c_header(
     Raises
     ------
     InputError
-        For an autoregressive model, a rate below the model's, or, in single precision, numbers
-        that it cannot hold or tell apart.
+        For an autoregressive model, a rate out of range, a compensation for another rate, or, in
+        single precision, numbers that it cannot hold or tell apart.
     """
     layered = check_layered(model)
     name = c_identifier(layered.texture)
-    renderer = Renderer(layered, rate_hz=rate_hz, seed=seed)
-    plan = RenderPlan(
-        rate_hz=renderer.rate_hz,
-        update_samples=renderer.update_samples,
-        limits=Limits(),
-        compensation=None,
-    )
+    plan = _plan(layered, rate_hz, seed=seed, limits=limits, compensation=compensation)
     members: Mapping[str, Any] = plan.texture(layered)
     if single:
         members = {member: _in_single(member, value) for member, value in members.items()}
@@ -117,6 +123,29 @@ def write_c_header(
     return name
 
 
+def _plan(
+    model: Layered,
+    rate_hz: float | None,
+    *,
+    seed: int,
+    limits: Limits | None,
+    compensation: Compensation | None,
+) -> RenderPlan:
+    """What a renderer with these arguments does."""
+    if rate_hz is not None and rate_hz > HIGHEST_RATE_HZ:
+        raise InputError(
+            f"expected an output rate of at most {HIGHEST_RATE_HZ} Hz, got {rate_hz:g}; no "
+            "converter is faster, so lower it."
+        )
+    renderer = Renderer(model, rate_hz=rate_hz, seed=seed, limits=limits, compensation=compensation)
+    return RenderPlan(
+        rate_hz=renderer.rate_hz,
+        update_samples=renderer.update_samples,
+        limits=limits or Limits(),
+        compensation=compensation,
+    )
+
+
 def c_identifier(texture: str) -> str:
     """A texture's name as an identifier in C: texture_, letters, digits, _ for all else."""
     return "texture_" + re.sub("[^A-Za-z0-9]", "_", texture)
@@ -129,7 +158,10 @@ def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | N
     with np.errstate(over="ignore"):
         rounded = np.asarray(value, dtype=np.float32)
     axis = member in ("speed_mm_s", "force_n")
-    if not np.isfinite(rounded).all() or (axis and not (np.diff(rounded, prepend=0) > 0).all()):
+    told_apart = not axis or (np.diff(rounded, prepend=0) > 0).all()
+    # As a scalar 0 stands for none: a limit must not vanish.
+    vanished = np.ndim(value) == 0 and value != 0 and rounded == 0
+    if vanished or not (told_apart and np.isfinite(rounded).all()):
         raise InputError(
             f"expected numbers that single precision can hold and tell apart, got others in "
             f"{member}; export in double precision."
@@ -194,11 +226,23 @@ to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g
            return 0;
        }}
 
-   Limits and vibrator compensation are fields of tq_texture, to be set in a copy of {name}.
+   {_restraints(plan, model.unit)}
 
    SPDX-License-Identifier: GPL-3.0-or-later (the kernel below) */
 
 """
+
+
+def _restraints(plan: RenderPlan, unit: str) -> str:
+    """What the header says of vibrator and limits."""
+    notch, limits = plan.compensation, plan.limits
+    vibrator = "Not compensated for a vibrator."
+    if notch is not None:
+        vibrator = f"Compensated for a vibrator with a resonance at {notch.frequency_hz:g} Hz."
+    found = {"peak": (limits.peak, unit), "RMS": (limits.rms, unit)}
+    found["duration"] = (limits.duration_s, "s")
+    told = [f"{what} {value:g} {of}" for what, (value, of) in found.items() if np.isfinite(value)]
+    return f"{vibrator} Limits: {', '.join(told) or 'none'}. Both are fields of tq_texture."
 
 
 def _quoted(text: str) -> str:
@@ -229,15 +273,17 @@ def write_wav(path: str | Path, recipe: Recipe) -> Stimulus:
     InputError
         For a recipe of several stimuli, or one that `write_set` refuses.
     """
-    with tempfile.TemporaryDirectory() as place:
-        stimuli = write_set(Path(place, "set"), recipe)
-        if len(stimuli) != 1:
-            raise InputError(
-                f"expected a recipe of one stimulus, got one of {len(stimuli)}; choose one model, "
-                "or make a stimulus set."
-            )
-        write_bytes(path, Path(place, "set", stimuli[0].file).read_bytes())
-    return stimuli[0]
+    sources = load_sources(recipe)
+    count = stimulus_count(recipe, sources)
+    if count != 1:
+        raise InputError(
+            f"expected a recipe of one stimulus, got one of {count}; choose one model, or make a "
+            "stimulus set."
+        )
+    ((stimulus, data),) = rendered(recipe, sources)
+    check_clipping([stimulus])
+    write_bytes(path, data)
+    return stimulus
 
 
 # --- JSON -------------------------------------------------------------------------------------

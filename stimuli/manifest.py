@@ -15,6 +15,7 @@ from stimuli.rendering import Floats, steady_part
 
 MANIFEST = "manifest.tsv"
 COLUMNS_FILE = "manifest.json"
+COMPENSATED = "compensated"
 
 COLUMNS = {
     "file": "name of the WAV file",
@@ -34,18 +35,24 @@ COLUMNS = {
     "bits": "bits per sample",
     "full_scale_g": "value of a full-scale sample of a pcm24 file in the unit, else n/a",
     "gain_db": "gain applied to what the model gives",
-    "rms": "RMS over the file without its fades (the first and last 10 ms)",
+    "rms": "RMS over the file without its fades (the first and last 10 ms); of a compensated file, "
+    "of the vibration meant at the hand, before the compensation",
     "level_db": "the same in dB re 1 g (re 1 where the unit is arbitrary)",
     "sensation_level_db": "threshold-weighted RMS after the gain in dB above threshold, over the "
-    "same part at the model's rate; n/a where loudness was not matched",
+    "same part at the model's rate, before any compensation; n/a where loudness was not matched",
     "share_without_threshold": "share of the power at frequencies without a known threshold, which "
     "the sensation level leaves out; n/a where loudness was not matched",
-    "peak": "largest absolute sample",
-    "crest_db": "peak over RMS",
+    "peak": "largest absolute sample of the file, compensated or not",
+    "crest_db": "peak over RMS; of a compensated file, of the vibration meant at the hand",
     "sha256": "SHA-256 of the file",
     "model_sha256": "SHA-256 of the model's file",
     "recipe_sha256": "SHA-256 of recipe.toml in this folder",
-    "simulated": "true where the recordings behind the model were simulated",
+    "vibrator": "compensated: the file is the drive for the vibrator of sources/vibrator.json, "
+    "whose vibration is then the one meant at the hand, times the flat gain in that file; n/a: the "
+    "file is the vibration itself",
+    "vibrator_sha256": "SHA-256 of the vibrator's file; n/a without",
+    "simulated": "true where the recordings behind the model, or the test of the vibrator, were "
+    "simulated",
 }
 
 
@@ -79,6 +86,8 @@ class Stimulus:
     sha256: str
     model_sha256: str
     recipe_sha256: str
+    vibrator: str | None
+    vibrator_sha256: str | None
     simulated: str
 
 
@@ -87,15 +96,15 @@ def level_db(rms: float) -> float:
     return 20 * float(np.log10(rms)) if rms > 0 else -np.inf
 
 
-def measured(vibration: Floats, rate_hz: float) -> dict[str, Any]:
-    """The columns rms, level_db, peak and crest_db of a file's samples."""
+def measured(vibration: Floats, rate_hz: float, *, written: Floats) -> dict[str, Any]:
+    """The columns rms, level_db and crest_db of a vibration, and peak of what is written for it."""
     rms = float(np.sqrt(np.mean(steady_part(vibration, rate_hz) ** 2)))
-    peak = float(np.abs(vibration).max())
+    highest = float(np.abs(vibration).max())
     return {
         "rms": rms,
         "level_db": level_db(rms),
-        "peak": peak,
-        "crest_db": level_db(peak) - level_db(rms) if rms > 0 else None,
+        "peak": float(np.abs(written).max()),
+        "crest_db": level_db(highest) - level_db(rms) if rms > 0 else None,
     }
 
 

@@ -66,7 +66,14 @@ LEVELS_DB = (-200.0, 200.0)
 FULL_SCALES_G = (1e-9, 1e9)
 _SECTIONS = {
     "set": (
-        *("name", "rate_hz", "format", "seeds", "noise", "duration_s", "settling_s", "vibrator"),
+        "name",
+        "rate_hz",
+        "format",
+        "seeds",
+        "noise",
+        "duration_s",
+        "settling_s",
+        "vibrator",
     ),
     "level": ("mode", "rms_db", "threshold", "sensation_level_db", "full_scale_g"),
     "model": ("path", "label"),

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import wavfile
 
-from modeling import Renderer
+from modeling import Compensation, Renderer
 from stimuli.recipe import SampleFormat
 from stimuli.sources import AnyModel
 from stimuli.trajectories import Trajectory
@@ -29,23 +29,27 @@ BITS: dict[SampleFormat, int] = {"float32": 32, "pcm24": 24}
 def render_with_margins(
     model: AnyModel, trajectory: Trajectory, *, seed: int, stream: int, settling_s: float
 ) -> Floats:
-    """The vibration of a stroke at the model's rate, with `MARGIN_S` more at both ends.
+    """The vibration of a stroke at the model's rate, with what comes before and after it.
 
-    Rendering begins `settling_s` earlier still, with the first condition held, while the filters
-    settle; that part is left out. Not rendered at the file's rate, since a filter warps less there
-    and skirts near the model's Nyquist frequency rise (METHOD 9): so every rate has one spectrum.
+    Rendering begins `settling_s` and `MARGIN_S` before the start, with the first condition held,
+    while the filters settle, and goes on for `MARGIN_S` after the end. Not rendered at the file's
+    rate, since a filter warps less there and its far skirts rise by up to 1 dB (METHOD 3): so every
+    rate has the same spectrum.
 
     Returns
     -------
     (n,) ndarray
-        In the model's unit; n = ⌈duration·rate⌉ and two margins (`margin_samples`).
+        In the model's unit; ⌈duration·rate⌉ samples from the start (`start_sample`) to the end.
     """
-    rate_hz, margin = model.rate_hz, margin_samples(model.rate_hz)
-    settling = round(settling_s * rate_hz)
-    count = settling + margin + ceil(trajectory.duration_s * rate_hz) + margin
-    elapsed_s = (np.arange(count) - (settling + margin)) / rate_hz
-    speed, force = trajectory.at(elapsed_s)
-    return Renderer(model, seed=seed, stream=stream).render(speed, force)[settling:]
+    rate_hz, start = model.rate_hz, start_sample(model.rate_hz, settling_s=settling_s)
+    count = start + ceil(trajectory.duration_s * rate_hz) + margin_samples(rate_hz)
+    speed, force = trajectory.at((np.arange(count) - start) / rate_hz)
+    return Renderer(model, seed=seed, stream=stream).render(speed, force)
+
+
+def start_sample(rate_hz: float, *, settling_s: float) -> int:
+    """Where a stroke begins in what `render_with_margins` returns."""
+    return round(settling_s * rate_hz) + margin_samples(rate_hz)
 
 
 def margin_samples(rate_hz: float) -> int:
@@ -54,9 +58,15 @@ def margin_samples(rate_hz: float) -> int:
 
 
 def at_rate(
-    with_margins: Floats, model_rate_hz: float, *, rate_hz: int, duration_s: float
+    with_margins: Floats,
+    model_rate_hz: float,
+    *,
+    rate_hz: int,
+    duration_s: float,
+    settling_s: float,
+    compensation: Compensation | None = None,
 ) -> Floats:
-    """A vibration with margins, resampled to a file's rate, cut to its duration and faded.
+    """A stroke with its margins, resampled to a file's rate, cut to its duration and faded.
 
     By FFT over a length that the ratio of the rates divides: exact up to the model's Nyquist
     frequency, and nothing above it (METHOD 2: a usual polyphase filter bends the top band by
@@ -65,9 +75,12 @@ def at_rate(
     Parameters
     ----------
     with_margins : (n,) ndarray
-        From `render_with_margins`.
+        From `render_with_margins`, as is `settling_s`.
     rate_hz : int
         At least `model_rate_hz`.
+    compensation : Compensation, optional
+        At `rate_hz`: what is returned is the drive of a vibrator (eq. 7). Applied to the margins,
+        too, so that it has settled where the file begins if `settling_s` is long enough.
 
     Returns
     -------
@@ -76,17 +89,20 @@ def at_rate(
     from scipy.signal import resample  # late: slow to load
 
     margin = margin_samples(model_rate_hz)
+    before = start_sample(model_rate_hz, settling_s=settling_s)
     ratio = Fraction(rate_hz / model_rate_hz).limit_denominator(LARGEST_DENOMINATOR)
     step = ratio.denominator
-    before = -margin % step
-    after = -(before + with_margins.size) % step
+    pad = -before % step
+    circle = np.pad(with_margins, (pad, -(pad + with_margins.size) % step))
     ends = _ramp(margin)
-    circle = np.pad(with_margins, (before, after))
-    circle[before : before + margin] *= ends
-    circle[circle.size - after - margin : circle.size - after] *= ends[::-1]
+    circle[pad : pad + margin] *= ends
+    end = pad + with_margins.size
+    circle[end - margin : end] *= ends[::-1]
     if ratio != 1:
         circle = resample(circle, circle.size // step * ratio.numerator)
-    start = (before + margin) // step * ratio.numerator
+    if compensation is not None:
+        circle = compensation.apply(circle)
+    start = (pad + before) // step * ratio.numerator
     vibration: Floats = circle[start : start + round(duration_s * rate_hz)]
     return _faded(vibration, rate_hz)
 

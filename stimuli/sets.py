@@ -5,17 +5,19 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import ceil, floor, log10
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling import InputError
+from modeling import InputError, compensation_for
 from modeling.files import check_replaceable, file_stem, replace_folder
 from stimuli.loudness import sensation_level
 from stimuli.manifest import (
     COLUMNS_FILE,
+    COMPENSATED,
     MANIFEST,
     Stimulus,
     level_db,
@@ -30,10 +32,19 @@ from stimuli.rendering import (
     highest_peak,
     margin_samples,
     render_with_margins,
+    start_sample,
     steady_part,
     wav_bytes,
 )
-from stimuli.sources import FOLDER, RECIPE, LabelledModel, Sources, copy_sources, load_sources
+from stimuli.sources import (
+    FOLDER,
+    RECIPE,
+    LabelledModel,
+    Sources,
+    copy_sources,
+    load_sources,
+    recipe_of_copies,
+)
 from stimuli.trajectories import Trajectory
 
 CONTACT_SHEET = "spectra.png"
@@ -57,7 +68,7 @@ class _Take:
         return f"{self.source.model.texture}_{self.source.label}_{self.entry.name}"
 
     def render(self) -> Floats:
-        """At the model's rate, with margins."""
+        """At the model's rate, with margins (`render_with_margins`)."""
         return render_with_margins(
             self.source.model,
             self.trajectory,
@@ -69,8 +80,8 @@ class _Take:
     def steady(self) -> Floats:
         """What its level is measured over, at the model's rate."""
         rate_hz, vibration = self.source.model.rate_hz, self.render()
-        margin = margin_samples(rate_hz)
-        return steady_part(vibration[margin : vibration.size - margin], rate_hz)
+        start = start_sample(rate_hz, settling_s=self.settling_s)
+        return steady_part(vibration[start : vibration.size - margin_samples(rate_hz)], rate_hz)
 
 
 class _Gain(NamedTuple):
@@ -82,7 +93,11 @@ class _Gain(NamedTuple):
 
 
 def write_set(
-    folder: str | Path, recipe: Recipe, *, progress: Callable[[str], None] | None = None
+    folder: str | Path,
+    recipe: Recipe,
+    *,
+    sources: Sources | None = None,
+    progress: Callable[[str], None] | None = None,
 ) -> tuple[Stimulus, ...]:
     """Render every model on every trajectory with every seed, at every rate, to a WAV file.
 
@@ -94,8 +109,11 @@ def write_set(
     Parameters
     ----------
     folder : path
-        Appears whole or not at all; replaced if it was a stimulus set, refused if it was not.
+        Appears whole or not at all; replaced if it was a stimulus set, refused if it was not
+        (`check_place`).
     recipe : Recipe
+    sources : Sources, optional
+        The recipe's, where they are loaded already.
     progress : callable, optional
         Called with the file's name after each file.
 
@@ -112,21 +130,19 @@ def write_set(
         that takes no more; then nothing is written.
     """
     target = Path(folder)
-    _check_target(target)
-    sources = load_sources(recipe)
-    takes = list(_takes(recipe, sources))
-    gains = _gains(takes, recipe, sources)
+    check_place(target)
+    sources = sources or load_sources(recipe)
+    files = rendered(recipe, sources)
+    stimuli = []
     try:
         with replace_folder(target) as fresh:
-            text = copy_sources(recipe, sources, folder=fresh)
-            writer = _Writer(fresh, recipe, hashlib.sha256(text.encode()).hexdigest())
-            stimuli = []
-            for take, gain in zip(takes, gains, strict=True):
-                for stimulus in writer.write(take, gain):
-                    stimuli.append(stimulus)
-                    if progress:
-                        progress(stimulus.file)
-            _check_clipping(stimuli)
+            copy_sources(recipe, sources, folder=fresh)
+            for stimulus, data in files:
+                _write_new(fresh / stimulus.file, data)
+                stimuli.append(stimulus)
+                if progress:
+                    progress(stimulus.file)
+            check_clipping(stimuli)
             write_manifest(fresh, stimuli)
     except OSError as error:
         where = f" at {error.filename}" if error.filename else ""
@@ -137,7 +153,7 @@ def write_set(
     return tuple(stimuli)
 
 
-def _check_target(target: Path) -> None:
+def check_place(target: Path) -> None:
     """Refuse a folder that holds anything but a set: its files and the copies of its sources."""
     own = (RECIPE, COLUMNS_FILE, CONTACT_SHEET, FOLDER)
     check_replaceable(target, index_name=MANIFEST, what="a stimulus set", beside=own)
@@ -150,6 +166,39 @@ def _check_target(target: Path) -> None:
             f"expected a new folder or a stimulus set, got {target} with a file in it that its "
             f"recipe does not name ({foreign[0]}); choose another folder."
         )
+
+
+def _write_new(path: Path, data: bytes) -> None:
+    if path.exists():
+        raise InputError(
+            f"expected each stimulus to have a name of its own, got {path.name} twice; rename a "
+            "texture, label or trajectory."
+        )
+    path.write_bytes(data)
+
+
+def stimulus_count(recipe: Recipe, sources: Sources) -> int:
+    """How many stimuli a recipe has."""
+    takes = len(sources.models) * len(recipe.trajectories) * len(recipe.seeds)
+    return takes * len(recipe.rates_hz)
+
+
+def rendered(recipe: Recipe, sources: Sources) -> Iterator[tuple[Stimulus, bytes]]:
+    """Every stimulus of a recipe: its row of the manifest and its WAV file.
+
+    Gains are found at once, files rendered one by one as they are asked for.
+
+    Raises
+    ------
+    InputError
+        For a silent stimulus that is to be brought to a level.
+    """
+    takes = list(_takes(recipe, sources))
+    gains = _gains(takes, recipe, sources)
+    text = recipe_of_copies(recipe, sources)[0].to_toml()
+    maker = _FileMaker(recipe, sources, hashlib.sha256(text.encode()).hexdigest())
+    pairs = zip(takes, gains, strict=True)
+    return (made for take, gain in pairs for made in maker.files(take, gain))
 
 
 def _takes(recipe: Recipe, sources: Sources) -> Iterator[_Take]:
@@ -204,38 +253,40 @@ def _loudness_gains(
 
 
 @dataclass(frozen=True)
-class _Writer:
-    """Writes the files of a recipe's takes into a folder."""
+class _FileMaker:
+    """Makes the files of a recipe's takes."""
 
-    folder: Path
     recipe: Recipe
+    sources: Sources
     recipe_sha256: str
 
-    def write(self, take: _Take, gain: _Gain) -> Iterator[Stimulus]:
+    def files(self, take: _Take, gain: _Gain) -> Iterator[tuple[Stimulus, bytes]]:
         """The files of one take, one per rate, each with its row of the manifest."""
         with_margins = take.render() * 10 ** (gain.gain_db / 20)
-        duration_s = take.trajectory.duration_s
+        resampled = partial(
+            at_rate,
+            with_margins,
+            take.source.model.rate_hz,
+            duration_s=take.trajectory.duration_s,
+            settling_s=take.settling_s,
+        )
         for rate_hz in self.recipe.rates_hz:
-            vibration = at_rate(
-                with_margins, take.source.model.rate_hz, rate_hz=rate_hz, duration_s=duration_s
-            )
-            data = wav_bytes(vibration, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
-            path = self.folder / self._file_name(take, rate_hz)
-            if path.exists():
-                raise InputError(
-                    f"expected each stimulus to have a name of its own, got {path.name} twice; "
-                    "rename a texture, label or trajectory."
-                )
-            path.write_bytes(data)
-            yield Stimulus(
-                file=path.name,
+            vibration = resampled(rate_hz=rate_hz)
+            written = vibration
+            if self.sources.vibrator is not None:
+                compensation = compensation_for(self.sources.vibrator, rate_hz=rate_hz)
+                written = resampled(rate_hz=rate_hz, compensation=compensation)
+            data = wav_bytes(written, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
+            stimulus = Stimulus(
+                file=self._file_name(take, rate_hz),
                 rate_hz=rate_hz,
                 duration_s=vibration.size / rate_hz,
                 sha256=hashlib.sha256(data).hexdigest(),
                 **gain._asdict(),
-                **measured(vibration, rate_hz),
+                **measured(vibration, rate_hz, written=written),
                 **self._description(take),
             )
+            yield stimulus, data
 
     def _file_name(self, take: _Take, rate_hz: int) -> str:
         """Seed and rate stand in the name only where there are several."""
@@ -245,7 +296,8 @@ class _Writer:
 
     def _description(self, take: _Take) -> dict[str, Any]:
         """What all files of a take have in common."""
-        model, recipe = take.source.model, self.recipe
+        model, recipe, vibrator = take.source.model, self.recipe, self.sources.vibrator
+        simulated = model.simulated or (vibrator is not None and vibrator.simulated)
         return {
             "texture": model.texture,
             "model": take.source.label,
@@ -263,11 +315,13 @@ class _Writer:
             "full_scale_g": recipe.level.full_scale_g,
             "model_sha256": take.source.sha256,
             "recipe_sha256": self.recipe_sha256,
-            "simulated": str(model.simulated).lower(),
+            "vibrator": None if vibrator is None else COMPENSATED,
+            "vibrator_sha256": self.sources.vibrator_sha256,
+            "simulated": str(simulated).lower(),
         }
 
 
-def _check_clipping(stimuli: Sequence[Stimulus]) -> None:
+def check_clipping(stimuli: Sequence[Stimulus]) -> None:
     """Refuse a set of 24-bit files of which one does not hold its samples."""
     loudest = max(stimuli, key=lambda stimulus: stimulus.peak)
     full_scale_g = loudest.full_scale_g

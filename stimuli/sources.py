@@ -1,15 +1,24 @@
-"""What a recipe names: models, hand trajectories and a threshold, read, checked and copied."""
+"""What a recipe names: models, hands, a threshold and a vibrator, read, checked and copied."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 
-from modeling import ARModel, InputError, RegressedModel, TextureModel, Threshold
+from modeling import (
+    ARModel,
+    InputError,
+    RegressedModel,
+    TextureModel,
+    Threshold,
+    Vibrator,
+    compensation_for,
+)
 from modeling.files import file_stem, write_text
 from stimuli.recipe import ModelEntry, Recipe, TrajectoryEntry
 from stimuli.trajectories import Trajectory
@@ -17,7 +26,10 @@ from stimuli.trajectories import Trajectory
 AnyModel = TextureModel | RegressedModel | ARModel
 FOLDER = "sources"
 RECIPE = "recipe.toml"
-_KINDS: tuple[type[AnyModel], ...] = (TextureModel, RegressedModel, ARModel)
+VIBRATOR = Path(FOLDER, "vibrator.json")
+_KINDS: dict[str, type[AnyModel]] = {
+    kind.FORMAT: kind for kind in (TextureModel, RegressedModel, ARModel)
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,21 +44,40 @@ class LabelledModel:
 
 @dataclass(frozen=True, eq=False)
 class Sources:
-    """Everything that a recipe names, in the recipe's order."""
+    """Everything that a recipe names, in the recipe's order.
+
+    `passed_over`: JSON files in its folders of models that say they are something else.
+    """
 
     models: tuple[LabelledModel, ...]
     trajectories: tuple[Trajectory, ...]
     threshold: Threshold | None
+    vibrator: Vibrator | None
+    vibrator_sha256: str | None
+    passed_over: tuple[Path, ...]
 
 
 def load_model(path: Path) -> AnyModel:
     """A saved model of any kind, by the format that the file states."""
+    # Where it states none, `TextureModel.load` says what is wrong with the file.
+    return _KINDS.get(_stated_format(path) or "", TextureModel).load(path)
+
+
+def is_something_else(path: Path) -> bool:
+    """Whether a JSON file states that it holds no model but, say, a vibrator.
+
+    False of a file that states nothing: that may be a damaged model.
+    """
+    stated = _stated_format(path)
+    return stated is not None and stated not in _KINDS
+
+
+def _stated_format(path: Path) -> str | None:
     try:
         stated = json.loads(path.read_text(encoding="utf-8")).get("format")
     except (OSError, ValueError, AttributeError):
-        stated = None  # `TextureModel.load` says what is wrong with the file
-    kinds = {kind.FORMAT: kind for kind in _KINDS}
-    return kinds.get(stated, TextureModel).load(path)
+        return None
+    return stated if isinstance(stated, str) else None
 
 
 def load_sources(recipe: Recipe) -> Sources:
@@ -55,38 +86,49 @@ def load_sources(recipe: Recipe) -> Sources:
     Raises
     ------
     InputError
-        For a file that is missing or no model (trajectory, threshold), two models of one texture
-        under one label, a rate below a model's, or a model in arbitrary units in a set that is to
-        be matched in loudness.
+        For a file that is missing or no model (trajectory, threshold, vibrator), two models of one
+        texture under one label, a rate below a model's, a trajectory shorter than a sample, a model
+        in arbitrary units in a set that is to be matched in loudness, or a vibrator that cannot be
+        compensated at a rate, or not within the time to settle.
     """
-    models = tuple(
-        _labelled(path, entry.label) for entry in recipe.models for path in _files(entry)
-    )
-    names = [f"{m.model.texture} ({m.label})" for m in models]
-    _check_distinct(names, what="model of each texture under each label")
-    for labelled, name in zip(models, names, strict=True):
-        _check_fits(labelled.model, name, recipe)
+    found = [(path, entry.label) for entry in recipe.models for path in _files(entry)]
+    # A model that the recipe names itself is to be one.
+    named = {entry.path for entry in recipe.models}
+    passed_over = [path for path, _ in found if path not in named and is_something_else(path)]
+    models = tuple(_labelled(path, label) for path, label in found if path not in passed_over)
+    _check_models(models, recipe)
     trajectories = tuple(
         Trajectory.of(entry, duration_s=recipe.duration_s) for entry in recipe.trajectories
     )
-    return Sources(models, trajectories, _threshold(recipe.level.threshold))
-
-
-def model_files(recipe: Recipe) -> list[tuple[Path, str]]:
-    """Every model's file with its label; folders are searched for `*.json`, in order of name."""
-    return [(path, entry.label) for entry in recipe.models for path in _files(entry)]
+    for trajectory in trajectories:
+        _check_lasts(trajectory, recipe)
+    vibrator = None if recipe.vibrator is None else Vibrator.load(recipe.vibrator)
+    if vibrator is not None:
+        _check_compensated(vibrator, recipe)
+    return Sources(
+        models=models,
+        trajectories=trajectories,
+        threshold=_threshold(recipe.level.threshold),
+        vibrator=vibrator,
+        vibrator_sha256=None if recipe.vibrator is None else _sha256(recipe.vibrator),
+        passed_over=tuple(passed_over),
+    )
 
 
 def _labelled(path: Path, label: str) -> LabelledModel:
-    model = load_model(path)
-    return LabelledModel(label, model, path, hashlib.sha256(path.read_bytes()).hexdigest())
+    return LabelledModel(label, load_model(path), path, _sha256(path))
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _files(entry: ModelEntry) -> list[Path]:
+    """A model's file, or those in a folder, in order of name, that may be one."""
     if not entry.path.is_dir():
         return [entry.path]
     found = sorted(p for p in entry.path.glob("*.json") if not p.name.endswith("provenance.json"))
-    if not found:
+    if all(map(is_something_else, found)):
         raise InputError(
             f"expected model files in {entry.path}, got none; fit or simplify some first."
         )
@@ -97,6 +139,13 @@ def _threshold(named: str | Path | None) -> Threshold | None:
     if named is None:
         return None
     return Threshold.load(named) if isinstance(named, Path) else Threshold.shipped(named)
+
+
+def _check_models(models: Sequence[LabelledModel], recipe: Recipe) -> None:
+    names = [f"{labelled.model.texture} ({labelled.label})" for labelled in models]
+    _check_distinct(names, what="model of each texture under each label")
+    for labelled, name in zip(models, names, strict=True):
+        _check_fits(labelled.model, name, recipe)
 
 
 def _check_fits(model: AnyModel, name: str, recipe: Recipe) -> None:
@@ -113,6 +162,27 @@ def _check_fits(model: AnyModel, name: str, recipe: Recipe) -> None:
         )
 
 
+def _check_lasts(trajectory: Trajectory, recipe: Recipe) -> None:
+    slowest = min(recipe.rates_hz)
+    if round(trajectory.duration_s * slowest) < 1:
+        raise InputError(
+            f"expected a trajectory of at least one sample at {slowest} Hz, got "
+            f"{trajectory.duration_s:g} s in {trajectory.name!r}; see whether its times are in "
+            "seconds."
+        )
+
+
+def _check_compensated(vibrator: Vibrator, recipe: Recipe) -> None:
+    needed_s = max(
+        compensation_for(vibrator, rate_hz=rate_hz).settling_s for rate_hz in recipe.rates_hz
+    )
+    if needed_s > recipe.settling_s:
+        raise InputError(
+            f"expected settling_s of at least {ceil(needed_s * 100) / 100:g} under [set], in which "
+            f"the compensation of {recipe.vibrator} settles, got {recipe.settling_s:g}; raise it."
+        )
+
+
 def _check_distinct(names: Iterable[str], *, what: str) -> None:
     seen: set[str] = set()
     for name in names:
@@ -121,37 +191,44 @@ def _check_distinct(names: Iterable[str], *, what: str) -> None:
         seen.add(name)
 
 
-def copy_sources(recipe: Recipe, sources: Sources, *, folder: Path) -> str:
-    """Copy all sources into `folder`/sources, and beside it a recipe that names the copies.
+def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Path, Path]]:
+    """The recipe with copies of all that it names in the folder `sources`; which is of which.
 
     Rendering from that recipe gives the same set, wherever the folder is moved and whatever
-    becomes of the originals. Returns the recipe's text.
+    becomes of the originals.
 
     Raises
     ------
     InputError
         Where two sources would have one name.
     """
-    (folder / FOLDER).mkdir()
     models = {labelled: _copy_of_model(labelled) for labelled in sources.models}
     hands = [_copy_of_trajectory(entry) for entry in recipe.trajectories]
     named = recipe.level.threshold
     threshold = Path(FOLDER, file_stem(named.name)) if isinstance(named, Path) else named
-    pairs: list[tuple[object, object]] = [(m.path, copy) for m, copy in models.items()]
-    pairs += [(t.file, copy.file) for t, copy in zip(recipe.trajectories, hands, strict=True)]
-    pairs.append((named, threshold))
+    vibrator = None if recipe.vibrator is None else VIBRATOR
+    pairs: list[tuple[object, object]] = [(copy, m.path) for m, copy in models.items()]
+    pairs += [(copy.file, t.file) for t, copy in zip(recipe.trajectories, hands, strict=True)]
+    pairs += [(threshold, named), (vibrator, recipe.vibrator)]
     copies = [(a, b) for a, b in pairs if isinstance(a, Path) and isinstance(b, Path)]
-    _check_distinct((copy.name for _, copy in copies), what="name for each source")
-    for path, copy in copies:
-        shutil.copyfile(path, folder / copy)
+    _check_distinct((copy.name for copy, _ in copies), what="name for each source")
     copied = replace(
         recipe,
         models=tuple(ModelEntry(copy, labelled.label) for labelled, copy in models.items()),
         trajectories=tuple(hands),
         level=replace(recipe.level, threshold=threshold),
+        vibrator=vibrator,
     )
+    return copied, dict(copies)
+
+
+def copy_sources(recipe: Recipe, sources: Sources, *, folder: Path) -> None:
+    """Copy all sources into `folder`/sources, and beside it the recipe that names the copies."""
+    copied, originals = recipe_of_copies(recipe, sources)
+    (folder / FOLDER).mkdir()
+    for copy, original in originals.items():
+        shutil.copyfile(original, folder / copy)
     write_text(folder / RECIPE, copied.to_toml())
-    return copied.to_toml()
 
 
 def _copy_of_model(labelled: LabelledModel) -> Path:

@@ -7,10 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from analysis.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
 from analysis.figures_stimuli import figure_contact_sheet, plot_stimuli
-from modeling import TextureModel
+from modeling import TextureModel, Vibrator
 from stimuli.planted import planted_texture
 from stimuli.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets import write_set
@@ -80,6 +81,33 @@ def test_24_bit_files_have_the_same_spectra(tmp_path: Path) -> None:
     assert np.nanmax(np.abs(a.density_db - b.density_db)) < 0.01
 
 
+def test_spectra_of_a_vibrators_set_are_those_of_its_drive(tmp_path: Path) -> None:
+    """Four times weaker at the resonance, alike far from it; levels as without."""
+    Vibrator(
+        rate_hz=22_050.0,
+        frequency_hz=200.0,
+        bandwidth_hz=50.0,
+        height=4.0,
+        flat_gain=0.3,
+        coherence=0.99,
+        lowest_hz=10.0,
+        highest_hz=1000.0,
+        curve_hz=[200.0],
+        curve_response=[1.2],
+        curve_coherence=[0.99],
+    ).save(tmp_path / "pen.json")
+    few = {"seeds": (1,), "rates_hz": (8000,), "duration_s": 1.0}
+    write_set(tmp_path / "plain", recipe_of(tmp_path, **few))
+    write_set(tmp_path / "driven", recipe_of(tmp_path, vibrator=tmp_path / "pen.json", **few))
+    plain, driven = (contact_sheet(tmp_path / name) for name in ("plain", "driven"))
+    assert (plain.compensated, driven.compensated) == (False, True)
+    assert np.array_equal(plain.level_db, driven.level_db, equal_nan=True)
+    change_db = (driven.density_db - plain.density_db)[1]
+    at = plain.frequency_hz
+    assert change_db[..., at == 200].mean() == pytest.approx(-20 * np.log10(4), abs=1.0)
+    assert np.abs(change_db[..., (at > 1800) & (at < 2400)]).max() < 0.2
+
+
 def test_silence_and_names_like_missing_values(tmp_path: Path) -> None:
     truth = planted_texture("PVC", **GRID)
     values = {name: getattr(truth, name) for name in truth.__dataclass_fields__}
@@ -118,6 +146,42 @@ def test_figure_shows_every_stimulus(sheet: ContactSheet) -> None:
     (legend,) = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["full", "simplified"]
     assert "dB re 1 g²/Hz" in figure.get_supylabel()
+
+
+@pytest.mark.parametrize("compensated", [False, True])
+@pytest.mark.parametrize("unit", ["g", "arbitrary"])
+@pytest.mark.parametrize("shape", [(1, 1, 1), (1, 3, 1), (7, 2, 3)])
+def test_nothing_is_cut_off(shape: tuple[int, int, int], unit: str, compensated: bool) -> None:
+    """Titles and labels lie within the picture, from one panel to fourteen."""
+    names = [
+        tuple(f"{what} {n}" for n in range(count)) for what, count in zip("tsm", shape, strict=True)
+    ]
+    sheet = ContactSheet(
+        name="touch",
+        textures=names[0],
+        trajectories=names[1],
+        models=names[2],
+        frequency_hz=np.arange(251) * LINE_HZ,
+        density_db=np.full((*shape, 251), -60.0),
+        level_db=np.full(shape, -20.0),
+        unit=unit,
+        simulated=np.ones(shape[0], dtype=bool),
+        compensated=compensated,
+    )
+    figure = figure_contact_sheet(sheet)
+    figure.draw_without_rendering()
+    whole = figure.bbox
+    texts = figure.findobj(Text)
+    assert len([text for text in texts if text.get_text()]) > 10
+    for text in texts:
+        box = text.get_window_extent()
+        if text.get_text() and text.get_visible():
+            assert box.x0 >= whole.x0, text
+            assert box.y0 >= whole.y0, text
+            assert box.x1 <= whole.x1, text
+            assert box.y1 <= whole.y1, text
+    words = f"{figure.get_supylabel()} {figure.get_suptitle()}"
+    assert ("drive" in words) == ("at the hand" in words) == compensated
 
 
 def test_one_panel_alone(sheet: ContactSheet) -> None:

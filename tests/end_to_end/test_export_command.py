@@ -49,7 +49,8 @@ def test_a_header_is_a_renderer_of_its_own(run, model: Path, tmp_path: Path) -> 
     assert (done.returncode, done.stdout) == (0, "texture_canvas (simulated): canvas.h\n")
     made = provenance(tmp_path / "canvas.h")
     assert (made["command"], made["seed"]) == ("tactileq export c", 5)
-    assert made["settings"] == {"rate_hz": 8000.0, "single": False}
+    none = {"peak": None, "rms": None, "duration_s": None}
+    assert made["settings"] == {"rate_hz": 8000.0, "single": False, "limits": none}
     sha256 = hashlib.sha256(f"{model.name}".encode() + model.read_bytes()).hexdigest()
     assert made["inputs_sha256"] == {"canvas.json": sha256}
     (tmp_path / "program.c").write_text(PROGRAM)
@@ -99,13 +100,17 @@ REFUSED = {
     ("c", "nowhere.json"): "expected a model file at nowhere.json",
     ("c", "."): "expected a model file at .",
     ("c", "canvas.json", "--rate", 1000): "at least the model's 5000 Hz, got 1000",
+    ("c", "canvas.json", "--rate", 0): "got 0",
+    ("c", "canvas.json", "--rate", 1e12): "of at most 768000 Hz, got 1e+12",
+    ("c", "canvas.json", "--peak", 0): "expected peak above 0 for limits, got 0.0",
+    ("c", "canvas.json", "--vibrator", "canvas.json"): "expected the format tactileq.vibrator",
     ("c", "canvas.json", "--out", "canvas.json"): "got something else; choose another name",
     ("c", "canvas.json", "--out", "canvas.json/a.h"): "expected to read or write",
     ("wav", "canvas.json", *WHERE, "--rate", 1000): "at least the model's 5000 Hz",
     ("wav", "canvas.json", *WHERE, "--rate", 8000.5): "whole number",
     ("wav", "canvas.json", *WHERE, "--duration", 0): "duration_s",
     ("wav", "canvas.json", "--speed", -1, "--force", 1): "speed_mm_s, got -1.0",
-    ("wav", "canvas.json", *WHERE, "--out", "canvas.json"): "choose another name with --out",
+    ("wav", "canvas.json", *WHERE, "--out", "canvas.json"): "something else; choose another name",
     ("json", "canvas.json", "--speed", 150): "expected a speed and a force",
     ("json", "canvas.json", "--speed", 400, "--force", 1): "got 400 mm/s and 1 N",
     ("json", "canvas.json", "--out", "canvas.json"): "earlier result of tactileq export json",

@@ -84,10 +84,58 @@ def test_options_make_a_recipe(run, tmp_path: Path, study: Path) -> None:
     assert hashes(tmp_path / "d") == hashes(tmp_path / "c")
 
 
+def test_a_set_goes_where_a_link_leads(run, tmp_path: Path, study: Path) -> None:
+    (tmp_path / "disk/sets").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("disk/sets")
+    made = run("stimuli", "study/models/PVC.json", "--duration", 0.1, "--out", "link")
+    assert made.returncode == 0, made.stderr
+    assert (tmp_path / "link").is_symlink()
+    assert [p.name for p in (tmp_path / "disk").iterdir()] == ["sets"]
+    names = {p.name for p in (tmp_path / "disk/sets").iterdir()}
+    assert {"manifest.tsv", "provenance.json", "spectra.png"} < names
+
+
+def test_other_files_among_the_models_are_named_and_passed_over(
+    run, tmp_path: Path, study: Path
+) -> None:
+    made = run("export", "json", "study/models/PVC.json", "--out", "study/models/x.json")
+    assert made.returncode == 0, made.stderr
+    (study / "set.toml").write_text(RECIPE.replace("[5000, 44100]", "5000"))
+    note = "note: study/models/x.json says that it is no model and is passed over.\n"
+    every = [path.relative_to(tmp_path) for path in sorted((study / "models").glob("*.json"))]
+    for named in (["study/set.toml"], every):
+        made = run("stimuli", *named, "--out", "set")
+        assert made.returncode == 0, made.stderr
+        assert made.stdout.count(note) == 1
+        assert set(pd.read_csv(tmp_path / "set/manifest.tsv", sep="\t").texture) == {
+            "PVC",
+            "canvas",
+        }
+
+
 REFUSED = {
     ("stimuli", "study/set.toml", "--rate", "8000"): "got both; write all that study/set.toml",
     ("stimuli", "study/set.toml", "study/set.toml"): "expected one recipe and --out",
+    (
+        "stimuli",
+        "study/set.toml",
+        "--vibrator",
+        "v.json",
+    ): "got both; write all that study/set.toml",
+    (
+        "stimuli",
+        "study/set.toml",
+        "--out",
+        ".",
+    ): "got ., which you are in",
+    (
+        "stimuli",
+        "study/set.toml",
+        "--out",
+        "dangling",
+    ): "link dangling, which leads nowhere",
     ("stimuli", "study/none.toml"): "expected a recipe at study/none.toml",
+    ("stimuli", "study/models/PVC.json", "--vibrator", "v.json"): "a model file at v.json, got no",
     ("stimuli", "study/models/PVC.json", "--rate", "44100.5"): "for rate_hz, got 44100.5",
     ("stimuli", "study/models/PVC.json", "--speed", "nan"): "for speed_mm_s, got nan",
     ("stimuli", "study/models/PVC_provenance.json"): "expected at least one model",
@@ -103,6 +151,7 @@ REFUSED = {
 
 
 def test_what_is_refused(run, tmp_path: Path, study: Path) -> None:
+    (tmp_path / "dangling").symlink_to("nowhere")
     before = sorted(tmp_path.rglob("*"))
     for command, sentence in REFUSED.items():
         result = run(*command)
@@ -110,6 +159,8 @@ def test_what_is_refused(run, tmp_path: Path, study: Path) -> None:
         assert sentence in result.stderr
         assert result.stderr.startswith("error: ")
         assert result.stderr.count("\n") == 1, result.stderr
+        # Wrong input is refused before there is a progress bar; a place only when it is written.
+        assert ("Rendering" in result.stdout) == ("File exists" in sentence)
     edit = (("0.3,400,2\n", "", "hand.csv"), ('name = "touch"', "speed = 1", "set.toml"))
     sentences = ("'hand', got 1 of them", "expected only name, rate_hz")
     for (old, new, file), sentence in zip(edit, sentences, strict=True):

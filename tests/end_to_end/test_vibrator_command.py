@@ -10,7 +10,10 @@ import pytest
 import soundfile
 from PIL import Image
 
-from modeling import Vibrator, compensation_for
+from modeling import Limits, Vibrator, compensation_for
+from modeling.files import read_table
+from stimuli.exports import write_c_header
+from stimuli.planted import planted_texture
 from stimuli.vibrators import SimulatedVibrator
 
 RATE_HZ = 22050
@@ -53,9 +56,61 @@ def test_a_test_becomes_a_file_a_picture_and_one_line(run, tmp_path: Path, recor
     assert np.abs(20 * np.log10(truth)).max() > 9
     colours = np.unique(np.asarray(Image.open(tmp_path / "pen.png").convert("RGB")).reshape(-1, 3))
     assert colours.size > 20
-    provenance = json.loads((tmp_path / "rig/pen_provenance.json").read_text())
-    assert provenance["command"] == "tactileq vibrator"
-    assert list(provenance["inputs_sha256"]) == [str(recorded)]
+    for file in ("rig/pen.json", "pen.png"):
+        provenance = json.loads((tmp_path / f"{file}_provenance.json").read_text())
+        assert provenance["command"] == "tactileq vibrator"
+        assert list(provenance["inputs_sha256"]) == [str(recorded)]
+
+
+def test_what_is_found_goes_into_stimuli_and_exports(run, tmp_path: Path, recorded: Path) -> None:
+    for _ in range(2):  # its own files are replaced
+        done = run("vibrator", recorded, "--out", "pen.json", "--plot", "pen.png", "--simulated")
+        assert done.returncode == 0, done.stderr
+    model = planted_texture("canvas")
+    model.save(tmp_path / "canvas.json")
+    found = Vibrator.load(tmp_path / "pen.json")
+    done = run("stimuli", "canvas.json", "--vibrator", "pen.json", "--rate", 22050, "--out", "set")
+    assert done.returncode == 0, done.stderr
+    (row,) = read_table(tmp_path / "set/manifest.tsv", ("vibrator", "simulated"))
+    assert row["vibrator"] == "compensated"
+    inputs = json.loads((tmp_path / "set/provenance.json").read_text())["inputs_sha256"]
+    assert set(inputs) == {"canvas.json", "pen.json"}
+    # The same vibration, in a file of its own.
+    where = ("--speed", 150, "--force", 1.5, "--rate", 22050, "--out", "x.wav")
+    done = run("export", "wav", "canvas.json", "--vibrator", "pen.json", *where)
+    assert done.returncode == 0, done.stderr
+    assert "as drive for the vibrator: x.wav" in done.stdout
+    assert (tmp_path / "x.wav").read_bytes() == (tmp_path / "set" / row["file"]).read_bytes()
+    limits = ("--peak", 0.5, "--rms", 0.2, "--duration", 60)
+    done = run("export", "c", "canvas.json", "--vibrator", "pen.json", *limits)
+    assert done.stdout == ("texture_canvas (simulated) for a vibrator (simulated): canvas.h\n"), (
+        done.stderr
+    )
+    write_c_header(
+        tmp_path / "expected.h",
+        model,
+        limits=Limits(peak=0.5, rms=0.2, duration_s=60.0),
+        compensation=compensation_for(found, rate_hz=model.rate_hz),
+    )
+    text = (tmp_path / "expected.h").read_text(encoding="utf-8")
+    expected = text.replace('#include "expected.h"', '#include "canvas.h"')
+    assert (tmp_path / "canvas.h").read_text(encoding="utf-8") == expected
+    settings = json.loads((tmp_path / "canvas.h_provenance.json").read_text())["settings"]
+    assert settings["limits"] == {"peak": 0.5, "rms": 0.2, "duration_s": 60.0}
+
+
+def test_other_files_are_not_overwritten(run, tmp_path: Path, recorded: Path) -> None:
+    planted_texture("canvas").save(tmp_path / "canvas.json")
+    (tmp_path / "photo.png").write_bytes(b"mine")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    for options, name in (
+        (("--out", "canvas.json"), "canvas.json"),
+        (("--plot", "photo.png"), "photo.png"),
+    ):
+        refused = run("vibrator", recorded, *options)
+        assert refused.returncode == 1
+        assert f"earlier result of tactileq vibrator at {name}, got something" in refused.stderr
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_what_is_no_test_writes_nothing(run, tmp_path: Path, recorded: Path) -> None:

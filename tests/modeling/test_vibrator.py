@@ -151,6 +151,30 @@ def test_a_compensated_drive_arrives_as_it_was_meant(
     assert np.abs(moved(vibrator, meant) - 0.5 * meant).max() > 0.1
 
 
+@pytest.mark.parametrize(
+    ("frequency_hz", "bandwidth_hz", "rate_hz"),
+    [(80.0, 100.0, 48_000.0), (80.0, 2.0, 8000.0), (10.0, 60.0, 8000.0), (900.0, 1500.0, 5000.0)],
+)
+def test_a_compensation_forgets_within_its_time_to_settle(
+    frequency_hz: float, bandwidth_hz: float, rate_hz: float
+) -> None:
+    """Its slowest mode, read from what an impulse leaves behind, falls to a thousandth then."""
+    compensation = Compensation(
+        frequency_hz=frequency_hz, bandwidth_hz=bandwidth_hz, height=4.0, rate_hz=rate_hz
+    )
+    left = compensation.apply(np.eye(1, 200)[0])[1:]
+    # Two modes: each sample follows from the two before it.
+    recursion = np.linalg.lstsq(np.stack([left[1:-1], left[:-2]], axis=1), left[2:], rcond=None)[0]
+    slowest = np.abs(np.roots([1.0, *-recursion])).max()
+    assert slowest ** (compensation.settling_s * rate_hz) == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_a_narrow_notch_settles_as_its_envelope_does() -> None:
+    """exp(−πB·t) = 1/1000, with B = 2 Hz after 1.0994 s."""
+    narrow = Compensation(frequency_hz=80.0, bandwidth_hz=2.0, height=4.0, rate_hz=8000.0)
+    assert narrow.settling_s == pytest.approx(math.log(1000) / (math.pi * 2.0), rel=1e-3)
+
+
 @pytest.mark.parametrize("rate_hz", [5000.0, 48000.0])
 def test_the_renderer_compensates_as_apply_does(make_model, rate_hz) -> None:
     model = make_model(0.02, [(60.0, 20.0, 0.3), (250.0, 60.0, -0.2)])

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from modeling import TextureModel
+from modeling import TextureModel, Vibrator
 from stimuli.planted import planted_texture
 from stimuli.recipe import ModelEntry, Recipe, TrajectoryEntry
 
@@ -22,6 +22,24 @@ MakeRecipe = Callable[..., Recipe]
 def truth() -> TextureModel:
     """Three layers on a grid of 2 × 2."""
     return planted_texture("wall paper", **SMALL)
+
+
+@pytest.fixture
+def vibrator() -> Vibrator:
+    """One layer: 80 Hz, four times as strong as the flat part, which gives 0.3."""
+    return Vibrator(
+        rate_hz=22_050.0,
+        frequency_hz=80.0,
+        bandwidth_hz=25.0,
+        height=4.0,
+        flat_gain=0.3,
+        coherence=0.99,
+        lowest_hz=10.0,
+        highest_hz=1000.0,
+        curve_hz=[80.0],
+        curve_response=[1.2],
+        curve_coherence=[0.99],
+    )
 
 
 @pytest.fixture

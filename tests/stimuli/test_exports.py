@@ -15,9 +15,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
-from scipy.signal import freqz
+from scipy.signal import freqz, lfilter
 
-from modeling import ARModel, InputError, RegressedModel, Renderer, TextureModel
+from modeling import (
+    ARModel,
+    InputError,
+    Limits,
+    RegressedModel,
+    Renderer,
+    TextureModel,
+    Vibrator,
+    compensation_for,
+)
 from modeling.kernel import SWITCH
 from stimuli.exports import c_identifier, write_c_header, write_peq_json, write_wav
 from stimuli.planted import planted_texture
@@ -30,13 +39,13 @@ PRECISIONS = ("double", "float")
 RATES_HZ = (5000.0, 48_000.0)
 
 # Renders the texture of this number, in blocks of this size, for a stroke of n speeds and n forces
-# on standard input; to standard output: n samples, lift-offs, clamped values.
+# on standard input; to standard output: n samples, then the counters in their order.
 PROGRAM = """
 {includes}
 #include <stdio.h>
 #include <stdlib.h>
 enum {{ LONGEST = 20000, MOST_MEMORY = 2000 }};
-static double hand[2 * LONGEST], result[LONGEST + 2];
+static double hand[2 * LONGEST], result[LONGEST + 5];
 static tq_real speed[LONGEST], force[LONGEST], out[LONGEST], memory[MOST_MEMORY];
 int main(int argc, char **argv)
 {{
@@ -60,7 +69,10 @@ int main(int argc, char **argv)
         result[n] = (double)out[n];
     result[count] = (double)state.counters.lift_offs;
     result[count + 1] = (double)state.counters.clamped;
-    return fwrite(result, sizeof(double), count + 2, stdout) != count + 2;
+    result[count + 2] = (double)state.counters.peak;
+    result[count + 3] = (double)state.counters.rms;
+    result[count + 4] = (double)state.counters.duration;
+    return fwrite(result, sizeof(double), count + 5, stdout) != count + 5;
 }}
 """
 
@@ -87,7 +99,35 @@ MODELS: dict[str, TextureModel | RegressedModel] = {
     "regressed": renamed(planted_texture("canvas").regressed(), "regressed"),
     "centroid": renamed(planted_texture("MDF").regressed(by="centroid"), "centroid"),
     "beyond": regression_beyond_its_bounds(),
+    "compensated": renamed(planted_texture("MDF"), "compensated"),
+    "limited": renamed(planted_texture("canvas"), "limited"),
+    "limited in RMS": renamed(planted_texture("canvas"), "limited in RMS"),
 }
+VIBRATOR = Vibrator(
+    rate_hz=22_050.0,
+    frequency_hz=80.0,
+    bandwidth_hz=25.0,
+    height=4.0,
+    flat_gain=0.3,
+    coherence=0.99,
+    lowest_hz=10.0,
+    highest_hz=1000.0,
+    curve_hz=[80.0],
+    curve_response=[1.2],
+    curve_coherence=[0.99],
+)
+LIMITS = {
+    "limited": Limits(peak=0.3, duration_s=0.15, pause_s=0.005),
+    "limited in RMS": Limits(peak=0.3, rms=0.1, rms_window_s=0.05, duration_s=0.15, pause_s=0.005),
+}
+
+
+def restraints(texture: str, rate_hz: float) -> dict[str, Any]:
+    """Limits and compensation with which a model is rendered; on most there are none."""
+    if texture not in ("compensated", *LIMITS):
+        return {}
+    compensation = compensation_for(VIBRATOR, rate_hz=rate_hz)
+    return {"compensation": compensation, "limits": LIMITS.get(texture)}
 
 
 def stroke(rate_hz: float) -> tuple[np.ndarray, np.ndarray]:
@@ -125,7 +165,7 @@ class Program:
     rate_hz: float
 
     def render(self, texture: str, block: int) -> tuple[np.ndarray, list[float]]:
-        """The stroke in blocks of this size; the samples, lift-offs and clamped values."""
+        """The stroke in blocks of this size; the samples and the counters."""
         number = list(MODELS).index(texture)
         speed, force = stroke(self.rate_hz)
         done = subprocess.run(
@@ -135,7 +175,7 @@ class Program:
             check=True,
         )
         values = np.frombuffer(done.stdout)
-        return values[:-2], values[-2:].tolist()
+        return values[:-5], values[-5:].tolist()
 
 
 @pytest.fixture(scope="module", params=[(p, r) for p in PRECISIONS for r in RATES_HZ], ids=str)
@@ -147,9 +187,14 @@ def program(
     headers = [f"model{number}.h" for number in range(len(MODELS))]
     names = [
         write_c_header(
-            folder / header, model, rate_hz=rate_hz, seed=SEED, single=precision == "float"
+            folder / header,
+            model,
+            rate_hz=rate_hz,
+            seed=SEED,
+            single=precision == "float",
+            **restraints(texture, rate_hz),
         )
-        for header, model in zip(headers, MODELS.values(), strict=True)
+        for header, (texture, model) in zip(headers, MODELS.items(), strict=True)
     ]
     source = PROGRAM.format(
         includes="\n".join(f'#include "{header}"' for header in [*headers, headers[0]]),
@@ -168,19 +213,31 @@ def test_the_header_renders_what_python_renders(
     precision, exported = program
     speed, force = stroke(exported.rate_hz)
     monkeypatch.setenv(SWITCH, "1")  # in Python alone: nothing of the kernel on this side
-    renderer = Renderer(MODELS[texture], rate_hz=exported.rate_hz, seed=SEED)
+    options = restraints(texture, exported.rate_hz)
+    renderer = Renderer(MODELS[texture], rate_hz=exported.rate_hz, seed=SEED, **options)
     expected = renderer.render(speed, force)
     samples, counters = exported.render(texture, speed.size)
     assert counters[0] == renderer.counters.lift_offs > 0
     if precision == "double":
         assert np.array_equal(samples, expected)
-        assert counters[1] == renderer.counters.clamped
+        assert counters == list(vars(renderer.counters).values())
         assert (counters[1] > 0) == (texture == "beyond")
+        limited = [texture in LIMITS, texture == "limited in RMS", texture in LIMITS]
+        assert [count > 0 for count in counters[2:]] == limited
+    elif texture == "limited in RMS":
+        # The root of a small difference is not the same sample in single precision, but no louder.
+        assert running_rms(samples, exported.rate_hz).max() == pytest.approx(0.1, rel=1e-5)
     else:
         error = np.abs(samples - expected).max() / np.abs(expected).max()
         assert 0 < error < 1e-5
     for block in (1, 7, 256):
         assert np.array_equal(exported.render(texture, block)[0], samples)
+
+
+def running_rms(samples: np.ndarray, rate_hz: float) -> np.ndarray:
+    """Weighted by exp(−age/50 ms)."""
+    share = -np.expm1(-1 / (0.05 * rate_hz))
+    return np.sqrt(lfilter([share], [1, share - 1], samples**2))
 
 
 def test_the_program_in_the_comment_runs(tmp_path: Path) -> None:
@@ -202,6 +259,10 @@ def test_a_header_says_what_it_is(tmp_path: Path) -> None:
         assert words in comment
     write_c_header(tmp_path / "b.h", replace(planted_texture("canvas"), simulated=False))
     assert "simulated" not in (tmp_path / "b.h").read_text(encoding="utf-8")
+    assert "Not compensated for a vibrator. Limits: none." in comment
+    write_c_header(tmp_path / "c.h", MODELS["canvas"], **restraints("limited in RMS", 5000.0))
+    comment = (tmp_path / "c.h").read_text(encoding="utf-8").split("*/")[0]
+    assert "resonance at 80 Hz. Limits: peak 0.3 g, RMS 0.1 g, duration 0.15 s." in comment
 
 
 def test_two_exports_of_one_name_are_not_confused(tmp_path: Path) -> None:
@@ -241,7 +302,17 @@ C_REFUSED = {
     "with layers, got the autoregressive one of oak": (autoregressive(), {}),
     "of at least the model's 5000 Hz, got 4000": (CANVAS, {"rate_hz": 4000.0}),
     "of at least the model's 5000 Hz, got nan": (CANVAS, {"rate_hz": np.nan}),
+    "at most 768000 Hz, got 1e.12": (CANVAS, {"rate_hz": 1e12}),
+    "at most 768000 Hz, got inf": (CANVAS, {"rate_hz": np.inf}),
+    "compensation for 48000 Hz, got one for 5000": (
+        CANVAS,
+        {"rate_hz": 48_000.0, "compensation": compensation_for(VIBRATOR, rate_hz=5000.0)},
+    ),
     "expected a seed": (CANVAS, {"seed": -1}),
+    "hold and tell apart, got others in mean_square": (
+        CANVAS,
+        {"limits": Limits(rms=1e-30), "single": True},
+    ),
     "hold and tell apart, got others in values": (loud(1e40), {"single": True}),
     "hold and tell apart, got others in speed_mm_s": (CLOSE, {"single": True}),
 }
@@ -313,17 +384,24 @@ def recipe(model: Path, **changes: Any) -> Recipe:
     return Recipe(name="x", models=(ModelEntry(model, "m"),), trajectories=(entry,), **options)
 
 
-def test_a_wav_is_that_of_a_stimulus_set(tmp_path: Path) -> None:
+@pytest.mark.parametrize("compensated", [False, True])
+def test_a_wav_is_that_of_a_stimulus_set(tmp_path: Path, compensated: bool) -> None:
     CANVAS.save(tmp_path / "canvas.json")
-    told = write_wav(tmp_path / "a.wav", recipe(tmp_path / "canvas.json"))
-    (stimulus,) = write_set(tmp_path / "set", recipe(tmp_path / "canvas.json"))
+    VIBRATOR.save(tmp_path / "pen.json")
+    made = recipe(tmp_path / "canvas.json", vibrator=tmp_path / "pen.json" if compensated else None)
+    told = write_wav(tmp_path / "a.wav", made)
+    (stimulus,) = write_set(tmp_path / "set", made)
     assert told == stimulus
     assert (tmp_path / "a.wav").read_bytes() == (tmp_path / "set" / stimulus.file).read_bytes()
     rate_hz, samples = wavfile.read(tmp_path / "a.wav")
     assert (rate_hz, samples.dtype, samples.size) == (48_000, np.float32, 24_000)
     assert told.peak == pytest.approx(np.abs(samples).max(), rel=1e-6)
     steady = samples[480:-480].astype(float)  # the fades take 10 ms
-    assert told.level_db == pytest.approx(10 * np.log10(np.mean(steady**2)), abs=1e-4)
+    level_db = 10 * np.log10(np.mean(steady**2))
+    if compensated:  # the level is that at the hand, the file weaker by the resonance
+        assert told.level_db > level_db + 0.5
+    else:
+        assert told.level_db == pytest.approx(level_db, abs=1e-4)
 
 
 def test_a_recipe_of_several_stimuli_is_no_wav(tmp_path: Path) -> None:

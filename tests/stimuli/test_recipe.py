@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
-from modeling import InputError
+from modeling import InputError, Vibrator
+from stimuli.planted import planted_texture
 from stimuli.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sources import load_sources
 
 ROOT = Path(__file__).parent.parent.parent
 LEAST = """
@@ -21,6 +25,9 @@ path = "models"
 speed_mm_s = 150
 force_n = 1.5
 """
+
+
+HELD = TrajectoryEntry.constant(150.0, 1.5)
 
 
 def load(folder: Path, text: str) -> Recipe:
@@ -70,31 +77,48 @@ def test_every_key_of_the_documentation_is_read(tmp_path: Path) -> None:
     )
     assert [t.name for t in recipe.trajectories] == ["150mms_1.5N", "hand"]
     assert recipe.trajectories[1].file == tmp_path / "hand.csv"
+    assert recipe.vibrator == tmp_path / "vibrator.json"
 
 
+def test_the_recipe_of_the_readme(tmp_path: Path, vibrator: Vibrator) -> None:
+    """With the files that it names, a set can be made of it."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (text,) = re.findall("```toml\n(.*?)```", readme, flags=re.DOTALL)
+    for folder in ("models", "simplified"):
+        planted_texture("canvas").save(tmp_path / folder / "canvas.json")
+    (tmp_path / "hand.csv").write_text("time_s,speed_mm_s,force_n\n0,0,1\n1,200,1\n")
+    vibrator.save(tmp_path / "vibrator.json")
+    recipe = load(tmp_path, text)
+    assert [entry.label for entry in recipe.models] == ["models", "simplified"]
+    assert [hand.duration_s for hand in load_sources(recipe).trajectories] == [1.0]
+
+
+paths = st.text().map(Path)  # whatever a file system holds
 names = st.text(st.characters(categories=("L", "N", "P", "S")), min_size=1)
 numbers = st.floats(0, 1e4, allow_subnormal=False)
 constants = st.builds(TrajectoryEntry, name=names, speed_mm_s=numbers, force_n=numbers)
-hands = st.builds(TrajectoryEntry, name=names, file=names.map(lambda n: Path(f"{n}.csv")))
+hands = st.builds(TrajectoryEntry, name=names, file=paths)
 levels = st.one_of(
     st.just(Level(full_scale_g=2.5)),
     st.builds(Level, mode=st.just("rms"), rms_db=st.floats(-100, 100), full_scale_g=st.just(1.0)),
     st.builds(
         Level,
         mode=st.just("loudness"),
+        threshold=st.just("pen-hold") | st.text().map(lambda name: Path(f"{name}x.tsv")),
         sensation_level_db=st.none() | st.floats(-50, 100),
         full_scale_g=st.floats(1e-3, 1e3),
     ),
 )
 
 
+CONTROLS = Recipe(name="x", models=(ModelEntry(Path("\x7f\x80\0\r\n"), "x"),), trajectories=(HELD,))
+
+
 @given(
     recipe=st.builds(
         Recipe,
         name=names,
-        models=st.lists(st.builds(ModelEntry, names.map(Path), names), min_size=1, unique=True).map(
-            tuple
-        ),
+        models=st.lists(st.builds(ModelEntry, paths, names), min_size=1, unique=True).map(tuple),
         trajectories=st.lists(
             constants | hands, min_size=1, max_size=4, unique_by=lambda t: t.name
         ).map(tuple),
@@ -105,16 +129,31 @@ levels = st.one_of(
         duration_s=st.floats(0.001, 3600),
         settling_s=st.floats(0, 60),
         level=levels,
+        vibrator=st.none() | paths,
     )
 )
+@example(recipe=CONTROLS)
 def test_text_keeps_all_of_a_recipe(recipe: Recipe, tmp_path_factory: pytest.TempPathFactory):
     file = tmp_path_factory.getbasetemp() / "any.toml"
     file.write_text(recipe.to_toml(), encoding="utf-8")
-    again = Recipe.load(file)
-    # What the file names is relative to its folder; put it back.
-    folder = f"{file.parent.as_posix()}/"
-    loaded = again.to_toml().replace(folder, "")
-    assert loaded == recipe.to_toml()
+    assert Recipe.load(file) == below(recipe, file.parent)
+
+
+def below(recipe: Recipe, folder: Path) -> Recipe:
+    """What the recipe means where it lies in this folder."""
+    threshold = recipe.level.threshold
+    if isinstance(threshold, Path):
+        threshold = folder / threshold
+    return replace(
+        recipe,
+        models=tuple(replace(entry, path=folder / entry.path) for entry in recipe.models),
+        trajectories=tuple(
+            entry if entry.file is None else replace(entry, file=folder / entry.file)
+            for entry in recipe.trajectories
+        ),
+        level=replace(recipe.level, threshold=threshold),
+        vibrator=None if recipe.vibrator is None else folder / recipe.vibrator,
+    )
 
 
 def refused(folder: Path, old: str, new: str) -> str:
@@ -160,14 +199,22 @@ def refused(folder: Path, old: str, new: str) -> str:
         ('"least"', '"least", duration_s = 3601', "to 3600 for duration_s, got 3601"),
         ('"least"', '"least", duration_s = true', "for duration_s, got True"),
         ('"least"', '"least", settling_s = 61', "for settling_s, got 61"),
-        ('"least"', '"least", seeds = [1, 1]', "each seeds once in the recipe, got 1 twice"),
+        ('"least"', '"least", seeds = [1, 1]', "each seed once in the recipe, got 1 twice"),
+        ('"least"', '"least", seeds = []', "expected at least one seed in the recipe, got none"),
+        ('"least"', '"least", vibrator = 3', "expected text for vibrator under [set], got 3"),
         ('"least"', '"least", seeds = [-1]', "for seed, got -1"),
         ('"least"', '"least", seeds = [0.5]', "for seed, got 0.5"),
         ("speed_mm_s = 150", "speed_mm_s = -150", "for speed_mm_s, got -150"),
         ("speed_mm_s = 150", "speed_mm_s = inf", "for speed_mm_s, got inf"),
         ("force_n = 1.5", 'force_n = "much"', "for force_n, got 'much'"),
-        ("force_n = 1.5", "", "expected speed_mm_s and force_n, or a file, in the trajectory"),
-        ("force_n = 1.5", 'force_n = 1.5\nfile = "hand.csv"', "in the trajectory 'hand'"),
+        ("force_n = 1.5", "", "or a file, in each [[trajectory]], got speed_mm_s; give the two"),
+        ("force_n = 1.5", 'name = "x"', "or a file, in the trajectory 'x', got speed_mm_s; give"),
+        (
+            "speed_mm_s = 150\nforce_n = 1.5",
+            'name = "x"',
+            "in the trajectory 'x', got none of them",
+        ),
+        ("force_n = 1.5", 'force_n = 1.5\nfile = "hand.csv"', "got speed_mm_s, force_n, file;"),
         ("force_n = 1.5", "force_n = 1.5\nname = 3", "as name of a trajectory, got 3"),
     ],
 )

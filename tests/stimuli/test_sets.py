@@ -280,6 +280,11 @@ def a_hand_of_one_sample(folder: Path, recipe: Recipe) -> Recipe:
     return replace(recipe, trajectories=(TrajectoryEntry(name="h", file=folder / "hand.csv"),))
 
 
+def a_hand_in_microseconds(folder: Path, recipe: Recipe) -> Recipe:
+    (folder / "hand.csv").write_text("time_s,speed_mm_s,force_n\n0,100,1\n1e-5,100,1\n")
+    return replace(recipe, trajectories=(TrajectoryEntry(name="h", file=folder / "hand.csv"),))
+
+
 def names_that_meet(folder: Path, recipe: Recipe) -> Recipe:
     entry = recipe.trajectories[0]
     return replace(recipe, trajectories=(replace(entry, name="a b"), replace(entry, name="a-b")))
@@ -299,6 +304,7 @@ DAMAGES = {
     an_empty_folder: "expected model files in .*empty",
     one_texture_twice: "one model of each texture under each label, got two of wall paper",
     a_hand_of_one_sample: "at least two rising times.*'h', got 1 of them",
+    a_hand_in_microseconds: "at least one sample at 8000 Hz, got 1e-05 s in 'h'; see whether",
     names_that_meet: "a name of its own, got wall-paper_full_a-b.wav twice",
     no_threshold: "expected a table at .*none.tsv",
     a_slow_rate: r"at least the model's 5000 Hz for wall paper \(full\), got 4000 Hz",

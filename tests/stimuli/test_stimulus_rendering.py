@@ -11,8 +11,9 @@ import soundfile
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
+from scipy.signal import iirpeak, lfilter
 
-from modeling import Renderer, TextureModel, fit_ar
+from modeling import Compensation, Renderer, TextureModel, fit_ar
 from stimuli.planted import planted_texture, record_texture
 from stimuli.recipe import TrajectoryEntry
 from stimuli.rendering import (
@@ -38,7 +39,7 @@ def stroke(duration_s: float = SECONDS) -> Trajectory:
 
 def rendered(model: AnyModel, rate_hz: int, duration_s: float = SECONDS) -> np.ndarray:
     whole = render_with_margins(model, stroke(duration_s), seed=1, stream=2, settling_s=0.5)
-    return at_rate(whole, model.rate_hz, rate_hz=rate_hz, duration_s=duration_s)
+    return at_rate(whole, model.rate_hz, rate_hz=rate_hz, duration_s=duration_s, settling_s=0.5)
 
 
 def third_octaves_db(vibration: np.ndarray) -> np.ndarray:
@@ -102,7 +103,8 @@ def test_a_sinusoid_stays_one_up_to_the_ends() -> None:
     for rate_hz in (44_100, 48_000, 5003):
         margin = margin_samples(5000.0)
         time_s = (np.arange(5000 + 2 * margin) - margin) / 5000.0
-        found = at_rate(np.sin(2 * np.pi * 2200 * time_s), 5000.0, rate_hz=rate_hz, duration_s=1.0)
+        tone = np.sin(2 * np.pi * 2200 * time_s)
+        found = at_rate(tone, 5000.0, rate_hz=rate_hz, duration_s=1.0, settling_s=0.0)
         expected = np.sin(2 * np.pi * 2200 * np.arange(rate_hz) / rate_hz)
         error = steady_part(found - expected, rate_hz)
         assert 20 * np.log10(np.abs(error).max()) < -110
@@ -114,7 +116,11 @@ def test_odd_model_rates_keep_their_frequencies() -> None:
     margin = margin_samples(model_rate_hz)
     time_s = (np.arange(round(2 * model_rate_hz) + 2 * margin) - margin) / model_rate_hz
     found = at_rate(
-        np.sin(2 * np.pi * 1000 * time_s), model_rate_hz, rate_hz=48_000, duration_s=2.0
+        np.sin(2 * np.pi * 1000 * time_s),
+        model_rate_hz,
+        rate_hz=48_000,
+        duration_s=2.0,
+        settling_s=0.0,
     )
     expected = np.sin(2 * np.pi * 1000 * np.arange(96_000) / 48_000)
     # 2e-6 of 1 kHz over 2 s is 0.025 rad.
@@ -156,7 +162,7 @@ def test_a_moving_hand_moves_the_spectrum() -> None:
     )
     hand = Trajectory("step", [5.0, 6.0, 6.001, 7.0], [100.0, 100.0, 300.0, 300.0], [2.0] * 4)
     whole = render_with_margins(one, hand, seed=3, stream=0, settling_s=0.5)
-    found = at_rate(whole, 5000.0, rate_hz=5000, duration_s=2.0)
+    found = at_rate(whole, 5000.0, rate_hz=5000, duration_s=2.0, settling_s=0.5)
     for half, frequency_hz in ((found[500:5000], 80.0), (found[5500:], 240.0)):
         lines = np.abs(np.fft.rfft(half)) ** 2
         frequency = np.fft.rfftfreq(half.size, 1 / 5000)
@@ -168,7 +174,68 @@ def test_lift_off_is_silent() -> None:
     hand = Trajectory("off", [0.0, 1.0], [np.nan] * 2, [np.nan] * 2)
     model = planted_texture("PVC", **SMALL)
     whole = render_with_margins(model, hand, seed=0, stream=0, settling_s=0.5)
-    assert not at_rate(whole, 5000.0, rate_hz=48_000, duration_s=1.0).any()
+    assert not at_rate(whole, 5000.0, rate_hz=48_000, duration_s=1.0, settling_s=0.5).any()
+
+
+@pytest.mark.parametrize("rate_hz", RATES_HZ)
+def test_the_drive_gives_the_vibration_meant(rate_hz: int) -> None:
+    """A vibrator of one layer, flat gain 0.3, answers it with 0.3 times the vibration."""
+    frequency_hz, bandwidth_hz, height = 80.0, 25.0, 4.0
+    whole = render_with_margins(
+        planted_texture("canvas", **SMALL), stroke(), seed=1, stream=2, settling_s=0.5
+    )
+    vibration, drive = (
+        at_rate(
+            whole,
+            5000.0,
+            rate_hz=rate_hz,
+            duration_s=SECONDS,
+            settling_s=0.5,
+            compensation=compensation,
+        )
+        for compensation in (None, notch(frequency_hz, bandwidth_hz, height, rate_hz=rate_hz))
+    )
+    b, a = iirpeak(frequency_hz, frequency_hz / bandwidth_hz, fs=rate_hz)
+    answer = 0.3 * (drive + (height - 1) * lfilter(b, a, drive))
+    # The test's own vibrator starts at rest; 0.4 s later its 25 Hz wide band has forgotten that.
+    late = slice(round(0.4 * rate_hz), -fade_samples(vibration.size, rate_hz))
+    assert np.abs(answer - 0.3 * vibration)[late].max() < 1e-9
+    assert np.abs(drive - vibration)[late].max() > 0.05
+
+
+def notch(frequency_hz: float, bandwidth_hz: float, height: float, *, rate_hz: int) -> Compensation:
+    """METHOD 9: the notch whose tan(πB/fs) is that of the resonance times its height."""
+    widened = height * np.tan(np.pi * bandwidth_hz / rate_hz)
+    return Compensation(
+        frequency_hz=frequency_hz,
+        bandwidth_hz=rate_hz / np.pi * np.arctan(widened),
+        height=height,
+        rate_hz=rate_hz,
+    )
+
+
+def test_a_drive_has_settled_where_it_begins() -> None:
+    """After the compensation's own time to settle as after any longer time, to a thousandth."""
+    compensation = notch(80.0, 1.5, 4.0, rate_hz=8000)
+    whole = render_with_margins(
+        planted_texture("canvas", **SMALL), stroke(), seed=1, stream=2, settling_s=5.0
+    )
+
+    def driven(settling_s: float) -> np.ndarray:
+        return at_rate(
+            whole[round((5.0 - settling_s) * 5000) :],
+            5000.0,
+            rate_hz=8000,
+            duration_s=SECONDS,
+            settling_s=settling_s,
+            compensation=compensation,
+        )
+
+    assert 0.3 < compensation.settling_s < 0.4
+    settled = driven(5.0)
+    error = [np.abs(driven(s) - settled).max() for s in (0.0, compensation.settling_s)]
+    largest = np.abs(settled).max()
+    assert error[1] < 1e-3 * largest < error[0]
 
 
 @given(
