@@ -289,8 +289,10 @@ def study_from(path: Path | None) -> Study:
 def load_models(folder: Path) -> dict[str, TextureModel]:
     """All models of a folder by the name of their texture; two of one texture are refused."""
     from modeling import TextureModel
+    from stimuli.sources import is_something_else
 
     paths = sorted(p for p in folder.glob("*.json") if not p.name.endswith("provenance.json"))
+    paths = [path for path in paths if not is_something_else(path)]
     if not paths:
         raise ValueError(f"expected model files in {folder}, got none; fit or simplify some first.")
     models: dict[str, TextureModel] = {}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from modeling import InputError
+from modeling.files import read_toml
 
 Task = Literal["absolute", "relative"]
 Schedule = Literal["by-day", "interleaved"]
@@ -215,16 +215,7 @@ class Study:
             If the file is missing, is not TOML, or holds unknown keys or values out of range.
         """
         file = Path(path)
-        try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(
-                f"expected a study file at {file}, got {error.strerror}; give its path."
-            ) from None
-        except ValueError as error:
-            raise InputError(
-                f"expected TOML in {file}, got something else ({error}); correct that line."
-            ) from None
+        values = read_toml(file, "a study file")
         try:
             return Study.from_dict(values)
         except InputError as error:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import shutil
 import tempfile
+import tomllib
 import warnings
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from modeling.errors import InputError
 
@@ -18,6 +20,20 @@ def file_stem(name: str) -> str:
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
     # "", "." and ".." would not be a file in the folder but another folder.
     return kept if kept.strip(".") else "-" * max(len(kept), 1)
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The contents of a TOML file; InputError naming `what` is expected where it is none."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(
+            f"expected {what} at {path}, got {error.strerror}; give its path."
+        ) from None
+    except ValueError as error:
+        raise InputError(
+            f"expected TOML in {path}, got something else ({error}); correct that line."
+        ) from None
 
 
 def write_text(path: str | Path, text: str) -> None:

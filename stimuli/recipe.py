@@ -41,13 +41,13 @@ What stands in brackets applies where the key is left out; `name` under [set], `
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modeling import InputError
+from modeling.files import read_toml
 from stimuli.checks import check_choice, check_name, check_number, check_whole
 
 SampleFormat = Literal["float32", "pcm24"]
@@ -273,16 +273,7 @@ class Recipe:
             values out of range. The files that it names are read later, by `sources.load`.
         """
         file = Path(path)
-        try:
-            values = tomllib.loads(file.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(
-                f"expected a recipe at {file}, got {error.strerror}; give its path."
-            ) from None
-        except ValueError as error:
-            raise InputError(
-                f"expected TOML in {file}, got something else ({error}); correct that line."
-            ) from None
+        values = read_toml(file, "a recipe")
         try:
             return _recipe_from(values, file.parent)
         except InputError as error:

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis")
-FRONT = ("tactileq", "steps", "modeling_steps")
+FRONT = ("tactileq", "steps", "modeling_steps", "rendering_commands", "rendering_steps")
 
 
 def imported(path: Path) -> set[str]:
