@@ -10,6 +10,7 @@ from scipy.signal import bilinear, freqz, lfilter
 
 from modeling.errors import InputError, check_rate
 from modeling.peq import HIGHEST_FREQUENCY_SHARE, LOWEST_FREQUENCY_HZ, Floats
+from modeling.vibrator import Vibrator
 
 
 @dataclass(frozen=True)
@@ -74,3 +75,27 @@ class SimulatedVibrator:
         damped = [1.0, omega / self.quality, omega**2]
         numerator, denominator = bilinear(through, damped, fs=warped_rate_hz)
         return np.asarray(numerator), np.asarray(denominator)
+
+
+def planted_vibrator(frequency_hz: float = 80.0, bandwidth_hz: float = 25.0) -> Vibrator:
+    """What a test of a vibrator of one layer would find: four times as strong there as elsewhere.
+
+    Parameters
+    ----------
+    frequency_hz, bandwidth_hz : float
+        Peak and −3 dB width; see `PEQ`.
+    """
+    return Vibrator(
+        rate_hz=22_050.0,
+        frequency_hz=frequency_hz,
+        bandwidth_hz=bandwidth_hz,
+        height=4.0,
+        flat_gain=0.3,
+        coherence=0.99,
+        lowest_hz=frequency_hz / 2,
+        highest_hz=4 * frequency_hz,
+        curve_hz=np.array([frequency_hz]),
+        curve_response=np.array([1.2]),
+        curve_coherence=np.array([0.99]),
+        simulated=True,
+    )

@@ -11,10 +11,11 @@ from matplotlib.text import Text
 
 from analysis.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
 from analysis.figures_stimuli import figure_contact_sheet, plot_stimuli
-from modeling import TextureModel, Vibrator
+from modeling import TextureModel
 from stimuli.planted import planted_texture
 from stimuli.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets import write_set
+from stimuli.vibrators import planted_vibrator
 
 GRID = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 TEXTURES = ("PVC", "canvas")
@@ -83,19 +84,7 @@ def test_24_bit_files_have_the_same_spectra(tmp_path: Path) -> None:
 
 def test_spectra_of_a_vibrators_set_are_those_of_its_drive(tmp_path: Path) -> None:
     """Four times weaker at the resonance, alike far from it; levels as without."""
-    Vibrator(
-        rate_hz=22_050.0,
-        frequency_hz=200.0,
-        bandwidth_hz=50.0,
-        height=4.0,
-        flat_gain=0.3,
-        coherence=0.99,
-        lowest_hz=10.0,
-        highest_hz=1000.0,
-        curve_hz=[200.0],
-        curve_response=[1.2],
-        curve_coherence=[0.99],
-    ).save(tmp_path / "pen.json")
+    planted_vibrator(200.0, 50.0).save(tmp_path / "pen.json")
     few = {"seeds": (1,), "rates_hz": (8000,), "duration_s": 1.0}
     write_set(tmp_path / "plain", recipe_of(tmp_path, **few))
     write_set(tmp_path / "driven", recipe_of(tmp_path, vibrator=tmp_path / "pen.json", **few))

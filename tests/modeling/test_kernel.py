@@ -21,6 +21,9 @@ from modeling.peq import band_coefficients
 from stimuli.planted import CATALOGUE, planted_texture
 
 
+pytestmark = pytest.mark.skipif(modeling.kernel.lib is None, reason="no kernel was compiled")
+
+
 def wild_model(layers: int, seed: int = 0, *, rate_hz: float = 5000.0) -> TextureModel:
     """Layers all over the legal range, from corner to corner of the grid, gains of either sign."""
     rng = np.random.default_rng(seed)
@@ -47,7 +50,9 @@ class Notch:
     band_share: float = 0.7
 
 
-def both(make: Callable[[], Renderer], speed: np.ndarray, force: np.ndarray) -> list[Renderer]:
+def assert_same_bits(
+    make: Callable[[], Renderer], speed: np.ndarray, force: np.ndarray
+) -> list[Renderer]:
     """The same stroke by kernel and in Python: equal bits, equal counters. The renderers."""
     compiled = make()
     with pytest.MonkeyPatch.context() as patch:
@@ -75,21 +80,21 @@ def test_bits_are_equal_whatever_the_hand_does(
     layers: int, hand: np.ndarray, update_samples: int, seed: int
 ) -> None:
     model = wild_model(layers, seed % 7)
-    both(lambda: Renderer(model, seed=seed, update_samples=update_samples), *hand)
+    assert_same_bits(lambda: Renderer(model, seed=seed, update_samples=update_samples), *hand)
 
 
 @pytest.mark.parametrize("rate_hz", [5000.0, 5001.0, 44100.0, 48000.0])
 @pytest.mark.parametrize("texture", sorted(CATALOGUE))
 def test_bits_are_equal_at_other_rates(texture: str, rate_hz: float) -> None:
     stroke = 200 * np.sin(np.linspace(0, 12, 900)), np.linspace(-0.2, 4, 900)
-    both(lambda: Renderer(planted_texture(texture), rate_hz=rate_hz, seed=1), *stroke)
+    assert_same_bits(lambda: Renderer(planted_texture(texture), rate_hz=rate_hz, seed=1), *stroke)
 
 
 def test_bits_are_equal_for_regressions() -> None:
     for by in ("conditions", "centroid"):
         model = planted_texture("canvas").regressed(by=by)
         stroke = 300 * np.sin(np.linspace(0, 9, 2000)), np.linspace(0, 4, 2000)
-        both(lambda model=model: Renderer(model, seed=1), *stroke)
+        assert_same_bits(lambda model=model: Renderer(model, seed=1), *stroke)
 
 
 def test_bits_are_equal_with_compensation_and_limits() -> None:
@@ -97,7 +102,7 @@ def test_bits_are_equal_with_compensation_and_limits() -> None:
     limits = Limits(peak=0.9, rms=0.4, rms_window_s=0.05, duration_s=0.3, pause_s=0.01)
     speed, force = np.full(6000, 200.0), np.full(6000, 2.0)
     force[2500:2700] = 0.0
-    renderers = both(
+    renderers = assert_same_bits(
         lambda: Renderer(model, seed=3, limits=limits, compensation=Notch()), speed, force
     )
     counters = renderers[0].counters

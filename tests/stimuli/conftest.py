@@ -12,6 +12,7 @@ import pytest
 from modeling import TextureModel, Vibrator
 from stimuli.planted import planted_texture
 from stimuli.recipe import ModelEntry, Recipe, TrajectoryEntry
+from stimuli.vibrators import planted_vibrator
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 
@@ -27,19 +28,7 @@ def truth() -> TextureModel:
 @pytest.fixture
 def vibrator() -> Vibrator:
     """One layer: 80 Hz, four times as strong as the flat part, which gives 0.3."""
-    return Vibrator(
-        rate_hz=22_050.0,
-        frequency_hz=80.0,
-        bandwidth_hz=25.0,
-        height=4.0,
-        flat_gain=0.3,
-        coherence=0.99,
-        lowest_hz=10.0,
-        highest_hz=1000.0,
-        curve_hz=[80.0],
-        curve_response=[1.2],
-        curve_coherence=[0.99],
-    )
+    return planted_vibrator()
 
 
 @pytest.fixture

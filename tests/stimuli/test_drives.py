@@ -80,9 +80,9 @@ def test_a_simulated_vibrator_makes_simulated_drives(
 ) -> None:
     replace(truth, simulated=False).save(tmp_path / "full/paper.json")
     made = recipe(models=(ModelEntry(tmp_path / "full", "full"),), vibrator=pen)
-    assert {s.simulated for s in write_set(tmp_path / "a", made)} == {"false"}
-    replace(vibrator, simulated=True).save(pen)
-    assert {s.simulated for s in write_set(tmp_path / "b", made)} == {"true"}
+    assert {s.simulated for s in write_set(tmp_path / "a", made)} == {"true"}
+    replace(vibrator, simulated=False).save(pen)
+    assert {s.simulated for s in write_set(tmp_path / "b", made)} == {"false"}
 
 
 @pytest.mark.parametrize("mode", ["rms", "loudness"])

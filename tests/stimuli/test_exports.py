@@ -24,7 +24,6 @@ from modeling import (
     RegressedModel,
     Renderer,
     TextureModel,
-    Vibrator,
     compensation_for,
 )
 from modeling.kernel import SWITCH
@@ -32,6 +31,7 @@ from stimuli.exports import c_identifier, write_c_header, write_peq_json, write_
 from stimuli.planted import planted_texture
 from stimuli.recipe import ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets import write_set
+from stimuli.vibrators import planted_vibrator
 
 SEED = 7
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
@@ -103,19 +103,7 @@ MODELS: dict[str, TextureModel | RegressedModel] = {
     "limited": renamed(planted_texture("canvas"), "limited"),
     "limited in RMS": renamed(planted_texture("canvas"), "limited in RMS"),
 }
-VIBRATOR = Vibrator(
-    rate_hz=22_050.0,
-    frequency_hz=80.0,
-    bandwidth_hz=25.0,
-    height=4.0,
-    flat_gain=0.3,
-    coherence=0.99,
-    lowest_hz=10.0,
-    highest_hz=1000.0,
-    curve_hz=[80.0],
-    curve_response=[1.2],
-    curve_coherence=[0.99],
-)
+VIBRATOR = planted_vibrator()
 LIMITS = {
     "limited": Limits(peak=0.3, duration_s=0.15, pause_s=0.005),
     "limited in RMS": Limits(peak=0.3, rms=0.1, rms_window_s=0.05, duration_s=0.15, pause_s=0.005),
