@@ -20,7 +20,6 @@ from modeling.noise import stream_key, white_noise
 from modeling.peq import band_coefficients
 from stimuli.planted import CATALOGUE, planted_texture
 
-
 pytestmark = pytest.mark.skipif(modeling.kernel.lib is None, reason="no kernel was compiled")
 
 
