@@ -269,10 +269,11 @@ def export_wav_file(
         seed=seed,
         vibrator=vibrator,
     )
-    stimulus = write_wav(target, recipe)
+    sources = load_sources(recipe)
+    stimulus = write_wav(target, recipe, sources=sources)
     settings = {"recipe": recipe.to_toml()}
     write_provenance(marker, "export wav", settings, seed=seed, inputs=recipe.files())
-    tell_beyond_grid(load_sources(recipe))
+    tell_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
     print(

@@ -19,7 +19,7 @@ from analysis.stability import (
     moving_variances,
     simulate,
 )
-from modeling import Limits, Recording, Renderer, TextureModel, similarity
+from modeling import Recording, Renderer, TextureModel, similarity
 from modeling.motion import Foresight
 from modeling.noise import stream_key, white_noise
 from modeling.peq import band_rms
@@ -90,12 +90,7 @@ def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) ->
 
     Frequencies and widths are held from update to update; gains move.
     """
-    plan = RenderPlan(
-        rate_hz=model.rate_hz,
-        update_samples=update_samples,
-        limits=Limits(),
-        compensation=None,
-    )
+    plan = RenderPlan(rate_hz=model.rate_hz, update_samples=update_samples)
     readings = (reading[::update_samples] for reading in hand)
     amid, end = (model.parameters(*foreseen) for foreseen in Foresight(plan)(*readings))
     gains = np.column_stack([end.noise_gain, end.gains])

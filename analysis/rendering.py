@@ -26,7 +26,6 @@ from analysis.rivals import (
     SosfiltStream,
     compiled_parts,
     layered_texture,
-    plan_of,
     predictor_of,
     tabled_predictor,
 )
@@ -34,7 +33,7 @@ from modeling import Renderer
 from modeling.filters import BandFilter, PythonEngine
 from modeling.noise import stream_key
 from modeling.peq import Floats
-from modeling.plan import LayeredModel
+from modeling.plan import LayeredModel, RenderPlan
 
 LAYERS = (1, 3, 8)
 UPDATES = (1, 5, 32)
@@ -272,7 +271,7 @@ def _sweep(effort: Effort) -> pd.DataFrame:
 def _in_python(effort: Effort) -> dict[str, Any]:
     """What renders where nothing was compiled."""
     texture = layered_texture(3)
-    plan = plan_of(texture, SWEEP_UPDATE)
+    plan = RenderPlan(rate_hz=texture.rate_hz, update_samples=SWEEP_UPDATE)
     engine = PythonEngine(BandFilter(texture, plan), plan, key=stream_key(0))
     hand = stroke(_PYTHON_SAMPLES, rate_hz=RATE_HZ)
     best = _best_seconds({PYTHON: partial(engine.render, *hand)}, min(effort.turns, 5))

@@ -13,7 +13,6 @@ from scipy.signal import sosfilt
 from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.autoregressive import fit_filter
 from modeling.kernel import CompiledEngine
-from modeling.limits import Limits
 from modeling.line_spectral import line_spectral_frequencies
 from modeling.noise import stream_key
 from modeling.peq import Floats
@@ -46,13 +45,6 @@ def compiled_parts(name: str) -> tuple[Any, Any]:
             f"expected the compiled {name}, got none; install a C compiler, then tactileq again."
         ) from error
     return module.ffi, module.lib
-
-
-def plan_of(model: LayeredModel, update_samples: int) -> RenderPlan:
-    """Rendering at the model's own rate without limits and compensation."""
-    return RenderPlan(
-        rate_hz=model.rate_hz, update_samples=update_samples, limits=Limits(), compensation=None
-    )
 
 
 def layered_texture(layers: int) -> TextureModel:
@@ -142,7 +134,8 @@ class CompiledStream:
 
     def __init__(self, name: str, model: LayeredModel, *, update_samples: int, seed: int) -> None:
         ffi, lib = compiled_parts("modeling._kernel")
-        plan, key = plan_of(model, update_samples), stream_key(seed)
+        key = stream_key(seed)
+        plan = RenderPlan(rate_hz=model.rate_hz, update_samples=update_samples)
         # Kept, because it owns what the texture points at.
         self._engine = CompiledEngine(model, plan, key=key)
         self._ffi, self._call = ffi, lib.tq_render

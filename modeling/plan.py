@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -75,6 +75,7 @@ class RenderPlan:
     update_samples : int
         From one parameter update to the next, 1 … 1 000 000.
     limits : Limits
+        None by default.
     compensation : Notch, optional
         At this rate.
 
@@ -86,8 +87,8 @@ class RenderPlan:
 
     rate_hz: float
     update_samples: int
-    limits: Limits
-    compensation: Notch | None
+    limits: Limits = field(default_factory=Limits)
+    compensation: Notch | None = None
 
     def __post_init__(self) -> None:
         whole = isinstance(self.update_samples, int | np.integer)

@@ -85,7 +85,7 @@ class Renderer:
         if update_samples is None:
             finite = np.isfinite(self.rate_hz)
             update_samples = max(1, round(UPDATE_S * self.rate_hz)) if finite else 1
-        plan = RenderPlan(
+        self.plan = plan = RenderPlan(
             rate_hz=self.rate_hz,
             update_samples=update_samples,
             limits=limits or Limits(),

@@ -32,7 +32,7 @@ from modeling.saved import dump_json
 from stimuli.manifest import Stimulus
 from stimuli.recipe import HIGHEST_RATE_HZ, Recipe
 from stimuli.sets import check_clipping, rendered, stimulus_count
-from stimuli.sources import AnyModel, load_sources
+from stimuli.sources import AnyModel, Sources, load_sources
 
 Layered = TextureModel | RegressedModel
 
@@ -138,12 +138,7 @@ def _plan(
             "converter is faster, so lower it."
         )
     renderer = Renderer(model, rate_hz=rate_hz, seed=seed, limits=limits, compensation=compensation)
-    return RenderPlan(
-        rate_hz=renderer.rate_hz,
-        update_samples=renderer.update_samples,
-        limits=limits or Limits(),
-        compensation=compensation,
-    )
+    return renderer.plan
 
 
 def c_identifier(texture: str) -> str:
@@ -253,7 +248,7 @@ def _quoted(text: str) -> str:
 # --- WAV --------------------------------------------------------------------------------------
 
 
-def write_wav(path: str | Path, recipe: Recipe) -> Stimulus:
+def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = None) -> Stimulus:
     """Write the only stimulus of a recipe to a WAV file, by default 32-bit floats in g.
 
     Parameters
@@ -262,6 +257,8 @@ def write_wav(path: str | Path, recipe: Recipe) -> Stimulus:
         The very file that the recipe's set would hold (`write_set`); there whole or not at all.
     recipe : Recipe
         Of one model, trajectory, rate and seed.
+    sources : Sources, optional
+        The recipe's, where they are loaded already.
 
     Returns
     -------
@@ -273,7 +270,7 @@ def write_wav(path: str | Path, recipe: Recipe) -> Stimulus:
     InputError
         For a recipe of several stimuli, or one that `write_set` refuses.
     """
-    sources = load_sources(recipe)
+    sources = sources or load_sources(recipe)
     count = stimulus_count(recipe, sources)
     if count != 1:
         raise InputError(

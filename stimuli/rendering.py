@@ -33,8 +33,8 @@ def render_with_margins(
 
     Rendering begins `settling_s` and `MARGIN_S` before the start, with the first condition held,
     while the filters settle, and goes on for `MARGIN_S` after the end. Not rendered at the file's
-    rate, since a filter warps less there and its far skirts rise by up to 1 dB (METHOD 3): so every
-    rate has the same spectrum.
+    rate, since a filter warps less there and its skirts near the model's Nyquist frequency rise
+    (see `Renderer`): so every rate has the same spectrum.
 
     Returns
     -------
