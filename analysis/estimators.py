@@ -21,16 +21,10 @@ from modeling import (
     similarity,
     spectrum,
 )
-from modeling.autoregressive import fit_filter, tapered
-from modeling.coherent import CoherentFit, as_layers
-from modeling.likelihood import (
-    bins_near,
-    centres_and_widths,
-    coherent,
-    limits_of,
-    maximise,
-    signal_power,
-)
+from modeling.autoregressive import fit_filter
+from modeling.coherent import climb, limits_of, observe
+from modeling.joint import as_layers
+from modeling.likelihood import centres_and_widths, signal_power
 from modeling.peq import Floats
 from stimuli.random_truth import KINDS, RATE_HZ, RandomTruth, TruthKind, random_truth
 
@@ -83,7 +77,7 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
     for _ in range(textures):
         truth = random_truth(kind, rng=rng)
         record = Recording(truth.record(rng=rng), RATE_HZ, 100.0, 1.0, "random", simulated=True)
-        measured, faded = spectrum(record), spectrum(tapered(record))
+        measured = spectrum(record)
         for name in ESTIMATORS:
             layers, seconds = _timed(partial(find_layers, measured, estimator=name))
             score = {**_score(measured, truth, layers), "seconds": seconds}
@@ -92,7 +86,7 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
             score = _score(measured, truth, _from_the_truth(measured, truth.layers))
             scores.setdefault(FROM_THE_TRUTH, []).append(score)
         for order in ORDERS:
-            found, seconds = _timed(partial(fit_filter, [faded], order=order))
+            found, seconds = _timed(partial(fit_filter, [measured], order=order))
             score = {**_likeness(measured, found), "seconds": seconds}
             scores.setdefault(f"AR({order})", []).append(score)
     return scores
@@ -112,14 +106,16 @@ def _from_the_truth(measured: Spectrum, planted: PEQ) -> Layers:
     assert power is not None, "a record with layers has power"
     places = (planted.frequencies_hz, planted.bandwidths_hz)
     gains = np.hstack((planted.noise_gain, planted.gains)) / power.scale
-    theta = np.log(np.hstack((gains[0], *places, gains[1:])))
-    signs, limits = np.ones(m), limits_of(m, power, shaped=False)
+    theta = np.log(np.hstack((gains[0], *places, gains[1:])))[None]
+    signs, limits = (
+        np.ones((1, m)),
+        limits_of(m, rate_hz=power.rate_hz, step_hz=power.step_hz),
+    )
     for _ in range(ROUNDS):  # bins are narrowest near the layers, so they are drawn anew
-        bins = bins_near(power, *centres_and_widths(theta, m))
-        theta, misfit = maximise(
-            coherent(signs), theta, bins, m=m, limits=limits, steps=10, enough=1e-3
-        )
-    return as_layers(CoherentFit(theta, signs, misfit, bins), power)
+        observed = observe([power], *centres_and_widths(theta, m), scale=power.scale)
+        fitted = climb(theta, signs, observed, limits=limits, steps=10, enough=1e-3)
+        theta = fitted.theta
+    return as_layers(fitted.row(0), power, observed)
 
 
 def _timed(work: Callable[[], Result]) -> tuple[Result, float]:

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from modeling import Recording, Spectrum, similarity, spectrum
-from modeling.autoregressive import fit_filter, tapered
+from modeling.autoregressive import fit_filter
 from modeling.layer_count import fit_layer_count
 from modeling.similarity import SimilarityReport, SpectralFilter
 
@@ -66,13 +66,13 @@ def _distance_db(measured: Spectrum, model: SpectralFilter, truth: SpectralFilte
 def _fits(
     recording: Recording, layers: Sequence[int], orders: Sequence[int]
 ) -> dict[tuple[str, int], SpectralFilter]:
-    measured, faded = spectrum(recording), spectrum(tapered(recording))
+    measured = spectrum(recording)
     fits: dict[tuple[str, int], SpectralFilter] = {}
     for count in layers:
         fits[EQUAL, count] = fit_layer_count(measured, count, equal_signs=True)
         fits[CHOSEN, count] = fit_layer_count(measured, count)
     for order in orders:
-        fits[AR, order] = fit_filter([faded], order=order)
+        fits[AR, order] = fit_filter([measured], order=order)
     return fits
 
 

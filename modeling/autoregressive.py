@@ -25,9 +25,6 @@ from modeling.spectra import Spectrum
 HIGHEST_ORDER = 40
 # White noise 90 dB below the record keeps an order that the data do not need from being singular.
 _REGULARISATION = 1e-9
-# The gain is the geometric mean of the spectrum, so what a rectangular window spills into quiet
-# bands would count in full; a tenth of a cosine at the ends removes it at 6 % of the data.
-_TAPERED_SHARE = 0.1
 
 
 class ARParameters(NamedTuple):
@@ -220,8 +217,9 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
 
     Yule–Walker: the autocorrelation is the inverse transform of the power spectrum, from which the
     sensor's floor has been subtracted (Burg's method needs the waveform, in which it cannot be),
-    averaged over the repeats of a condition. Records are tapered at their ends (Tukey, 10 %), which
-    makes it as good as Burg's. Holes of the grid are filled as in `fit_texture`.
+    averaged over the repeats of a condition. Records are tapered at their ends, which makes it as
+    good as Burg's: the gain is the geometric mean of the spectrum, so that what a rectangular
+    window spills into quiet bands would count in full. Holes of the grid are filled as in `fit_texture`.
 
     Parameters
     ----------
@@ -245,10 +243,9 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
     texture, unit = records.texture, only_unit(records)
-    faded = RecordingSet(tapered(record) for record in records)
-    by_condition = spectra_by_condition(recording_spectra(faded))
+    by_condition = spectra_by_condition(recording_spectra(records))
     _check_order(order, min(s.n_samples for found in by_condition.values() for s in found))
-    speeds, forces = grid_axes(by_condition, texture)
+    speeds, forces = grid_axes(by_condition)
     rows = {condition: _fit_row(found, order) for condition, found in by_condition.items()}
     full, interpolated = fill_grid(rows, texture)
     return ARModel(
@@ -265,25 +262,13 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     )
 
 
-def tapered(recording: Recording) -> Recording:
-    """The recording faded in and out over a twentieth each, at the same mean power.
-
-    What `fit_filter` should be given the spectrum of.
-    """
-    from scipy.signal.windows import tukey
-
-    window = tukey(recording.samples.size, _TAPERED_SHARE)
-    window /= np.sqrt(np.mean(window**2))
-    return replace(recording, samples=(recording.samples - recording.samples.mean()) * window)
-
-
 def fit_filter(spectra: Sequence[Spectrum], *, order: int) -> ARFilter:
     """The all-pole filter of one condition, by Yule–Walker on its mean autocorrelation.
 
     Parameters
     ----------
     spectra : sequence of Spectrum
-        One or more repeats at one rate, of `tapered` recordings.
+        One or more repeats at one rate.
     order : int
         1 … 40, and below half the number of samples.
     """
@@ -312,7 +297,7 @@ def _fit_row(spectra: Sequence[Spectrum], order: int) -> Floats:
 
 def _autocorrelation(spectrum: Spectrum) -> Floats:
     """E[y(n)·y(n+lag)] from the power spectrum, lags 0 … n/2."""
-    power = spectrum.magnitude**2 * np.pi / 4  # |FFT|²/n, see `Spectrum.magnitude`
+    power = spectrum.without_leakage**2 * np.pi / 4  # |FFT|²/n, see `Spectrum.magnitude`
     autocorrelation: Floats = np.fft.irfft(power, n=spectrum.n_samples)
     return autocorrelation
 

@@ -16,8 +16,10 @@ from modeling.estimators import (
     find_peak_frequencies,
     fit_layers,
 )
-from modeling.grid import Condition, fill_grid, grid_axes
+from modeling.grid import Condition, check_spanned, fill_grid, grid_axes
+from modeling.layer_search import MOST_LAYERS
 from modeling.layers import Layers
+from modeling.likelihood import is_silent
 from modeling.model import TextureModel
 from modeling.recording import Recording, RecordingSet
 from modeling.spectra import MODEL_RATE_HZ, Spectrum, mean_spectrum, spectrum, subtract_floor
@@ -34,19 +36,25 @@ class _Tracked:
 
 
 def fit_texture(
-    recordings: RecordingSet | Iterable[Recording], *, estimator: str = "joint"
+    recordings: RecordingSet | Iterable[Recording],
+    *,
+    estimator: str = "joint",
+    layers: int | None = None,
 ) -> TextureModel:
     """Model one texture over its grid of speeds and forces.
 
-    Repeats of a condition are averaged. Conditions of the rectangular grid without a recording are
-    interpolated from their neighbours and marked in `interpolated`. Recordings at force 0 are
-    taken as the sensor's floor and subtracted in power.
+    Repeats of a condition are averaged. Conditions of the rectangular grid without a recording, or
+    with a silent one, are interpolated from their neighbours and marked in `interpolated`.
+    Recordings at force 0 are taken as the sensor's floor and subtracted in power.
 
     Parameters
     ----------
     recordings : RecordingSet or iterable of Recording
-        One texture, at least 2 speeds × 2 forces, one unit; any rates.
+        One texture, one unit; any rates. One speed or one force will do: then nothing is known of
+        others.
     estimator : {"joint", "paper", "paper-consistent"}
+    layers : int, optional
+        Number of layers, 1 … 12, with `joint` only, which chooses it otherwise.
 
     Returns
     -------
@@ -56,18 +64,22 @@ def fit_texture(
     Raises
     ------
     GridError
-        Where the recordings do not span such a grid.
+        Where the recordings lie on a line across the grid.
     InputError
-        Where they mix textures or units, or have contact without speed.
+        Where they mix textures or units, or have contact without speed; for a number of layers out
+        of range or with another estimator.
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
     check_estimator(estimator)
     only_unit(records)
-    return fit_spectra(recording_spectra(records), estimator=estimator)
+    return fit_spectra(recording_spectra(records), estimator=estimator, layers=layers)
 
 
 def fit_spectra(
-    measured: Sequence[tuple[Recording, Spectrum]], *, estimator: str = "joint"
+    measured: Sequence[tuple[Recording, Spectrum]],
+    *,
+    estimator: str = "joint",
+    layers: int | None = None,
 ) -> TextureModel:
     """Model one texture from spectra that `recording_spectra` has prepared; see `fit_texture`.
 
@@ -78,15 +90,22 @@ def fit_spectra(
     estimator : {"joint", "paper", "paper-consistent"}
     """
     chosen = check_estimator(estimator)
+    _check_layers(layers, chosen)
     first, spectrum_of_first = measured[0]
     repeats = spectra_by_condition(measured)
     spectra = {condition: mean_spectrum(found) for condition, found in repeats.items()}
-    speeds, forces = grid_axes(spectra, first.texture)
+    spectra = {condition: s for condition, s in spectra.items() if not is_silent(s)}
+    if not spectra:
+        raise InputError(
+            f"{first.texture}: expected a recording with vibration, got silence in all of "
+            f"{len(repeats)} conditions; check the sensor, or leave its floor out."
+        )
+    check_spanned(spectra, first.texture)
+    speeds, forces = grid_axes(spectra)
     if chosen == "joint":
-        fitted = fit_grid_jointly(spectra)
-        tracked = {c: _Tracked(fitted.layers[c], fitted.inherited[c]) for c in spectra}
+        arrays = _joint_arrays(spectra, layers)
     else:
-        tracked = _track(spectra, chosen)
+        arrays = _grids(_track(spectra, chosen), first.texture)
     return TextureModel(
         texture=first.texture,
         rate_hz=spectrum_of_first.rate_hz,
@@ -95,8 +114,41 @@ def fit_spectra(
         estimator=chosen,
         unit=first.unit,
         simulated=any(r.simulated for r, _ in measured),
-        **_grids(tracked, first.texture),
+        **arrays,
     )
+
+
+def _check_layers(layers: object, estimator: EstimatorName) -> None:
+    if layers is None:
+        return
+    whole = isinstance(layers, int) and not isinstance(layers, bool)
+    if estimator != "joint" or not (whole and 1 <= int(layers) <= MOST_LAYERS):  # type: ignore[call-overload]
+        raise InputError(
+            f"expected 1 to {MOST_LAYERS} layers with the estimator joint, got {layers!r} with "
+            f"{estimator}; leave the number out, or give another."
+        )
+
+
+def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> dict[str, Any]:
+    """The model's arrays by `joint`; holes are what their neighbours foretell."""
+    found = fit_grid_jointly(spectra, count=count)
+    speeds, forces = grid_axes(spectra)
+    grid = [(speed, force) for speed in speeds for force in forces]
+    shape = (len(speeds), len(forces))
+
+    def table(name: str) -> NDArray[Any]:
+        return np.array([getattr(found.layers[c], name) for c in grid]).reshape(*shape, -1)
+
+    recorded = np.array([found.recorded[c] for c in grid]).reshape(shape)
+    inherited = np.array([found.inherited[c] for c in grid]).reshape(*shape, -1)
+    names = ("frequencies_hz", "bandwidths_hz", "gains", "level_sd_db", "unresolved")
+    return {
+        "noise_gains": table("noise_gain")[:, :, 0],
+        **{name: table(name) for name in names},
+        "inherited": inherited & recorded[:, :, None],
+        "interpolated": ~recorded,
+        "blending": "logarithmic",
+    }
 
 
 def missing_conditions(model: TextureModel) -> list[Condition]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -23,18 +23,18 @@ class Hand(NamedTuple):
 
 
 def check_axes(speeds_mm_s: Floats, forces_n: Floats) -> None:
-    """Refuse a grid that is not at least 2 × 2 rising finite values above 0.
+    """Refuse axes that are not rising finite values above 0, one at least.
 
     Raises
     ------
     InputError
     """
     for name, axis in (("speeds_mm_s", speeds_mm_s), ("forces_n", forces_n)):
-        rising = axis.ndim == 1 and axis.size >= 2 and bool((np.diff(axis) > 0).all())
+        rising = axis.ndim == 1 and axis.size >= 1 and bool((np.diff(axis) > 0).all())
         if not rising or not (axis[0] > 0 and np.isfinite(axis).all()):
             raise InputError(
-                f"expected at least two rising values above 0 in {name}, got "
-                f"{axis.tolist()}; a model needs a grid of at least 2 × 2."
+                f"expected one or more rising values above 0 in {name}, got "
+                f"{axis.tolist()}; give the speeds and forces of the model's grid."
             )
 
 
@@ -81,35 +81,45 @@ class Cells:
         tail = (slice(None),) + (None,) * (grid.ndim - 2)
         x, y = self._row_share[tail], self._column_share[tail]
         row, column = self._row, self._column
-        low = grid[row, column] * (1 - x) + grid[row + 1, column] * x
-        high = grid[row, column + 1] * (1 - x) + grid[row + 1, column + 1] * x
+        # Of an axis of one value both ends of the cell are that one.
+        below, beside = np.minimum(row + 1, len(grid) - 1), np.minimum(column + 1, len(grid[0]) - 1)
+        low = grid[row, column] * (1 - x) + grid[below, column] * x
+        high = grid[row, beside] * (1 - x) + grid[below, beside] * x
         blended: Floats = low * (1 - y) + high * y
         return blended
 
 
 def _cell(axis: Floats, inside: Floats) -> tuple[NDArray[np.intp], Floats]:
     """Index of the grid cell that holds each value, and the position within it (0 … 1)."""
+    if axis.size == 1:
+        return np.zeros(inside.shape, dtype=np.intp), np.zeros(inside.shape)
     index = np.clip(np.searchsorted(axis, inside, side="right") - 1, 0, axis.size - 2)
     return index, (inside - axis[index]) / (axis[index + 1] - axis[index])
 
 
-def grid_axes(conditions: Iterable[Condition], texture: str) -> tuple[list[float], list[float]]:
-    """The rising speeds and forces that (speed, force) conditions span.
+def grid_axes(conditions: Iterable[Condition]) -> tuple[list[float], list[float]]:
+    """The rising speeds and forces that (speed, force) conditions span."""
+    every = list(conditions)
+    return sorted({speed for speed, _ in every}), sorted({force for _, force in every})
+
+
+def check_spanned(conditions: Collection[Condition], texture: str) -> None:
+    """Refuse conditions on a line across the grid, between which nothing can be interpolated.
+
+    One speed or one force alone is no such line: nothing is known of others then.
 
     Raises
     ------
     GridError
-        For fewer than two speeds or two forces.
     """
-    speeds = sorted({speed for speed, _ in conditions})
-    forces = sorted({force for _, force in conditions})
-    if len(speeds) < 2 or len(forces) < 2:
+    speeds, forces = grid_axes(conditions)
+    points = np.array(sorted(conditions))
+    across = len(speeds) > 1 and len(forces) > 1
+    if across and np.linalg.matrix_rank((points - points.mean(axis=0)) / np.ptp(points, axis=0)) < 2:
         raise GridError(
-            f"{texture}: expected recordings at 2 or more speeds and 2 or more forces for a full "
-            f"model, got {_count(speeds, 'speed')} and {_count(forces, 'force')}; "
-            f"record more {'force' if len(forces) < 2 else 'speed'} levels."
+            f"{texture}: expected recordings that span the grid, got {len(points)} of "
+            f"{len(speeds) * len(forces)} conditions on one line; record more of them."
         )
-    return speeds, forces
 
 
 def fill_grid(
@@ -123,7 +133,7 @@ def fill_grid(
     Parameters
     ----------
     rows : mapping of (speed, force) to (k,) array_like
-        At least 2 speeds × 2 forces.
+        One condition at least.
     texture : str
         For messages.
 
@@ -137,7 +147,8 @@ def fill_grid(
     GridError
         Where the conditions do not span the grid.
     """
-    speeds, forces = grid_axes(rows, texture)
+    check_spanned(rows, texture)
+    speeds, forces = grid_axes(rows)
     conditions = [(speed, force) for speed in speeds for force in forces]
     known = np.array([condition in rows for condition in conditions], dtype=np.bool_)
     points = np.array(conditions)
@@ -145,27 +156,16 @@ def fill_grid(
     full = np.empty((len(conditions), values.shape[1]))
     full[known] = values
     if not known.all() and values.size:
-        full[~known] = _between(points[known], values, holes=points[~known], texture=texture)
+        full[~known] = _between(points[known], values, holes=points[~known])
     shape = (len(speeds), len(forces))
     return full.reshape(*shape, -1), ~known.reshape(shape)
 
 
-def _count(levels: list[float], name: str) -> str:
-    return f"{len(levels)} {name}{'' if len(levels) == 1 else 's'}"
-
-
-def _between(points: Floats, values: Floats, *, holes: Floats, texture: str) -> Floats:
+def _between(points: Floats, values: Floats, *, holes: Floats) -> Floats:
     """Linear interpolation over (speed, force); beyond the outermost neighbours the nearest one."""
     from scipy.interpolate import griddata
-    from scipy.spatial import QhullError
 
-    try:
-        linear = griddata(points, values, holes, method="linear", rescale=True)
-    except (QhullError, ValueError):
-        raise GridError(
-            f"{texture}: expected recordings that span the grid, got {len(points)} of "
-            f"{len(points) + len(holes)} conditions on one line; record more of them."
-        ) from None
+    linear = griddata(points, values, holes, method="linear", rescale=True)
     nearest = griddata(points, values, holes, method="nearest", rescale=True)
     filled = np.where(np.isnan(linear), nearest, linear)
     # Rounding must not carry a value beyond its neighbours, and so out of the legal range.

@@ -9,21 +9,31 @@ from __future__ import annotations
 import numpy as np
 
 from modeling.coherent import (
-    CoherentFit,
-    as_layers,
-    coherent_fit,
-    coherent_gains,
-    refitted,
+    LINE_WIDTH,
+    Climbed,
+    Observed,
+    climb,
+    covariance_alone,
+    level_deviations,
+    limits_of,
+    misfits,
+    one_spectrum,
+    response,
     sign_patterns,
-    without,
+    told,
+    without_layer,
 )
 from modeling.layers import Layers, no_layers
-from modeling.likelihood import Power, bins_near, signal_power
-from modeling.peaks import find_peaks_jointly, penalty, power_sum_misfit
+from modeling.likelihood import Bools, Power, bins_near, misfit_of, power_sum, signal_power, split
+from modeling.peaks import Peaks, find_peaks_jointly, penalty, theta_of
+from modeling.peq import Floats
 from modeling.spectra import Spectrum
 
 # The coherent response holds where it fits as well as the power sum does, in log likelihood.
 COHERENT_BY = 5.0
+FARTHEST_MOVE = 0.25  # of log frequency: what coherence does to a peak, and no change of places
+WIDTH_FACTOR = 5.0
+NEPER_DB = 20 / np.log(10)
 
 
 def fit_jointly(spectrum: Spectrum) -> Layers:
@@ -39,27 +49,90 @@ def fit_jointly(spectrum: Spectrum) -> Layers:
     if not peaks.gains.size:
         return no_layers(power.scale * peaks.noise_gain)
     bins = bins_near(power, peaks.frequencies_hz, peaks.bandwidths_hz)
-    patterns = sign_patterns(peaks.frequencies_hz)
-    signs = min(patterns, key=lambda signs: coherent_gains(peaks, bins, signs)[1])
-    known = np.zeros(peaks.gains.size, dtype=bool)
-    fitted = coherent_fit(peaks, power, signs, known=known, move=True, bins=bins)
-    if fitted.misfit <= power_sum_misfit(peaks, bins) + COHERENT_BY:
-        fitted = _pruned(fitted, power)
+    observed = one_spectrum(bins, line_hz=LINE_WIDTH * power.step_hz)
+    fitted = _fitted_to(peaks, power, observed, move=True)
+    alone = misfit_of(bins, power_sum(theta_of(peaks), peaks.gains.size, bins)[0])
+    if fitted.misfit <= alone + COHERENT_BY:
+        fitted = _pruned(fitted, power, observed)
     else:
-        fitted = coherent_fit(peaks, power, signs, known=known, move=False, bins=bins)
-    return as_layers(fitted, power)
+        fitted = _fitted_to(peaks, power, observed, move=False)
+    return as_layers(fitted, power, observed)
 
 
-def _pruned(fitted: CoherentFit, power: Power) -> CoherentFit:
+def _fitted_to(peaks: Peaks, power: Power, observed: Observed, *, move: bool) -> Climbed:
+    """The likeliest coherent response near the peaks, with the signs that suit it best."""
+    signs = sign_patterns(peaks.frequencies_hz)
+    m, count = peaks.gains.size, len(signs)
+    # At its peak alone, G_w + s·G has the power G_w² + gain².
+    gains = np.hypot(peaks.noise_gain, peaks.gains) - signs * peaks.noise_gain
+    places = np.log(np.hstack((peaks.noise_gain, peaks.frequencies_hz, peaks.bandwidths_hz)))
+    theta = np.hstack((np.tile(places, (count, 1)), np.log(gains)))
+    low, high = limits_of(m, rate_hz=power.rate_hz, step_hz=power.step_hz)
+    held = np.zeros(low.size, dtype=bool)
+    held[1 : 1 + m if move else 1 + 2 * m] = True
+    rows = observed.rows(np.zeros(count, dtype=np.intp))
+    first = climb(theta, signs, rows, limits=(low, high), free=_gains_only(m), steps=4, enough=0.3)
+    near = np.full(low.size, FARTHEST_MOVE if move else 0.0)
+    if move:
+        near[1 + m : 1 + 2 * m] = np.inf
+    else:  # where no coherent response fits, a width would run away
+        near[1 + m : 1 + 2 * m] = np.log(WIDTH_FACTOR)
+    near[0] = near[1 + 2 * m :] = np.inf
+    start = first.theta[:1]
+    limits = np.maximum(low, start - near), np.minimum(high, start + near)
+    fits = climb(first.theta, signs, rows, limits=limits, steps=8, enough=0.3)
+    return fits.row(int(np.argmin(fits.objective)))
+
+
+def _gains_only(m: int) -> Bools:
+    free = np.ones(1 + 3 * m, dtype=bool)
+    free[1 : 1 + 2 * m] = False
+    return free
+
+
+def _pruned(fitted: Climbed, power: Power, observed: Observed) -> Climbed:
     """The fit without the layers that the coherent response does not need."""
     while fitted.signs.size > 1:
-        fewer = [without(fitted, layer) for layer in range(fitted.signs.size)]
-        least = min(fewer, key=lambda f: f.misfit)
+        m = fitted.signs.size
+        theta = np.array([without_layer(fitted.theta, layer) for layer in range(m)])
+        signs = np.array([np.delete(fitted.signs, layer) for layer in range(m)])
+        rows = observed.rows(np.zeros(m, dtype=np.intp))
+        limits = limits_of(m - 1, rate_hz=power.rate_hz, step_hz=power.step_hz)
         # Refitting the others makes up for part of the loss, hardly for more than three quarters.
-        if least.misfit - fitted.misfit > 4 * penalty(power):
+        losses = misfits(response(theta, signs, rows).power, rows) - fitted.misfit
+        few = np.flatnonzero(losses <= 4 * penalty(power))
+        if not few.size:
             break
-        least = refitted(least, power)
+        fits = climb(theta[few], signs[few], rows.rows(few), limits=limits, steps=5, enough=0.3)
+        least = fits.row(int(np.argmin(fits.misfit)))
         if least.misfit - fitted.misfit >= penalty(power):
             break
         fitted = least
     return fitted
+
+
+def as_layers(fitted: Climbed, power: Power, observed: Observed) -> Layers:
+    """Layers of one spectrum by rising frequency.
+
+    The standard deviations of the levels come from the likelihood's information. A layer whose
+    amplitude is less than one standard deviation is left out; `unresolved` is a width within the
+    distance of two lines.
+    """
+    m = fitted.signs.size
+    noise, frequency, bandwidth, gain = split(fitted.theta, m)
+    information = told(fitted.theta[None], fitted.signs[None], observed)
+    deviation = level_deviations(
+        fitted.theta[None], covariance_alone(information), rate_hz=power.rate_hz
+    )[0]
+    alone = 1 / np.sqrt(np.maximum(np.einsum("pp->p", information[0])[1 + 2 * m :], 1e-12))
+    order = np.argsort(frequency)
+    order = order[alone[order] <= 1.0]
+    width = np.exp(bandwidth)
+    return Layers(
+        power.scale * float(np.exp(noise[0])),
+        np.exp(frequency)[order],
+        width[order],
+        (power.scale * fitted.signs * np.exp(gain))[order],
+        NEPER_DB * deviation[order],
+        (width < 2 * power.step_hz)[order],
+    )

@@ -6,19 +6,9 @@ from itertools import product
 
 import numpy as np
 
-from modeling.coherent import sign_patterns
+from modeling.coherent import Climbed, climb, limits_of, observe, sign_patterns
 from modeling.errors import InputError
-from modeling.likelihood import (
-    Power,
-    bins_near,
-    centres_and_widths,
-    coherent,
-    limits_of,
-    maximise,
-    misfit_of,
-    signal_power,
-    split,
-)
+from modeling.likelihood import Power, centres_and_widths, signal_power, split
 from modeling.peq import PEQ, Floats, clamp_bands
 from modeling.spectra import Spectrum
 
@@ -49,14 +39,9 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
     if power is None or count < 1:
         got = f"{count} layers" if power is not None else "silence"
         raise InputError(f"expected a spectrum with power and a layer or more, got {got}; fix it.")
-    patterns = sign_patterns(np.arange(float(count)))
-    fits = [
-        _climbed(power, start, signs)
-        for signs in (patterns[:1] if equal_signs else patterns)
-        for start in _starts(power, count)
-    ]
-    _, theta, signs = min(fits, key=lambda fit: fit[0])
-    noise, frequency, bandwidth, gain, _ = split(theta, count)
+    patterns = sign_patterns(np.arange(float(count)))[: 1 if equal_signs else None]
+    fitted = _likeliest(power, starts_of(power, count), patterns)
+    noise, frequency, bandwidth, gain = split(fitted.theta, count)
     order = np.argsort(frequency)
     # At a limit, the exponential of its logarithm may be a rounding error beyond it.
     frequencies_hz, bandwidths_hz, _ = clamp_bands(
@@ -66,12 +51,12 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
         noise_gain=power.scale * float(np.exp(noise[0])),
         frequencies_hz=frequencies_hz[order],
         bandwidths_hz=bandwidths_hz[order],
-        gains=power.scale * (signs * np.exp(gain))[order],
+        gains=power.scale * (fitted.signs * np.exp(gain))[order],
         rate_hz=spectrum.rate_hz,
     )
 
 
-def _starts(power: Power, count: int) -> list[Floats]:
+def starts_of(power: Power, count: int) -> Floats:
     """Layers spread over the power, evenly or in its upper half, wide or narrow; quiet noise."""
     share = np.cumsum(power.power) / power.power.sum()
     low, high = np.interp([0.1, 0.9], share, power.frequency_hz)
@@ -84,16 +69,21 @@ def _starts(power: Power, count: int) -> list[Floats]:
             width = np.full(count, max(width_share * (high - low) / count, 2 * power.step_hz))
             parts = ([noise + noise_db * np.log(10) / 20], np.log(centre), np.log(width))
             starts.append(np.concatenate([*parts, np.log(height) / 2]))
-    return starts
+    return np.array(starts)
 
 
-def _climbed(power: Power, theta: Floats, signs: Floats) -> tuple[float, Floats, Floats]:
-    """Misfit, parameters and signs at the nearest maximum of the likelihood."""
-    count, response = signs.size, coherent(signs)
-    limits = limits_of(count, power, shaped=False)
+def _likeliest(power: Power, starts: Floats, patterns: Floats) -> Climbed:
+    """The nearest maximum of the likelihood from any start with any signs."""
+    count = patterns.shape[1]
+    theta = np.repeat(starts, len(patterns), axis=0)
+    signs = np.tile(patterns, (len(starts), 1))
+    limits = limits_of(count, rate_hz=power.rate_hz, step_hz=power.step_hz)
     for _ in range(_ROUNDS):  # bins are finest near the layers, so they are drawn anew
-        bins = bins_near(power, *centres_and_widths(theta, count))
-        theta, _ = maximise(response, theta, bins, m=count, limits=limits, steps=60, enough=1e-3)
+        near = centres_and_widths(theta, count)
+        observed = observe([power] * len(theta), *near, scale=power.scale)
+        theta = climb(theta, signs, observed, limits=limits, steps=60, enough=1e-3).theta
     # Misfits are compared on the same bins, whatever layers they belong to.
-    common = bins_near(power, np.zeros(0), np.zeros(0))
-    return misfit_of(common, response(theta, count, common)[0]), theta, signs
+    nowhere = np.zeros((len(theta), 0))
+    common = observe([power] * len(theta), nowhere, nowhere, scale=power.scale)
+    fits = climb(theta, signs, common, limits=limits, steps=0)
+    return fits.row(int(np.argmin(fits.misfit)))

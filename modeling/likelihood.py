@@ -7,14 +7,13 @@ in stationary time series"), here over averages of neighbouring lines.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from modeling.peq import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ, Floats
-from modeling.spectra import HIGH_PASS_HZ, Spectrum
+from modeling.spectra import HIGH_PASS_HZ, SMOOTHING_HZ, Spectrum, smooth
 
 Bools = NDArray[np.bool_]
 
@@ -84,10 +83,6 @@ class Bins:
     rate_hz: float
 
 
-# Expected power (n,) and its relative derivatives (p, n), from parameters, layers and bins.
-Response = Callable[[Floats, int, Bins], tuple[Floats, Floats]]
-
-
 def signal_power(spectrum: Spectrum) -> Power | None:
     """The band of a spectrum that holds signal; None for silence.
 
@@ -95,19 +90,20 @@ def signal_power(spectrum: Spectrum) -> Power | None:
     within 50 dB of its maximum: above a recorder's own low-pass there is nothing to model, and an
     empty region would rule the likelihood.
     """
-    smoothed = spectrum.smoothed()
+    magnitude = spectrum.without_leakage
+    smoothed = smooth(magnitude, SMOOTHING_HZ, step_hz=spectrum.rate_hz / spectrum.n_samples)
     within = (spectrum.frequency_hz >= LOWEST_HZ) & (
         spectrum.frequency_hz <= HIGHEST_SHARE * spectrum.rate_hz / 2
     )
     loudest = float(smoothed[within].max(initial=0.0))
-    if not (loudest > 0 and (spectrum.magnitude[within] > 0).any()):
+    if not (loudest > 0 and (magnitude[within] > 0).any()):
         return None
     last = np.flatnonzero(within & (smoothed >= loudest * 10 ** (EMPTY_BELOW_DB / 20)))[-1]
     within[last + 1 :] = False
     # Of a Rayleigh-distributed magnitude of mean r the mean square is (4/π)r²; of the mean of K
     # such magnitudes it is r² + (4/π − 1)r²/K.
     records = spectrum.averaged
-    power = (spectrum.magnitude[within] / loudest) ** 2 / (1 + (4 / np.pi - 1) / records)
+    power = (magnitude[within] / loudest) ** 2 / (1 + (4 / np.pi - 1) / records)
     share = np.broadcast_to(spectrum.share, within.shape)[within]
     return Power(
         spectrum.frequency_hz[within],
@@ -120,20 +116,24 @@ def signal_power(spectrum: Spectrum) -> Power | None:
     )
 
 
-def split(theta: Floats, m: int) -> tuple[Floats, ...]:
-    """Log noise gain (1,), log frequencies, bandwidths and gains (m,) each, and the rest."""
+def is_silent(spectrum: Spectrum) -> bool:
+    """Whether a spectrum holds nothing that a layer or a noise gain could be fitted to."""
+    return signal_power(spectrum) is None
+
+
+def split(theta: Floats, m: int) -> tuple[Floats, Floats, Floats, Floats]:
+    """Log noise gain (…, 1), log frequencies, bandwidths and gains (…, m) of m layers."""
     return (
-        theta[:1],
-        theta[1 : 1 + m],
-        theta[1 + m : 1 + 2 * m],
-        theta[1 + 2 * m : 1 + 3 * m],
-        theta[1 + 3 * m :],
+        theta[..., :1],
+        theta[..., 1 : 1 + m],
+        theta[..., 1 + m : 1 + 2 * m],
+        theta[..., 1 + 2 * m : 1 + 3 * m],
     )
 
 
 def centres_and_widths(theta: Floats, m: int) -> tuple[Floats, Floats]:
     """Frequencies and bandwidths (Hz) among the parameters."""
-    _, frequency, bandwidth, _, _ = split(theta, m)
+    _, frequency, bandwidth, _ = split(theta, m)
     return np.exp(frequency), np.exp(bandwidth)
 
 
@@ -175,9 +175,9 @@ def offsets(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats, Floats]:
 
 def power_sum_of_peaks(theta: Floats, m: int, bins: Bins) -> Floats:
     """The parts of `power_sum`, noise first, (m+1, n)."""
-    noise, _, _, gain, shape = split(theta, m)
+    noise, _, _, gain = split(theta, m)
     u, _, _ = offsets(theta, m, bins)
-    nu = np.exp(shape[0])
+    nu = np.exp(theta[-1])
     phi = np.exp(-nu * np.log1p((2 ** (1 / nu) - 1) * u * u))
     floor = np.full((1, bins.tangent.size), np.exp(2 * noise[0]))
     return np.concatenate((floor, np.exp(2 * gain)[:, None] * phi))
@@ -188,9 +188,9 @@ def power_sum(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
 
     φ = (1 + (2^(1/ν) − 1)·u²)^(−ν): −3 dB at u = ±1 whatever the shape ν.
     """
-    noise, _, _, gain, shape = split(theta, m)
+    noise, _, _, gain = split(theta, m)
     u, by_frequency, by_width = offsets(theta, m, bins)
-    nu, twice = np.exp(shape[0]), (2 * np.exp(2 * gain))[:, None]
+    nu, twice = np.exp(theta[-1]), (2 * np.exp(2 * gain))[:, None]
     c = 2 ** (1 / nu) - 1
     square = u * u
     log_base = np.log1p(c * square)
@@ -210,58 +210,6 @@ def power_sum(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
     return expected, derivative
 
 
-def interference(
-    noise_gain: float, signed: Floats, *, real: Floats, imaginary: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """The coherent sum G_w + Σ G_i·H_i, its power, and what that owes to each gain.
-
-    Parameters
-    ----------
-    noise_gain : float
-    signed : (m,) ndarray
-        Signed gains.
-    real, imaginary : (m, n) ndarray
-        Of the bands H_i.
-
-    Returns
-    -------
-    in_phase, quadrature, power : (n,) ndarray
-    by_gain : (m+1, n) ndarray
-        Derivatives of the power by the logarithms of the noise gain and of the layers' gains.
-    """
-    in_phase, quadrature = noise_gain + signed @ real, signed @ imaginary
-    by_gain = np.empty((signed.size + 1, in_phase.size))
-    by_gain[0] = 2 * noise_gain * in_phase
-    by_gain[1:] = (real * in_phase + imaginary * quadrature) * (2 * signed)[:, None]
-    # Never quite 0, so that a bin where layers cancel stays comparable.
-    power = np.maximum(in_phase * in_phase + quadrature * quadrature, LEAST_POWER)
-    return in_phase, quadrature, power, by_gain
-
-
-def coherent(signs: Floats) -> Response:
-    """The coherent power |G_w + Σ s_i·G_i·H_i|² of layers with these signs, as `power_sum`."""
-
-    def response(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats]:
-        noise, _, _, gain, _ = split(theta, m)
-        u, by_frequency, by_width = offsets(theta, m, bins)
-        real = 1 / (1 + u * u)
-        signed = np.exp(gain) * signs
-        in_phase, quadrature, expected, by_gain = interference(
-            np.exp(noise[0]), signed, real=real, imaginary=u * real
-        )
-        twice = (2 * signed)[:, None]
-        by_u = ((1 - u * u) * quadrature - 2 * u * in_phase) * (real * real) * twice
-        derivative = np.empty((theta.size, expected.size))
-        derivative[0] = by_gain[0]
-        derivative[1 : 1 + m] = by_u * by_frequency
-        derivative[1 + m : 1 + 2 * m] = by_u * by_width
-        derivative[1 + 2 * m :] = by_gain[1:]
-        derivative /= expected
-        return expected, derivative
-
-    return response
-
-
 def misfit_of(bins: Bins, expected: Floats) -> float:
     """Minus the log likelihood, 0 where every bin is as expected."""
     ratio = bins.power / expected
@@ -269,27 +217,23 @@ def misfit_of(bins: Bins, expected: Floats) -> float:
 
 
 def maximise(
-    response: Response,
     theta: Floats,
     bins: Bins,
     *,
     m: int,
     limits: tuple[Floats, Floats],
-    free: Bools | None = None,
     steps: int,
     enough: float,
 ) -> tuple[Floats, float]:
-    """Parameters of the greatest likelihood near a start, and the misfit there.
+    """Parameters of the likeliest power sum near a start, and the misfit there.
 
     Fisher scoring with Levenberg–Marquardt damping.
 
     Parameters
     ----------
-    theta : (p,) ndarray
-        The start; see `split`.
-    limits : pair of (p,) ndarray
-    free : (p,) ndarray of bool, optional
-        Which parameters may move; all by default.
+    theta : (3m + 2,) ndarray
+        The start; see `power_sum`.
+    limits : pair of (3m + 2,) ndarray
     steps : int
         At most.
     enough : float
@@ -298,19 +242,19 @@ def maximise(
     low, high = limits
     theta = np.minimum(np.maximum(theta, low), high)
     damping = 1e-2
-    expected, derivative = response(theta, m, bins)
+    expected, derivative = power_sum(theta, m, bins)
     misfit = misfit_of(bins, expected)
-    information, score = _information(bins, expected, derivative, free)
+    information, score = _information(bins, expected, derivative)
     while steps > 0:
         tried = np.minimum(np.maximum(theta + _step(information, score, damping), low), high)
-        expected, derivative = response(tried, m, bins)
+        expected, derivative = power_sum(tried, m, bins)
         misfit_tried = misfit_of(bins, expected)
         if misfit_tried < misfit:
             gained = misfit - misfit_tried
             theta, misfit, steps = tried, misfit_tried, steps - 1
             if gained < enough:
                 break
-            information, score = _information(bins, expected, derivative, free)
+            information, score = _information(bins, expected, derivative)
             damping = max(damping / 10, 1e-4)
         elif damping > 100:
             break
@@ -319,12 +263,8 @@ def maximise(
     return theta, misfit
 
 
-def _information(
-    bins: Bins, expected: Floats, derivative: Floats, free: Bools | None
-) -> tuple[Floats, Floats]:
-    """Fisher information (p, p) and score (p,), 0 for what is not free."""
-    if free is not None:
-        derivative = derivative * free[:, None]
+def _information(bins: Bins, expected: Floats, derivative: Floats) -> tuple[Floats, Floats]:
+    """Fisher information (p, p) and score (p,)."""
     weighted = derivative * bins.weight
     return weighted @ derivative.T, weighted @ (bins.power / expected - 1)
 
@@ -337,16 +277,14 @@ def _step(information: Floats, score: Floats, damping: float) -> Floats:
     return step
 
 
-def limits_of(m: int, power: Power, *, shaped: bool) -> tuple[Floats, Floats]:
-    """Lowest and highest parameters of m layers: what a model may hold and a record can tell."""
-    shape = np.log(SHAPE_RANGE) if shaped else np.zeros((2, 0))
+def limits_of_sum(m: int, power: Power) -> tuple[Floats, Floats]:
+    """Lowest and highest parameters of a power sum of m peaks: what a record can tell."""
     narrowest_hz = max(NARROWEST_LINES * power.step_hz, LOWEST_BANDWIDTH_HZ)
 
-    def limit(gain: float, frequency_hz: float, bandwidth_hz: float) -> Floats:
+    def limit(gain: float, frequency_hz: float, bandwidth_hz: float, shape: float) -> Floats:
         places = np.repeat(np.log([frequency_hz, bandwidth_hz]), m)
-        return np.concatenate(([gain], places, np.full(m, gain)))
+        return np.concatenate(([gain], places, np.full(m, gain), [np.log(shape)]))
 
-    low = limit(-WIDEST_LOG_GAIN, LOWEST_HZ, narrowest_hz)
+    low = limit(-WIDEST_LOG_GAIN, LOWEST_HZ, narrowest_hz, SHAPE_RANGE[0])
     highest_hz = HIGHEST_FREQUENCY_SHARE * power.rate_hz
-    high = limit(WIDEST_LOG_GAIN, highest_hz, WIDEST_SHARE * power.rate_hz)
-    return np.append(low, shape[0]), np.append(high, shape[1])
+    return low, limit(WIDEST_LOG_GAIN, highest_hz, WIDEST_SHARE * power.rate_hz, SHAPE_RANGE[1])

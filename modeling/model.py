@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,13 +14,17 @@ from modeling.grid import check_axes
 from modeling.peq import PEQ, Floats, check_bands, clamp_bands
 from modeling.recording import UNITS
 from modeling.saved import SavedModel
-from modeling.table import Parameters, ParameterTable
+from modeling.table import Parameters, ParameterTable, logarithmic_nodes, wide_enough
 
 if TYPE_CHECKING:
     from modeling.regressed import RegressedModel
 
 Bools = NDArray[np.bool_]
 DrivenBy = Literal["conditions", "centroid"]
+Blending = Literal["linear", "logarithmic"]
+BLENDINGS: tuple[Blending, ...] = ("linear", "logarithmic")
+# Above this a layer's level is not identifiable from the records (METHOD 4).
+LARGEST_TOLD_SD_DB = 6.0
 
 
 def _no_marks() -> Bools:
@@ -37,9 +42,9 @@ class TextureModel(SavedModel):
     rate_hz : float
         The rate at which the driving noise has unit variance.
     speeds_mm_s : (S,) array_like
-        Rising, > 0, S ≥ 2.
+        Rising, > 0, S ≥ 1; of one speed alone nothing is known of others.
     forces_n : (F,) array_like
-        Rising, > 0, F ≥ 2.
+        Rising, > 0, F ≥ 1.
     noise_gains : (S, F) array_like
         G_w ≥ 0, in `unit` per unit noise.
     frequencies_hz, bandwidths_hz, gains : (S, F, m) array_like
@@ -56,14 +61,18 @@ class TextureModel(SavedModel):
         `modeling.Layers`).
     interpolated : (S, F) array_like of bool, optional
         Condition without a recording, filled from its neighbours.
+    blending : {"linear", "logarithmic"}
+        How parameters are read between conditions: linearly over speed and force, or as powers of
+        both (METHOD 9), for which no layer may change its sign. A file without it means linear.
 
     Raises
     ------
     InputError
-        For a grid smaller than 2 × 2, wrong shapes or values out of range.
+        For wrong shapes or values out of range.
     """
 
     FORMAT = "tactileq.texture-model"
+    OPTIONAL = frozenset({"blending"})
 
     texture: str
     rate_hz: float
@@ -80,6 +89,7 @@ class TextureModel(SavedModel):
     inherited: Bools = field(default_factory=_no_marks)
     unresolved: Bools = field(default_factory=_no_marks)
     interpolated: Bools = field(default_factory=_no_marks)
+    blending: Blending = "linear"
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -128,6 +138,16 @@ class TextureModel(SavedModel):
                 "fit the model again."
             )
         check_bands(self.frequencies_hz, self.bandwidths_hz, self.rate_hz)
+        if self.blending not in BLENDINGS:
+            raise InputError(
+                f"expected a blending among {', '.join(BLENDINGS)}, got {self.blending!r}; fix it."
+            )
+        crossing = (self.gains > 0).any(axis=(0, 1)) & (self.gains < 0).any(axis=(0, 1))
+        if self.blending == "logarithmic" and crossing.any():
+            raise InputError(
+                "expected one sign per layer where gains are blended in logarithms, got both in "
+                f"layer {int(np.argmax(crossing)) + 1}; blend linearly, or turn it."
+            )
 
     @property
     def n_layers(self) -> int:
@@ -139,8 +159,14 @@ class TextureModel(SavedModel):
         """Numbers per condition: 1 + 3m (METHOD 9)."""
         return 1 + 3 * self.n_layers
 
+    @property
+    def not_identifiable(self) -> Bools:
+        """Where the records do not tell a layer's level, (S, F, m): deviations above 6 dB."""
+        unknown: Bools = self.level_sd_db > LARGEST_TOLD_SD_DB
+        return unknown
+
     def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
-        """Bilinear interpolation over the grid, with the edges of METHOD 9.
+        """Interpolation over the grid as `blending` says, with the edges of METHOD 9.
 
         Above the grid: clamped. Below the lowest speed or force all gains fall linearly to 0 at
         rest or lift-off (in the corner by the product of both ramps). NaN and infinite values
@@ -155,17 +181,20 @@ class TextureModel(SavedModel):
         """
         return self.table.at(speed_mm_s, force_n)
 
-    @property
+    @cached_property
     def table(self) -> ParameterTable:
         """The parameters as the renderer reads them."""
+        speeds, forces = self.speeds_mm_s, self.forces_n
+        values = np.concatenate(
+            [self.noise_gains[..., None], self.frequencies_hz, self.bandwidths_hz, self.gains],
+            axis=-1,
+        )
+        if self.blending == "logarithmic":
+            speeds, forces, values = logarithmic_nodes(speeds, forces, values)
+        speeds, values = wide_enough(speeds, values, along=0)
+        forces, values = wide_enough(forces, values, along=1)
         return ParameterTable(
-            speeds_mm_s=self.speeds_mm_s,
-            forces_n=self.forces_n,
-            values=np.concatenate(
-                [self.noise_gains[..., None], self.frequencies_hz, self.bandwidths_hz, self.gains],
-                axis=-1,
-            ),
-            signs=np.zeros(self.n_layers),
+            speeds_mm_s=speeds, forces_n=forces, values=values, signs=np.zeros(self.n_layers)
         )
 
     def peq(self, speed_mm_s: float, force_n: float) -> PEQ:

@@ -16,7 +16,7 @@ from modeling.likelihood import (
     Power,
     bins_near,
     centres_and_widths,
-    limits_of,
+    limits_of_sum,
     maximise,
     misfit_of,
     power_sum,
@@ -89,10 +89,8 @@ def find_peaks_jointly(power: Power) -> Peaks:
         bins = bins_near(power, *centres_and_widths(grown, m + len(candidates)))
         before = misfit_of(bins, power_sum(theta if m else _noise_alone(bins), m, bins)[0])
         m_grown = m + len(candidates)
-        limits = limits_of(m_grown, power, shaped=True)
-        grown, after = maximise(
-            power_sum, grown, bins, m=m_grown, limits=limits, steps=4, enough=1.0
-        )
+        limits = limits_of_sum(m_grown, power)
+        grown, after = maximise(grown, bins, m=m_grown, limits=limits, steps=4, enough=1.0)
         if before - after < penalty(power) * len(candidates):
             break
         theta, m = grown, m_grown
@@ -153,7 +151,8 @@ def _candidates(power: Power, expected: Floats) -> Floats:
 
 def _insert(theta: Floats, m: int, candidates: Floats, power: Power, expected: Floats) -> Floats:
     """Parameters of the power sum with the candidates as further peaks."""
-    noise, frequency, bandwidth, gain, shape = split(theta, m)
+    noise, frequency, bandwidth, gain = split(theta, m)
+    shape = theta[-1:]
     centre, width, ratio = candidates.T
     there = np.interp(centre, power.frequency_hz, expected)
     height = 0.5 * np.log(there * np.maximum(ratio - 1, 0.3) / 0.7)
@@ -177,7 +176,7 @@ def _as_peaks(theta: Floats, m: int, power: Power) -> Peaks:
     # Summed anew: next to a pure tone, the whole less the tone would be rounded to nothing.
     rest = [np.delete(parts, i, axis=0).sum(axis=0) for i in range(1, m + 1)]
     evidence = np.array([misfit_of(bins, expected) - whole for expected in rest])
-    noise, frequency, bandwidth, gain, shape = split(theta, m)
+    noise, frequency, bandwidth, gain = split(theta, m)
     order = np.argsort(frequency)
     # Later peaks may have taken over for earlier ones.
     order = order[evidence[order] > penalty(power)]
@@ -186,7 +185,7 @@ def _as_peaks(theta: Floats, m: int, power: Power) -> Peaks:
         frequencies_hz=np.exp(frequency)[order],
         bandwidths_hz=np.exp(bandwidth)[order],
         gains=np.exp(gain)[order],
-        shape=float(np.exp(shape[0])),
+        shape=float(np.exp(theta[-1])),
         evidence=evidence[order],
     )
 

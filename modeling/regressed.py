@@ -215,8 +215,8 @@ def regressed_model(model: TextureModel, *, by: DrivenBy = "conditions") -> Regr
         texture=model.texture,
         rate_hz=model.rate_hz,
         driven_by=by,
-        speeds_mm_s=model.speeds_mm_s[[0, -1]],
-        forces_n=model.forces_n[[0, -1]],
+        speeds_mm_s=_ends(model.speeds_mm_s),
+        forces_n=_ends(model.forces_n),
         noise_gain=rows(NOISE_GAIN, range(1))[:, 0],
         frequencies_hz=rows(FREQUENCY, layers),
         bandwidths_hz=rows(BANDWIDTH, layers),
@@ -227,6 +227,11 @@ def regressed_model(model: TextureModel, *, by: DrivenBy = "conditions") -> Regr
         unit=model.unit,
         simulated=model.simulated,
     )
+
+
+def _ends(axis: Floats) -> Floats:
+    """Lowest and highest; of one value, of which nothing depends, that and twice as much."""
+    return axis[[0, -1]] if axis.size > 1 else axis[0] * np.array([1.0, 2.0])
 
 
 def _check_driver(driven_by: str) -> None:

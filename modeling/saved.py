@@ -25,6 +25,7 @@ class SavedModel(_Base):
 
     FORMAT: ClassVar[str]
     VERSION: ClassVar[int] = 1
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset()  # fields that a file may lack
 
     def save(self, path: str | Path) -> None:
         """Write the model as versioned JSON; the file is there whole or not at all."""
@@ -42,8 +43,8 @@ class SavedModel(_Base):
         """
         values = _load_json(Path(path), cls.FORMAT, version=cls.VERSION)
         names = {f.name for f in fields(cls)}
-        if set(values) != names:
-            wrong = ", ".join(sorted(names ^ set(values)))
+        wrong = ", ".join(sorted((names - cls.OPTIONAL - set(values)) | (set(values) - names)))
+        if wrong:
             raise InputError(
                 f"expected the fields of a {cls.FORMAT} in {path}, got too few or too many "
                 f"({wrong}); make the file again."

@@ -184,6 +184,7 @@ def planted_texture(
         level_sd_db=np.zeros((*shape, len(layers))),
         estimator="planted",
         simulated=True,
+        blending="logarithmic",
     )
 
 

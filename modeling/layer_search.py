@@ -1,0 +1,310 @@
+"""Which layers a texture may have: how many, where, with which signs (METHOD 3 and 5).
+
+The search runs on a coarse part of the grid, with a stiff field. Layers grow one by one as
+independent ones, whose powers add and which need no signs; then signs are tried; layers that the
+coherent response does not need are taken away, and such as it lacks are added. Spectra without
+clear peaks are also begun from layers spread over them, with every sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from modeling.coherent import Climbed, Observed, climb, neighbouring_patterns, observe, without_layer
+from modeling.field import FieldFit, fit_field, usual_changes
+from modeling.growth import candidates, inserted, inserted_independently
+from modeling.layer_count import starts_of
+from modeling.likelihood import split
+from modeling.peq import Floats
+from modeling.texture_grid import Integers, TextureGrid
+
+MOST_LAYERS = 12
+STIFFNESS = 3.0  # of the field while searching: layers must not change places
+# A layer must raise the log likelihood by so much per record to be looked at.
+LEAST_GAIN = 4.0
+# What a layer costs when solutions with different numbers of layers are compared in passing.
+ROUGH_PRICE = 2.5
+DECIDING_CONDITIONS = 6
+STARTING_CONDITIONS = 3
+MOST_SPREAD_LAYERS = 3
+ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
+TRIED_SIGNS, TRIED_GROWTH, TRIED_STARTS = 2, 2, 3
+CONTENDERS = 2  # per number of layers
+NOT_WORSE = 4.0  # per record, for a number of layers to be looked at in full
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Layers of a whole texture: parameters (C, p) relative to the grid's scale, and signs (m,).
+
+    `value` is the penalised misfit, less what scatter alone gives in these bins, so that solutions
+    in different bins can be compared; `observed` are the bins.
+    """
+
+    theta: Floats
+    signs: Floats
+    value: float
+    observed: Observed
+    fit: FieldFit
+
+    @property
+    def count(self) -> int:
+        """Number of layers."""
+        return self.signs.size
+
+
+def fitted(
+    grid: TextureGrid,
+    theta: Floats,
+    signs: Floats,
+    *,
+    precision: Floats | None = None,
+    observed: Observed | None = None,
+    steps: int = 12,
+    enough: float = 1.0,
+) -> Solution:
+    """The field near a start (C, p); by default with the stiff one of the search."""
+    if precision is None:
+        precision = stiff(signs.size)
+    observed = grid.observed(theta) if observed is None else observed
+    fit = fit_field(
+        theta,
+        signs,
+        observed,
+        grid.field(precision),
+        limits=grid.limits(signs.size),
+        steps=steps,
+        enough=enough,
+    )
+    value = fit.value - float(observed.scatter.sum())
+    return Solution(fit.theta, signs, value, observed, fit)
+
+
+def stiff(m: int) -> Floats:
+    """Precision of the field of m layers while they are searched."""
+    return np.asarray(np.linalg.inv(usual_changes(m)) * STIFFNESS)
+
+
+def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
+    """Contenders on the whole grid, two per number of layers at most, the likelier first.
+
+    Parameters
+    ----------
+    grid : TextureGrid
+        One condition or more with a spectrum.
+    count : int, optional
+        The only number of layers to be considered.
+    """
+    part, chosen = grid.coarse()
+    pool = _Pool(part, count)
+    _grow(pool)
+    _reduce(pool)
+    if pool.best().count <= MOST_SPREAD_LAYERS:
+        _spread(pool)
+    _complete(pool)
+    if part is grid:
+        return pool.contenders()
+    return [expanded(grid, part, s) for s in pool.contenders()]
+
+
+class _Pool:
+    """Solutions on the coarse grid, by number of layers."""
+
+    def __init__(self, grid: TextureGrid, count: int | None) -> None:
+        self.grid, self.count = grid, count
+        self.records = int(grid.recorded.sum())
+        self.most = MOST_LAYERS if count is None else max(count, 1)
+        noise = fitted(grid, grid.levels()[:, None], np.zeros(0))
+        self._solutions: dict[int, list[Solution]] = {0: [noise]}
+
+    def add(self, solutions: Sequence[Solution]) -> None:
+        for solution in solutions:
+            self._solutions.setdefault(solution.count, []).append(solution)
+
+    def of(self, count: int) -> Solution | None:
+        """The likeliest with so many layers."""
+        return min(self._solutions.get(count, []), key=lambda s: s.value, default=None)
+
+    def price(self, solution: Solution) -> float:
+        """What makes a solution bad, per record."""
+        if self.count is not None:
+            return solution.value / self.records + 1e6 * abs(solution.count - self.count)
+        return solution.value / self.records + ROUGH_PRICE * solution.count
+
+    def best(self) -> Solution:
+        every = (s for solutions in self._solutions.values() for s in solutions)
+        return min(every, key=self.price)
+
+    def contenders(self) -> list[Solution]:
+        limit = self.price(self.best()) + NOT_WORSE
+        chosen: list[Solution] = []
+        for _, solutions in sorted(self._solutions.items()):
+            distinct: list[Solution] = []
+            for solution in sorted(solutions, key=lambda s: s.value):
+                near = any(abs(solution.value - s.value) < 1.0 for s in distinct)
+                if not near and self.price(solution) <= limit and len(distinct) < CONTENDERS:
+                    distinct.append(solution)
+            chosen += distinct
+        return chosen
+
+
+def _grow(pool: _Pool) -> None:
+    """Independent layers, one by one, along laws over the grid; each number with signs."""
+    grid = pool.grid
+    theta = pool.best().theta
+    grown: list[Floats] = []
+    now = pool.best().value
+    while len(grown) < pool.most:
+        found = candidates(grid, theta, None)
+        if not found:
+            break
+        start = inserted_independently(theta, found[0], rate_hz=grid.rate_hz)
+        m = len(grown) + 1
+        observed = grid.observed(start)
+        field, limits = grid.field(stiff(m)), grid.limits(m)
+        fit = fit_field(start, None, observed, field, limits=limits, steps=12, enough=1.0)
+        value = fit.value - float(observed.scatter.sum())
+        if now - value < LEAST_GAIN * pool.records:
+            break
+        theta, now = fit.theta, value
+        grown.append(theta)
+    for layers in grown[-3:]:
+        pool.add(_with_signs(grid, layers))
+
+
+def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
+    """Independent layers made coherent, with the signs that suit them best."""
+    m = (theta.shape[1] - 1) // 3
+    noise, frequency, bandwidth, gain = split(theta, m)
+    patterns = np.array(list(product((1.0, -1.0), repeat=m)))
+    if m > ALL_PATTERNS:
+        patterns = neighbouring_patterns(np.median(np.exp(frequency), axis=0))
+    starts = []
+    for signs in patterns:
+        # At its peak alone, G_w + s·G has the power G_w² + gain².
+        amplitude = np.hypot(np.exp(noise), np.exp(gain)) - signs * np.exp(noise)
+        amplitude = np.maximum(amplitude, 1e-3 * np.exp(noise))
+        starts.append((np.hstack((noise, frequency, bandwidth, np.log(amplitude))), signs))
+    return [fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_SIGNS)]
+
+
+def _reduce(pool: _Pool) -> None:
+    """From the most layers downwards: the one that is missed least goes."""
+    most = max(pool._solutions)
+    for m in range(most, 1, -1):
+        solution = pool.of(m)
+        if solution is None:
+            continue
+        starts = [
+            (without_layer(solution.theta, layer), np.delete(solution.signs, layer))
+            for layer in range(m)
+        ]
+        pool.add([fitted(pool.grid, *s) for s in _likeliest(pool.grid, starts, 1)])
+
+
+def _complete(pool: _Pool) -> None:
+    """Further layers where the coherent response lacks them, while they are worth their price."""
+    while True:
+        best = pool.best()
+        if best.count >= pool.most:
+            return
+        grid = pool.grid
+        starts = [
+            inserted(best.theta, best.signs, found, sign=sign, rate_hz=grid.rate_hz)
+            for found in candidates(grid, best.theta, best.signs)
+            for sign in (1.0, -1.0)
+        ]
+        if not starts:
+            return
+        pool.add([fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_GROWTH)])
+        if pool.best() is best:
+            return
+
+
+def _spread(pool: _Pool) -> None:
+    """Two or three layers spread over single spectra, every sign, carried to all conditions."""
+    counts = range(2, MOST_SPREAD_LAYERS + 1) if pool.count is None else [pool.count]
+    for count in counts:
+        if count <= MOST_SPREAD_LAYERS:
+            pool.add(_spread_layers(pool.grid, count))
+
+
+def _spread_layers(grid: TextureGrid, count: int) -> list[Solution]:
+    levels, bins = grid.levels(), grid.observed(np.zeros((len(grid.powers), 1)))
+    patterns = np.array(list(product((1.0, -1.0), repeat=count)))
+    carried = []
+    for row in grid.spread(STARTING_CONDITIONS):
+        power = grid.powers[row]
+        assert power is not None, "only recorded conditions are spread"
+        starts = starts_of(power, count)
+        starts[:, np.r_[0, 1 + 2 * count : 1 + 3 * count]] += np.log(power.scale / grid.scale)
+        theta = np.repeat(starts, len(patterns), axis=0)
+        signs = np.tile(patterns, (len(starts), 1))
+        here = bins.rows(np.full(len(theta), row))
+        fits = climb(theta, signs, here, limits=grid.limits(count), steps=20, enough=1.0)
+        for best in _distinct(fits, TRIED_STARTS - 1):
+            everywhere = np.tile(best.theta, (len(levels), 1))
+            gains = np.r_[0, 1 + 2 * count : 1 + 3 * count]
+            everywhere[:, gains] += (levels - levels[row])[:, None]
+            carried.append((everywhere, best.signs))
+    rough = [fitted(grid, *c, observed=bins, steps=8, enough=5.0) for c in carried]
+    rough.sort(key=lambda s: s.value)
+    return [fitted(grid, s.theta, s.signs) for s in rough[:TRIED_STARTS]]
+
+
+def _distinct(fits: Climbed, count: int) -> list[Climbed]:
+    """The likeliest rows that do not say the same."""
+    chosen: list[Climbed] = []
+    for row in np.argsort(fits.objective, kind="stable"):
+        fit = fits.row(int(row))
+        if all(abs(fit.objective - c.objective) > 1.0 for c in chosen):
+            chosen.append(fit)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _likeliest(
+    grid: TextureGrid, starts: Sequence[tuple[Floats, Floats]], count: int
+) -> list[tuple[Floats, Floats]]:
+    """The best of some starts of as many layers, by what they come to in a few conditions."""
+    some = grid.spread(DECIDING_CONDITIONS)
+    theta = np.concatenate([theta[some] for theta, _ in starts])
+    signs = np.concatenate([np.tile(signs, (some.size, 1)) for _, signs in starts])
+    m = signs.shape[1]
+    _, frequency, bandwidth, _ = split(theta, m)
+    powers = [grid.powers[i] for i in some] * len(starts)
+    observed = observe(powers, np.exp(frequency), np.exp(bandwidth), scale=grid.scale)
+    fits = climb(theta, signs, observed, limits=grid.limits(m), steps=10, enough=1.0)
+    loss = np.sort((fits.objective - observed.scatter).reshape(len(starts), -1), axis=1)
+    # In a few conditions a start may go astray.
+    held = loss[:, : max(1, round(0.67 * some.size))].sum(axis=1)
+    return [starts[i] for i in np.argsort(held, kind="stable")[:count]]
+
+
+def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Solution:
+    """A solution of the coarse grid on the whole one: linear in log speed and log force."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    places = np.log(np.array(part.conditions)).reshape(part.rows, part.columns, 2)
+    by_row = int(np.argmax(np.ptp(places[:, 0], axis=0)))
+    axes = [places[:, 0, by_row], places[0, :, 1 - by_row]]
+    values = solution.theta.reshape(part.rows, part.columns, -1)
+    for axis, nodes in enumerate(axes):
+        if nodes.size == 1:  # constant along an axis of one node
+            axes[axis] = nodes[0] + np.array([-1.0, 1.0])
+            values = np.repeat(values, 2, axis=axis)
+    wanted = np.log(np.array(grid.conditions))[:, [by_row, 1 - by_row]]
+    theta = RegularGridInterpolator(tuple(axes), values)(wanted)
+    return fitted(grid, np.asarray(theta, dtype=np.float64), solution.signs, steps=10)
+
+
+def hidden(grid: TextureGrid, solution: Solution) -> Solution:
+    """The same field without every second condition, which it then foretells."""
+    seen = solution.observed.without(grid.every_second())
+    refit = fitted(grid, solution.theta, solution.signs, observed=seen, enough=0.5)
+    return replace(refit, observed=solution.observed)
