@@ -29,7 +29,7 @@ from modeling.peq import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ, Floats
 # Width at −3 dB of a spectral line seen through the taper of `spectra.tapered`, in lines; a band
 # that is as narrow looks wider by it, and lower, at the same level.
 LINE_WIDTH = 0.9
-NARROWEST_LINES = 0.25
+NARROWEST_LINES = 1.5
 # Half the corner of the high-pass of the preparation: of layers below it only a skirt is seen.
 LOWEST_LAYER_HZ = 5.0
 # A layer higher than this many times the response at its own frequency is mostly cancelled by

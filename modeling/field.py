@@ -37,6 +37,7 @@ USUAL_CHANGE = 0.175
 USUAL_LEVEL_CHANGE = 0.38
 # Precision of a parameter that no record tells anything of: a deviation of 30 in its logarithm.
 FAINTEST = 1e-3
+MENDING_ROUNDS = 3
 FLATTENING = 1e-3  # of a trend where all speeds, or all forces, are the same
 
 
@@ -150,6 +151,9 @@ def fit_field(
 ) -> FieldFit:
     """All conditions at once to the greatest penalised likelihood near a start.
 
+    No condition stays worse than its neighbours foretell it: such a one has gone astray and is
+    begun anew from there.
+
     Parameters
     ----------
     theta : (C, p) ndarray
@@ -163,6 +167,35 @@ def fit_field(
     steps, enough
         As in `coherent.climb`.
     """
+    fit = _climb_field(
+        theta, signs, observed, field, limits=limits, steps=steps, enough=enough
+    )
+    for _ in range(MENDING_ROUNDS):
+        foretold = np.clip(fit.field.foretold(fit.theta), *limits)
+        astray = slopes(foretold, signs, observed).objective < fit.slopes.objective - enough
+        if not astray.any():
+            break
+        start = np.where(astray[:, None], foretold, fit.theta)
+        again = _climb_field(
+            start, signs, observed, fit.field, limits=limits, steps=steps, enough=enough
+        )
+        if again.value >= fit.value:
+            break
+        fit = again
+    return fit
+
+
+def _climb_field(
+    theta: Floats,
+    signs: Floats | None,
+    observed: Observed,
+    field: Field,
+    *,
+    limits: tuple[Floats, Floats],
+    steps: int,
+    enough: float,
+) -> FieldFit:
+    """Fisher scoring with Levenberg–Marquardt damping; the trend follows."""
     low, high = limits
     theta = np.clip(theta, low, high)
     damping = FIRST_DAMPING

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 
 from modeling.coherent import Climbed, Observed, climb, neighbouring_patterns, observe, without_layer
-from modeling.field import FieldFit, fit_field, usual_changes
+from modeling.field import FieldFit, fit_field, log_evidence, usual_changes
 from modeling.growth import candidates, inserted, inserted_independently
 from modeling.layer_count import starts_of
 from modeling.likelihood import split
@@ -26,15 +27,13 @@ MOST_LAYERS = 12
 STIFFNESS = 3.0  # of the field while searching: layers must not change places
 # A layer must raise the log likelihood by so much per record to be looked at.
 LEAST_GAIN = 4.0
-# What a layer costs when solutions with different numbers of layers are compared in passing.
-ROUGH_PRICE = 2.5
 DECIDING_CONDITIONS = 6
 STARTING_CONDITIONS = 3
 MOST_SPREAD_LAYERS = 3
 ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
-TRIED_SIGNS, TRIED_GROWTH, TRIED_STARTS = 2, 2, 3
+TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
 CONTENDERS = 2  # per number of layers
-NOT_WORSE = 4.0  # per record, for a number of layers to be looked at in full
+NOT_WORSE = 3.0  # in log evidence per record, for a solution to be looked at in full
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +54,11 @@ class Solution:
     def count(self) -> int:
         """Number of layers."""
         return self.signs.size
+
+    @cached_property
+    def evidence(self) -> float:
+        """Log evidence, comparable between solutions in different bins."""
+        return log_evidence(self.fit) + float(self.observed.scatter.sum())
 
 
 def fitted(
@@ -105,7 +109,8 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
     _reduce(pool)
     if pool.best().count <= MOST_SPREAD_LAYERS:
         _spread(pool)
-    _complete(pool)
+    if _complete(pool):
+        _reduce(pool)
     if part is grid:
         return pool.contenders()
     return [expanded(grid, part, s) for s in pool.contenders()]
@@ -126,30 +131,35 @@ class _Pool:
             self._solutions.setdefault(solution.count, []).append(solution)
 
     def of(self, count: int) -> Solution | None:
-        """The likeliest with so many layers."""
-        return min(self._solutions.get(count, []), key=lambda s: s.value, default=None)
+        """The best with so many layers."""
+        return max(self._solutions.get(count, []), key=lambda s: s.evidence, default=None)
 
-    def price(self, solution: Solution) -> float:
-        """What makes a solution bad, per record."""
-        if self.count is not None:
-            return solution.value / self.records + 1e6 * abs(solution.count - self.count)
-        return solution.value / self.records + ROUGH_PRICE * solution.count
+    def rank(self, solution: Solution) -> tuple[int, float]:
+        """The larger the better: as many layers as are asked for, then the evidence."""
+        off = 0 if self.count is None else abs(solution.count - self.count)
+        return -off, solution.evidence
 
     def best(self) -> Solution:
-        every = (s for solutions in self._solutions.values() for s in solutions)
-        return min(every, key=self.price)
+        return max(self._every(), key=self.rank)
+
+    def largest(self) -> int:
+        """The largest number of layers among the solutions."""
+        return max(self._solutions)
 
     def contenders(self) -> list[Solution]:
-        limit = self.price(self.best()) + NOT_WORSE
+        best = self.best()
+        least = best.evidence - NOT_WORSE * self.records
         chosen: list[Solution] = []
-        for _, solutions in sorted(self._solutions.items()):
-            distinct: list[Solution] = []
-            for solution in sorted(solutions, key=lambda s: s.value):
-                near = any(abs(solution.value - s.value) < 1.0 for s in distinct)
-                if not near and self.price(solution) <= limit and len(distinct) < CONTENDERS:
-                    distinct.append(solution)
-            chosen += distinct
+        for solution in sorted(self._every(), key=self.rank, reverse=True):
+            off = self.rank(solution)[0] != self.rank(best)[0] or solution.evidence < least
+            alike = [s for s in chosen if s.count == solution.count]
+            near = any(abs(solution.value - s.value) < 1.0 for s in alike)
+            if not (off or near or len(alike) == CONTENDERS):
+                chosen.append(solution)
         return chosen
+
+    def _every(self) -> list[Solution]:
+        return [s for solutions in self._solutions.values() for s in solutions]
 
 
 def _grow(pool: _Pool) -> None:
@@ -194,8 +204,7 @@ def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
 
 def _reduce(pool: _Pool) -> None:
     """From the most layers downwards: the one that is missed least goes."""
-    most = max(pool._solutions)
-    for m in range(most, 1, -1):
+    for m in range(pool.largest(), 1, -1):
         solution = pool.of(m)
         if solution is None:
             continue
@@ -203,15 +212,17 @@ def _reduce(pool: _Pool) -> None:
             (without_layer(solution.theta, layer), np.delete(solution.signs, layer))
             for layer in range(m)
         ]
-        pool.add([fitted(pool.grid, *s) for s in _likeliest(pool.grid, starts, 1)])
+        likeliest = _likeliest(pool.grid, starts, TRIED_REMOVALS)
+        pool.add([fitted(pool.grid, *start) for start in likeliest])
 
 
-def _complete(pool: _Pool) -> None:
-    """Further layers where the coherent response lacks them, while they are worth their price."""
+def _complete(pool: _Pool) -> bool:
+    """Further layers where the coherent response lacks them; whether any was worth it."""
+    completed = False
     while True:
         best = pool.best()
         if best.count >= pool.most:
-            return
+            return completed
         grid = pool.grid
         starts = [
             inserted(best.theta, best.signs, found, sign=sign, rate_hz=grid.rate_hz)
@@ -219,10 +230,11 @@ def _complete(pool: _Pool) -> None:
             for sign in (1.0, -1.0)
         ]
         if not starts:
-            return
+            return completed
         pool.add([fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_GROWTH)])
         if pool.best() is best:
-            return
+            return completed
+        completed = True
 
 
 def _spread(pool: _Pool) -> None:

@@ -1,8 +1,8 @@
 """The `joint` estimator over a whole grid: the layers of a texture as one smooth field.
 
-Of the solutions that the search has found, those that foretell hidden conditions worse than others
-are left out; of the rest the one with the largest evidence is taken, so that a layer must say more
-than the freedom to say it costs. Then the field learns its own smoothness from the texture
+Of the solutions that the search has found the likeliest is taken: by its evidence, so that a layer
+must say more than the freedom to say it costs, and by how well it foretells conditions that are
+hidden from it. Then the field learns its own smoothness from the texture
 (METHOD 3–5).
 """
 
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from modeling.coherent import level_deviations, slopes, told
-from modeling.field import Covariances, covariances, learnt_precision, log_evidence, usual_changes
+from modeling.coherent import level_deviations, told
+from modeling.field import Covariances, covariances, learnt_precision, usual_changes
 from modeling.grid import Condition
 from modeling.growth import expected_on_lines
 from modeling.joint import NEPER_DB
@@ -26,10 +26,7 @@ from modeling.spectra import Spectrum
 from modeling.texture_grid import TextureGrid, texture_grid
 
 LEARNING_ROUNDS = 4
-MENDING_ROUNDS = 3
-# Of the log likelihood of a hidden condition: what a solution may lack and still be a contender;
-# one condition counts no more than `FORETELLING_REACH`.
-FORETELLING_SLACK, FORETELLING_REACH = 5.0, 20.0
+FORETELLING_REACH = 20.0  # of log likelihood: no hidden condition counts for more
 LARGEST_LEVEL_SD_DB = 12.0
 # A record that leaves more than this of the variance with which its neighbours foretell a
 # frequency has not told it.
@@ -70,19 +67,17 @@ def fit_grid_jointly(
     grid = texture_grid(spectra)
     if not grid.recorded.any():
         return _silent(grid)
-    solution = _mended(grid, _learnt(grid, _chosen(grid, search(grid, count=count))))
+    solution = _learnt(grid, _chosen(grid, search(grid, count=count)))
     return _grid_fit(grid, solution)
 
 
 def _chosen(grid: TextureGrid, solutions: Sequence[Solution]) -> Solution:
-    """The likeliest, whatever its freedom, of those that foretell hidden conditions."""
-    if len(solutions) > 1:
-        losses = np.array([foretelling_losses(grid, s) for s in solutions])
-        if losses.size:
-            worse = np.minimum(losses - losses.min(axis=0), FORETELLING_REACH).mean(axis=1)
-            fit = worse <= worse.min() + FORETELLING_SLACK
-            solutions = [s for s, good in zip(solutions, fit, strict=True) if good]
-    return max(solutions, key=lambda s: log_evidence(s.fit))
+    """The likeliest, whatever its freedom, that foretells hidden conditions, too."""
+    if len(solutions) == 1:
+        return solutions[0]
+    losses = np.array([foretelling_losses(grid, s) for s in solutions])
+    worse = np.minimum(losses - losses.min(axis=0), FORETELLING_REACH).sum(axis=1)
+    return solutions[int(np.argmax([s.evidence for s in solutions] - worse))]
 
 
 def foretelling_losses(grid: TextureGrid, solution: Solution) -> Floats:
@@ -119,29 +114,6 @@ def _learnt(grid: TextureGrid, solution: Solution) -> Solution:
         )
         theta, precision = solution.theta, learnt_precision(solution.fit)
     return fitted(grid, theta, solution.signs, precision=precision, steps=8, enough=0.3)
-
-
-def _mended(grid: TextureGrid, solution: Solution) -> Solution:
-    """The solution without conditions that their neighbours foretell better than they are."""
-    for _ in range(MENDING_ROUNDS):
-        foretold = solution.fit.field.foretold(solution.theta)
-        own = solution.fit.slopes.objective
-        theirs = slopes(foretold, solution.signs, solution.observed).objective
-        worse = grid.recorded & (theirs < own)
-        if not worse.any():
-            break
-        theta = np.where(worse[:, None], foretold, solution.theta)
-        mended = fitted(
-            grid,
-            theta,
-            solution.signs,
-            precision=solution.fit.field.precision,
-            observed=solution.observed,
-        )
-        if mended.value >= solution.value:
-            break
-        solution = mended
-    return solution
 
 
 def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
