@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
-from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,14 +148,14 @@ def check_own_file(out: Path, command: str) -> Path:
 
 
 def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:
-    """Say how many conditions lie outside what a toolkit's texture was modelled from."""
-    moved = [c for c in conditions if not all(map(isclose, c, texture.nearest(*c)))]
-    if moved:
-        fastest, strongest = texture.conditions.max(axis=0)
+    """Say which conditions a toolkit's texture does not tell of, and so have no recording."""
+    inside = set(texture.conditions_inside(conditions))
+    outside = [condition for condition in conditions if condition not in inside]
+    if outside:
+        names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in outside)
         print(
-            f"note: {texture.material} reaches {fastest:g} mm/s and {strongest:g} N; "
-            f"{len(moved)} of {len(conditions)} conditions lie beyond its models and sound as the "
-            "nearest condition within them."
+            f"note: {texture.material}: {len(outside)} of {len(conditions)} conditions lie beyond "
+            f"its models, or are silent there, and are left out: {names}"
         )
 
 
@@ -230,12 +229,18 @@ def add_to_set(
     *,
     settings: Mapping[str, object],
     files: Sequence[Path],
+    left_out: Sequence[str] = (),
 ) -> None:
-    """Save imported recordings, together with those that `out` already holds."""
+    """Save imported recordings, together with those that `out` already holds.
+
+    `left_out`: a sentence for each file that could not be used.
+    """
     from modeling import RecordingSet
     from modeling.recording import INDEX_NAME
 
     warn_of_clipping(new)
+    for sentence in left_out:
+        print(f"warning: left out: {sentence}", file=sys.stderr)
     known = RecordingSet.load(out).recordings if (out / INDEX_NAME).is_file() else ()
     earlier = out / "provenance.json"
     before = _read_object(earlier) if earlier.is_file() else None
@@ -248,6 +253,8 @@ def add_to_set(
             "(WAV) or --unit (CSV)."
         )
     rates = sorted({f"{r.rate_hz:g}" for r in new.recordings})
+    if left_out:
+        print(f"note: {len(left_out)} of {len(files)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {len(everything)} in {out}")
 
 
@@ -314,17 +321,20 @@ def simplification_shown(
     threshold: Threshold,
     criterion: CriterionName,
     margin_db: float,
+    hold_above: bool,
 ) -> Simplification:
     """The verdicts behind the simplified model that people felt; refused where they differ."""
     from modeling import simplify
 
-    verdicts = simplify(full, threshold, criterion=criterion, margin_db=margin_db)
+    verdicts = simplify(
+        full, threshold, criterion=criterion, margin_db=margin_db, hold_above=hold_above
+    )
     if verdicts.model != shown:
         raise ValueError(
             f"expected the simplified model of {full.texture} to be the one that {threshold.name}, "
             f"{criterion} and {margin_db:g} dB give, got "
-            f"{'another' if shown else 'none'}; give the --threshold, --criterion and --margin-db "
-            "that it was made with."
+            f"{'another' if shown else 'none'}; give the --threshold, --criterion, "
+            "--margin-db and --known-only that it was made with."
         )
     return verdicts
 

@@ -54,13 +54,20 @@ Estimator = Annotated[
     Literal["joint", "paper", "paper-consistent"], typer.Option(help="How layers are found.")
 ]
 ThresholdName = Annotated[
-    str, typer.Option("--threshold", help="codec, pen-hold, or a TSV file of your own.")
+    str, typer.Option("--threshold", help="codec, pen-hold, mobile, or a TSV file of your own.")
 ]
 Criterion = Annotated[
     Literal["energy", "paper-fft", "paper-gain"],
     typer.Option(help="Which amplitude is compared with the threshold."),
 ]
 Margin = Annotated[float, typer.Option(help="How far below threshold a layer must be, in dB.")]
+HoldAbove = Annotated[
+    bool,
+    typer.Option(
+        "--hold-above/--known-only",
+        help="Above the threshold's table hold its last level as a lower bound, or know nothing.",
+    ),
+]
 StudyFile = Annotated[
     Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
 ]
@@ -140,14 +147,12 @@ def import_wav(
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
     from rig.importing import import_wav as read
+    from rig.importing import usable
 
-    records = read(
-        files,
-        labels_of(files, labels, texture=texture or out.name, speed=speed, force=force),
-        g_per_fullscale=g_per_fullscale,
-    )
+    named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
+    records, refused = usable(partial(read, g_per_fullscale=g_per_fullscale), files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "labels": str(labels)}
-    add_to_set(out, records, "import wav", settings=settings, files=files)
+    add_to_set(out, records, "import wav", settings=settings, files=files, left_out=refused)
 
 
 @imports.command("csv")
@@ -171,16 +176,13 @@ def import_csv(
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
     """
     from rig.importing import import_csv as read
+    from rig.importing import usable
 
-    records = read(
-        files,
-        labels_of(files, labels, texture=texture or out.name, speed=speed, force=force),
-        axis=axis,
-        unit=unit,
-        rate_hz=rate_hz,
-    )
+    named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
+    read_one = partial(read, axis=axis, unit=unit, rate_hz=rate_hz)
+    records, refused = usable(read_one, files, named)
     settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
-    add_to_set(out, records, "import csv", settings=settings, files=files)
+    add_to_set(out, records, "import csv", settings=settings, files=files, left_out=refused)
 
 
 @imports.command("hatt")
@@ -192,12 +194,13 @@ def import_hatt(
     rate_hz: Annotated[
         float | None, typer.Option("--rate", help="Sampling rate in Hz; the file's without it.")
     ] = None,
-    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 1.0,
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 10.0,
     seed: Seed = 0,
 ) -> None:
     """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
 
-    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. The toolkit is not included.
+    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. Conditions beyond a file's
+    models are left out, so that they count as holes. The toolkit is not included.
 
     Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
     """
@@ -253,6 +256,7 @@ def simplify(
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
     margin_db: Margin = 0.0,
+    hold_above: HoldAbove = True,
     plot: Annotated[
         bool, typer.Option("--plot", help="Draw spectra, layers and threshold of one condition.")
     ] = False,
@@ -276,7 +280,13 @@ def simplify(
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
     check_own_model(start, "simplify")
-    result = drop_layers(full, threshold_named(threshold), criterion=criterion, margin_db=margin_db)
+    result = drop_layers(
+        full,
+        threshold_named(threshold),
+        criterion=criterion,
+        margin_db=margin_db,
+        hold_above=hold_above,
+    )
     if plot:
         draw_condition(full, result, start, recordings=recordings, speed=speed, force=force)
     elif (recordings, speed, force) != (None, None, None):
@@ -287,7 +297,12 @@ def simplify(
     table = simplification_table(result)
     write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
     tell_verdicts(result)
-    settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
+    settings = {
+        "threshold": threshold,
+        "criterion": criterion,
+        "margin_db": margin_db,
+        "hold_above": hold_above,
+    }
     provenance = Path(f"{start}_provenance.json")
     write_provenance(provenance, "simplify", settings, inputs=[model_file])
     print(f"{full.n_layers} layers to {result.model.n_layers}{simulated_note(full)}: {start}.json")
@@ -391,6 +406,7 @@ def analyze(
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
     margin_db: Margin = 0.0,
+    hold_above: HoldAbove = True,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
@@ -419,6 +435,7 @@ def analyze(
                 threshold=threshold_named(threshold),
                 criterion=criterion,
                 margin_db=margin_db,
+                hold_above=hold_above,
             ),
         )
     elif folders != (None, None, None):
@@ -426,7 +443,12 @@ def analyze(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    settings = {"threshold": threshold, "criterion": criterion, "margin_db": margin_db}
+    settings = {
+        "threshold": threshold,
+        "criterion": criterion,
+        "margin_db": margin_db,
+        "hold_above": hold_above,
+    }
     inputs = [path for path in (data, *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         provenance = write_provenance(

@@ -51,11 +51,13 @@ class SpectrumComparison:
     layer_threshold : (m, n) ndarray
         The gain (g per unit noise) with which a layer of this width would stand at the threshold
         by `criterion`, a quarter of an octave around the layer, NaN elsewhere and where no
-        threshold is known. The layer is above threshold where its response peaks above this.
+        threshold is known or assumed. The layer is above threshold where its response peaks above this.
     dropped : (m,) ndarray of bool
         Layers that the simplified model does without.
     threshold : Threshold
         What the layers were held against.
+    hold_above : bool
+        Whether its last level was assumed to hold above its end, as a lower bound.
     criterion : str
         Which amplitude was held against it (METHOD 7): energy, paper-fft or paper-gain.
     """
@@ -74,6 +76,7 @@ class SpectrumComparison:
     layer_threshold: Floats
     dropped: NDArray[np.bool_]
     threshold: Threshold
+    hold_above: bool
     criterion: CriterionName
 
 
@@ -146,6 +149,7 @@ def compare_condition(
         layer_threshold=_layer_thresholds(peq, simplification, frequency_hz=frequency),
         dropped=np.array([v.verdict == "dropped" for v in simplification.layers], bool),
         threshold=simplification.threshold,
+        hold_above=simplification.hold_above,
         criterion=simplification.criterion,
     )
 
@@ -162,7 +166,9 @@ def _layer_thresholds(peq: PEQ, simplification: Simplification, *, frequency_hz:
     per_gain = layer_amplitudes_g(unit_gains, criterion=simplification.criterion)
     centres = peq.frequencies_hz[:, None]
     near = (frequency_hz >= centres / THRESHOLD_REACH) & (frequency_hz <= centres * THRESHOLD_REACH)
-    return np.where(near, simplification.threshold.at(frequency_hz) / per_gain[:, None], np.nan)
+    threshold = simplification.threshold
+    level = (threshold.held if simplification.hold_above else threshold.at)(frequency_hz)
+    return np.where(near, level / per_gain[:, None], np.nan)
 
 
 def _bands(peq: PEQ, frequency_hz: Floats) -> NDArray[np.complex128]:

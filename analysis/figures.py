@@ -119,6 +119,15 @@ def plot_layers_and_threshold(
         color=BLACK,
         label=f"detection threshold ({threshold.name})",
     )
+    end, last = threshold.frequency_hz[-1], threshold.acceleration_g[-1]
+    if comparison.hold_above and end < comparison.frequency_hz[-1]:
+        ax.plot(
+            [end, comparison.frequency_hz[-1]],
+            [last, last],
+            color=BLACK,
+            ls="--",
+            label="assumed lower bound",
+        )
     # A layer without power must not stretch the axis: weaker ones stand on its lower edge.
     bottom = float(threshold.acceleration_g.min()) / 1000
     _plot_stems(ax, comparison, bottom=bottom, with_dropped=model == "full")

@@ -14,6 +14,7 @@ from analysis.statistics import ALL_TEXTURES
 from analysis.tables import TextureResult, likeness_table
 from modeling import RegressedModel, TextureModel
 from modeling.model import DrivenBy
+from modeling.own_peaks import own_peaks
 from modeling.regression import (
     ALPHA,
     FORCE,
@@ -83,13 +84,15 @@ def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
         (1-based), unit, conditions (that the regression rests on), inherited (conditions left
         out because the frequency there is a copy), multiple_r, adjusted_r_squared, p (F test),
         mark (* p < .05, ** p < .01, *** p < .001), residual_degrees (of
-        freedom), intercept, p_intercept, and for speed, force
+        freedom), own_peak (false of a layer without a maximum
+        of the response, which takes no part in support ratings), intercept, p_intercept, and for speed, force
         and speed_force the coefficient (…_coefficient; per mm/s, N and mm/s·N), p (p_…) and mark
         (mark_…); reduced: the terms that backward elimination leaves, reduced_adjusted_r_squared;
         simulated. What cannot be said is NaN (see `modeling.regression.Regression`).
     """
     rows = []
     for model in models:
+        peaks = own_peaks(model)
         for found in parameter_regressions(model):
             gain = found.parameter in ("noise_gain", "amplitude")
             labels = {
@@ -99,6 +102,7 @@ def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
                 "unit": model.unit if gain else "Hz",
                 "conditions": found.full.n_conditions,
                 "inherited": found.inherited,
+                "own_peak": bool(peaks.is_peak[found.layer - 1]) if found.layer else True,
             }
             rows.append(
                 labels | _fit(found.full) | _reduced(found) | {"simulated": model.simulated}
@@ -149,7 +153,7 @@ def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         One row per parameter: parameter, of (how many layers, or textures for the noise gain,
-        could be tested), support_… (share in % of them whose coefficient has p < .05; a constant
+        could be tested; layers without a maximum of their own take no part), support_… (share in % of them whose coefficient has p < .05; a constant
         parameter supports nothing) for speed, force and speed_force, published_support_…,
         adjusted_r_squared (their mean) and published_adjusted_r_squared.
     """
@@ -157,7 +161,7 @@ def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
     for parameter in PARAMETERS:
         chosen = regressions[regressions["parameter"] == parameter]
         # No residual degree of freedom: no test, which is no verdict on the coefficient.
-        tested = chosen[chosen["residual_degrees"] > 0]
+        tested = chosen[(chosen["residual_degrees"] > 0) & chosen["own_peak"]]
         row: dict[str, object] = {"parameter": NAMES[parameter], "of": len(tested)}
         published = dict(zip(TERMS, PUBLISHED_SUPPORT[parameter], strict=True))
         for term in TERMS:

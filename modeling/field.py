@@ -167,9 +167,7 @@ def fit_field(
     steps, enough
         As in `coherent.climb`.
     """
-    fit = _climb_field(
-        theta, signs, observed, field, limits=limits, steps=steps, enough=enough
-    )
+    fit = _climb_field(theta, signs, observed, field, limits=limits, steps=steps, enough=enough)
     for _ in range(MENDING_ROUNDS):
         foretold = np.clip(fit.field.foretold(fit.theta), *limits)
         astray = slopes(foretold, signs, observed).objective < fit.slopes.objective - enough

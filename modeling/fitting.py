@@ -22,7 +22,18 @@ from modeling.layers import Layers
 from modeling.likelihood import is_silent
 from modeling.model import TextureModel
 from modeling.recording import Recording, RecordingSet
-from modeling.spectra import MODEL_RATE_HZ, Spectrum, mean_spectrum, spectrum, subtract_floor
+from modeling.peq import Floats
+from modeling.sinusoids import common_hum
+from modeling.spectra import (
+    MODEL_RATE_HZ,
+    Spectrum,
+    mean_spectrum,
+    prepare,
+    prepared_spectrum,
+    spectrum,
+    subtract_floor,
+)
+from modeling.stationarity import drift_of, straightened
 from modeling.tracking import assign_peaks, reference_of, visiting_order
 from modeling.whole_grid import fit_grid_jointly
 
@@ -170,11 +181,13 @@ def spectra_by_condition(
 
 
 def recording_spectra(
-    records: RecordingSet, *, rate_hz: float = MODEL_RATE_HZ
+    records: RecordingSet, *, rate_hz: float = MODEL_RATE_HZ, keep_hum: bool = False
 ) -> list[tuple[Recording, Spectrum]]:
     """Each recording with contact and its spectrum, at one rate, the sensor's floor subtracted.
 
-    This is what models are fitted to and held against (METHOD 2).
+    This is what models are fitted to and held against (METHOD 2). Hum of the mains is taken out,
+    and frequencies that drift within a record are held at those of its middle; the spectra's
+    `notes` say so.
 
     Parameters
     ----------
@@ -182,6 +195,8 @@ def recording_spectra(
         One texture; recordings at force 0 are the floor.
     rate_hz : float
         Of the spectra, unless a recording with contact has a lower rate: then that one.
+    keep_hum : bool
+        Leave hum of the mains where it is.
 
     Raises
     ------
@@ -196,12 +211,37 @@ def recording_spectra(
             f"expected recordings with a speed and a force above 0, got {got}; correct the labels."
         )
     rate_hz = min(rate_hz, *(r.rate_hz for r in contact))
-    spectra = [spectrum(r, rate_hz=rate_hz) for r in contact]
+    prepared = [prepare(r, rate_hz=rate_hz) for r in contact]
+    hum = [()] * len(contact) if keep_hum else common_hum(prepared, rate_hz)
+    spectra = [
+        _spectrum_of(record, samples, rate_hz, hum_hz=lines)
+        for record, samples, lines in zip(contact, prepared, hum, strict=True)
+    ]
     floors = [spectrum(r, rate_hz=rate_hz) for r in records.recordings if r.force_n == 0]
     if floors:
         floor = mean_spectrum(floors)
         spectra = [subtract_floor(measured, floor) for measured in spectra]
     return list(zip(contact, spectra, strict=True))
+
+
+def _spectrum_of(
+    record: Recording, samples: Floats, rate_hz: float, *, hum_hz: Sequence[float]
+) -> Spectrum:
+    """The spectrum of one prepared record, mended and told of."""
+    notes = []
+    if hum_hz:
+        lines = ", ".join(f"{f:.0f}" for f in hum_hz)
+        notes.append(f"hum of the mains at {lines} Hz taken out")
+    drift = drift_of(samples, rate_hz)
+    if drift.frequency:
+        samples = straightened(samples, drift.frequency)
+        notes.append(
+            f"its frequencies drift by {drift.frequency:+.0%}, so its speed does; they are held at "
+            "those of its middle"
+        )
+    if drift.level_db:
+        notes.append(f"its level changes by {drift.level_db:.1f} dB; the mean power is modelled")
+    return prepared_spectrum(samples, rate_hz, record, hum_hz=hum_hz, notes=notes)
 
 
 def only_unit(records: RecordingSet) -> str:

@@ -115,7 +115,10 @@ def check_spanned(conditions: Collection[Condition], texture: str) -> None:
     speeds, forces = grid_axes(conditions)
     points = np.array(sorted(conditions))
     across = len(speeds) > 1 and len(forces) > 1
-    if across and np.linalg.matrix_rank((points - points.mean(axis=0)) / np.ptp(points, axis=0)) < 2:
+    if (
+        across
+        and np.linalg.matrix_rank((points - points.mean(axis=0)) / np.ptp(points, axis=0)) < 2
+    ):
         raise GridError(
             f"{texture}: expected recordings that span the grid, got {len(points)} of "
             f"{len(speeds) * len(forces)} conditions on one line; record more of them."

@@ -153,9 +153,7 @@ def _appended(theta: Floats, candidate: Candidate, log_amplitude: Floats) -> Flo
     return np.concatenate(columns, axis=1)
 
 
-def _offsets_at(
-    frequency: Floats, bandwidth: Floats, at_hz: Floats, *, rate_hz: float
-) -> Floats:
+def _offsets_at(frequency: Floats, bandwidth: Floats, at_hz: Floats, *, rate_hz: float) -> Floats:
     """u (C, m) of each layer at one frequency per condition; see `coherent.response`."""
     per_hz = np.pi / rate_hz
     g, k = np.tan(per_hz * np.exp(frequency)), np.tan(per_hz * np.exp(bandwidth))

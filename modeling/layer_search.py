@@ -15,7 +15,14 @@ from itertools import product
 
 import numpy as np
 
-from modeling.coherent import Climbed, Observed, climb, neighbouring_patterns, observe, without_layer
+from modeling.coherent import (
+    Climbed,
+    Observed,
+    climb,
+    neighbouring_patterns,
+    observe,
+    without_layer,
+)
 from modeling.field import FieldFit, fit_field, log_evidence, usual_changes
 from modeling.growth import candidates, inserted, inserted_independently
 from modeling.layer_count import starts_of

@@ -2,43 +2,68 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from modeling.model import TextureModel
 from modeling.peq import PEQ, Floats, band_response
 
-PEAK = -1
 POINTS = 400
 LEAST_REACH_HZ = 10.0
 LOWEST_HZ = 5.0
 HIGHEST_SHARE = 0.98
+SHAPING_SHARE = 0.5
+TINY = 1e-300
 
 
-def filled_layers(model: TextureModel) -> NDArray[np.intp]:
-    """The layer that each one fills, (m,) of 0-based indices; −1 for peaks of their own.
+class OwnPeaks(NamedTuple):
+    """What each of m layers is to the response.
 
-    A peak of its own has a local maximum of the response within half its width (10 Hz at least) in
-    most recorded conditions, nearer to it than to any other layer. What has none widens, flattens
-    or sharpens the peak of the layer that is the loudest at its place. Where no layer has a maximum
-    the loudest one counts as a peak.
+    Parameters
+    ----------
+    is_peak : (m,) ndarray of bool
+        It has a local maximum of the response within half its width (10 Hz at least) in most
+        recorded conditions, nearer to it than to any other layer. Where no layer has one the
+        loudest counts as a peak.
+    fills : (m,) ndarray of int
+        The peak (0-based) that a layer without a maximum of its own widens, flattens or sharpens:
+        the loudest one at its place. −1 for peaks, and for what makes up less than half of the
+        response there in most conditions: such a layer is hidden, but shapes nothing.
     """
+
+    is_peak: NDArray[np.bool_]
+    fills: NDArray[np.intp]
+
+
+def own_peaks(model: TextureModel) -> OwnPeaks:
+    """Which layers of a model are peaks of their own, and which peaks the others fill."""
     m = model.n_layers
-    recorded = np.argwhere(~model.interpolated)
-    seen, shares, levels = np.zeros(m), np.zeros((m, m)), np.zeros(m)
-    for at in map(tuple, recorded):
-        own, share, level = _one_condition(model, at)
-        seen, shares, levels = seen + own, shares + share, levels + level
-    peaks = seen > 0.5 * len(recorded)
-    if m and not peaks.any():
-        peaks[int(np.argmax(levels))] = True
-    loudest = np.argmax(np.where(peaks[None, :], shares, -1.0), axis=1) if m else np.zeros(0)
-    filled: NDArray[np.intp] = np.where(peaks, PEAK, loudest).astype(np.intp)
-    return filled
+    recorded = [tuple(at) for at in np.argwhere(~model.interpolated)]
+    found = [_one_condition(model, at) for at in recorded]
+    if not (m and found):
+        return OwnPeaks(np.ones(m, dtype=bool), np.full(m, -1, dtype=np.intp))
+    is_peak = np.mean([condition.own for condition in found], axis=0) > 0.5
+    if not is_peak.any():
+        is_peak[int(np.argmax(np.sum([condition.rms for condition in found], axis=0)))] = True
+    shaping = np.mean([condition.shaping for condition in found], axis=0) > 0.5
+    loudness = np.sum([condition.share for condition in found], axis=0)
+    loudest = np.argmax(np.where(is_peak[None, :], loudness, -1.0), axis=1)
+    return OwnPeaks(is_peak, np.where(shaping & ~is_peak, loudest, -1).astype(np.intp))
 
 
-def _one_condition(model: TextureModel, at: tuple[int, ...]) -> tuple[Floats, Floats, Floats]:
-    """Layers with a maximum of their own (m,); who is how loud at whose place (m, m); levels."""
+class _Condition(NamedTuple):
+    """Of m layers: who has a maximum, who makes up half of the response at its own place, how loud
+    the others are there (m, m), and each one's RMS."""
+
+    own: NDArray[np.bool_]
+    shaping: NDArray[np.bool_]
+    share: Floats
+    rms: Floats
+
+
+def _one_condition(model: TextureModel, at: tuple[int, ...]) -> _Condition:
     peq = PEQ(
         noise_gain=float(model.noise_gains[at]),
         frequencies_hz=model.frequencies_hz[at],
@@ -50,14 +75,14 @@ def _one_condition(model: TextureModel, at: tuple[int, ...]) -> tuple[Floats, Fl
     maxima = _maxima(peq)
     reach = np.maximum(width / 2, LEAST_REACH_HZ)
     away = np.abs(maxima[:, None] - centre[None, :]) / reach[None, :]
-    own = np.zeros(centre.size)
+    own = np.zeros(centre.size, dtype=bool)
     if away.size:
-        nearest = np.argmin(away, axis=1)
-        own[nearest[away.min(axis=1) <= 1]] = 1.0
+        own[np.argmin(away, axis=1)[away.min(axis=1) <= 1]] = True
     bands = band_response(centre, centres_hz=centre, bandwidths_hz=width, rate_hz=peq.rate_hz)
     loudness = (np.abs(peq.gains)[:, None] * np.abs(bands)).T
-    total = np.maximum(loudness.sum(axis=1, keepdims=True), 1e-300)
-    return own, loudness / total, peq.band_rms
+    share = loudness / np.maximum(loudness.sum(axis=1, keepdims=True), TINY)
+    shaping = np.abs(peq.gains) >= SHAPING_SHARE * peq.response(centre)
+    return _Condition(own, shaping, share, peq.band_rms)
 
 
 def _maxima(peq: PEQ) -> Floats:

@@ -302,6 +302,30 @@ class RecordingSet:
         )
 
 
+def load_usable(
+    folder: str | Path, *, texture: str | None = None
+) -> tuple[RecordingSet, tuple[str, ...]]:
+    """As `RecordingSet.load`, but unusable records are left out, with a sentence for each.
+
+    Raises
+    ------
+    InputError
+        For a folder that is no recording set, and where no record can be used: what is wrong with
+        the first.
+    """
+    records, refusals = [], []
+    for row in _listed(Path(folder)):
+        if texture not in (None, row["texture"]):
+            continue
+        try:
+            records.append(_load_row(Path(folder), row))
+        except InputError as error:
+            refusals.append(error)
+    if refusals and not records:
+        raise refusals[0]
+    return RecordingSet(records), tuple(map(str, refusals))
+
+
 def is_recording_set(folder: Path) -> bool:
     """Whether `RecordingSet.load` finds anything in this folder."""
     return (folder / INDEX_NAME).is_file() or bool(_sidecar_files(folder))

@@ -246,9 +246,7 @@ def _fits_by_centroid(model: TextureModel) -> tuple[Floats, dict[tuple[str, int]
     centroid, speed, _ = centroid_observations(model)
     course = _row(reduced_regression(centroid, {SPEED: speed}), (SPEED,))
     fits = {
-        (o.parameter, o.layer): reduced_regression(
-            o.values, {CENTROID: course[0] + course[1] * o.speed_mm_s}
-        )
+        (o.parameter, o.layer): o.regressions({CENTROID: course[0] + course[1] * o.speed_mm_s})[1]
         for o in parameter_observations(model)
     }
     return np.array(course), fits

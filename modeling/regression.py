@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +33,8 @@ class Regression:
     coefficients, p_values : (1 + terms,) ndarray
         The intercept first, then one per term, and the two-sided p of its t-test.
     n_conditions : int
+        0 where no condition tells the parameter: then the intercept is a mean of what neighbours
+        foretell, and nothing can be tested.
     multiple_r, adjusted_r_squared, p : float
         Multiple correlation R (0–1), 1 − (1 − R²)(n − 1)/(n − k − 1) with k terms, and p of the
         F test of all terms at once.
@@ -191,7 +193,9 @@ class Observations(NamedTuple):
     """One parameter of one layer in the n conditions that say something about it.
 
     `layer` counts from 1; 0 is the noise gain, which belongs to no layer. `inherited` is the number
-    of conditions left out because the layer's frequency there was copied from another condition.
+    of recorded conditions left out, because the layer's frequency there was told by other
+    conditions, or because its level is not identifiable. Where that leaves none, `told` is false
+    and the values are those of all recorded conditions.
     """
 
     parameter: str
@@ -200,28 +204,39 @@ class Observations(NamedTuple):
     speed_mm_s: Floats
     force_n: Floats
     inherited: int
+    told: bool = True
+
+    def regressions(self, predictors: Mapping[str, ArrayLike]) -> tuple[Regression, Regression]:
+        """Full and reduced; of what is not told anywhere the mean, which rests on 0 conditions."""
+        if not self.told:
+            constant = replace(regress(self.values, {}), n_conditions=0)
+            return constant, constant
+        return regress(self.values, predictors), reduced_regression(self.values, predictors)
 
 
 def parameter_observations(model: TextureModel) -> tuple[Observations, ...]:
     """What the regressions of a model rest on: n, then f, a and b of each layer.
 
-    Interpolated conditions are left out. So are, for the frequency alone, those that inherited it:
-    a copy is no observation (amplitude and width were fitted there and count). Amplitude is |G|.
+    Interpolated conditions are left out, and of a layer those where its level is not identifiable.
+    So are, for the frequency alone, those that inherited it: a copy is no observation (amplitude
+    and width were fitted there and count). Amplitude is |G|.
     """
     speed, force = np.meshgrid(model.speeds_mm_s, model.forces_n, indexing="ij")
     recorded = ~model.interpolated
 
     def observed(parameter: str, layer: int, *, of: Floats, at: NDArray[np.bool_]) -> Observations:
-        left_out = int(np.count_nonzero(recorded & ~at))
-        return Observations(parameter, layer, of[at], speed[at], force[at], left_out)
+        left_out, told = int(np.count_nonzero(recorded & ~at)), bool(at.any())
+        at = at if told else recorded
+        return Observations(parameter, layer, of[at], speed[at], force[at], left_out, told)
 
     found = [observed(NOISE_GAIN, 0, of=model.noise_gains, at=recorded)]
     for i in range(model.n_layers):
-        own = recorded & ~model.inherited[:, :, i]
+        told = recorded & ~model.not_identifiable[:, :, i]
+        own = told & ~model.inherited[:, :, i]
         found += [
             observed(FREQUENCY, i + 1, of=model.frequencies_hz[:, :, i], at=own),
-            observed(AMPLITUDE, i + 1, of=np.abs(model.gains[:, :, i]), at=recorded),
-            observed(BANDWIDTH, i + 1, of=model.bandwidths_hz[:, :, i], at=recorded),
+            observed(AMPLITUDE, i + 1, of=np.abs(model.gains[:, :, i]), at=told),
+            observed(BANDWIDTH, i + 1, of=model.bandwidths_hz[:, :, i], at=told),
         ]
     return tuple(found)
 
@@ -248,9 +263,7 @@ def parameter_regressions(model: TextureModel) -> tuple[ParameterRegression, ...
     """
     found = []
     for o in parameter_observations(model):
-        predictors = condition_predictors(o.speed_mm_s, o.force_n)
-        full = regress(o.values, predictors)
-        reduced = reduced_regression(o.values, predictors)
+        full, reduced = o.regressions(condition_predictors(o.speed_mm_s, o.force_n))
         found.append(ParameterRegression(o.parameter, o.layer, o.inherited, full, reduced))
     return tuple(found)
 

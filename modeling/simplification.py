@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from modeling.coherent import neighbouring_patterns
 from modeling.errors import InputError
 from modeling.model import Bools, TextureModel
+from modeling.own_peaks import own_peaks
 from modeling.peq import PEQ, Floats, band_response, band_rms
 from modeling.similarity import HIGHEST_SHARE, LOWEST_HZ
 from modeling.thresholds import Threshold
@@ -50,6 +51,12 @@ class LayerVerdict:
         levels scattered once more by their standard deviations, as in a block bootstrap of the
         records (normal, independent between conditions); NaN where a threshold is not known. Not
         in it: whether the estimator would find the layer again, its bias, the other rules.
+    assumed : int
+        In how many conditions the threshold was not known at the layer's frequency, but its last
+        level was held as a lower bound.
+    fills : int
+        The layer (1-based) whose shape this one only fills, with which alone it goes; 0 for a peak
+        of its own.
     """
 
     layer: int
@@ -60,6 +67,8 @@ class LayerVerdict:
     worst_frequency_hz: float
     distance_db: float
     flip_probability: float
+    assumed: int
+    fills: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +80,7 @@ class Simplification:
     criterion: CriterionName
     threshold: Threshold
     margin_db: float
+    hold_above: bool
 
 
 def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -> Floats:
@@ -106,14 +116,17 @@ def simplify(
     *,
     criterion: CriterionName = "energy",
     margin_db: float = 0.0,
+    hold_above: bool = True,
 ) -> Simplification:
     """Drop every layer that is below threshold in every condition, stably and in sum.
 
     A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
     grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
     weighted by the threshold, margin included) stay below it too; else the loudest of them are
-    kept. Where no threshold is known the layer is kept. The noise and at least one layer always
-    stay (PAPER V, METHOD 7).
+    kept. Where no threshold is known the layer is kept; but above the table's end its last level is
+    held as a lower bound, below which a layer may go. A layer that only fills another's shape
+    (`modeling.own_peaks`) goes with that one or not at all. The noise and at least one layer
+    always stay (PAPER V, METHOD 7).
 
     Parameters
     ----------
@@ -123,6 +136,8 @@ def simplify(
     criterion : {"energy", "paper-fft", "paper-gain"}
     margin_db : float
         ≥ 0; how far below the threshold a layer has to be.
+    hold_above : bool
+        False: above the table's end nothing is known, so that every layer there stays.
 
     Raises
     ------
@@ -131,18 +146,50 @@ def simplify(
     """
     _check_input(model, criterion, margin_db)
     by_condition = (model.noise_gains.size, model.n_layers)
-    distances = distances_db(model, threshold, criterion=criterion).reshape(by_condition)
+    distances, assumed = _distances(
+        model, threshold, criterion=criterion, margin_db=margin_db, hold_above=hold_above
+    )
     level_sd_db = DEVIATIONS_PER_LEVEL_SD[criterion] * model.level_sd_db.reshape(by_condition)
     flips = _flip_probabilities(distances + margin_db, level_sd_db)
-    decided = _decide(distances + margin_db, flips, threshold)
-    _name_unresolved(decided, model.unresolved.reshape(by_condition))
+    fills = own_peaks(model).fills
+    decided = _decide(distances + margin_db, flips, threshold, fills=fills)
+    _name_doubts(decided, model.unresolved.reshape(by_condition), assumed)
     verdicts = tuple(
-        _verdict(model, layer, distances[:, layer], decided[layer], float(flips[layer]))
+        replace(
+            _verdict(model, layer, distances[:, layer], decided[layer], float(flips[layer])),
+            assumed=int(assumed[:, layer].sum()),
+            fills=int(fills[layer]) + 1,
+        )
         for layer in range(model.n_layers)
     )
     keep = [layer for layer, (kept, _) in enumerate(decided) if kept]
     simplified = with_signs_chosen_again(model, keep)
-    return Simplification(simplified, verdicts, criterion, threshold, margin_db)
+    return Simplification(simplified, verdicts, criterion, threshold, margin_db, hold_above)
+
+
+def _distances(
+    model: TextureModel,
+    threshold: Threshold,
+    *,
+    criterion: CriterionName,
+    margin_db: float,
+    hold_above: bool,
+) -> tuple[Floats, Bools]:
+    """Distances (C, m) that count, NaN where none is known, and which of them are assumed.
+
+    Above the table's end a layer below the bound is below the threshold; of one above it nothing is
+    known.
+    """
+    known = distances_db(model, threshold, criterion=criterion)
+    if hold_above:
+        amplitude = layer_amplitudes_g(model, criterion=criterion)
+        with np.errstate(divide="ignore"):
+            bound = 20 * np.log10(amplitude / threshold.held(model.frequencies_hz))
+    else:
+        bound = known
+    assumed = np.isnan(known) & (bound + margin_db < 0)
+    shape = (model.noise_gains.size, model.n_layers)
+    return np.where(assumed, bound, known).reshape(shape), assumed.reshape(shape)
 
 
 def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureModel:
@@ -214,36 +261,58 @@ def _check_input(model: TextureModel, criterion: str, margin_db: float) -> None:
         raise InputError(f"expected a margin of at least 0 dB, got {margin_db}; correct it.")
 
 
-def _decide(distances: Floats, flips: Floats, threshold: Threshold) -> list[tuple[bool, str]]:
+def _decide(
+    distances: Floats, flips: Floats, threshold: Threshold, *, fills: NDArray[np.intp]
+) -> list[tuple[bool, str]]:
     """(kept?, reason) per layer, from (conditions, m) distances that include the margin."""
-    known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
-    decided: list[tuple[bool, str]] = []
-    for level, flip in zip(distances.T, flips, strict=True):
-        if np.isnan(level).any():
-            outside = int(np.isnan(level).sum())
-            where = f"{outside} of {level.size} conditions"
-            reason = f"no threshold known in {where} ({threshold.name} covers {known})"
-            decided.append((True, reason))
-        elif (level >= 0).any():
-            above = int((level >= 0).sum())
-            decided.append((True, f"above threshold in {above} of {level.size} conditions"))
-        elif flip >= HIGHEST_FLIP_PROBABILITY:
-            decided.append((True, "below threshold, but the records are too short to be sure"))
-        else:
-            decided.append((False, "below threshold in every condition"))
+    decided = [
+        _decide_alone(level, float(flip), threshold)
+        for level, flip in zip(distances.T, flips, strict=True)
+    ]
+    _keep_together(decided, fills)
     _keep_summed(distances, decided)
+    _keep_together(decided, fills)
     if decided and not any(kept for kept, _ in decided):
-        loudest = int(np.argmax(distances.max(axis=0)))
+        known = np.nan_to_num(distances.max(axis=0), nan=-np.inf)
+        loudest = int(np.argmax(np.where(fills < 0, known, -np.inf)))
         decided[loudest] = (True, "below threshold, kept as the last layer")
     return decided
 
 
-def _name_unresolved(decided: list[tuple[bool, str]], unresolved: Bools) -> None:
-    """Say of a dropped layer where its level is a bound rather than an estimate."""
+def _decide_alone(level: Floats, flip: float, threshold: Threshold) -> tuple[bool, str]:
+    if (level >= 0).any():
+        above = int((level >= 0).sum())
+        return True, f"above threshold in {above} of {level.size} conditions"
+    if np.isnan(level).any():
+        outside = int(np.isnan(level).sum())
+        known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
+        where = f"{outside} of {level.size} conditions"
+        return True, f"no threshold known in {where} ({threshold.name} covers {known})"
+    if flip >= HIGHEST_FLIP_PROBABILITY:
+        return True, "below threshold, but the records are too short to be sure"
+    return False, "below threshold in every condition"
+
+
+def _keep_together(decided: list[tuple[bool, str]], fills: NDArray[np.intp]) -> None:
+    """A layer that fills another's shape stays as long as that one, and holds it."""
+    for layer, peak in enumerate(fills.tolist()):
+        if peak < 0:
+            continue
+        if decided[layer][0] and not decided[peak][0]:
+            decided[peak] = (True, f"below threshold, but layer {layer + 1} fills its shape")
+        elif decided[peak][0] and not decided[layer][0]:
+            decided[layer] = (True, f"below threshold, but fills the shape of layer {peak + 1}")
+    if any(p >= 0 and decided[i][0] != decided[p][0] for i, p in enumerate(fills.tolist())):
+        _keep_together(decided, fills)
+
+
+def _name_doubts(decided: list[tuple[bool, str]], unresolved: Bools, assumed: Bools) -> None:
+    """Say of a dropped layer where its level is a bound, and where the threshold is assumed."""
     for layer, (kept, reason) in enumerate(decided):
-        count = int(unresolved[:, layer].sum())
-        if count and not kept:
-            decided[layer] = (kept, f"{reason} (not resolved in {count} of {len(unresolved)})")
+        counts = {"not resolved": unresolved[:, layer].sum(), "assumed": assumed[:, layer].sum()}
+        doubts = [f"{what} in {count} of {len(assumed)}" for what, count in counts.items() if count]
+        if doubts and not kept:
+            decided[layer] = (kept, f"{reason} ({', '.join(doubts)})")
 
 
 def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:
@@ -296,4 +365,6 @@ def _verdict(
         worst_frequency_hz=float(model.frequencies_hz[speed, force, layer]),
         distance_db=float("nan") if nothing_known else float(known.max()),
         flip_probability=flip_probability,
+        assumed=0,
+        fills=0,
     )

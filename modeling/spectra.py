@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -11,11 +13,14 @@ from numpy.typing import NDArray
 from modeling.errors import InputError
 from modeling.peq import Floats
 from modeling.recording import Recording
+from modeling.sinusoids import Sinusoids, find_sinusoids, sinusoids_near
 
 MODEL_RATE_HZ = 5000.0
 HIGH_PASS_HZ = 10.0
 SMOOTHING_HZ = 30.0
 TAPERED_SHARE = 0.1
+TONE_LINES = 2.0
+HUM_LINES = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +42,11 @@ class Spectrum:
     share : (n,) ndarray or 1
         Of each line's power, what subtracting the sensor's floor has left, 0…1.
     tapered_magnitude : (n,) ndarray, optional
-        The same of the record faded in and out (`tapered`): what is fitted to, since a
-        rectangular window spills loud bands into quiet ones.
+        The same of the record faded in and out: what is fitted to, since a rectangular window
+        spills loud bands into quiet ones. Pure tones are in it as bands of noise two lines wide,
+        of the same power: what a layer can describe.
+    notes : tuple of str
+        What was found and mended in the record, one phrase each.
     """
 
     frequency_hz: Floats
@@ -48,6 +56,7 @@ class Spectrum:
     averaged: float = 1.0
     share: Floats | float = 1.0
     tapered_magnitude: Floats | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def without_leakage(self) -> Floats:
@@ -72,18 +81,6 @@ def smooth(magnitude: Floats, sigma_hz: float, *, step_hz: float) -> Floats:
     return smoothed
 
 
-def tapered(recording: Recording) -> Recording:
-    """The recording faded in and out over a twentieth each (Tukey window), at the same mean power.
-
-    It removes what a rectangular window spills into quiet bands, at 6 % of the data.
-    """
-    from scipy.signal.windows import tukey
-
-    window = tukey(recording.samples.size, TAPERED_SHARE)
-    window /= np.sqrt(np.mean(window**2))
-    return replace(recording, samples=(recording.samples - recording.samples.mean()) * window)
-
-
 def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     """Mean removed, resampled by FFT, 10 Hz high-pass (4th-order Butterworth, one direction).
 
@@ -98,7 +95,7 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     (n,) ndarray
         In the recording's unit, at min(rate_hz, recording.rate_hz).
     """
-    from scipy.signal import butter, resample, sosfilt
+    from scipy.signal import resample, sosfilt
 
     target_hz = min(rate_hz, recording.rate_hz)
     if target_hz <= 2 * HIGH_PASS_HZ:
@@ -109,12 +106,21 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     samples = recording.samples - recording.samples.mean()
     if target_hz != recording.rate_hz:
         samples = resample(samples, round(samples.size * target_hz / recording.rate_hz))
-    sections = butter(4, HIGH_PASS_HZ, btype="highpass", fs=target_hz, output="sos")
-    filtered: Floats = sosfilt(sections, samples)
+    filtered: Floats = sosfilt(_high_pass(target_hz), samples)
     return filtered
 
 
-def spectrum(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Spectrum:
+@lru_cache(maxsize=8)
+def _high_pass(rate_hz: float) -> Floats:
+    from scipy.signal import butter
+
+    sections: Floats = butter(4, HIGH_PASS_HZ, btype="highpass", fs=rate_hz, output="sos")
+    return sections
+
+
+def spectrum(
+    recording: Recording, *, rate_hz: float = MODEL_RATE_HZ, hum_hz: Sequence[float] = ()
+) -> Spectrum:
     """The recording's magnitude spectrum at the model rate (rectangular window).
 
     Parameters
@@ -123,17 +129,76 @@ def spectrum(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Spectru
         At least 64 samples after resampling.
     rate_hz : float
         Model rate; data of a lower rate keep their own.
+    hum_hz : sequence of float
+        Sinusoids that are no vibration of the texture: each is subtracted, and the lines around
+        it tell nothing.
     """
     samples = prepare(recording, rate_hz=rate_hz)
-    target_hz = min(rate_hz, recording.rate_hz)
+    return prepared_spectrum(samples, min(rate_hz, recording.rate_hz), recording, hum_hz=hum_hz)
+
+
+def prepared_spectrum(
+    samples: Floats,
+    rate_hz: float,
+    recording: Recording,
+    *,
+    hum_hz: Sequence[float] = (),
+    notes: Sequence[str] = (),
+) -> Spectrum:
+    """As `spectrum`, of (n,) samples that `prepare` has made of the recording.
+
+    `notes` go before those of the spectrum's own.
+    """
     if samples.size < 64:
         raise InputError(
-            f"{recording.describe()}: expected at least 64 samples at {target_hz:g} Hz, got "
+            f"{recording.describe()}: expected at least 64 samples at {rate_hz:g} Hz, got "
             f"{samples.size}; record longer."
         )
-    faded = spectrum_of_samples(prepare(tapered(recording), rate_hz=rate_hz), target_hz)
-    plain = spectrum_of_samples(samples, target_hz)
-    return replace(plain, tapered_magnitude=faded.magnitude)
+    frequency = np.fft.rfftfreq(samples.size, 1 / rate_hz)
+    share: Floats | float = 1.0
+    if hum_hz:
+        hum = sinusoids_near(samples, rate_hz, np.asarray(hum_hz, dtype=np.float64))
+        samples = samples - hum.samples(samples.size, rate_hz)
+        apart = np.abs(frequency[:, None] - np.asarray(hum_hz)).min(axis=1)
+        share = np.where(apart <= HUM_LINES * frequency[1], 0.0, 1.0)
+    tones = find_sinusoids(samples, rate_hz, lowest_hz=HIGH_PASS_HZ)
+    plain = spectrum_of_samples(samples, rate_hz)
+    rest = samples - tones.samples(samples.size, rate_hz)
+    faded = spectrum_of_samples(_taper(rest.size) * rest, rate_hz).magnitude
+    levels = zip(tones.frequency_hz.tolist(), tones.amplitude.tolist(), strict=True)
+    told = [
+        f"pure tone of {a / np.sqrt(2):.3g} {recording.unit} RMS at {f:.1f} Hz" for f, a in levels
+    ]
+    return replace(
+        plain,
+        share=share,
+        tapered_magnitude=np.sqrt(faded**2 + _as_bands(tones, plain.frequency_hz, samples.size)),
+        notes=(*notes, *told),
+    )
+
+
+@lru_cache(maxsize=8)
+def _taper(count: int) -> Floats:
+    """Window (n,) that fades a record in and out over a twentieth each (Tukey), of unit power.
+
+    It removes what a rectangular window spills into quiet bands, at 6 % of the data.
+    """
+    from scipy.signal.windows import tukey
+
+    window = np.asarray(tukey(count, TAPERED_SHARE), dtype=np.float64)
+    faded: Floats = window / np.sqrt(np.mean(window**2))
+    return faded
+
+
+def _as_bands(tones: Sinusoids, frequency_hz: Floats, count: int) -> Floats:
+    """Squared magnitude (n,) of narrow bands of noise with the tones' frequencies and powers."""
+    squares = np.zeros(frequency_hz.size)
+    half_hz = TONE_LINES / 2 * frequency_hz[1]
+    for at_hz, amplitude in zip(tones.frequency_hz, tones.amplitude, strict=True):
+        band = 1 / (1 + ((frequency_hz - at_hz) / half_hz) ** 2)
+        # |FFT|² sums to n·(its power)·n/2 over the lines; magnitudes are relative to √(πn)/2.
+        squares += amplitude**2 / 2 * (2 * count / np.pi) * band / band.sum()
+    return squares
 
 
 def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectrum:

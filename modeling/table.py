@@ -140,10 +140,14 @@ def logarithmic_nodes(
     signs = np.sign(values.sum(axis=(0, 1)))
     floor = np.maximum(LOWEST_GAIN_SHARE * largest, np.finfo(np.float64).tiny)
     logs = np.log(np.maximum(np.abs(values), floor))
-    speeds, by_speed = _finer(speeds_mm_s, np.abs(np.diff(logs, axis=0)).max(axis=(1, 2), initial=0))
+    speeds, by_speed = _finer(
+        speeds_mm_s, np.abs(np.diff(logs, axis=0)).max(axis=(1, 2), initial=0)
+    )
     forces, by_force = _finer(forces_n, np.abs(np.diff(logs, axis=1)).max(axis=(0, 2), initial=0))
     finer = signs * np.exp(np.einsum("as,bf,sfk->abk", by_speed, by_force, logs))
-    given = np.ix_(np.flatnonzero(np.isin(speeds, speeds_mm_s)), np.isin(forces, forces_n).nonzero()[0])
+    given = np.ix_(
+        np.flatnonzero(np.isin(speeds, speeds_mm_s)), np.isin(forces, forces_n).nonzero()[0]
+    )
     finer[given] = values
     return speeds, forces, finer
 

@@ -14,7 +14,7 @@ from modeling.files import number, read_table
 from modeling.peq import Floats
 
 STANDARD_GRAVITY_M_S2 = 9.80665
-SHIPPED = ("codec", "pen-hold")
+SHIPPED = ("codec", "pen-hold", "mobile")
 LEVEL_COLUMNS = ("acceleration_g", "displacement_um")
 
 
@@ -78,6 +78,15 @@ class Threshold:
         known = (frequency >= self.frequency_hz[0]) & (frequency <= self.frequency_hz[-1])
         return np.where(known, level, np.nan)
 
+    def held(self, frequency_hz: ArrayLike) -> Floats:
+        """As `at`, but above the range its last level (g): a lower bound, which is assumed.
+
+        Thresholds rise there: the P channel is the most sensitive at 250 to 300 Hz (METHOD 7).
+        """
+        above = np.asarray(frequency_hz, dtype=np.float64) > self.frequency_hz[-1]
+        finite = above & np.isfinite(frequency_hz)
+        return np.where(finite, self.acceleration_g[-1], self.at(frequency_hz))
+
     @staticmethod
     def load(path: str | Path) -> Threshold:
         """Read a TSV with frequency_hz and displacement_um or acceleration_g (both peak).
@@ -117,7 +126,7 @@ class Threshold:
 
     @staticmethod
     def shipped(name: str) -> Threshold:
-        """One of the thresholds that come along: "codec" or "pen-hold" (METHOD 7)."""
+        """One of the thresholds that come along: one of `SHIPPED` (METHOD 7)."""
         if name not in SHIPPED:
             raise InputError(
                 f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got {name!r}; "

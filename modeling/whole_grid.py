@@ -52,9 +52,7 @@ class GridFit:
     recorded: dict[Condition, bool]
 
 
-def fit_grid_jointly(
-    spectra: Mapping[Condition, Spectrum], *, count: int | None = None
-) -> GridFit:
+def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None = None) -> GridFit:
     """Layers of one texture over its grid, by their frequencies in the top corner.
 
     Parameters

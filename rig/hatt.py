@@ -28,6 +28,8 @@ UNITS = {"AccelUnits": "m/s^2", "SpeedUnits": "mm/s", "ForceUnits": "N"}
 # A pole 2 Hz wide has forgotten where it began to 1e-5 by then.
 _RUN_IN_S = 2.0
 _INSIDE = -1e-9
+# Toolkit models are short to fit and tell of their surfaces as of any length of record.
+DURATION_S = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +128,13 @@ class HattTexture:
         speeds_mm_s: Sequence[float],
         forces_n: Sequence[float],
         *,
-        duration_s: float = 1.0,
+        duration_s: float = DURATION_S,
         rate_hz: float | None = None,
         seed: int = 0,
     ) -> RecordingSet:
         """Simulated recordings over a grid: Gaussian noise through the filter of each condition.
 
-        Conditions outside the hull sound as the nearest one inside it, but keep their labels.
+        Conditions outside the hull of the file's models, and silent ones, have no recording.
 
         Parameters
         ----------
@@ -148,7 +150,7 @@ class HattTexture:
         Raises
         ------
         InputError
-            For values out of range, and for a condition in which the texture is silent.
+            For values out of range, and where no condition lies within the hull and vibrates.
         """
         rate = self.rate_hz if rate_hz is None else rate_hz
         if not 0 < rate <= self.rate_hz:
@@ -159,11 +161,38 @@ class HattTexture:
         if not 0 < duration_s < np.inf:
             raise InputError(f"expected a duration above 0 s, got {duration_s:g}; give another.")
         grid = [(float(speed), float(force)) for speed in speeds_mm_s for force in forces_n]
+        for condition in grid:
+            self._check_condition(*condition)
+        inside = self.conditions_inside(grid)
+        if not inside:
+            raise InputError(
+                f"{self.material}: expected a condition within the file's models and with "
+                f"vibration, got none of {len(grid)}; choose another grid."
+            )
         stream = np.random.SeedSequence([seed, zlib.crc32(self.material.encode())])
         return RecordingSet(
             self._recording(*condition, rate, duration_s=duration_s, rng=np.random.default_rng(s))
             for condition, s in zip(grid, stream.spawn(len(grid)), strict=True)
+            if condition in inside
         )
+
+    def conditions_inside(
+        self, conditions: Sequence[tuple[float, float]]
+    ) -> list[tuple[float, float]]:
+        """Those of some (speed, force) conditions that the file tells of, and not as silence."""
+        return [
+            (speed, force)
+            for speed, force in conditions
+            if np.allclose((speed, force), self.nearest(speed, force), rtol=1e-9)
+            and self.filter(speed, force).numerator.any()
+        ]
+
+    def _check_condition(self, speed_mm_s: float, force_n: float) -> None:
+        if not (0 < speed_mm_s < np.inf and 0 < force_n < np.inf):
+            raise InputError(
+                f"{self.material}: expected speeds and forces above 0, got {speed_mm_s:g} mm/s and "
+                f"{force_n:g} N; choose others."
+            )
 
     def _recording(
         self,
@@ -174,17 +203,7 @@ class HattTexture:
         duration_s: float,
         rng: np.random.Generator,
     ) -> Recording:
-        if not (0 < speed_mm_s < np.inf and 0 < force_n < np.inf):
-            raise InputError(
-                f"{self.material}: expected speeds and forces above 0, got {speed_mm_s:g} mm/s and "
-                f"{force_n:g} N; choose others."
-            )
         fitted = self.filter(speed_mm_s, force_n)
-        if not fitted.numerator.any():
-            raise InputError(
-                f"{self.material}: expected a condition with vibration, got {speed_mm_s:g} mm/s "
-                f"and {force_n:g} N, where the file's variance or gain is 0; choose another grid."
-            )
         run_in = round(_RUN_IN_S * self.rate_hz)
         noise = rng.standard_normal(run_in + round(duration_s * self.rate_hz))
         samples = lfilter(fitted.numerator, fitted.denominator, noise)[run_in:]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -121,6 +121,36 @@ def import_csv(
         clipped = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
         records.append(_recording(path, samples, rate, label, unit=name, clipped_share=clipped))
     return RecordingSet(records)
+
+
+def usable(
+    read: Callable[[Sequence[Path], Sequence[Label]], RecordingSet],
+    paths: Sequence[Path],
+    labels: Sequence[Label],
+) -> tuple[RecordingSet, tuple[str, ...]]:
+    """What can be read of some files, and a sentence for each that is left out.
+
+    Parameters
+    ----------
+    read : callable
+        `import_wav` or `import_csv` with its options.
+    paths, labels
+        As there.
+
+    Raises
+    ------
+    InputError
+        Where no file can be read: what is wrong with the first.
+    """
+    records, refusals = [], []
+    for path, label in zip(paths, labels, strict=True):
+        try:
+            records += read([path], [label]).recordings
+        except InputError as error:
+            refusals.append(error)
+    if refusals and not records:
+        raise refusals[0]
+    return RecordingSet(records), tuple(map(str, refusals))
 
 
 def labels_from_table(table: Path, paths: Sequence[Path], *, texture: str | None) -> list[Label]:
