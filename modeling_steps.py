@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -53,8 +53,30 @@ class Outcome:
     error: str = ""
 
 
+@dataclass(frozen=True)
+class HowToModel:
+    """What `tactileq model` was asked for.
+
+    Parameters
+    ----------
+    estimator : str
+    layers : int, optional
+        Their number; chosen without it.
+    keep_hum, check, alone, plot : bool
+        Leave hum of the mains in; leave conditions out and foretell them; find the layers of each
+        recording by itself; draw pictures.
+    """
+
+    estimator: str = "joint"
+    layers: int | None = None
+    keep_hum: bool = False
+    check: bool = False
+    alone: bool = False
+    plot: bool = False
+
+
 def model_textures(
-    folders: Sequence[Path], out: Path, *, estimator: str, plot: bool, jobs: int | None
+    folders: Sequence[Path], out: Path, *, how: HowToModel, jobs: int | None
 ) -> None:
     """Model every texture in these folders, some at a time, and tell of each in order.
 
@@ -66,9 +88,7 @@ def model_textures(
         Recording sets, or folders of them.
     out : Path
         Where the files go; a texture's are written once it is modelled.
-    estimator : str
-    plot : bool
-        Also draw each model's layers over its grid.
+    how : HowToModel
     jobs : int, optional
         Textures at a time, in processes of their own; as many as there are cores without it. The
         files do not depend on it.
@@ -81,7 +101,7 @@ def model_textures(
     """
     sources, unreadable = _sources_in(folders)
     _require_own_files(sources, out)
-    done = _model_all(sources, out, estimator=estimator, plot=plot, jobs=jobs)
+    done = _model_all(sources, out, how=how, jobs=jobs)
     outcomes = [*unreadable, *done]
     failed = [outcome for outcome in outcomes if outcome.error]
     if len(outcomes) == len(failed) == 1:
@@ -97,19 +117,14 @@ def model_textures(
 
 
 def _model_all(
-    sources: Sequence[Source], out: Path, *, estimator: str, plot: bool, jobs: int | None
+    sources: Sequence[Source], out: Path, *, how: HowToModel, jobs: int | None
 ) -> list[Outcome]:
     """Outcomes in the order of the sources, with a progress bar."""
-    from joblib import Parallel, cpu_count, delayed
-
-    if not sources:
-        return []
     outcomes: list[Outcome] = []
-    work = delayed(partial(_model_one, out=out, estimator=estimator, plot=plot))
-    parallel = Parallel(n_jobs=min(jobs or cpu_count(), len(sources)), return_as="generator")
+    work = partial(_model_one, out=out, how=how)
     with progress("Finding layers, fitting", len(sources)) as advance:
         try:
-            for source, outcome in zip(sources, parallel(map(work, sources)), strict=True):
+            for source, outcome in zip(sources, _each(work, sources, jobs), strict=True):
                 outcomes.append(outcome)
                 advance(source.texture)
         except BrokenExecutor:
@@ -120,30 +135,67 @@ def _model_all(
     return outcomes
 
 
-def _model_one(source: Source, *, out: Path, estimator: str, plot: bool) -> Outcome:
+def _each(
+    work: Callable[[Source], Outcome], sources: Sequence[Source], jobs: int | None
+) -> Iterable[Outcome]:
+    """The work on each source, in processes of its own where there are several."""
+    if len(sources) < 2 or jobs == 1:
+        return map(work, sources)
+    from joblib import Parallel, cpu_count, delayed
+
+    parallel = Parallel(n_jobs=min(jobs or cpu_count(), len(sources)), return_as="generator")
+    results: Iterable[Outcome] = parallel(map(delayed(work), sources))
+    return results
+
+
+def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
     """Load, model and write one texture; what is wrong with it becomes its outcome's error."""
     from threadpoolctl import threadpool_limits
 
     from analysis.findings import find_in, save_findings
-    from modeling import RecordingSet
+    from modeling.recording import load_usable
 
     what = f"{source.texture} in {source.folder}"
     try:
         # One thread each: sums must not depend on how many cores a process finds.
         with threadpool_limits(limits=1):
-            records = RecordingSet.load(source.folder, texture=source.texture)
-            found = find_in(records, estimator=estimator)
-            start = save_findings(found, out, plot=plot)
-            write_provenance(
-                Path(f"{start}_provenance.json"),
-                "model",
-                {"estimator": estimator},
-                inputs=[source.folder],
+            records, unusable = load_usable(source.folder, texture=source.texture)
+            found = find_in(
+                records,
+                estimator=how.estimator,
+                layers=how.layers,
+                keep_hum=how.keep_hum,
+                check=how.check,
+                alone=how.alone,
             )
+            start = save_findings(found, out, plot=how.plot)
+            settings = {
+                "estimator": how.estimator,
+                "layers": how.layers,
+                "keep_hum": how.keep_hum,
+                "left_out": list(unusable),
+            }
+            provenance = Path(f"{start}_provenance.json")
+            write_provenance(provenance, "model", settings, inputs=[source.folder])
     except (ValueError, OSError, MemoryError) as error:
         return Outcome(what, error=sentence_of(error))
-    notes = (*_rate_notes(records), *_told(found, start, plot=plot))
-    return Outcome(what, notes=notes, warnings=tuple(clipping_warnings(records)))
+    notes = (*_rate_notes(records), *_told(found, start, plot=how.plot))
+    left_out = [f"warning: {source.texture}: left out: {sentence}" for sentence in unusable]
+    warnings = (*left_out, *clipping_warnings(records), *_mended(found))
+    return Outcome(what, notes=notes, warnings=warnings)
+
+
+def _mended(found: Findings) -> list[str]:
+    """One sentence for each thing that was found and mended in recordings, and for silent ones."""
+    by_note: dict[str, list[str]] = {}
+    for recording, spectrum in found.measured:
+        notes = spectrum.notes if spectrum.magnitude.any() else ("silent: left out",)
+        for note in notes:
+            by_note.setdefault(note, []).append(recording.describe())
+    return [
+        f"warning: {where[0]}{f' and {len(where) - 1} more' * (len(where) > 1)}: {note}."
+        for note, where in by_note.items()
+    ]
 
 
 def _tell(outcome: Outcome) -> None:
@@ -170,21 +222,38 @@ def _rate_notes(records: RecordingSet) -> list[str]:
 
 def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
     """What was found and where it is, with the conditions that were interpolated."""
+    from analysis.between import sentence
     from modeling import missing_conditions
+    from modeling.own_peaks import own_peaks
 
     name, model = found.texture, found.model
-    lines = [f"{name}: layers of each recording in {start}_layers.tsv, {start}_spectra.png"]
+    lines = [f"{name}: layers of each recording alone in {start}_alone.tsv"] if found.alone else []
     if model is None:
         return [*lines, f"no full model of {found.why_not}"]
-    inherited = int(model.inherited.any(axis=2).sum())
-    unresolved = int(model.unresolved.any(axis=2).sum())
+    peaks = own_peaks(model)
+    filling = int((~peaks.is_peak).sum())
+    filled = f", {filling} of them without a peak of {'its' if filling == 1 else 'their'} own"
+    conditions, unknown = model.noise_gains.size, int(model.not_identifiable.any(axis=2).sum())
     lines.append(
-        f"{name}{simulated_note(model)}: {model.n_layers} layers, {model.n_parameters} numbers "
-        f"per condition; some layer inherited its frequency in {inherited} and was not resolved "
-        f"in {unresolved} of {model.noise_gains.size} conditions: {start}.json"
+        f"{name}{simulated_note(model)}: {model.n_layers} layers{filled * bool(filling)}, "
+        f"{model.n_parameters} numbers per condition; some layer's frequency is told by other "
+        f"conditions in {int(model.inherited.any(axis=2).sum())}, its width or level not resolved "
+        f"in {int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
+        f"{conditions} conditions: {start}.json"
     )
+    lines.append(f"{name}: layers over the grid in {start}_layers.tsv")
+    lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
+    if found.left_out is not None:
+        lines.append(f"{name}: conditions left out and foretold: {sentence(found.left_out)}")
+    for axis, unit in ((model.speeds_mm_s, "mm/s"), (model.forces_n, "N")):
+        if axis.size == 1:
+            other = "speeds" if unit == "mm/s" else "forces"
+            lines.append(
+                f"note: {name}: recorded at {axis[0]:g} {unit} alone; nothing is known of "
+                f"other {other}."
+            )
     if plot:
-        lines.append(f"{name}: layers over the grid in {start}_layers.png")
+        lines.append(f"{name}: pictures in {start}_spectra.png and {start}_layers.png")
     if missing := missing_conditions(model):
         names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
         lines.append(f"{name}: interpolated for want of a recording: {names}")

@@ -168,9 +168,11 @@ def results_of_study(
     verdict: Callable[[TextureModel, TextureModel | None], Simplification],
 ) -> list[TextureResult]:
     """Recordings, models and verdicts of every texture that was asked about."""
+    from analysis.between import left_out_by_model
     from analysis.tables import TextureResult
     from modeling import RecordingSet
     from modeling.files import file_stem
+    from modeling.fitting import recording_spectra
 
     asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
     missing = [texture for texture in asked if texture not in full]
@@ -183,7 +185,9 @@ def results_of_study(
     for texture in asked:
         records = RecordingSet.load(recordings / file_stem(texture)).of_texture(texture)
         model = full[texture]
-        results.append(TextureResult(records, model, verdict(model, shown.get(texture))))
+        left_out = left_out_by_model(recording_spectra(records), model)
+        simplified = verdict(model, shown.get(texture))
+        results.append(TextureResult(records, model, simplified, left_out=left_out))
     return results
 
 
@@ -384,10 +388,12 @@ def run_study(
 
 def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
+    from analysis.between import left_out_by_model
     from analysis.tables import TextureResult
     from modeling import RecordingSet, fit_texture
     from modeling import simplify as drop_layers
     from modeling.files import file_stem
+    from modeling.fitting import recording_spectra
     from stimuli.planted import planted_texture, record_texture
 
     truth = planted_texture(name)
@@ -399,4 +405,5 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     full.save(folder / "models" / f"{file_stem(name)}.json")
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     others = (fit_texture(records, estimator="paper"),)
-    return TextureResult(records, full, simplification, truth, others)
+    left_out = left_out_by_model(recording_spectra(records), full)
+    return TextureResult(records, full, simplification, truth, others, left_out)

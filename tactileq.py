@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from modeling_steps import draw_condition, model_textures, tell_verdicts
+from modeling_steps import HowToModel, draw_condition, model_textures, tell_verdicts
 from rendering_commands import ModelFile, Out, Seed, benches, exports, stimuli, vibrator
 from rendering_steps import demo_recipe, render_set
 from steps import (
@@ -234,19 +234,37 @@ def model(
     ],
     out: Out = Path("models"),
     estimator: Estimator = "joint",
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the layers over the grid.")] = False,
+    layers: Annotated[
+        int | None, typer.Option(min=1, help="Number of layers; chosen without it (joint).")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Leave conditions out and foretell them.")
+    ] = False,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Find the layers of each recording by itself, too.")
+    ] = False,
+    keep_hum: Annotated[
+        bool, typer.Option("--keep-hum", help="Leave hum of the mains in the recordings.")
+    ] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw some spectra, and the layers over the grid.")
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
     ] = None,
 ) -> None:
-    """Find the layers of every recording and fit a model of each texture over its grid.
+    """Fit a model of each texture over its grid of speeds and forces.
 
-    Writes TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv and TEXTURE_spectra.png, with
-    --plot also TEXTURE_layers.png. A texture that cannot be modelled does not stop the others.
+    Writes TEXTURE.json, TEXTURE_layers.tsv and TEXTURE_spectra.tsv, with --check TEXTURE_check.tsv,
+    with --alone TEXTURE_alone.tsv, with --plot TEXTURE_spectra.png and TEXTURE_layers.png. A recording that cannot be used is left
+    out, and a texture that cannot be modelled does not stop the others.
 
-    Example: tactileq model recordings/* --out models --plot
+    Example: tactileq model recordings/* --out models --check
     """
-    model_textures(folders, out, estimator=estimator, plot=plot, jobs=jobs)
+    how = HowToModel(
+        estimator, layers=layers, keep_hum=keep_hum, check=check, alone=alone, plot=plot
+    )
+    model_textures(folders, out, how=how, jobs=jobs)
 
 
 @app.command()

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings import RecordingLayers
 from analysis.tables import TextureResult
 from modeling import (
     PEQ,
     InputError,
+    Recording,
     Simplification,
     Spectrum,
     TextureModel,
@@ -24,6 +24,7 @@ from modeling.simplification import CriterionName, layer_amplitudes_g
 from modeling.spectra import SMOOTHING_HZ, mean_spectrum, smooth
 
 Floats = NDArray[np.float64]
+PANELS_PER_AXIS = 3
 THRESHOLD_REACH = 2**0.25  # a layer's threshold is drawn a quarter of an octave to both sides
 
 
@@ -51,7 +52,8 @@ class SpectrumComparison:
     layer_threshold : (m, n) ndarray
         The gain (g per unit noise) with which a layer of this width would stand at the threshold
         by `criterion`, a quarter of an octave around the layer, NaN elsewhere and where no
-        threshold is known or assumed. The layer is above threshold where its response peaks above this.
+        threshold is known or assumed. The layer is above threshold where its response peaks
+        above this.
     dropped : (m,) ndarray of bool
         Layers that the simplified model does without.
     threshold : Threshold
@@ -332,35 +334,49 @@ class SpectrumPanel:
 
 
 def spectrum_panels(
-    found: Sequence[RecordingLayers], *, estimator: str, model: TextureModel | None = None
+    measured: Sequence[tuple[Recording, Spectrum]],
+    *,
+    estimator: str,
+    model: TextureModel | None = None,
 ) -> tuple[SpectrumPanel, ...]:
-    """One panel per condition of one texture, by speed and force; no grid is needed.
+    """Panels of some conditions of one texture, by speed and force; no grid is needed.
+
+    Three speeds and three forces at most, spread over what was recorded, both ends in.
 
     Parameters
     ----------
-    found : sequence of RecordingLayers
+    measured : sequence of (Recording, Spectrum)
         Repeats of a condition are averaged.
     estimator : str
-        The one that found them; it finds the layers of averages.
+        Finds the layers of each condition alone.
     model : TextureModel, optional
         Fitted to the same recordings.
     """
-    by_condition: dict[tuple[float, float], list[RecordingLayers]] = {}
-    for each in found:
-        by_condition.setdefault(each.recording.condition, []).append(each)
-    return tuple(
-        _panel(repeats, estimator=estimator, model=model)
-        for _, repeats in sorted(by_condition.items())
+    by_condition: dict[tuple[float, float], list[tuple[Recording, Spectrum]]] = {}
+    for pair in measured:
+        by_condition.setdefault(pair[0].condition, []).append(pair)
+    shown = _spread_conditions(sorted(by_condition))
+    return tuple(_panel(by_condition[c], estimator=estimator, model=model) for c in shown)
+
+
+def _spread_conditions(conditions: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Those at three speeds and three forces; of a scattered few all."""
+    if len(conditions) <= PANELS_PER_AXIS**2:
+        return list(conditions)
+    speeds, forces = (
+        {axis[round(i)] for i in np.linspace(0, len(axis) - 1, PANELS_PER_AXIS)}
+        for axis in (sorted({v for v, _ in conditions}), sorted({f for _, f in conditions}))
     )
+    chosen = [(v, f) for v, f in conditions if v in speeds and f in forces]
+    return chosen or list(conditions[: PANELS_PER_AXIS**2])
 
 
 def _panel(
-    repeats: Sequence[RecordingLayers], *, estimator: str, model: TextureModel | None
+    repeats: Sequence[tuple[Recording, Spectrum]], *, estimator: str, model: TextureModel | None
 ) -> SpectrumPanel:
-    recording, measured, layers = repeats[0].recording, repeats[0].spectrum, repeats[0].layers
-    if len(repeats) > 1:
-        measured = mean_spectrum([each.spectrum for each in repeats])
-        layers = find_layers(measured, estimator=estimator)
+    recording = repeats[0][0]
+    measured = mean_spectrum([spectrum for _, spectrum in repeats])
+    layers = find_layers(measured, estimator=estimator)
     magnitude = measured.smoothed(SMOOTHING_HZ)
     response = np.zeros(0)
     if model is not None:
@@ -368,7 +384,7 @@ def _panel(
     return SpectrumPanel(
         title=f"{recording.texture}, {recording.speed_mm_s:g} mm/s, {recording.force_n:g} N",
         unit=recording.unit,
-        simulated=any(each.recording.simulated for each in repeats),
+        simulated=any(each.simulated for each, _ in repeats),
         frequency_hz=measured.frequency_hz,
         magnitude=magnitude,
         layer_frequency_hz=layers.frequencies_hz,

@@ -35,7 +35,7 @@ MODEL_HATCHES = {"full": "", "simplified": "///"}
 LEVELS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
 BAR_WIDTH = 0.38
-MOST_LARGE_PANELS = 16  # more small multiples than these stand seven in a row, as the paper's grid
+PANELS_IN_A_ROW = 3
 LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side on a log axis
 AMPLITUDE_LABELS = {
     "energy": "amplitude of the sinusoid of equal power",
@@ -363,7 +363,7 @@ def plot_layer_course(
 
 def figure_spectra(panels: Sequence[SpectrumPanel]) -> Figure:
     """Small multiples: each condition's smoothed spectrum with its layers marked."""
-    columns = min(4 if len(panels) <= MOST_LARGE_PANELS else 7, len(panels))
+    columns = min(PANELS_IN_A_ROW, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(max(3.4 * columns, 5), 2.6 * rows + 0.4), layout="constrained")
     first = None

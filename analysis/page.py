@@ -23,7 +23,8 @@ _P_VALUES = (
 )
 _NAMES = (
     *("scale", "texture", "model", "estimator", "layer", "verdict", "presented", "answered"),
-    *("parameter", "coefficient", "driven_by", "reduced"),
+    *("parameter", "coefficient", "driven_by", "reduced", "foretold_by"),
+    *("worst_level_error_at", "worst_distance_at"),
 )
 _GRID_AXES = ("_mm_s", "force_n")
 _LABELS = {
@@ -69,6 +70,17 @@ _LABELS = {
     "amplitude_r": "r with amplitude",
     "p_amplitude": "p",
     "mean_centroid_hz": "mean (Hz)",
+    "foretold_by": "foretold by",
+    "median_level_error_db": "level error, median (dB)",
+    "worst_level_error_db": "worst (dB)",
+    "worst_level_error_at": "at",
+    "median_distance_db": "distance, median (dB)",
+    "worst_distance_db": "worst (dB)",
+    "worst_distance_at": "at",
+    "distance_at_db": "distance at (dB)",
+    "distance_between_db": "distance between (dB)",
+    "median_level_error_between_db": "level error between, median (dB)",
+    "worst_level_error_between_db": "worst (dB)",
 }
 _UNITS = {"hz": "Hz", "db": "dB", "n": "N", "mm_s": "mm/s", "s": "s"}
 

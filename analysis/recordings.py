@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from modeling import Layers, Recording, Spectrum, find_layers
+from modeling import Layers, Recording, Spectrum, TextureModel, find_layers
+from modeling.own_peaks import own_peaks
 
 SPECTRUM_STEP_HZ = 5.0
 
@@ -84,12 +85,55 @@ def layers_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def spectra_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
+def model_layers_table(model: TextureModel) -> pd.DataFrame:
+    """The layers of a model in every condition of its grid, as `layers_table` tells them.
+
+    Returns
+    -------
+    DataFrame
+        The columns of `layers_table` without repeat, and besides: own_peak (false of a layer
+        without a maximum of the response), inherited (its frequency is told by other conditions),
+        not_identifiable (its level is not told), interpolated (there is no recording).
+    """
+    peaks = own_peaks(model).is_peak
+    rows: list[dict[str, Any]] = []
+    for i, speed in enumerate(model.speeds_mm_s.tolist()):
+        for j, force in enumerate(model.forces_n.tolist()):
+            labels = {
+                "texture": model.texture,
+                "speed_mm_s": speed,
+                "force_n": force,
+                "unit": model.unit,
+                "simulated": model.simulated,
+                "noise_gain": model.noise_gains[i, j],
+                "interpolated": model.interpolated[i, j],
+            }
+            if not model.n_layers:
+                rows.append({**labels, "layer": 0})
+            rows += [
+                {
+                    **labels,
+                    "layer": layer + 1,
+                    "frequency_hz": model.frequencies_hz[i, j, layer],
+                    "bandwidth_hz": model.bandwidths_hz[i, j, layer],
+                    "gain": model.gains[i, j, layer],
+                    "level_sd_db": model.level_sd_db[i, j, layer],
+                    "own_peak": peaks[layer],
+                    "inherited": model.inherited[i, j, layer],
+                    "unresolved": model.unresolved[i, j, layer],
+                    "not_identifiable": model.not_identifiable[i, j, layer],
+                }
+                for layer in range(model.n_layers)
+            ]
+    return pd.DataFrame(rows)
+
+
+def spectra_table(measured: Sequence[tuple[Recording, Spectrum]]) -> pd.DataFrame:
     """The smoothed spectrum (σ = 30 Hz) of each recording every 5 Hz, in long form.
 
     Parameters
     ----------
-    found : sequence of RecordingLayers
+    measured : sequence of (Recording, Spectrum)
 
     Returns
     -------
@@ -98,9 +142,8 @@ def spectra_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
         noise).
     """
     parts = []
-    for each in found:
-        recording, measured = each.recording, each.spectrum
-        frequency = np.arange(0.0, measured.rate_hz / 2, SPECTRUM_STEP_HZ)
+    for recording, found in measured:
+        frequency = np.arange(0.0, found.rate_hz / 2, SPECTRUM_STEP_HZ)
         parts.append(
             pd.DataFrame(
                 {
@@ -110,7 +153,7 @@ def spectra_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
                     "repeat": recording.repeat,
                     "simulated": recording.simulated,
                     "frequency_hz": frequency,
-                    "magnitude": np.interp(frequency, measured.frequency_hz, measured.smoothed()),
+                    "magnitude": np.interp(frequency, found.frequency_hz, found.smoothed()),
                 }
             )
         )

@@ -83,9 +83,9 @@ def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
         Per texture one row for the noise gain and three per peak: texture, parameter, peak
         (1-based), unit, conditions (that the regression rests on), inherited (conditions left
         out because the frequency there is a copy), multiple_r, adjusted_r_squared, p (F test),
-        mark (* p < .05, ** p < .01, *** p < .001), residual_degrees (of
-        freedom), own_peak (false of a layer without a maximum
-        of the response, which takes no part in support ratings), intercept, p_intercept, and for speed, force
+        mark (* p < .05, ** p < .01, *** p < .001), residual_degrees (of freedom), own_peak (false
+        of a layer without a maximum of the response, which takes no part in support ratings),
+        intercept, p_intercept, and for speed, force
         and speed_force the coefficient (…_coefficient; per mm/s, N and mm/s·N), p (p_…) and mark
         (mark_…); reduced: the terms that backward elimination leaves, reduced_adjusted_r_squared;
         simulated. What cannot be said is NaN (see `modeling.regression.Regression`).
@@ -153,9 +153,10 @@ def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
     -------
     DataFrame
         One row per parameter: parameter, of (how many layers, or textures for the noise gain,
-        could be tested; layers without a maximum of their own take no part), support_… (share in % of them whose coefficient has p < .05; a constant
-        parameter supports nothing) for speed, force and speed_force, published_support_…,
-        adjusted_r_squared (their mean) and published_adjusted_r_squared.
+        could be tested; layers without a maximum of their own take no part), support_… (share in %
+        of them whose coefficient has p < .05; a constant parameter supports nothing) for speed,
+        force and speed_force, published_support_…, adjusted_r_squared (their mean) and
+        published_adjusted_r_squared.
     """
     rows = []
     for parameter in PARAMETERS:

@@ -9,12 +9,14 @@ import numpy as np
 import pandas as pd
 
 from analysis import figures, outcomes, statistics
+from analysis.between import left_out_summary, planted_between_table
 from analysis.comparison import compare_spectra, layer_course
 from analysis.load import MODELS, Responses
 from analysis.page import Fold, Item, Picture, Table
 from analysis.planted import ALL_LAYERS, planted_layers_table, planted_truth_table
 from analysis.tables import TextureResult, gfc_table, simplification_table
 from modeling.files import file_stem
+from stimuli.planted import TEXTURES
 
 Progress = Callable[[float, str], None]
 
@@ -97,14 +99,35 @@ def model_section(
         any(result.simulated for result in textures),
         GFC_COLUMNS,
     )
+    left_out = left_out_summary(textures)
+    foretold = _left_out_items(left_out, simulated=any(r.simulated for r in textures))
     return Section(
         "models",
         "Models and their simplification",
-        (table, *folds),
-        outcomes=tuple(outcomes.simplification_outcomes(gfc)),
+        (table, *foretold, *folds),
+        outcomes=(
+            *outcomes.simplification_outcomes(gfc),
+            *outcomes.left_out_outcomes(left_out),
+        ),
         done=_models_done(textures),
         tiles=_model_tiles(gfc),
     )
+
+
+def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ...]:
+    if not len(summary):
+        return ()
+    table = Table(
+        "left_out",
+        "Conditions foretold that the model was not shown",
+        "A hand is hardly ever at a recorded condition. Every second condition was left out and "
+        "foretold from its neighbours, by the model and by an autoregressive one. Level error "
+        "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) to the "
+        "recording that was left out, whose own scatter is in them.",
+        summary,
+        simulated,
+    )
+    return (table,)
 
 
 def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
@@ -214,12 +237,29 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
         ]
     score = pd.concat(scores, ignore_index=True)
     tables = _planted_tables(score, pd.concat(layers, ignore_index=True))
+    between = _planted_between(textures)
     return Section(
         "planted",
         "Planted truth",
-        tables,
+        (tables[0], *between, *tables[1:]),
         outcomes=tuple(outcomes.planted_outcomes(score)),
     )
+
+
+def _planted_between(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
+    known = [result for result in textures if result.texture in TEXTURES]
+    if not known:
+        return ()
+    table = Table(
+        "planted_between",
+        "Distance to the planted spectrum at the conditions and between them",
+        "RMS of the log ratio of the two responses over all conditions (15 Hz to 0.96 of the "
+        "Nyquist frequency, unsmoothed), at the recorded conditions and half-way between four of "
+        "them, where the truth is known by its formula; level errors are those half-way between.",
+        planted_between_table(known),
+        simulated=True,
+    )
+    return (table,)
 
 
 def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ...]:

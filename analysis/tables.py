@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 
 import numpy as np
 import pandas as pd
@@ -37,6 +37,9 @@ class TextureResult:
         What was planted, where the recordings are simulated from a known model.
     other_estimates : tuple of TextureModel
         Models of other estimators, to be held against the truth beside `model`.
+    left_out : mapping of str to DataFrame
+        By model (joint, AR(20)): conditions foretold by one that was fitted without them
+        (`analysis.between.left_out_table`); empty where that was not tried.
     """
 
     recordings: RecordingSet
@@ -44,6 +47,7 @@ class TextureResult:
     simplification: Simplification
     truth: TextureModel | None = None
     other_estimates: tuple[TextureModel, ...] = ()
+    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
 
     @property
     def texture(self) -> str:
@@ -186,7 +190,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         worst_frequency_hz (the condition where the layer stands highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1), simulated.
     """
-    columns = [field.name for field in fields(LayerVerdict)]
+    columns = [each.name for each in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
     worst = ["worst_speed_mm_s", "worst_force_n", "worst_frequency_hz"]
     # No condition is the worst one where no threshold is known in any.

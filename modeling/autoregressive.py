@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -100,7 +100,7 @@ class ARModel(SavedModel):
     rate_hz : float
         The rate at which the filters run and the driving noise has unit variance.
     speeds_mm_s, forces_n : (S,), (F,) array_like
-        Rising, > 0, at least two each.
+        Rising, > 0, one at least.
     line_spectral_frequencies : (S, F, p) array_like
         Radians per sample, rising in (0, π); p ≥ 1.
     gains : (S, F) array_like
@@ -116,7 +116,7 @@ class ARModel(SavedModel):
     Raises
     ------
     InputError
-        For a grid smaller than 2 × 2, wrong shapes or values out of range.
+        For wrong shapes or values out of range.
     """
 
     FORMAT = "tactileq.ar-model"
@@ -219,12 +219,12 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     sensor's floor has been subtracted (Burg's method needs the waveform, in which it cannot be),
     averaged over the repeats of a condition. Records are tapered at their ends, which makes it as
     good as Burg's: the gain is the geometric mean of the spectrum, so that what a rectangular
-    window spills into quiet bands would count in full. Holes of the grid are filled as in `fit_texture`.
+    window spills into quiet bands would count in full. Holes of the grid are interpolated linearly.
 
     Parameters
     ----------
     recordings : RecordingSet or iterable of Recording
-        One texture, at least 2 speeds × 2 forces, one unit; any rates.
+        One texture, one unit; any rates.
     order : int
         p, 1 … 40, and below half the number of samples.
 
@@ -236,28 +236,38 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     Raises
     ------
     GridError
-        Where the recordings do not span such a grid.
+        Where the recordings lie on a line across the grid.
     InputError
         Where they mix textures or units, have contact without speed, or are shorter than the
         order asks for.
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
-    texture, unit = records.texture, only_unit(records)
-    by_condition = spectra_by_condition(recording_spectra(records))
+    only_unit(records)
+    return fit_ar_spectra(recording_spectra(records), order=order)
+
+
+def fit_ar_spectra(measured: Sequence[tuple[Recording, Spectrum]], *, order: int) -> ARModel:
+    """Model one texture from spectra that `recording_spectra` has prepared; see `fit_ar`.
+
+    Silent conditions count as not recorded.
+    """
+    first = measured[0][0]
+    heard = [pair for pair in measured if pair[1].magnitude.any()]
+    by_condition = spectra_by_condition(heard or measured)
     _check_order(order, min(s.n_samples for found in by_condition.values() for s in found))
     speeds, forces = grid_axes(by_condition)
     rows = {condition: _fit_row(found, order) for condition, found in by_condition.items()}
-    full, interpolated = fill_grid(rows, texture)
+    full, interpolated = fill_grid(rows, first.texture)
     return ARModel(
-        texture=texture,
-        rate_hz=next(iter(by_condition.values()))[0].rate_hz,
+        texture=first.texture,
+        rate_hz=measured[0][1].rate_hz,
         speeds_mm_s=np.array(speeds),
         forces_n=np.array(forces),
         line_spectral_frequencies=full[:, :, :order],
         gains=full[:, :, order],
         level_sd_db=full[:, :, order + 1],
-        unit=unit,
-        simulated=any(r.simulated for r in records.recordings),
+        unit=first.unit,
+        simulated=any(r.simulated for r, _ in measured),
         interpolated=interpolated,
     )
 

@@ -7,15 +7,15 @@ arrays have one row per spectrum, bins that a row does not need have no weight.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modeling.likelihood import (
     LEAST_POWER,
-    LOWEST_HZ,
     WIDEST_LOG_GAIN,
     WIDEST_SHARE,
     Bins,
@@ -72,7 +72,7 @@ class Observed:
         each = self.weight * (np.log(count) - digamma(count))
         return np.asarray(np.where(self.weight > 0, each, 0.0).sum(axis=1))
 
-    def rows(self, chosen: Sequence[int] | np.ndarray) -> Observed:
+    def rows(self, chosen: Sequence[int] | NDArray[np.intp]) -> Observed:
         """Some of the spectra, any of them several times."""
         return Observed(
             self.power[chosen],
@@ -87,15 +87,7 @@ class Observed:
     def without(self, hidden: Bools) -> Observed:
         """The same with (K,) spectra hidden: their bins have no weight."""
         seen = ~hidden[:, None]
-        return Observed(
-            self.power,
-            self.weight * seen,
-            self.count * seen,
-            self.tangent,
-            self.cotangent,
-            self.line_hz,
-            self.rate_hz,
-        )
+        return replace(self, weight=self.weight * seen, count=self.count * seen)
 
 
 def observe(
@@ -117,13 +109,21 @@ def observe(
         filled = (relative, bins.weight, bins.count, bins.tangent, bins.cotangent)
         table[:, row, : bins.power.size] = filled
         rate_hz, line_hz[row] = power.rate_hz, LINE_WIDTH * power.step_hz
-    return Observed(*table, line_hz, rate_hz)
+    power_of, weight, count, tangent, cotangent = table
+    return Observed(power_of, weight, count, tangent, cotangent, line_hz, rate_hz)
 
 
 def one_spectrum(bins: Bins, *, line_hz: float) -> Observed:
     """One spectrum's bins as the only row."""
-    rows = (bins.power, bins.weight, bins.count, bins.tangent, bins.cotangent)
-    return Observed(*(row[None] for row in rows), np.array([line_hz]), bins.rate_hz)
+    return Observed(
+        bins.power[None],
+        bins.weight[None],
+        bins.count[None],
+        bins.tangent[None],
+        bins.cotangent[None],
+        np.array([line_hz]),
+        bins.rate_hz,
+    )
 
 
 class Climbed(NamedTuple):
@@ -213,8 +213,10 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     u = (g * g * scale)[..., None] * cotangent - scale[..., None] * tangent
     amplitude = np.exp(gain) * np.sqrt(width / seen)
     floor = np.exp(noise)
-    added = _independent if signs is None else _coherent
-    power, by_noise, by_gain, by_u = added(floor, amplitude, signs, u)
+    if signs is None:
+        power, by_noise, by_gain, by_u = _independent(floor, amplitude, u)
+    else:
+        power, by_noise, by_gain, by_u = _coherent(floor, amplitude * signs, u)
     growth = 2 * g * per_hz * centre
     by_frequency = (growth * (1 + g * g) * scale)[..., None] * cotangent - growth[..., None] * u
     by_width = u * (-per_hz * seen * (1 + k * k) / k)[..., None]
@@ -226,9 +228,7 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     return Response(power, derivative)
 
 
-def _coherent(
-    floor: Floats, amplitude: Floats, signs: Floats, u: Floats
-) -> tuple[Floats, Floats, Floats, Floats]:
+def _coherent(floor: Floats, signed: Floats, u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Power (K, n) of one noise through all bands, and its relative derivatives.
 
     By log noise gain (K, n), by log amplitudes (K, m, n) and by the bands' u (K, m, n).
@@ -236,7 +236,6 @@ def _coherent(
     square = u * u
     real = 1 / (1 + square)
     imaginary = u * real
-    signed = amplitude * signs
     in_phase = floor + np.einsum("km,kmn->kn", signed, real)
     quadrature = np.einsum("km,kmn->kn", signed, imaginary)
     # Never quite 0, so that a bin where layers cancel stays comparable.
@@ -250,7 +249,7 @@ def _coherent(
 
 
 def _independent(
-    floor: Floats, amplitude: Floats, signs: None, u: Floats
+    floor: Floats, amplitude: Floats, u: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """The same for layers each with a noise of its own: powers add."""
     real = 1 / (1 + u * u)
@@ -334,7 +333,7 @@ def limits_of(m: int, *, rate_hz: float, step_hz: float) -> tuple[Floats, Floats
 
 def climb(
     theta: Floats,
-    signs: Floats | None,
+    signs: Floats,
     observed: Observed,
     *,
     limits: tuple[Floats, Floats],
@@ -361,8 +360,10 @@ def climb(
     """
     low, high = limits
     theta = np.clip(theta, low, high)
-    moving = np.ones(theta.shape) if free is None else np.broadcast_to(free, theta.shape) * 1.0
-    damping = np.full(theta.shape[0], FIRST_DAMPING)
+    moving: Floats = np.ones(theta.shape)
+    if free is not None:
+        moving = moving * free
+    damping: Floats = np.full(theta.shape[0], FIRST_DAMPING)
     settled = np.zeros(theta.shape[0], dtype=bool)
     now = slopes(theta, signs, observed)
     for _ in range(steps):

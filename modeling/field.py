@@ -74,7 +74,8 @@ class Field:
         """The field with the trend of these parameters (C, p), by least squares."""
         along = self.laplacian(self.places)
         normal = self.places.T @ along + FLATTENING * np.eye(2)
-        return replace(self, trend=np.linalg.solve(normal, along.T @ theta))
+        trend = np.asarray(np.linalg.solve(normal, along.T @ theta), dtype=np.float64)
+        return replace(self, trend=trend)
 
     def laplacian(self, theta: Floats) -> Floats:
         """Each condition's parameters less its neighbours', summed over the neighbours, (C, p)."""

@@ -21,8 +21,8 @@ from modeling.layer_search import MOST_LAYERS
 from modeling.layers import Layers
 from modeling.likelihood import is_silent
 from modeling.model import TextureModel
-from modeling.recording import Recording, RecordingSet
 from modeling.peq import Floats
+from modeling.recording import Recording, RecordingSet
 from modeling.sinusoids import common_hum
 from modeling.spectra import (
     MODEL_RATE_HZ,

@@ -115,7 +115,8 @@ def expected_on_lines(power: Power, theta: Floats, signs: Floats | None) -> Floa
     tangent = np.tan(np.pi / power.rate_hz * power.frequency_hz)[None]
     one = np.ones(tangent.shape)
     lines = Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), power.rate_hz)
-    return response(theta[None], signs, lines).power[0]
+    expected: Floats = response(theta[None], signs, lines).power[0]
+    return expected
 
 
 def _boxes(ratio: Floats, lines: Floats, width: int) -> tuple[Floats, Floats]:

@@ -26,7 +26,6 @@ from modeling.coherent import (
 from modeling.layers import Layers, no_layers
 from modeling.likelihood import Bools, Power, bins_near, misfit_of, power_sum, signal_power, split
 from modeling.peaks import Peaks, find_peaks_jointly, penalty, theta_of
-from modeling.peq import Floats
 from modeling.spectra import Spectrum
 
 # The coherent response holds where it fits as well as the power sum does, in log likelihood.
@@ -72,16 +71,17 @@ def _fitted_to(peaks: Peaks, power: Power, observed: Observed, *, move: bool) ->
     held[1 : 1 + m if move else 1 + 2 * m] = True
     rows = observed.rows(np.zeros(count, dtype=np.intp))
     first = climb(theta, signs, rows, limits=(low, high), free=_gains_only(m), steps=4, enough=0.3)
+    best = int(np.argmin(first.objective))
     near = np.full(low.size, FARTHEST_MOVE if move else 0.0)
     if move:
         near[1 + m : 1 + 2 * m] = np.inf
     else:  # where no coherent response fits, a width would run away
         near[1 + m : 1 + 2 * m] = np.log(WIDTH_FACTOR)
     near[0] = near[1 + 2 * m :] = np.inf
-    start = first.theta[:1]
+    start = first.theta[best : best + 1]
     limits = np.maximum(low, start - near), np.minimum(high, start + near)
-    fits = climb(first.theta, signs, rows, limits=limits, steps=8, enough=0.3)
-    return fits.row(int(np.argmin(fits.objective)))
+    one = signs[best : best + 1]
+    return climb(start, one, observed, limits=limits, steps=8, enough=0.3).row(0)
 
 
 def _gains_only(m: int) -> Bools:

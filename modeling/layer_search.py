@@ -28,14 +28,14 @@ from modeling.growth import candidates, inserted, inserted_independently
 from modeling.layer_count import starts_of
 from modeling.likelihood import split
 from modeling.peq import Floats
-from modeling.texture_grid import Integers, TextureGrid
+from modeling.texture_grid import TextureGrid
 
 MOST_LAYERS = 12
 STIFFNESS = 3.0  # of the field while searching: layers must not change places
 # A layer must raise the log likelihood by so much per record to be looked at.
 LEAST_GAIN = 4.0
 DECIDING_CONDITIONS = 6
-STARTING_CONDITIONS = 3
+STARTING_CONDITIONS = 2
 MOST_SPREAD_LAYERS = 3
 ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
 TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
@@ -110,7 +110,7 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
     count : int, optional
         The only number of layers to be considered.
     """
-    part, chosen = grid.coarse()
+    part = grid.coarse()
     pool = _Pool(part, count)
     _grow(pool)
     _reduce(pool)
@@ -189,7 +189,7 @@ def _grow(pool: _Pool) -> None:
             break
         theta, now = fit.theta, value
         grown.append(theta)
-    for layers in grown[-3:]:
+    for layers in grown[-2:]:
         pool.add(_with_signs(grid, layers))
 
 

@@ -459,7 +459,7 @@ def _read_samples(path: Path) -> NDArray[np.float64]:
             "the file is truncated; copy or record it again."
         )
     try:
-        return np.array(lines[1:-1], dtype=np.float64)
+        return np.array(list(map(float, lines[1:-1])))
     except ValueError as error:
         raise InputError(
             f"expected one number per line in {path}, got a line that is none ({error}); "

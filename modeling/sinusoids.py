@@ -1,8 +1,8 @@
 """Sinusoids in a record: the hum of the mains, and pure tones.
 
-A sinusoid is told from a narrow band of noise by Thomson's F-test: the spectra of one record through
-several tapers, which are independent for noise, agree in amplitude and phase for a sinusoid (Thomson
-1982, "Spectrum estimation and harmonic analysis"; Percival and Walden 1993, section 10.11).
+A sinusoid is told from a narrow band of noise by Thomson's F-test: the spectra of one record
+through several tapers, which are independent for noise, agree in amplitude and phase for a sinusoid
+(Thomson 1982, "Spectrum estimation and harmonic analysis").
 """
 
 from __future__ import annotations
@@ -184,7 +184,7 @@ def _tested(samples: Floats, rate_hz: float, near_hz: Floats) -> _Tested:
         ratio = (TAPERS - 1) * np.abs(mean[best]) ** 2 * (sums @ sums) / max(residual, TINY)
         # The tail of F with 2 and d degrees of freedom, in closed form.
         p = (1 + 2 * ratio / degrees) ** (-degrees / 2)
-        frequency = float(np.linspace(*band, ZOOMED_POINTS)[best])
+        frequency = float(np.linspace(band[0], band[1], ZOOMED_POINTS)[best])
         rows.append((frequency, 2 * np.abs(mean[best]), np.angle(mean[best]), p))
     table = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return _Tested(Sinusoids(*table[:3]), table[3])

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike
 from modeling.errors import InputError
 from modeling.grid import Cells, Floats, within_grid
 
-
 # Between nodes of a logarithmic table no parameter changes by more than 3 dB, where read linearly
 # it is within 0.13 dB of its law; but a cell has at most eight parts, which a layer that vanishes
 # from one condition to the next would exceed.

@@ -105,8 +105,8 @@ class TextureGrid:
         row, column = np.indices((self.rows, self.columns))
         return np.asarray((row + column) % 2 == 1).ravel()
 
-    def coarse(self) -> tuple[TextureGrid, Integers]:
-        """A part of the grid with few nodes on either axis, both ends in; and which ones."""
+    def coarse(self) -> TextureGrid:
+        """A part of the grid with few nodes on either axis, both ends in."""
         rows, columns = _nodes(self.rows), _nodes(self.columns)
         chosen = (rows[:, None] * self.columns + columns[None, :]).ravel()
         part = TextureGrid(
@@ -116,8 +116,8 @@ class TextureGrid:
             columns.size,
         )
         if part.recorded.sum() < 0.75 * chosen.size:  # too many holes to search between
-            return self, np.arange(len(self.conditions))
-        return part, chosen
+            return self
+        return self if chosen.size == len(self.conditions) else part
 
 
 def texture_grid(spectra: Mapping[Condition, Spectrum]) -> TextureGrid:

@@ -142,7 +142,8 @@ def usable(
     InputError
         Where no file can be read: what is wrong with the first.
     """
-    records, refusals = [], []
+    records: list[Recording] = []
+    refusals: list[InputError] = []
     for path, label in zip(paths, labels, strict=True):
         try:
             records += read([path], [label]).recordings

@@ -81,7 +81,9 @@ class DrawnSurface:
             )
         statistics = _statistics()
         level_db = statistics.mean_db + statistics.curves @ self.scores(speed_mm_s, force_n)
-        at = np.interp(frequency_hz, statistics.frequency_hz, level_db)
+        at = np.interp(
+            np.asarray(frequency_hz, dtype=np.float64), statistics.frequency_hz, level_db
+        )
         return np.asarray(10 ** (at / 20), dtype=np.float64)
 
     def record(
@@ -121,9 +123,7 @@ def draw_surface(seed: int) -> DrawnSurface:
     drawn = rng.multivariate_normal(statistics.mean, statistics.covariance)
     curves = statistics.residual_sd.size
     nodes = rng.standard_normal((SPEEDS_MM_S.size, FORCES_N.size, curves))
-    return DrawnSurface(
-        f"drawn {seed}", drawn.reshape(-1, curves), nodes * statistics.residual_sd
-    )
+    return DrawnSurface(f"drawn {seed}", drawn.reshape(-1, curves), nodes * statistics.residual_sd)
 
 
 @dataclass(frozen=True, eq=False)
