@@ -235,6 +235,8 @@ def solve(field: Field, blocks: Floats, right: Floats) -> Floats:
     """
     from scipy.linalg import solveh_banded
 
+    if len(right) == 1:
+        return np.asarray(np.linalg.solve(blocks, right[..., None])[..., 0])
     band = _band(field, blocks)
     solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, check_finite=False)
     return np.asarray(solution, dtype=np.float64).reshape(right.shape)

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from modeling import ESTIMATORS, PEQ, Layers, Spectrum, TextureModel, Threshold, simplify
-from modeling.coherent import CoherentFit, as_layers, refitted
+from modeling.coherent import climb, limits_of, observe
 from modeling.estimators import (
     BANDWIDTH_PER_S,
     FWHM_PER_S,
@@ -20,7 +20,8 @@ from modeling.estimators import (
     noise_amount,
 )
 from modeling.level_sd import smoothed_level_sd_db
-from modeling.likelihood import bins_near, signal_power
+from modeling.joint import as_layers
+from modeling.likelihood import signal_power
 from modeling.peq import band_rms
 from modeling.simplification import distances_db
 from modeling.spectra import SMOOTHING_HZ, spectrum_of_samples
@@ -182,10 +183,12 @@ def refitted_level_db(samples: Floats, first: Layers) -> float:
     places = first.frequencies_hz, first.bandwidths_hz
     noise_gain, gains = first.noise_gain / power.scale, np.abs(first.gains) / power.scale
     theta = np.log(np.hstack((noise_gain, *places, gains)))
-    start = CoherentFit(theta, np.sign(first.gains), np.inf, bins_near(power, *places))
-    known = np.zeros(first.gains.shape, dtype=bool)
-    layers = as_layers(refitted(start, power), power, known=known)
-    layer = int(np.argmin(np.abs(first.frequencies_hz - FREQUENCY_HZ)))
+    signs = np.sign(first.gains)[None]
+    observed = observe([power], *(place[None] for place in places), scale=power.scale)
+    limits = limits_of(first.gains.size, rate_hz=power.rate_hz, step_hz=power.step_hz)
+    fitted = climb(theta[None], signs, observed, limits=limits, steps=8, enough=0.3)
+    layers = as_layers(fitted.row(0), power, observed)
+    layer = int(np.argmin(np.abs(layers.frequencies_hz - FREQUENCY_HZ)))
     rms = band_rms(layers.gains, layers.bandwidths_hz, rate_hz=RATE_HZ)
     return 20 * float(np.log10(rms[layer]))
 
