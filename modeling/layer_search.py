@@ -24,7 +24,7 @@ from modeling.coherent import (
     without_layer,
 )
 from modeling.field import FieldFit, fit_field, log_evidence, usual_changes
-from modeling.growth import candidates, inserted, inserted_independently
+from modeling.growth import CLEAR_EVIDENCE, candidates, inserted, inserted_independently
 from modeling.layer_count import starts_of
 from modeling.likelihood import split
 from modeling.peq import Floats
@@ -170,27 +170,29 @@ class _Pool:
 
 
 def _grow(pool: _Pool) -> None:
-    """Independent layers, one by one, along laws over the grid; each number with signs."""
+    """Independent layers, one by one, along laws over the grid; each number of them with signs.
+
+    Where coherent layers dig holes or add up, independent ones go on growing for ever; it ends
+    when two more have not made the coherent solution any better.
+    """
     grid = pool.grid
-    theta = pool.best().theta
-    grown: list[Floats] = []
-    now = pool.best().value
-    while len(grown) < pool.most:
+    theta, now, idle = pool.best().theta, pool.best().value, 0
+    for m in range(1, pool.most + 1):
         found = candidates(grid, theta, None)
         if not found:
-            break
+            return
         start = inserted_independently(theta, found[0], rate_hz=grid.rate_hz)
-        m = len(grown) + 1
         observed = grid.observed(start)
         field, limits = grid.field(stiff(m)), grid.limits(m)
         fit = fit_field(start, None, observed, field, limits=limits, steps=12, enough=1.0)
         value = fit.value - float(observed.scatter.sum())
         if now - value < LEAST_GAIN * pool.records:
-            break
-        theta, now = fit.theta, value
-        grown.append(theta)
-    for layers in grown[-2:]:
-        pool.add(_with_signs(grid, layers))
+            return
+        theta, now, best = fit.theta, value, pool.best()
+        pool.add(_with_signs(grid, theta))
+        idle = 0 if pool.best() is not best else idle + 1
+        if idle == 2:
+            return
 
 
 def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
@@ -242,6 +244,20 @@ def _complete(pool: _Pool) -> bool:
         if pool.best() is best:
             return completed
         completed = True
+
+
+def completed(grid: TextureGrid, solution: Solution, *, count: int | None = None) -> Solution:
+    """The solution, with layers added where some condition clearly lacks them.
+
+    The coarse grid may not show a layer that is heard at one speed alone.
+    """
+    excess = solution.fit.slopes.misfit - solution.observed.scatter
+    if count is not None or not (excess[grid.recorded] > CLEAR_EVIDENCE).any():
+        return solution
+    pool = _Pool(grid, count)
+    pool.add([solution])
+    _complete(pool)
+    return pool.best()
 
 
 def _spread(pool: _Pool) -> None:

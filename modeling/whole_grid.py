@@ -9,16 +9,16 @@ hidden from it. Then the field learns its own smoothness from the texture
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from modeling.coherent import level_deviations, told
-from modeling.field import Covariances, covariances, learnt_precision, usual_changes
+from modeling.coherent import level_deviations, misfits, response, told
+from modeling.field import Covariances, covariances, learnt_precision, solve, usual_changes
 from modeling.grid import Condition
 from modeling.growth import expected_on_lines
 from modeling.joint import NEPER_DB
-from modeling.layer_search import Solution, fitted, hidden, search
+from modeling.layer_search import Solution, completed, fitted, hidden, search
 from modeling.layers import Layers
 from modeling.likelihood import Bools, split
 from modeling.peq import Floats
@@ -31,6 +31,11 @@ LARGEST_LEVEL_SD_DB = 12.0
 # A record that leaves more than this of the variance with which its neighbours foretell a
 # frequency has not told it.
 INHERITED_SHARE = 0.5
+# In log likelihood: what a record must lose without a layer, to show a peak of it.
+LEAST_EVIDENCE = 3.0
+FADED = 8.0  # of log amplitude: 70 dB
+HELD = 1e8
+TREND_ROUNDS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +70,8 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     grid = texture_grid(spectra)
     if not grid.recorded.any():
         return _silent(grid)
-    solution = _learnt(grid, _chosen(grid, search(grid, count=count)))
+    best = _chosen(grid, search(grid, count=count))
+    solution = _learnt(grid, completed(grid, best, count=count))
     return _grid_fit(grid, solution)
 
 
@@ -116,17 +122,18 @@ def _learnt(grid: TextureGrid, solution: Solution) -> Solution:
 
 def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     """Layers in the order of their frequencies in the top corner, with their deviations."""
-    m, theta = solution.count, solution.theta
+    m = solution.count
+    absent = _absent(grid, solution)
+    theta = _placed_by_neighbours(solution, absent)
     noise, frequency, bandwidth, gain = split(theta, m)
     top = max(range(len(theta)), key=lambda row: grid.conditions[row])
     order = np.argsort(frequency[top], kind="stable")
     records = told(theta, solution.signs, solution.observed)
     after = covariances(solution.fit.field, records)
     level_sd = level_deviations(theta, after.conditions, rate_hz=grid.rate_hz)
-    inherited = _inherited(after, records, m)
-    nothing = np.einsum("cpp->cp", records)[:, 1 + 2 * m :] < 1.0
+    inherited = absent | _told_by_neighbours(after, records, m)
     width = np.exp(bandwidth)
-    unresolved = grid.recorded[:, None] & (nothing | (width < 2 * grid.step_hz))
+    unresolved = grid.recorded[:, None] & (absent | (width < 2 * grid.step_hz))
     gains = grid.scale * solution.signs * np.exp(gain)
     layers = {
         condition: Layers(
@@ -146,7 +153,48 @@ def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     )
 
 
-def _inherited(after: Covariances, records: Floats, m: int) -> Bools:
+def _absent(grid: TextureGrid, solution: Solution) -> Bools:
+    """Where a record hardly shows a layer, (C, m): without it there it is as likely."""
+    m, theta = solution.count, solution.theta
+    absent = np.zeros((len(theta), m), dtype=bool)
+    for layer in range(m):
+        without = theta.copy()
+        without[:, 1 + 2 * m + layer] -= FADED
+        power = response(without, solution.signs, solution.observed).power
+        cost = misfits(power, solution.observed) - solution.fit.slopes.misfit
+        absent[:, layer] = grid.recorded & (cost < LEAST_EVIDENCE)
+    return absent
+
+
+def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:
+    """Parameters (C, p) with absent layers where their neighbours foretell them.
+
+    Frequencies and widths that a record has read into its own scatter would mislead between the
+    conditions.
+    """
+    m, field = solution.count, solution.fit.field
+    if not absent.any():
+        return solution.theta
+    untold = np.zeros(solution.theta.shape, dtype=bool)
+    untold[:, 1 : 1 + m] = untold[:, 1 + m : 1 + 2 * m] = absent
+    # Of a layer that no record shows nothing is foretold.
+    shown = ~absent.all(axis=0)
+    untold[:, 1 : 1 + m] &= shown
+    untold[:, 1 + m : 1 + 2 * m] &= shown
+    # Each parameter by itself: a layer that vanishes must not pull its frequency along.
+    alone = replace(field, precision=np.diag(np.diag(field.precision)))
+    held = np.where(untold, 0.0, HELD)
+    blocks = held[:, :, None] * np.eye(held.shape[1])
+    theta = solution.theta
+    for _ in range(TREND_ROUNDS):  # the trend is that of the layers that are shown
+        trend = alone.places @ alone.trend
+        rest = solve(alone, blocks, held * (solution.theta - trend))
+        theta = np.where(untold, rest + trend, solution.theta)
+        alone = alone.following(theta)
+    return theta
+
+
+def _told_by_neighbours(after: Covariances, records: Floats, m: int) -> Bools:
     """Where the neighbours tell a layer's frequency rather than the record, (C, m)."""
     own = np.eye(records.shape[1]) - after.conditions @ records
     before = np.linalg.solve(own + 1e-12 * np.eye(records.shape[1]), after.conditions)

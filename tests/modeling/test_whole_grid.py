@@ -1,15 +1,17 @@
-"""The `joint` estimator over whole grids of planted conditions: names, signs, silence, order."""
+"""The `joint` estimator over whole grids of planted conditions: names, signs, holes, order."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from modeling import PEQ, Recording, fit_texture
 from modeling.grid import Condition
+from modeling.own_peaks import own_peaks
 from modeling.peq import Floats, band_response
 from modeling.spectra import Spectrum, spectrum_of_samples
 from modeling.whole_grid import GridFit, fit_grid_jointly
@@ -152,7 +154,9 @@ def judged() -> Mapping[tuple[str, bool], list[Names]]:
             )
             for estimator in ("joint", "paper-consistent"):
                 model = fit_texture(recordings, estimator=estimator)
-                found_hz = model.frequencies_hz.reshape(len(grid), model.n_layers)
+                # Of layers that only fill another's shape nobody claims that they are there.
+                found = np.flatnonzero(own_peaks(model).is_peak)
+                found_hz = model.frequencies_hz.reshape(len(grid), -1)[:, found]
                 score = names_kept(true_hz, width_hz, found_hz=found_hz)
                 scores.setdefault((estimator, independent), []).append(score)
     return scores
@@ -220,7 +224,9 @@ def test_one_sign_per_layer_over_the_whole_texture(signs: tuple[int, int, int]) 
     found = fit_grid_jointly(spectra(truth, grid))
     gains = np.sign(table(found, "gains", grid))
     assert (gains == gains[0]).all()
-    assert gains[0].tolist() == list(signs)
+    # What the noise floor has to do with a loud layer's sign a few records may not tell.
+    relative = (gains[0][1:] * gains[0][:-1]).tolist()
+    assert relative == [a * b for a, b in pairwise(signs)]
 
 
 # --- what is missing
@@ -275,20 +281,19 @@ def test_a_layer_that_leaves_the_band_below() -> None:
     assert frequency[speed > 90, 0] == pytest.approx(speed[speed > 90] / 5, abs=6)
 
 
-def test_silent_conditions_get_the_others_layers_without_gain() -> None:
+def test_silent_conditions_are_told_by_the_others() -> None:
     grid = axes(5, 4)
     found = fit_grid_jointly(
         spectra(lambda v, f: planted((200.0, 40, 0.3), (700.0, 60, 0.3)) if v > 100 else None, grid)
     )
-    gains = table(found, "gains", grid)
     silent = np.array(grid)[:, 0] < 100
-    assert gains.shape == (20, 2)
-    assert (gains[silent] == 0).all()
-    assert (gains[~silent] != 0).all()
+    assert [found.recorded[c] for c in grid] == (~silent).tolist()
     assert table(found, "frequencies_hz", grid) == pytest.approx(
         np.broadcast_to([200.0, 700.0], (20, 2)), abs=25
     )
-    assert (table(found, "noise_gain", grid)[silent] == 0).all()
+    level_sd = table(found, "level_sd_db", grid)
+    assert level_sd[silent].min() > level_sd[~silent].max()
+    assert table(found, "noise_gain", grid) == pytest.approx(0.02, rel=0.2)
 
 
 def test_silence_and_white_noise_have_no_layers() -> None:
