@@ -58,13 +58,14 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
 
 def starts_of(power: Power, count: int) -> Floats:
     """Layers spread over the power, evenly or in its upper half, wide or narrow; quiet noise."""
-    share = np.cumsum(power.power) / power.power.sum()
+    heard = power.power * power.weight
+    share = np.cumsum(heard) / heard.sum()
     low, high = np.interp([0.1, 0.9], share, power.frequency_hz)
-    noise = np.log(np.quantile(power.power[power.power > 0], 0.05)) / 2
+    noise = np.log(np.quantile(power.power[heard > 0], 0.05)) / 2
     starts = []
     for places in ((np.arange(count) + 0.5) / count, np.linspace(0.5, 0.98, count)):
         centre = np.interp(places, share, power.frequency_hz)
-        height = np.interp(centre, power.frequency_hz, power.power) + power.power.mean()
+        height = np.interp(centre, power.frequency_hz, power.power) + power.power[heard > 0].mean()
         for width_share, noise_db in product(_WIDTH_SHARES, _NOISE_DB):
             width = np.full(count, max(width_share * (high - low) / count, 2 * power.step_hz))
             parts = ([noise + noise_db * np.log(10) / 20], np.log(centre), np.log(width))
