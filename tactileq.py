@@ -256,8 +256,9 @@ def model(
     """Fit a model of each texture over its grid of speeds and forces.
 
     Writes TEXTURE.json, TEXTURE_layers.tsv and TEXTURE_spectra.tsv, with --check TEXTURE_check.tsv,
-    with --alone TEXTURE_alone.tsv, with --plot TEXTURE_spectra.png and TEXTURE_layers.png. A recording that cannot be used is left
-    out, and a texture that cannot be modelled does not stop the others.
+    with --alone TEXTURE_alone.tsv, with --plot TEXTURE_spectra.png and TEXTURE_layers.png. A
+    recording that cannot be used is left out, and a texture that cannot be modelled does not stop
+    the others.
 
     Example: tactileq model recordings/* --out models --check
     """

@@ -38,7 +38,9 @@ USUAL_LEVEL_CHANGE = 0.38
 # Precision of a parameter that no record tells anything of: a deviation of 30 in its logarithm.
 FAINTEST = 1e-3
 MENDING_ROUNDS = 3
-FLATTENING = 1e-3  # of a trend where all speeds, or all forces, are the same
+# Weight of a trend's square in the penalty: a power of speed or force of 1 is as usual as a change
+# of USUAL_CHANGE between neighbours. Matters where two speeds alone tell the trend, or none.
+TREND_SHARE = USUAL_CHANGE**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +73,9 @@ class Field:
         return pull
 
     def following(self, theta: Floats) -> Field:
-        """The field with the trend of these parameters (C, p), by least squares."""
+        """The field with the trend of these parameters (C, p), where the penalty is least."""
         along = self.laplacian(self.places)
-        normal = self.places.T @ along + FLATTENING * np.eye(2)
+        normal = self.places.T @ along + TREND_SHARE * np.eye(2)
         trend = np.asarray(np.linalg.solve(normal, along.T @ theta), dtype=np.float64)
         return replace(self, trend=trend)
 
@@ -93,9 +95,10 @@ class Field:
         return _degrees(self.rows, self.columns).ravel()
 
     def penalty(self, theta: Floats) -> float:
-        """½·Σ over neighbours of Δ'·precision·Δ."""
+        """½·Σ over neighbours of Δ'·precision·Δ, and a little for the trend itself."""
         rest = theta - self.places @ self.trend
-        return 0.5 * float(np.sum(rest * (self.laplacian(rest) @ self.precision)))
+        trend = TREND_SHARE * float(np.sum(self.trend * (self.trend @ self.precision)))
+        return 0.5 * (trend + float(np.sum(rest * (self.laplacian(rest) @ self.precision))))
 
     def foretold(self, theta: Floats) -> Floats:
         """What the neighbours of each condition and the trend make of its parameters, (C, p)."""

@@ -32,6 +32,7 @@ from modeling.spectra import Spectrum
 COHERENT_BY = 5.0
 FARTHEST_MOVE = 0.25  # of log frequency: what coherence does to a peak, and no change of places
 WIDTH_FACTOR = 5.0
+TRIED_SIGNS = 3
 NEPER_DB = 20 / np.log(10)
 
 
@@ -71,17 +72,24 @@ def _fitted_to(peaks: Peaks, power: Power, observed: Observed, *, move: bool) ->
     held[1 : 1 + m if move else 1 + 2 * m] = True
     rows = observed.rows(np.zeros(count, dtype=np.intp))
     first = climb(theta, signs, rows, limits=(low, high), free=_gains_only(m), steps=4, enough=0.3)
-    best = int(np.argmin(first.objective))
+    best = np.argsort(first.objective, kind="stable")[:TRIED_SIGNS]
     near = np.full(low.size, FARTHEST_MOVE if move else 0.0)
     if move:
         near[1 + m : 1 + 2 * m] = np.inf
     else:  # where no coherent response fits, a width would run away
         near[1 + m : 1 + 2 * m] = np.log(WIDTH_FACTOR)
     near[0] = near[1 + 2 * m :] = np.inf
-    start = first.theta[best : best + 1]
+    start = first.theta[best]
     limits = np.maximum(low, start - near), np.minimum(high, start + near)
-    one = signs[best : best + 1]
-    return climb(start, one, observed, limits=limits, steps=8, enough=0.3).row(0)
+    fits = climb(
+        start,
+        signs[best],
+        observed.rows(np.zeros(best.size, dtype=np.intp)),
+        limits=limits,
+        steps=8,
+        enough=0.3,
+    )
+    return fits.row(int(np.argmin(fits.objective)))
 
 
 def _gains_only(m: int) -> Bools:
@@ -94,9 +102,13 @@ def _pruned(fitted: Climbed, power: Power, observed: Observed) -> Climbed:
     """The fit without the layers that the coherent response does not need."""
     while fitted.signs.size > 1:
         m = fitted.signs.size
-        theta = np.array([without_layer(fitted.theta, layer) for layer in range(m)])
+        theta = np.array([without_layer(fitted.theta, layer) for layer in range(m)] * 2)
         signs = np.array([np.delete(fitted.signs, layer) for layer in range(m)])
-        rows = observed.rows(np.zeros(m, dtype=np.intp))
+        # Neighbours that it kept apart may need the other sign towards each other.
+        places = fitted.theta[1 : 1 + m]
+        above = np.array([np.delete(places, layer) > places[layer] for layer in range(m)])
+        signs = np.concatenate((signs, np.where(above, -signs, signs)))
+        rows = observed.rows(np.zeros(len(signs), dtype=np.intp))
         limits = limits_of(m - 1, rate_hz=power.rate_hz, step_hz=power.step_hz)
         # Refitting the others makes up for part of the loss, hardly for more than three quarters.
         losses = misfits(response(theta, signs, rows).power, rows) - fitted.misfit

@@ -260,6 +260,24 @@ def completed(grid: TextureGrid, solution: Solution, *, count: int | None = None
     return pool.best()
 
 
+def uncrossed(grid: TextureGrid, solution: Solution) -> Solution:
+    """The solution with layers in the order of their frequencies, where two speeds allow for it.
+
+    They do not tell which layers have crossed; that none has is likelier if it is as near.
+    """
+    _, frequency, _, _ = split(solution.theta, solution.count)
+    order = np.argsort(frequency, axis=1, kind="stable")
+    if len({speed for speed, _ in grid.conditions}) != 2 or (order == order[0]).all():
+        return solution
+    columns = np.hstack([part * solution.count + order for part in range(3)])
+    theta = solution.theta.copy()
+    theta[:, 1:] = np.take_along_axis(theta[:, 1:], columns, axis=1)
+    patterns = neighbouring_patterns(np.median(np.exp(theta[:, 1 : 1 + solution.count]), axis=0))
+    likeliest = _likeliest(grid, [(theta, signs) for signs in patterns], TRIED_SIGNS)
+    tried = [fitted(grid, *start, observed=solution.observed) for start in likeliest]
+    return max([solution, *tried], key=lambda s: s.evidence)
+
+
 def _spread(pool: _Pool) -> None:
     """Two or three layers spread over single spectra, every sign, carried to all conditions."""
     counts = range(2, MOST_SPREAD_LAYERS + 1) if pool.count is None else [pool.count]

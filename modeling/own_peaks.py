@@ -76,8 +76,10 @@ def _one_condition(model: TextureModel, at: tuple[int, ...]) -> _Condition:
     reach = np.maximum(width / 2, LEAST_REACH_HZ)
     away = np.abs(maxima[:, None] - centre[None, :]) / reach[None, :]
     own = np.zeros(centre.size, dtype=bool)
-    if away.size:
-        own[np.argmin(away, axis=1)[away.min(axis=1) <= 1]] = True
+    for distances in away:
+        if distances.min() <= 1:  # of layers in one place the loudest
+            nearest = np.flatnonzero(distances == distances.min())
+            own[nearest[np.argmax(peq.band_rms[nearest])]] = True
     bands = band_response(centre, centres_hz=centre, bandwidths_hz=width, rate_hz=peq.rate_hz)
     loudness = (np.abs(peq.gains)[:, None] * np.abs(bands)).T
     share = loudness / np.maximum(loudness.sum(axis=1, keepdims=True), TINY)

@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
-from modeling.coherent import level_deviations, misfits, response, told
+from modeling.coherent import level_deviations, misfits, response, told, without_layer
 from modeling.field import Covariances, covariances, learnt_precision, solve, usual_changes
 from modeling.grid import Condition
 from modeling.growth import expected_on_lines
 from modeling.joint import NEPER_DB
-from modeling.layer_search import Solution, completed, fitted, hidden, search
+from modeling.layer_search import LEAST_GAIN, Solution, completed, fitted, hidden, search, uncrossed
 from modeling.layers import Layers
 from modeling.likelihood import Bools, split
 from modeling.peq import Floats
@@ -33,6 +34,9 @@ LARGEST_LEVEL_SD_DB = 12.0
 INHERITED_SHARE = 0.5
 # In log likelihood: what a record must lose without a layer, to show a peak of it.
 LEAST_EVIDENCE = 3.0
+# Layers within this share of their widths, of opposite signs, are tried as one.
+TWINS_SHARE = 0.25
+LEAST_LEFT = 0.05
 FADED = 8.0  # of log amplitude: 70 dB
 HELD = 1e8
 TREND_ROUNDS = 8
@@ -71,7 +75,10 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     if not grid.recorded.any():
         return _silent(grid)
     best = _chosen(grid, search(grid, count=count))
-    solution = _learnt(grid, completed(grid, best, count=count))
+    best = uncrossed(grid, completed(grid, best, count=count))
+    solution = _learnt(grid, best)
+    if count is None:
+        solution = _merged(grid, solution)
     return _grid_fit(grid, solution)
 
 
@@ -120,11 +127,46 @@ def _learnt(grid: TextureGrid, solution: Solution) -> Solution:
     return fitted(grid, theta, solution.signs, precision=precision, steps=8, enough=0.3)
 
 
+def _merged(grid: TextureGrid, solution: Solution) -> Solution:
+    """The solution without layers that another, of the opposite sign, mostly cancels.
+
+    Two of them at one place can say what one would, and vanish where it would have to change more
+    than a field may; but what is left of them is told by their difference alone.
+    """
+    while (pair := _twins(grid, solution)) is not None:
+        stays, goes = pair
+        m, theta = solution.count, solution.theta.copy()
+        gain = 1 + 2 * m
+        amplitude = np.exp(theta[:, gain + stays]) - np.exp(theta[:, gain + goes])
+        least = LEAST_LEFT * np.exp(theta[:, gain + stays])
+        theta[:, gain + stays] = np.log(np.maximum(amplitude, least))
+        start = without_layer(theta, goes), np.delete(solution.signs, goes)
+        one = _learnt(grid, fitted(grid, *start))
+        power = response(one.theta, one.signs, solution.observed).power
+        lost = misfits(power, solution.observed) - solution.fit.slopes.misfit
+        if lost.sum() > LEAST_GAIN * grid.recorded.sum():
+            return solution
+        solution = one
+    return solution
+
+
+def _twins(grid: TextureGrid, solution: Solution) -> tuple[int, int] | None:
+    """Two layers (the louder one first) of opposite signs at one place in most conditions."""
+    _, frequency, bandwidth, gain = (np.exp(part) for part in split(solution.theta, solution.count))
+    for a, b in combinations(range(solution.count), 2):
+        near = TWINS_SHARE * np.minimum(bandwidth[:, a], bandwidth[:, b])
+        together = np.abs(frequency[:, a] - frequency[:, b]) < near
+        if solution.signs[a] != solution.signs[b] and together[grid.recorded].mean() > 0.5:
+            louder = (gain[:, a] > gain[:, b])[grid.recorded].mean() >= 0.5
+            return (a, b) if louder else (b, a)
+    return None
+
+
 def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     """Layers in the order of their frequencies in the top corner, with their deviations."""
     m = solution.count
     absent = _absent(grid, solution)
-    theta = _placed_by_neighbours(solution, absent)
+    theta = np.clip(_placed_by_neighbours(solution, absent), *grid.limits(m))
     noise, frequency, bandwidth, gain = split(theta, m)
     top = max(range(len(theta)), key=lambda row: grid.conditions[row])
     order = np.argsort(frequency[top], kind="stable")

@@ -208,9 +208,13 @@ def test_floor_is_subtracted() -> None:
     assert without.response(empty).mean() < 0.5 * with_floor.response(empty).mean()
 
 
-def test_too_small_a_grid_is_named() -> None:
-    with pytest.raises(GridError, match="got 3 speeds and 1 force; record more force levels"):
-        fit_ar(grid_of_recordings([c for c in GRID if c[1] == 1.0]), order=4)
+def test_one_force_suffices() -> None:
+    """Every force then sounds as that one."""
+    model = fit_ar(grid_of_recordings([c for c in GRID if c[1] == 1.0]), order=4)
+    assert model.forces_n.tolist() == [1.0]
+    one = model.filter(150.0, 1.0).response(np.arange(20.0, 400.0))
+    other = model.filter(150.0, 2.5).response(np.arange(20.0, 400.0))
+    assert np.array_equal(one, other)
 
 
 def test_conditions_on_one_line_are_named() -> None:

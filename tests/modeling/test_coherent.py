@@ -172,7 +172,7 @@ def test_layers_that_cancel_cost() -> None:
     found = slopes(pair, signs, told_exactly)
     assert found.misfit[0] == pytest.approx(0.0, abs=1e-9)
     own = np.sqrt(response(pair, signs, at(np.array([300.0, 310.0]))).power[0])
-    assert (2.0 > LARGEST_SHARE * own).all()
+    assert (LARGEST_SHARE * own < 2.0).all()
     excess = np.log(2.0 / (LARGEST_SHARE * own))
     assert found.objective[0] == pytest.approx(0.5 * CANCELLING * (excess**2).sum(), rel=1e-6)
     assert found.objective[0] > 4.0

@@ -244,14 +244,19 @@ def test_recordings_on_a_line_are_refused(make_model: ModelMaker) -> None:
         fit_texture(record(make_model(0.05, LAYERS), without=without))
 
 
-def test_one_force_level_is_refused(make_model: ModelMaker) -> None:
+@pytest.mark.parametrize("estimator", ["paper", "paper-consistent", "joint"])
+def test_one_force_or_one_speed_suffices(make_model: ModelMaker, estimator: str) -> None:
+    """A grid of 1 × n; what was recorded holds at every value of the other."""
     recordings = record(make_model(0.05, LAYERS))
-    one_force = [r for r in recordings if r.force_n == 1.0]
-    with pytest.raises(InputError, match=r"2 speeds and 1 force; record more force levels\."):
-        fit_texture(one_force)
-    one_speed = [r for r in recordings if r.speed_mm_s == 100.0]
-    with pytest.raises(InputError, match=r"1 speed and 2 forces; record more speed levels\."):
-        fit_texture(one_speed)
+    by_speed = fit_texture([r for r in recordings if r.force_n == 1.0], estimator=estimator)
+    assert by_speed.noise_gains.shape == (2, 1)
+    assert by_speed.n_layers == 3
+    assert by_speed.frequencies_hz[0, 0] == pytest.approx([c for c, _, _ in LAYERS], rel=0.1)
+    assert np.array_equal(by_speed.peq(150.0, 1.0).gains, by_speed.peq(150.0, 9.0).gains)
+    by_force = fit_texture([r for r in recordings if r.speed_mm_s == 100.0], estimator=estimator)
+    assert by_force.noise_gains.shape == (1, 2)
+    one = [r for r in recordings if (r.speed_mm_s, r.force_n) == (100.0, 1.0)]
+    assert fit_texture(one, estimator=estimator).noise_gains.shape == (1, 1)
 
 
 def test_mixed_textures_and_units_are_refused(
@@ -322,7 +327,10 @@ def drawn(peq: PEQ, n: int, *, rng: np.random.Generator) -> np.ndarray:
 
 
 def test_repeats_tell_joint_more(make_model: ModelMaker) -> None:
-    """Four records of a condition halve the levels' deviations; means keep gains unbiased."""
+    """Four records of a condition halve what they tell; means keep gains unbiased.
+
+    What the neighbours tell of a level is not halved for its own records: so nearly half.
+    """
     truth = make_model(0.05, LAYERS)
     once = record(truth, seed=0)
     often = [
@@ -333,7 +341,7 @@ def test_repeats_tell_joint_more(make_model: ModelMaker) -> None:
     one, four = fit_texture(once), fit_texture(often)
     assert one.n_layers == four.n_layers == 3
     ratio = four.level_sd_db / one.level_sd_db
-    assert np.median(ratio) == pytest.approx(0.5, abs=0.05)
+    assert 0.45 < np.median(ratio) < 0.6
     assert four.noise_gains == pytest.approx(0.05, rel=0.05)
     level_db = 20 * np.log10(four.gains * np.sqrt(four.bandwidths_hz))
     expected = [20 * np.log10(g * np.sqrt(b)) for _, b, g in LAYERS]

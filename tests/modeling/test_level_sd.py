@@ -19,8 +19,8 @@ from modeling.estimators import (
     fit_layers,
     noise_amount,
 )
-from modeling.level_sd import smoothed_level_sd_db
 from modeling.joint import as_layers
+from modeling.level_sd import smoothed_level_sd_db
 from modeling.likelihood import signal_power
 from modeling.peq import band_rms
 from modeling.simplification import distances_db

@@ -248,24 +248,90 @@ def test_no_layers_to_begin_with(make_model: ModelMaker) -> None:
 
 def test_no_threshold_known(make_model: ModelMaker) -> None:
     quiet = (1500.0, 50.0, 1e-6)
-    result = run(make_model(0.0, [*at_db(10, -20), quiet]))
+    result = run(make_model(0.0, [*at_db(10, -20), quiet]), hold_above=False)
     layer = result.layers[2]
     assert verdicts(result) == ["kept", "dropped", "kept"]
     assert layer.reason == "no threshold known in 4 of 4 conditions (flat covers 10 to 1000 Hz)"
     assert np.isnan(layer.distance_db)
     assert np.isnan(layer.flip_probability)
     assert layer.worst_frequency_hz == 1500.0
+    assert layer.assumed == 0
 
 
-def test_threshold_unknown_in_some_conditions_keeps_the_layer(make_model: ModelMaker) -> None:
-    model = make_model(0.0, at_db(10, -20))
+def one_condition_beyond(model: TextureModel, frequency_hz: float) -> TextureModel:
+    """The second layer of the last condition somewhere else."""
     frequencies = model.frequencies_hz.copy()
-    frequencies[1, 1, 1] = 1200.0
-    changed = TextureModel(**{**fields_of(model), "frequencies_hz": frequencies})
-    layer = run(changed).layers[1]
+    frequencies[1, 1, 1] = frequency_hz
+    return TextureModel(**{**fields_of(model), "frequencies_hz": frequencies})
+
+
+@pytest.mark.parametrize(("frequency_hz", "hold_above"), [(1200.0, False), (5.0, True)])
+def test_threshold_unknown_in_some_conditions_keeps_the_layer(
+    make_model: ModelMaker, frequency_hz: float, hold_above: bool
+) -> None:
+    """Above the table unless its last level is held; below it in any case."""
+    changed = one_condition_beyond(make_model(0.0, at_db(10, -20)), frequency_hz)
+    layer = run(changed, hold_above=hold_above).layers[1]
     assert layer.verdict == "kept"
     assert layer.reason.startswith("no threshold known in 1 of 4 conditions")
     assert layer.distance_db == pytest.approx(-20)
+
+
+def test_below_the_last_level_of_the_table_a_layer_may_go(make_model: ModelMaker) -> None:
+    """That is a lower bound of the threshold above its end (METHOD 7)."""
+    quiet = (1500.0, 50.0, 0.1 * 10 ** (-14 / 20))
+    result = run(make_model(0.0, [*at_db(10, -20), quiet]))
+    layer = result.layers[2]
+    assert verdicts(result) == ["kept", "dropped", "dropped"]
+    assert layer.reason == "below threshold in every condition (assumed in 4 of 4)"
+    assert layer.distance_db == pytest.approx(-14)
+    assert layer.assumed == 4
+    in_one = run(one_condition_beyond(make_model(0.0, at_db(10, -20)), 1200.0)).layers[1]
+    assert in_one.reason == "below threshold in every condition (assumed in 1 of 4)"
+
+
+def test_above_the_last_level_of_the_table_nothing_is_known(make_model: ModelMaker) -> None:
+    loud = (1500.0, 50.0, 0.1 * 10 ** (1 / 20))
+    result = run(make_model(0.0, [*at_db(10, -20), loud]))
+    layer = result.layers[2]
+    assert verdicts(result) == ["kept", "dropped", "kept"]
+    assert layer.reason == "no threshold known in 4 of 4 conditions (flat covers 10 to 1000 Hz)"
+    assert np.isnan(layer.distance_db)
+    assert layer.assumed == 0
+    near = run(make_model(0.0, [*at_db(10), (1500.0, 50.0, 0.09)]), margin_db=2.0)
+    assert verdicts(near) == ["kept", "kept"]
+
+
+def test_above_threshold_wins_over_no_threshold_known(make_model: ModelMaker) -> None:
+    """A layer that is surely felt in one condition needs no threshold in the others."""
+    changed = one_condition_beyond(make_model(0.0, at_db(10, 3)), 1200.0)
+    layer = run(changed, hold_above=False).layers[1]
+    assert (layer.verdict, layer.reason) == ("kept", "above threshold in 3 of 4 conditions")
+
+
+def test_what_fills_the_shape_of_a_layer_stays_with_it(make_model: ModelMaker) -> None:
+    """60 dB too quiet alone; but it flattens the top of the layer that is felt."""
+    level = Threshold("two", np.array([10.0, 300.0, 301.0, 1000.0]), [0.01, 0.01, 10, 10], "", "")
+    shape = [(280.0, 80.0, 1.0), (330.0, 80.0, -0.75)]
+    alone = simplify(make_model(0.0, [*shape, (900.0, 20.0, 0.5)]), level, criterion="paper-gain")
+    assert verdicts(alone) == ["kept", "kept", "dropped"]
+    assert [layer.fills for layer in alone.layers] == [0, 1, 0]
+    assert alone.layers[1].reason == "below threshold, but fills the shape of layer 1"
+
+
+def test_what_fills_a_shape_goes_with_it(make_model: ModelMaker) -> None:
+    shape = [(280.0, 80.0, 0.04), (330.0, 80.0, -0.03), (900.0, 20.0, 0.2)]
+    result = run(make_model(0.0, shape))
+    assert [layer.fills for layer in result.layers] == [0, 1, 0]
+    assert verdicts(result) == ["dropped", "dropped", "kept"]
+
+
+def test_a_layer_stays_with_what_fills_its_shape(make_model: ModelMaker) -> None:
+    level = Threshold("two", np.array([10.0, 300.0, 301.0, 1000.0]), [10, 10, 0.01, 0.01], "", "")
+    shape = [(280.0, 80.0, 1.0), (330.0, 80.0, -0.75)]
+    result = simplify(make_model(0.0, shape), level, criterion="paper-gain")
+    assert verdicts(result) == ["kept", "kept"]
+    assert result.layers[0].reason == "below threshold, but layer 2 fills its shape"
 
 
 def test_margin_lowers_the_bar(make_model: ModelMaker) -> None:

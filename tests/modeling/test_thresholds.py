@@ -79,6 +79,28 @@ def test_interpolation_is_a_power_law_between_points(
     assert curve.at(between) == pytest.approx(level * (between / low) ** slope, rel=1e-9)
 
 
+@settings(deadline=None)
+@given(st.floats(1e-3, 1e5))
+def test_above_the_range_the_last_level_is_held(frequency: float) -> None:
+    curve = table((20.0, 0.1), (200.0, 0.2))
+    held = curve.held(frequency)
+    if frequency > 200.0:
+        assert held == 0.2
+    else:
+        assert np.array_equal(held, curve.at(frequency), equal_nan=True)
+
+
+def test_shipped_mobile_levels() -> None:
+    """AOSP BasicToPwleSegmentAdapter, in dB re 1 g."""
+    levels_mg = {10: 3.6, 20: 9.6, 40: 22.9, 50: 25.3, 100: 25.4, 150: 27.1, 200: 28.6}
+    levels_mg |= {250: 35.6, 300: 45.7, 400: 102.0}
+    mobile = Threshold.shipped("mobile")
+    for frequency, level_mg in levels_mg.items():
+        assert 1e3 * mobile.at(float(frequency)) == pytest.approx(level_mg, rel=0.01)
+    assert mobile.held(1000.0) == pytest.approx(0.102, rel=1e-12)
+    assert "not stated" in mobile.caveat
+
+
 def test_outside_the_range_nothing_is_known() -> None:
     curve = table((20.0, 0.1), (200.0, 0.2))
     assert curve.at([20.0, 200.0]) == pytest.approx([0.1, 0.2])
@@ -170,7 +192,9 @@ def test_comments_and_windows_line_ends_are_read(tmp_path: Path) -> None:
     assert (own.source, own.caveat) == ("rig 2", "not stated in the file")
 
 
-@pytest.mark.parametrize(("name", "lowest", "highest"), [("codec", 10, 400), ("pen-hold", 10, 320)])
+@pytest.mark.parametrize(
+    ("name", "lowest", "highest"), [("codec", 10, 400), ("pen-hold", 10, 320), ("mobile", 10, 400)]
+)
 def test_shipped_tables_state_their_range(name: str, lowest: float, highest: float) -> None:
     assert Threshold.shipped(name).valid_range_hz == (lowest, highest)
 
@@ -178,5 +202,5 @@ def test_shipped_tables_state_their_range(name: str, lowest: float, highest: flo
 def test_missing_tables_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no file there"):
         Threshold.load(tmp_path / "lab.tsv")
-    with pytest.raises(InputError, match="codec, pen-hold or a TSV file"):
+    with pytest.raises(InputError, match="codec, pen-hold, mobile or a TSV file"):
         Threshold.shipped("ours")  # type: ignore[arg-type]
