@@ -13,7 +13,6 @@ from matplotlib.text import Text
 
 from analysis import figures
 from analysis.comparison import compare_spectra, layer_course, spectrum_panels
-from analysis.recordings import layers_of_recordings
 from analysis.statistics import confusion_matrices, rate_tests, rating_tests
 from modeling import InputError, RecordingSet
 from modeling.fitting import recording_spectra
@@ -144,8 +143,7 @@ def test_layers_over_speed_beside_the_planted_ones(results):
 @pytest.mark.parametrize("count", [1, 3])
 def test_small_multiples_of_spectra_need_no_grid(results, count):
     recordings = RecordingSet(results[0].recordings.recordings[:count])
-    found = layers_of_recordings(recording_spectra(recordings), estimator="paper")
-    panels = spectrum_panels(found, estimator="paper")
+    panels = spectrum_panels(recording_spectra(recordings), estimator="paper")
     figure = figures.figure_spectra(panels)
     axes = drawn(figure)
     assert len(axes) == count

@@ -16,8 +16,8 @@ from analysis.comparison import (
     layers_over_grid,
     spectrum_panels,
 )
-from analysis.recordings import layers_of_recordings
 from modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify
+from modeling.estimators import find_layers
 from modeling.fitting import recording_spectra
 from modeling.spectra import mean_spectrum, smooth
 
@@ -65,7 +65,13 @@ def test_a_layer_stands_above_its_drawn_threshold_as_its_amplitude_does(model, c
         drawn = shown.layer_response[layer, at] / shown.layer_threshold[layer, at]
         compared = shown.layer_amplitude_g[layer] / threshold.at(frequency)
         assert drawn == pytest.approx(compared, rel=1e-12)
-    assert np.isnan(shown.layer_threshold[2]).all()  # none is known at 900 Hz
+    # None is known at 900 Hz: its last level is drawn as a lower bound.
+    bound = shown.layer_response[2, 900] / shown.layer_threshold[2, 900]
+    compared = shown.layer_amplitude_g[2] / threshold.at(400.0)
+    assert bound == pytest.approx(compared, rel=1e-12)
+    known_only = simplify(model, threshold, criterion=criterion, hold_above=False)
+    shown = compare_condition(model, known_only, speed_mm_s=150.0, force_n=1.5)
+    assert np.isnan(shown.layer_threshold[2]).all()
 
 
 def test_thresholds_are_drawn_a_quarter_octave_around_their_layers(model) -> None:
@@ -174,18 +180,18 @@ def test_panels_average_repeats_and_show_the_model_that_was_fitted(results) -> N
     first, *others = results[0].recordings.recordings
     again = replace(others[0], speed_mm_s=first.speed_mm_s, force_n=first.force_n, repeat=2)
     measured = recording_spectra(RecordingSet([first, again, *others]))
-    found = layers_of_recordings(measured, estimator="paper")
     model = results[0].model
-    panels = spectrum_panels(found, estimator="paper", model=model)
+    panels = spectrum_panels(measured, estimator="paper", model=model)
     assert len(panels) == 1 + len(others)
-    mean = mean_spectrum([found[0].spectrum, found[1].spectrum])
+    mean = mean_spectrum([measured[0][1], measured[1][1]])
     assert np.array_equal(panels[0].magnitude, mean.smoothed())
-    assert np.array_equal(panels[1].layer_frequency_hz, found[2].layers.frequencies_hz)
+    alone = find_layers(measured[2][1], estimator="paper")
+    assert np.array_equal(panels[1].layer_frequency_hz, alone.frequencies_hz)
     peq = model.peq(*first.condition)
     expected = smooth(peq.response(mean.frequency_hz), 30.0, step_hz=2.0)
     assert panels[0].response == pytest.approx(expected, rel=1e-12)
     figure = figures.figure_spectra(panels)
     figure.draw_without_rendering()
     assert "model, smoothed" in texts(figure)
-    bare = figures.figure_spectra(spectrum_panels(found, estimator="paper"))
+    bare = figures.figure_spectra(spectrum_panels(measured, estimator="paper"))
     assert "model, smoothed" not in texts(bare)

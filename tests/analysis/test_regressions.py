@@ -92,7 +92,8 @@ def test_inherited_and_interpolated_conditions_are_told(models) -> None:
 
 
 def test_support_is_the_share_of_what_responds(models) -> None:
-    table = support_table(regression_table(models)).set_index("parameter")
+    every = regression_table(models).assign(own_peak=True)
+    table = support_table(every).set_index("parameter")
     assert table["of"].tolist() == [3, 4, 4, 4]
     support = table[["support_speed", "support_force", "support_speed_force"]]
     wanted = [[200 / 3, 0, 0], [75, 25, 0], [50, 0, 25], [0, 0, 0]]
@@ -100,6 +101,19 @@ def test_support_is_the_share_of_what_responds(models) -> None:
     # Constants have no R²; whatever else was planted is explained entirely.
     assert table["adjusted_r_squared"].tolist()[:3] == [1, 1, 1]
     assert np.isnan(table["adjusted_r_squared"].iloc[3])
+
+
+def test_what_only_fills_another_shape_takes_no_part_in_support(models) -> None:
+    """The second layer of "one" digs a hole into the noise: no response has its maximum there."""
+    table = regression_table(models)
+    assert table.loc[
+        ~table["own_peak"], ["texture", "peak"]
+    ].drop_duplicates().to_numpy().tolist() == [["one", "2"]]
+    support = support_table(table).set_index("parameter")
+    assert support["of"].tolist() == [3, 3, 3, 3]
+    others = table[~((table["texture"] == "one") & (table["peak"] == "2"))]
+    alone = support_table(others.assign(own_peak=True)).set_index("parameter")
+    pd.testing.assert_frame_equal(support, alone)
 
 
 def test_mean_coefficients_over_all_and_over_the_significant_ones(models) -> None:

@@ -165,8 +165,8 @@ def test_recordings_have_the_spectrum_of_the_filter(
 
 
 def test_set_is_labelled_simulated_in_g(load: Callable[[str], HattTexture], hatt_xml: Xml) -> None:
-    records = load(hatt_xml()).recordings([100.0, 500.0], [1.0, 2.0], duration_s=0.5)
-    assert [r.condition for r in records] == [(100, 1), (100, 2), (500, 1), (500, 2)]
+    records = load(hatt_xml()).recordings([100.0, 150.0], [1.0, 2.0], duration_s=0.5)
+    assert [r.condition for r in records] == [(100, 1), (100, 2), (150, 1), (150, 2)]
     assert all(r.simulated and r.unit == "g" and r.texture == "Planted 1" for r in records)
     assert {(r.samples.size, r.rate_hz) for r in records} == {(500, 1000.0)}
 
@@ -189,9 +189,9 @@ def test_lower_rates_keep_the_band_below(load: Callable[[str], HattTexture], hat
     texture = load(hatt_xml())
     [full] = texture.recordings([160.0], [1.5], seed=2)
     [half] = texture.recordings([160.0], [1.5], rate_hz=500.0, seed=2)
-    assert (half.rate_hz, half.samples.size) == (500.0, 500)
-    kept = np.fft.rfft(full.samples)[1:240]
-    assert np.fft.rfft(half.samples)[1:240] * 2 == pytest.approx(kept, abs=1e-9)
+    assert (half.rate_hz, half.samples.size) == (500.0, 5000)
+    kept = np.fft.rfft(full.samples)[1:2400]
+    assert np.fft.rfft(half.samples)[1:2400] * 2 == pytest.approx(kept, abs=1e-9)
 
 
 def test_such_a_set_becomes_a_model_and_a_rival(
@@ -227,10 +227,26 @@ def test_conditions_without_contact_are_refused(condition: tuple[float, float]) 
         UNIT.recordings([condition[0]], [condition[1]])
 
 
-def test_silent_conditions_are_named(load: Callable[[str], HattTexture], hatt_xml: Xml) -> None:
+def test_silent_textures_are_refused(load: Callable[[str], HattTexture], hatt_xml: Xml) -> None:
     silent = load(re.sub("<var>.*?</var>", "<var>0.000000</var>", hatt_xml()))
-    with pytest.raises(InputError, match="got 100 mm/s and 1 N, where the file's variance"):
+    with pytest.raises(InputError, match="within the file's models and with vibration, got none"):
         silent.recordings([100.0], [1.0])
+
+
+def test_conditions_beyond_the_hull_are_holes() -> None:
+    """Nothing is known there; a copy of the nearest filter would say that nothing changes."""
+    records = UNIT.recordings([50.0, 200.0, 201.0], [1.0, 4.0, 5.0], duration_s=0.5)
+    assert [r.condition for r in records] == [(50, 1), (50, 4), (200, 1), (200, 4)]
+    assert UNIT.conditions_inside([(200.0, 4.0), (200.001, 4.0)]) == [(200.0, 4.0)]
+    with pytest.raises(InputError, match="got none of 4; choose another grid"):
+        UNIT.recordings([300.0, 400.0], [1.0, 2.0])
+
+
+def test_a_hole_changes_no_other_recording() -> None:
+    inside = {r.condition: r for r in UNIT.recordings([50.0, 150.0], [1.0], duration_s=0.5)}
+    again = UNIT.recordings([50.0, 999.0], [1.0], duration_s=0.5)
+    [kept] = again
+    assert np.array_equal(kept.samples, inside[50.0, 1.0].samples)
 
 
 # --- bad files

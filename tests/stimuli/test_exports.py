@@ -356,14 +356,29 @@ def test_json_holds_every_condition_of_the_grid(tmp_path: Path, texture: str) ->
 
 
 def test_json_of_one_condition_is_interpolated(tmp_path: Path) -> None:
-    assert write_peq_json(tmp_path / "a.json", CANVAS, speed_mm_s=75.0, force_n=0.25) == 1
-    (condition,) = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["conditions"]
-    # Halfway between two speeds, and half of the level below the lowest force.
-    expected = CANVAS.gains[:2, 0].mean(axis=0) / 2
-    assert [layer["gain"] for layer in condition["layers"]] == pytest.approx(expected)
-    assert condition["noise_gain"] == pytest.approx(CANVAS.noise_gains[:2, 0].mean() / 2)
-    expected = CANVAS.frequencies_hz[:2, 0].mean(axis=0)
-    assert [layer["frequency_hz"] for layer in condition["layers"]] == pytest.approx(expected)
+    def exported(model: TextureModel) -> Any:
+        at = {"speed_mm_s": float(np.sqrt(50.0 * 100.0)), "force_n": 0.25}
+        assert write_peq_json(tmp_path / "a.json", model, **at) == 1
+        (condition,) = json.loads((tmp_path / "a.json").read_text(encoding="utf-8"))["conditions"]
+        return condition
+
+    # Between two speeds, and half of the level below the lowest force.
+    share = np.sqrt(2) - 1
+    linear = exported(replace(CANVAS, blending="linear"))
+    low, high = CANVAS.gains[:2, 0]
+    expected = ((1 - share) * low + share * high) / 2
+    assert [layer["gain"] for layer in linear["layers"]] == pytest.approx(expected)
+    low, high = CANVAS.frequencies_hz[:2, 0]
+    expected = (1 - share) * low + share * high
+    assert [layer["frequency_hz"] for layer in linear["layers"]] == pytest.approx(expected)
+    # In logarithms the geometric mean, to what the finer table leaves of it (METHOD 9).
+    near = {"rel": 10 ** (0.13 / 20) - 1}
+    logarithmic = exported(CANVAS)
+    expected = np.sign(CANVAS.gains[0, 0]) * np.sqrt(np.prod(CANVAS.gains[:2, 0], axis=0)) / 2
+    assert [layer["gain"] for layer in logarithmic["layers"]] == pytest.approx(expected, **near)
+    expected = np.sqrt(low * high)
+    found = [layer["frequency_hz"] for layer in logarithmic["layers"]]
+    assert found == pytest.approx(expected, **near)
 
 
 def recipe(model: Path, **changes: Any) -> Recipe:
