@@ -23,7 +23,7 @@ from modeling import (
 )
 from modeling.autoregressive import fit_filter
 from modeling.spectra import MODEL_RATE_HZ
-from modeling_steps import model_textures
+from modeling_steps import HowToModel, model_textures
 from stimuli.planted import planted_texture
 
 RECORDER_RATE_HZ = 22704.0
@@ -132,29 +132,29 @@ def test_models_of_a_study(
 def test_findings_of_a_study_on_all_cores(
     benchmark: BenchmarkFixture, study: tuple[RecordingSet, ...], estimator: str
 ) -> None:
-    """What the command computes: each recording's layers and each texture's model."""
-    benchmark.extra_info |= {"what": f"recordings' layers and models on all cores, {estimator}"}
+    """What the command computes: each texture's model, and how well it fits its recordings."""
+    benchmark.extra_info |= {"what": f"models and their fit on all cores, {estimator}"}
     find = delayed(partial(find_in, estimator=estimator))
     with Parallel(n_jobs=min(cpu_count(), len(study))) as parallel:
         findings = benchmark.pedantic(lambda: parallel(map(find, study)), rounds=3, warmup_rounds=1)
     for found, recordings in zip(findings, study, strict=True):
         assert found.model is not None
-        assert len(found.recordings) == len(recordings)
+        assert len(found.measured) == len(recordings)
 
 
 @pytest.mark.benchmark(group="whole study, 343 records")
 def test_command_on_a_study(
     benchmark: BenchmarkFixture, study: tuple[RecordingSet, ...], tmp_path: Path
 ) -> None:
-    """From files to files: reading, both fits, tables, and a picture of 49 spectra per texture."""
+    """From files to files: reading, fitting, and tables."""
     for number, recordings in enumerate(study):
         recordings.save(tmp_path / "recordings" / str(number))
-    benchmark.extra_info |= {"what": "tactileq model, files and pictures, all cores"}
-    options = {"estimator": "joint", "plot": False, "jobs": None}
+    benchmark.extra_info |= {"what": "tactileq model, from files to files, all cores"}
+    options = {"how": HowToModel(), "jobs": None}
     benchmark.pedantic(
         model_textures, args=([tmp_path / "recordings"], tmp_path / "out"), kwargs=options
     )
-    assert len(list((tmp_path / "out").glob("*_spectra.png"))) == len(study)
+    assert len(list((tmp_path / "out").glob("*_layers.tsv"))) == len(study)
 
 
 @pytest.mark.benchmark(group="parameters at 20 000 points of a stroke")

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+import tactileq
+
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -25,5 +27,25 @@ def run(tmp_path: Path) -> Run:
             text=True,
             timeout=250,
         )
+
+    return call
+
+
+@pytest.fixture
+def main(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Run:
+    """`run` without a process of its own: loading the libraries takes longer than the work."""
+
+    def call(*arguments: object) -> subprocess.CompletedProcess[str]:
+        monkeypatch.chdir(tmp_path)
+        words = [str(argument) for argument in arguments]
+        # Worker processes would outlive the test, in the folder where they began.
+        words += ["--jobs", "1"] if words[0] == "model" else []
+        monkeypatch.setattr("sys.argv", ["tactileq", *words])
+        with pytest.raises(SystemExit) as end:
+            tactileq.main()
+        told = capsys.readouterr()
+        return subprocess.CompletedProcess(words, int(end.value.code or 0), told.out, told.err)
 
     return call

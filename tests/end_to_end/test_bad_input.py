@@ -52,7 +52,6 @@ DAMAGES = {
     "nan": (fill("0002.csv", ["0.1", "nan"] * 50), "expected finite samples"),
     "inf": (fill("0002.csv", ["0.1", "-inf"] * 50), "expected finite samples"),
     "constant": (fill("0002.csv", ["0.25"] * 100), "got the constant value 0.25"),
-    "twice": (edit("recordings.tsv", "50.0\t2.0", "50.0\t1.0"), "one recording per condition"),
     "unit": (edit("recordings.tsv", "\tg\t", "\tfurlong\t"), "got 'furlong'"),
     "rate": (edit("recordings.tsv", "\t5000.0\t", "\t\t"), "expected a number for rate_hz"),
     "zero rate": (edit("recordings.tsv", "\t5000.0\t", "\t0\t"), "rate above 0 Hz"),
@@ -63,10 +62,44 @@ DAMAGES = {
 
 
 @pytest.mark.parametrize("name", DAMAGES)
-def test_damaged_recordings(run, tmp_path: Path, name: str) -> None:
+def test_a_damaged_recording_is_named_and_left_out(main, tmp_path: Path, name: str) -> None:
     damage, sentence = DAMAGES[name]
     make_set(tmp_path / "set", damage)
-    assert_refused(run("model", "set", "--out", "models"), sentence)
+    done = main("model", "set", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    (warning,) = [line for line in done.stderr.splitlines() if "left out" in line]
+    assert warning.startswith("warning: oak: left out: ")
+    assert sentence in warning
+    assert "oak: interpolated for want of a recording: " in done.stdout
+    model = json.loads((tmp_path / "models/oak.json").read_text())
+    assert np.sum(model["interpolated"]) == 1
+    provenance = json.loads((tmp_path / "models/oak_provenance.json").read_text())
+    assert [sentence in told for told in provenance["settings"]["left_out"]] == [True]
+
+
+@pytest.mark.parametrize("silence", ["0", "0.25"])
+def test_a_silent_recording_is_named_and_left_out(main, tmp_path: Path, silence: str) -> None:
+    make_set(tmp_path / "set", fill("0002.csv", [silence] * 3000))
+    done = main("model", "set", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    assert "left out" in done.stderr
+    assert "oak: interpolated for want of a recording: 50 mm/s at 2 N" in done.stdout
+
+
+def test_recordings_that_are_all_damaged_are_refused(run, tmp_path: Path) -> None:
+    def damage(folder: Path) -> None:
+        for number in range(1, 5):
+            (folder / f"{number:04d}.csv").write_text("")
+
+    make_set(tmp_path / "set", damage)
+    assert_refused(run("model", "set", "--out", "models"), "got an empty file")
+    assert not (tmp_path / "models").exists()
+
+
+def test_one_condition_twice_is_refused(run, tmp_path: Path) -> None:
+    """One of the labels is wrong, nobody knows which."""
+    make_set(tmp_path / "set", edit("recordings.tsv", "50.0\t2.0", "50.0\t1.0"))
+    assert_refused(run("model", "set", "--out", "models"), "one recording per condition")
     assert not (tmp_path / "models").exists()
 
 
@@ -105,7 +138,7 @@ def test_options_without_meaning(run, tmp_path: Path) -> None:
     planted_texture("canvas").save(tmp_path / "m.json")
     cases = {
         ("simplify", "m.json", "--margin-db", "-1"): "margin of at least 0 dB",
-        ("simplify", "m.json", "--threshold", "tongue"): "codec, pen-hold or a TSV file",
+        ("simplify", "m.json", "--threshold", "tongue"): "codec, pen-hold, mobile or a TSV file",
         ("simplify", "m.json", "--threshold", "my.tsv"): "expected a table at my.tsv",
         ("stimuli", "m.json", "--rate", "1000"): "rendering rate of at least the model's",
         ("stimuli", "m.json", "--duration", "0"): "to 3600 for duration_s, got 0.0",

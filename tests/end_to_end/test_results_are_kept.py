@@ -60,7 +60,7 @@ def test_models_of_two_textures_stand_side_by_side(run, tmp_path: Path) -> None:
         grid(name).save(tmp_path / name)
         assert run("model", name, "--out", "models").returncode == 0
     names = {p.name for p in (tmp_path / "models").iterdir()}
-    endings = ("_layers.tsv", "_spectra.tsv", "_spectra.png", "_provenance.json", ".json")
+    endings = ("_layers.tsv", "_spectra.tsv", "_provenance.json", ".json")
     assert names == {name + ending for name in ("canvas", "MDF") for ending in endings}
 
 
