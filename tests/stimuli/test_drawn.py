@@ -105,7 +105,7 @@ def test_conditions_outside_are_refused(condition: tuple[float, float]) -> None:
 
 
 def test_joint_is_as_close_between_conditions_as_at_them() -> None:
-    """Four surfaces of the forty of docs/studies/real_surfaces.md, where all figures are."""
+    """Four surfaces; forty others, and the rivals, are in docs/studies/real_surfaces.md."""
     at, between, levels = [], [], []
     for seed in range(4):
         surface = draw_surface(seed)

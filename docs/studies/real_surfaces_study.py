@@ -1,0 +1,178 @@
+"""How close models of real surfaces are at the recorded conditions, and between them.
+
+Simulated: random surfaces with the statistics of 100 real ones and no layers of their own
+(`stimuli.drawn`), whose spectra are known at every speed and force.
+
+Example: python docs/studies/real_surfaces_study.py writes real_surfaces_study*.tsv and .png beside
+this file and prints the tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from threadpoolctl import threadpool_limits
+
+from analysis.between import FilterAt, halfway, truth_summary
+from analysis.drawing import LAYER_COLOURS, LAYER_MARKERS, finish_axes, shared_legend
+from analysis.drawing import stamp_if_simulated as stamp
+from modeling import RecordingSet, fit_ar, fit_texture
+from modeling.grid import Condition
+from stimuli.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
+
+SURFACES = 40
+FIRST = 1000  # surfaces that no constant of the estimator was chosen by
+FREQUENCY_HZ = np.arange(15.0, 481.0)
+MODELS = (
+    "joint",
+    "joint, 2 layers",
+    "joint, 3 layers",
+    "AR(6)",
+    "AR(20)",
+    "paper",
+    "paper-consistent",
+)
+# Few speeds: three are recorded at two forces, two others are foretold.
+FEW_SPEEDS, FEW_FORCES, HIDDEN_SPEEDS = (50.0, 150.0, 350.0), (1.0, 2.5), (90.0, 230.0)
+Conditions = Sequence[Condition]
+
+
+def fitted(records: RecordingSet, name: str) -> tuple[FilterAt, int]:
+    """One of `MODELS` of these records, and its numbers per condition."""
+    if name.startswith("AR"):
+        order = int(name[3:-1])
+        return fit_ar(records, order=order).filter, order + 1
+    estimator, _, layers = name.partition(", ")
+    model = fit_texture(
+        records, estimator=estimator, layers=int(layers.split()[0]) if layers else None
+    )
+    return model.peq, 1 + 3 * model.n_layers
+
+
+def compared(
+    surface: DrawnSurface, records: RecordingSet, places: dict[str, Conditions]
+) -> list[dict[str, Any]]:
+    """Every model of these records against the surface, at the places named: one row each."""
+    rows = []
+    for name in MODELS:
+        start = perf_counter()
+        filter_at, numbers = fitted(records, name)
+        row: dict[str, Any] = {"surface": surface.name, "model": name, "numbers": numbers}
+        row["milliseconds_a_record"] = 1e3 * (perf_counter() - start) / len(records)
+        for place, conditions in places.items():
+            distance, level, worst = truth_summary(
+                filter_at, surface, conditions, frequency_hz=FREQUENCY_HZ
+            )
+            row |= {place: distance, f"{place}_level": level, f"{place}_worst_level": worst}
+        rows.append(row)
+    return rows
+
+
+def whole_grid(seed: int) -> list[dict[str, Any]]:
+    """7 × 7 conditions: at them and half-way between them."""
+    surface = draw_surface(seed)
+    nodes = [(v, f) for v in SPEEDS_MM_S for f in FORCES_N]
+    places = {"at": nodes, "between": halfway(list(SPEEDS_MM_S), list(FORCES_N))}
+    return compared(surface, surface.record(seed=seed), places)
+
+
+def every_second_node(seed: int) -> list[dict[str, Any]]:
+    """4 × 4 of the 7 × 7 conditions recorded: at the 33 others."""
+    surface = draw_surface(seed)
+    known = {(v, f) for v in SPEEDS_MM_S[::2] for f in FORCES_N[::2]}
+    hidden = [(v, f) for v in SPEEDS_MM_S for f in FORCES_N if (v, f) not in known]
+    records = RecordingSet(r for r in surface.record(seed=seed) if r.condition in known)
+    return compared(surface, records, {"between": hidden})
+
+
+def few_speeds(seed: int) -> list[dict[str, Any]]:
+    """3 × 2 conditions: at two speeds between them."""
+    surface = draw_surface(seed)
+    records = surface.record(FEW_SPEEDS, FEW_FORCES, seed=seed)
+    nodes = [(v, f) for v in FEW_SPEEDS for f in FEW_FORCES]
+    hidden = [(v, f) for v in HIDDEN_SPEEDS for f in FEW_FORCES]
+    return compared(surface, records, {"at": nodes, "between": hidden})
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
+    """Per model: median and 95th percentile over surfaces, and the worst level of all."""
+    table = pd.DataFrame(rows)
+    by_model = table.groupby("model", sort=False)
+    found = pd.DataFrame({"numbers": by_model["numbers"].median()})
+    for place in ("at", "between"):
+        if place not in table:
+            continue
+        found[f"{place}_db"] = by_model[place].median()
+        found[f"{place}_95th_db"] = by_model[place].quantile(0.95)
+        found[f"{place}_level_db"] = by_model[f"{place}_level"].median()
+        found[f"{place}_worst_level_db"] = by_model[f"{place}_worst_level"].max()
+    found["milliseconds_a_record"] = by_model["milliseconds_a_record"].median()
+    return found.reset_index().assign(surfaces=table["surface"].nunique(), simulated=True)
+
+
+def figure_of(table: pd.DataFrame) -> Figure:
+    """Distance from the truth against fitting time, at and between the conditions."""
+    figure = Figure(figsize=(10, 4.4), layout="constrained")
+    panels = figure.subplots(1, 2, sharey=True)
+    titles = {"at": "at the recorded conditions", "between": "half-way between them"}
+    for ax, (place, title) in zip(panels, titles.items(), strict=True):
+        _panel(ax, table, place=place)
+        ax.set_title(title, loc="left", fontsize=10)
+    panels[0].set_ylabel("log-spectral distance\nfrom the truth (dB)")
+    shared_legend(figure, panels[:1], ncols=4)
+    stamp(panels[-1], simulated=True)
+    return figure
+
+
+def _panel(ax: Axes, table: pd.DataFrame, *, place: str) -> None:
+    """Markers at medians over the surfaces, bars up to the 95th percentile."""
+    for number, row in table.iterrows():
+        median = row[f"{place}_db"]
+        colour = LAYER_COLOURS[int(number) % len(LAYER_COLOURS)]
+        ax.errorbar(
+            row["milliseconds_a_record"],
+            median,
+            yerr=[[0.0], [row[f"{place}_95th_db"] - median]],
+            fmt=LAYER_MARKERS[int(number) % len(LAYER_MARKERS)],
+            color=colour,
+            capsize=3,
+            markersize=8,
+            label=f"{row['model']} ({row['numbers']:.0f} numbers)",
+        )
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    times, distances = [0.3, 1, 3, 10, 30], [0.3, 0.5, 1, 2, 5, 10]
+    ax.set_xticks(times, [f"{time:g}" for time in times])
+    ax.set_yticks(distances, [f"{distance:g}" for distance in distances])
+    ax.minorticks_off()
+    ax.set_xlabel("fitting time a record (ms)")
+    finish_axes(ax)
+
+
+def run(make: Callable[[int], list[dict[str, Any]]], surfaces: int) -> pd.DataFrame:
+    """The summary of one of the three cases over this many surfaces."""
+    return summary([row for n in range(surfaces) for row in make(FIRST + n)])
+
+
+def main() -> None:
+    """Run the study and write its tables and picture."""
+    stem = Path(__file__).with_suffix("")
+    cases = {"": whole_grid, "_every_second": every_second_node, "_few_speeds": few_speeds}
+    for suffix, make in cases.items():
+        with threadpool_limits(limits=1):
+            table = run(make, SURFACES)
+        table.to_csv(f"{stem}{suffix}.tsv", sep="\t", index=False, float_format="%.4g")
+        print(f"{make.__name__}\n{table.round(3).to_string(index=False)}", flush=True)
+        if not suffix:
+            figure_of(table).savefig(stem.with_suffix(".png"), dpi=110)
+
+
+if __name__ == "__main__":
+    main()
