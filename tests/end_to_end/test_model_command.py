@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -188,3 +190,87 @@ def test_simplify_draws_the_condition_that_was_asked_for(main, three: Path) -> N
         assert sentence in refused.stderr
         assert refused.stderr.count("\n") == 1
     assert contents(three.parent / "fewer") == before
+
+
+def test_layers_check_and_alone(main, tmp_path: Path) -> None:
+    """A prescribed number of layers; conditions foretold; each recording by itself."""
+    axes = {"speeds_mm_s": np.array([100.0, 200.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+    truth = planted_texture("canvas", **axes)
+    record_texture(truth, rate_hz=5000.0, duration_s=0.5).save(tmp_path / "set")
+    done = main("model", "set", "--layers", 2, "--check", "--alone", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    assert TextureModel.load(tmp_path / "models/canvas.json").n_layers == 2
+    assert "log-spectral distance" in done.stdout
+    foretold = pd.read_csv(tmp_path / "models/canvas_check.tsv", sep="\t")
+    # Six conditions, four of them corners.
+    assert list(zip(foretold.speed_mm_s, foretold.force_n, strict=True)) == [(200, 1), (200, 3)]
+    assert foretold.simulated.all()
+    assert np.isfinite(foretold.level_error_db).all()
+    alone = pd.read_csv(tmp_path / "models/canvas_alone.tsv", sep="\t")
+    assert len(alone.groupby(["speed_mm_s", "force_n"])) == 6
+    provenance = json.loads((tmp_path / "models/canvas_provenance.json").read_text())
+    assert provenance["settings"]["layers"] == 2
+    for options, sentence in (
+        (("--layers", 13), "expected 1 to 12 layers with the estimator joint, got 13"),
+        (("--layers", 2, "--estimator", "paper"), "got 2 with paper"),
+    ):
+        refused = main("model", "set", *options, "--out", "others")
+        assert refused.returncode == 1
+        assert sentence in refused.stderr
+        assert not (tmp_path / "others").exists()
+
+
+def test_hum_is_taken_out_with_a_warning_and_kept_on_request(main, tmp_path: Path) -> None:
+    time = np.arange(5000) / 5000.0
+    hum = 0.5 * np.sin(2 * np.pi * 60 * time)
+    rng = np.random.default_rng(1)
+    RecordingSet(
+        Recording(rng.normal(0, 0.1, 5000) + hum, 5000.0, v, f, "oak")
+        for v in (100.0, 200.0)
+        for f in (1.0, 2.0)
+    ).save(tmp_path / "set")
+    done = main("model", "set", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    [warning] = done.stderr.splitlines()
+    assert warning.startswith("warning: ")
+    assert "and 3 more: hum of the mains at 60 Hz taken out." in warning
+    kept = main("model", "set", "--keep-hum", "--out", "kept")
+    assert "pure tone of 0.35" in kept.stderr
+    without, with_it = (
+        TextureModel.load(tmp_path / folder / "oak.json") for folder in ("models", "kept")
+    )
+    assert without.n_layers == 0
+    assert np.abs(with_it.frequencies_hz - 60).min(axis=-1) == pytest.approx(0, abs=1)
+
+
+def test_unusable_recordings_of_a_texture_are_named_and_left_out(main, tmp_path: Path) -> None:
+    axes = {"speeds_mm_s": np.array([100.0, 200.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+    truth = planted_texture("canvas", **axes)
+    record_texture(truth, rate_hz=5000.0, duration_s=0.5).save(tmp_path / "set")
+    table = pd.read_csv(tmp_path / "set/recordings.tsv", sep="\t")
+    dead = table.file[(table.speed_mm_s == 200) & (table.force_n == 1)].item()
+    rows = (tmp_path / "set" / dead).read_text().splitlines()
+    silent = [rows[0], *["0.0"] * (len(rows) - 1)]
+    (tmp_path / "set" / dead).write_text("\n".join(silent) + "\n")
+    done = main("model", "set", "--out", "models")
+    assert done.returncode == 0, done.stderr
+    assert "warning: canvas: left out: " in done.stderr
+    assert "expected a vibration, got the constant value 0" in done.stderr
+    model = TextureModel.load(tmp_path / "models/canvas.json")
+    assert model.interpolated.tolist() == [[False, False], [True, False], [False, False]]
+
+
+def test_above_the_thresholds_end(main, tmp_path: Path) -> None:
+    """Its last level is held as a lower bound unless only what is known may count."""
+    model = planted_texture("canvas", **AXES)
+    high = replace(model, frequencies_hz=model.frequencies_hz + 600, gains=1e-4 * model.gains)
+    high.save(tmp_path / "high.json")
+    for options, left, verdict in (
+        ((), 1, "assumed"),  # the last layer is kept
+        (("--known-only",), model.n_layers, "no threshold known"),
+    ):
+        done = main("simplify", "high.json", *options, "--out", "fewer")
+        assert done.returncode == 0, done.stderr
+        assert TextureModel.load(tmp_path / "fewer/canvas.json").n_layers == left
+        told = (tmp_path / "fewer/canvas_layers.tsv").read_text()
+        assert verdict in told

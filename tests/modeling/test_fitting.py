@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from modeling import (
     fit_texture,
     missing_conditions,
 )
-from modeling.fitting import recording_spectra, spectra_by_condition
+from modeling.fitting import fit_spectra, recording_spectra, spectra_by_condition
 from modeling.grid import fill_grid
 from modeling.recording import RecordingSet
 from modeling.spectra import mean_spectrum
@@ -397,3 +398,68 @@ def test_a_layer_beyond_the_nyquist_frequency_is_foretold_within_it() -> None:
     assert model.n_layers == 2
     assert model.frequencies_hz.max() <= 2450
     assert model.inherited[-1, :, 1].all()
+
+
+# --- what is wrong with a record
+
+
+def with_hum(recording: Recording) -> Recording:
+    """The record with 50 and 150 Hz of the mains, louder than it is itself."""
+    time = np.arange(recording.samples.size) / recording.rate_hz
+    loud = np.sqrt(2) * recording.samples.std()
+    hum = 3 * loud * np.sin(2 * np.pi * 50 * time + 1) + loud * np.sin(2 * np.pi * 150 * time)
+    return replace(recording, samples=recording.samples + hum)
+
+
+def test_hum_is_taken_out_told_of_and_kept_on_request(make_model: ModelMaker) -> None:
+    clean = RecordingSet(record(make_model(0.05, LAYERS)))
+    humming = RecordingSet([with_hum(r) for r in clean])
+    measured = recording_spectra(humming)
+    notes = [spectrum.notes for _, spectrum in measured]
+    assert notes == [("hum of the mains at 50, 150 Hz taken out",)] * 4
+    kept = recording_spectra(humming, keep_hum=True)
+    for recording, spectrum in kept:
+        rms = np.std(recording.samples) / np.sqrt(1 + 9 + 1) * np.array([3, 1])
+        words = [note.split() for note in spectrum.notes]
+        assert [float(word[-2]) for word in words] == [50.0, 150.0]
+        assert [float(word[3]) for word in words] == pytest.approx(rms, rel=0.05)
+    model, without, with_it = fit_texture(humming), fit_texture(clean), fit_spectra(kept)
+    assert model.n_layers == without.n_layers == 3
+    assert 20 * np.log10(
+        model.peq(200.0, 2.0).band_rms / without.peq(200.0, 2.0).band_rms
+    ) == pytest.approx(0, abs=1.5)
+    assert np.abs(with_it.frequencies_hz - 50).min(axis=-1).max() < 2
+
+
+def test_a_record_that_drifts_or_changes_its_level_is_told_of(make_model: ModelMaker) -> None:
+    """Played ever faster, by 30 % in all; and twice as loud half-way."""
+    steady = record(make_model(0.05, LAYERS), duration_s=2.0)
+    n = steady[0].samples.size // 2
+    share = np.arange(n) / n
+    at = (share + 0.3 * (share**2 - share) / 2) * n + n / 4
+    faster = np.interp(at, np.arange(2 * n), steady[0].samples)
+    louder = steady[1].samples * np.where(np.arange(2 * n) < n, 1.0, 2.0)
+    changed = [
+        replace(steady[0], samples=faster),
+        replace(steady[1], samples=louder),
+        *steady[2:],
+    ]
+    drifting, loud, *others = [s.notes for _, s in recording_spectra(RecordingSet(changed))]
+    assert len(drifting) == len(loud) == 1
+    assert "its frequencies drift by +" in drifting[0]
+    assert "its level changes by 6." in loud[0]
+    assert others == [(), ()]
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_a_silent_condition_is_interpolated(make_model: ModelMaker, estimator: str) -> None:
+    """One that holds nothing but the sensor's floor."""
+    recordings = record(make_model(0.05, LAYERS))
+    floor = replace(recordings[0], samples=1e-4 * recordings[0].samples, force_n=0.0)
+    silent = replace(recordings[1], samples=floor.samples)
+    others = [recordings[0], *recordings[2:], floor]
+    model = fit_texture([*others, silent], estimator=estimator)
+    assert model.interpolated.tolist() == [[False, True], [False, False]]
+    assert np.array_equal(model.gains, fit_texture(others, estimator=estimator).gains)
+    with pytest.raises(InputError, match="expected a recording with vibration, got silence in all"):
+        fit_texture([silent, floor], estimator=estimator)

@@ -82,6 +82,37 @@ def test_bits_are_equal_whatever_the_hand_does(
     assert_same_bits(lambda: Renderer(model, seed=seed, update_samples=update_samples), *hand)
 
 
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=st.integers(0, 100),
+    speeds=st.integers(1, 3),
+    forces=st.integers(1, 4),
+    hand=arrays(np.float64, st.tuples(st.just(2), st.integers(0, 150)), elements=ANY_HAND),
+)
+def test_bits_are_equal_in_logarithms_and_of_one_speed_or_force(
+    seed: int, speeds: int, forces: int, hand: np.ndarray
+) -> None:
+    """Gains of one sign per layer, some of them 0; grids of 1 × n and n × 1."""
+    wild = wild_model(3, seed)
+    grid = np.ix_(range(speeds), range(forces))
+    signs = np.sign(wild.gains[0, 0])
+    gains = np.where(np.abs(wild.gains) < 0.2, 0.0, signs * np.abs(wild.gains))[grid]
+    model = replace(
+        wild,
+        speeds_mm_s=wild.speeds_mm_s[:speeds],
+        forces_n=wild.forces_n[:forces],
+        noise_gains=wild.noise_gains[grid],
+        frequencies_hz=wild.frequencies_hz[grid],
+        bandwidths_hz=wild.bandwidths_hz[grid],
+        gains=gains,
+        level_sd_db=np.zeros_like(gains),
+        inherited=np.zeros(gains.shape, dtype=bool),
+        interpolated=np.zeros(gains.shape[:2], dtype=bool),
+        blending="logarithmic",
+    )
+    assert_same_bits(lambda: Renderer(model, seed=seed), *hand)
+
+
 @pytest.mark.parametrize("rate_hz", [5000.0, 5001.0, 44100.0, 48000.0])
 @pytest.mark.parametrize("texture", sorted(CATALOGUE))
 def test_bits_are_equal_at_other_rates(texture: str, rate_hz: float) -> None:

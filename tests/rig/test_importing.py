@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from modeling import InputError, RecordingSet
-from rig.importing import Label, import_csv, import_wav, labels_from_table
+from rig.importing import Label, import_csv, import_wav, labels_from_table, usable
 
 LABEL = Label("oak", 100.0, 1.0)
 RATE_HZ = 3200.0
@@ -335,3 +335,17 @@ def test_an_option_must_not_contradict_the_header(
     with pytest.raises(InputError, match=r"'m/s2' in its header and 'g' from --unit"):
         import_csv([path], [LABEL], unit="g")
     assert import_csv([path], [LABEL], unit="m/s2").recordings[0].unit == "g"
+
+
+def test_one_broken_file_of_many_is_named_and_left_out(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    paths = [write_csv(tmp_path / f"{n}.csv", "time_s,x_g", with_time(axes[:1])) for n in range(3)]
+    paths[1].write_text("nothing of use\n", encoding="utf-8")
+    labels = [Label("oak", speed, 1.0) for speed in (100.0, 200.0, 300.0)]
+    records, refusals = usable(import_csv, paths, labels)
+    assert [r.speed_mm_s for r in records] == [100.0, 300.0]
+    [sentence] = refusals
+    assert "1.csv" in sentence
+    with pytest.raises(InputError, match=r"1\.csv"):
+        usable(import_csv, paths[1:2], labels[1:2])
