@@ -135,14 +135,16 @@ def likeness_table(
             "at force 0."
         )
     seeds = rng.integers(2**63, size=len(above_floor))
+    by_condition = [
+        similarity.reports(
+            measured,
+            [model.peq(*recording.condition) for model in models.values()],
+            rng=np.random.default_rng(seed),
+        )
+        for (recording, measured), seed in zip(above_floor, seeds, strict=True)
+    ]
     rows = []
-    for name, model in models.items():
-        reports = [
-            similarity.report(
-                measured, model.peq(*recording.condition), rng=np.random.default_rng(seed)
-            )
-            for (recording, measured), seed in zip(above_floor, seeds, strict=True)
-        ]
+    for (name, model), reports in zip(models.items(), zip(*by_condition, strict=True), strict=True):
         labels = {
             "texture": first.texture,
             "model": name,

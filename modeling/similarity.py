@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from modeling.autoregressive import ARModel
 from modeling.errors import InputError
@@ -127,22 +128,58 @@ def report(
         Draws for the ceiling; by default a generator of fixed seed, so that a table repeats.
     """
     fitted, measured = _at_condition(recording, model)
+    return reports(measured, [fitted], rng=rng)[0]
+
+
+def reports(
+    measured: Spectrum,
+    filters: Iterable[SpectralFilter],
+    *,
+    rng: np.random.Generator | None = None,
+) -> list[SimilarityReport]:
+    """`report` of several filters and one spectrum, against the same draws for the ceiling.
+
+    Parameters
+    ----------
+    measured : Spectrum
+        At the rate of the filters.
+    filters : iterable of PEQ or ARFilter
+    rng : Generator, optional
+        As in `report`.
+    """
     rng = np.random.default_rng(0) if rng is None else rng
-    frequency = measured.frequency_hz
-    band = (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
+    band = _compared(measured)
     step_hz = measured.rate_hz / measured.n_samples
-    response = fitted.response(frequency)
     outline = measured.smoothed()
     draws = _draws(outline, rng)
-    scores, floors, ceilings = [], [], []
+    truths, ceilings = [], []
     for sigma_hz in SIGMAS_HZ:
-        truth = measured.smoothed(sigma_hz)
-        scores.append(gfc(smooth(response, sigma_hz, step_hz=step_hz)[band], truth[band]))
-        floors.append(gfc(np.ones(int(band.sum())), truth[band]))
+        truths.append(measured.smoothed(sigma_hz)[band])
         shape = smooth(outline, sigma_hz, step_hz=step_hz)[band]
         drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
         ceilings.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
-    smoothed, truth = smooth(response, SIGMAS_HZ[0], step_hz=step_hz)[band], outline[band]
+    return [_report(measured, fitted, truths, ceilings) for fitted in filters]
+
+
+def _compared(measured: Spectrum) -> NDArray[np.bool_]:
+    """10 Hz … 0.98 of the Nyquist frequency."""
+    frequency = measured.frequency_hz
+    return (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
+
+
+def _report(
+    measured: Spectrum,
+    fitted: SpectralFilter,
+    truths: Sequence[Floats],
+    ceilings: Sequence[float],
+) -> SimilarityReport:
+    """One filter; `truths` (smoothed, in the band) and `ceilings` in the order of `SIGMAS_HZ`."""
+    frequency, band = measured.frequency_hz, _compared(measured)
+    step_hz = measured.rate_hz / measured.n_samples
+    response = fitted.response(frequency)
+    smoothed = [smooth(response, sigma_hz, step_hz=step_hz)[band] for sigma_hz in SIGMAS_HZ]
+    scores = [gfc(ours, truth) for ours, truth in zip(smoothed, truths, strict=True)]
+    floors = [gfc(np.ones(truth.size), truth) for truth in truths]
     heard = measured.magnitude[band] > 0  # where the sensor's floor took all, dB mean nothing
     edges, band_errors = band_energy_error_db(
         frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2
@@ -154,7 +191,7 @@ def report(
         floor_gfc5=floors[1],
         ceiling_gfc30=ceilings[0],
         ceiling_gfc5=ceilings[1],
-        log_spectral_distance_db=log_spectral_distance_db(smoothed[heard], truth[heard]),
+        log_spectral_distance_db=log_spectral_distance_db(smoothed[0][heard], truths[0][heard]),
         rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
         band_edges_hz=edges,
         band_energy_error_db=band_errors,

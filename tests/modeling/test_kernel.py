@@ -107,6 +107,7 @@ def test_bits_are_equal_in_logarithms_and_of_one_speed_or_force(
         gains=gains,
         level_sd_db=np.zeros_like(gains),
         inherited=np.zeros(gains.shape, dtype=bool),
+        unresolved=np.zeros(gains.shape, dtype=bool),
         interpolated=np.zeros(gains.shape[:2], dtype=bool),
         blending="logarithmic",
     )
