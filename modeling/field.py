@@ -31,8 +31,8 @@ from modeling.peq import Floats
 # What differences between neighbours are expected to be, beside their trend, before anything is
 # known: a sixth in each parameter, and 3 dB more in the level of all gains together. It counts as
 # much as one difference more than there are parameters. Chosen where fits of planted and of drawn
-# surfaces are nearest to their truths; three times looser or stiffer changes the distances by a
-# twentieth (docs/studies/real_surfaces.md).
+# surfaces are nearest to their truths; three times looser or stiffer changes the distances by up to
+# a tenth (docs/studies/real_surfaces.md).
 USUAL_CHANGE = 0.175
 USUAL_LEVEL_CHANGE = 0.38
 # Precision of a parameter that no record tells anything of: a deviation of 30 in its logarithm.

@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from analysis.planted import match_layers
 from modeling import PEQ, Recording, RecordingSet, fit_texture
+from modeling.own_peaks import own_peaks
 from stimuli.random_truth import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
 
 Floats = NDArray[np.float64]
@@ -181,16 +182,22 @@ def judged(case: Case, seed: int) -> list[dict[str, float]]:
         true_hz, width_hz = np.append(true_hz, TONE_HZ), np.append(width_hz, 1.0)
         # Over lines of 1 Hz of a response to unit noise at this rate.
         power[np.argmin(np.abs(FREQUENCY_HZ - TONE_HZ))] += TONE_RMS_G**2 * RATE_HZ / 2
+    is_peak = own_peaks(model).is_peak
     rows = []
     for condition, level in zip(CONDITIONS, LEVELS, strict=True):
         found = model.peq(*condition)
         partner = match_layers(true_hz, width_hz, estimated_frequency_hz=found.frequencies_hz)
+        peaks = match_layers(
+            true_hz, width_hz, estimated_frequency_hz=found.frequencies_hz[is_peak]
+        )
         response = fine_power(found)
         rows.append(
             {
                 "true": true_hz.size,
                 "found": found.gains.size,
                 "matched": int((partner >= 0).sum()),
+                "peaks": int(is_peak.sum()),
+                "matched_peaks": int((peaks >= 0).sum()),
                 "level_error_db": 10 * np.log10(response / (level**2 * power.sum())),
             }
         )
@@ -204,7 +211,10 @@ def fine_power(peq: PEQ) -> float:
 
 
 def study(textures: int) -> pd.DataFrame:
-    """Per case: precision, recall, and level errors over all conditions of all textures."""
+    """Per case: precision, recall, and level errors over all conditions of all textures.
+
+    Once of all layers, and once of those that are peaks of their own (METHOD 5).
+    """
     rows = []
     for name, case in CASES.items():
         found = pd.DataFrame([row for seed in range(textures) for row in judged(case, seed)])
@@ -215,6 +225,9 @@ def study(textures: int) -> pd.DataFrame:
                 "textures": textures,
                 "precision": found["matched"].sum() / max(1, found["found"].sum()),
                 "recall": found["matched"].sum() / found["true"].sum(),
+                "precision_of_own_peaks": found["matched_peaks"].sum()
+                / max(1, found["peaks"].sum()),
+                "recall_of_own_peaks": found["matched_peaks"].sum() / found["true"].sum(),
                 "layers_per_true_layer": found["found"].sum() / found["true"].sum(),
                 "median_level_error_db": level.median(),
                 "largest_level_error_db": level.iloc[int(level.abs().to_numpy().argmax())],
