@@ -36,6 +36,7 @@ STIFFNESS = 3.0  # of the field while searching: layers must not change places
 LEAST_GAIN = 4.0
 DECIDING_CONDITIONS = 6
 STARTING_CONDITIONS = 2
+CARRIED_CONDITIONS = 3
 MOST_SPREAD_LAYERS = 3
 ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
 TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
@@ -118,6 +119,7 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
         _spread(pool)
     if _complete(pool):
         _reduce(pool)
+    _carry(pool)
     if part is grid:
         return pool.contenders()
     return [expanded(grid, part, s) for s in pool.contenders()]
@@ -276,6 +278,25 @@ def uncrossed(grid: TextureGrid, solution: Solution) -> Solution:
     likeliest = _likeliest(grid, [(theta, signs) for signs in patterns], TRIED_SIGNS)
     tried = [fitted(grid, *start, observed=solution.observed) for start in likeliest]
     return max([solution, *tried], key=lambda s: s.evidence)
+
+
+def _carry(pool: _Pool) -> None:
+    """The layers of single conditions that are fitted well, carried to all others.
+
+    Frequencies and gains follow their trend, widths stay. A few conditions that have gone astray
+    together, mostly in their widths, hold each other there.
+    """
+    grid, count = pool.grid, pool.best().count
+    for solution in map(pool.of, (count - 1, count)):
+        if solution is None or not solution.count:
+            continue
+        m = solution.count
+        excess = solution.fit.slopes.misfit - solution.observed.scatter
+        rows = np.argsort(np.where(grid.recorded, excess, np.inf), kind="stable")
+        for row in rows[:CARRIED_CONDITIONS]:
+            along = (grid.places - grid.places[row]) @ solution.fit.field.trend
+            along[:, 1 + m : 1 + 2 * m] = 0.0
+            pool.add([fitted(grid, solution.theta[row] + along, solution.signs)])
 
 
 def _spread(pool: _Pool) -> None:
