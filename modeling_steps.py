@@ -211,7 +211,7 @@ def _rate_notes(records: RecordingSet) -> list[str]:
     """A note where the data's rate is lower than the model's would be."""
     from modeling.spectra import MODEL_RATE_HZ
 
-    rate_hz = min(r.rate_hz for r in records.recordings)
+    rate_hz = min(r.rate_hz for r in records.recordings if r.force_n > 0)
     if rate_hz >= MODEL_RATE_HZ:
         return []
     return [
@@ -356,12 +356,11 @@ def draw_condition(
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:
     """The recordings of one texture in a folder, or in the sub-folder that holds them."""
-    from modeling import RecordingSet
-    from modeling.recording import textures_in
+    from modeling.recording import load_usable, textures_in
 
     for found in recording_folders(folder):
         if texture in textures_in(found):
-            return RecordingSet.load(found, texture=texture)
+            return load_usable(found, texture=texture)[0]
     raise ValueError(
         f"expected recordings of {texture!r} in {folder}, got none; give the folder that the model "
         "came from."

@@ -170,9 +170,9 @@ def results_of_study(
     """Recordings, models and verdicts of every texture that was asked about."""
     from analysis.between import left_out_by_model
     from analysis.tables import TextureResult
-    from modeling import RecordingSet
     from modeling.files import file_stem
     from modeling.fitting import recording_spectra
+    from modeling.recording import load_usable
 
     asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
     missing = [texture for texture in asked if texture not in full]
@@ -183,7 +183,9 @@ def results_of_study(
         )
     results = []
     for texture in asked:
-        records = RecordingSet.load(recordings / file_stem(texture)).of_texture(texture)
+        records, unusable = load_usable(recordings / file_stem(texture), texture=texture)
+        for sentence in unusable:
+            print(f"warning: {texture}: left out: {sentence}", file=sys.stderr)
         model = full[texture]
         left_out = left_out_by_model(recording_spectra(records), model)
         simplified = verdict(model, shown.get(texture))

@@ -19,6 +19,7 @@ from modeling import GridError, Recording, Spectrum, TextureModel, similarity
 from modeling.autoregressive import fit_ar_spectra
 from modeling.fitting import fit_spectra, spectra_by_condition
 from modeling.grid import Condition
+from modeling.likelihood import is_silent
 from modeling.similarity import SpectralFilter
 from modeling.spectra import SMOOTHING_HZ, mean_spectrum, smooth
 from stimuli.planted import PlantedSurface
@@ -146,6 +147,7 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
         As `distances_to_recordings`, one row per condition that was left out; none where the grid
         is too small to leave any out.
     """
+    measured = [pair for pair in measured if not is_silent(pair[1])]
     tables = []
     for colour in (1, 0):
         out = _squares(measured, colour)

@@ -23,10 +23,11 @@ from modeling.likelihood import is_silent
 from modeling.model import TextureModel
 from modeling.peq import Floats
 from modeling.recording import Recording, RecordingSet
-from modeling.sinusoids import common_hum
+from modeling.sinusoids import common_hum, sinusoids_near
 from modeling.spectra import (
     MODEL_RATE_HZ,
     Spectrum,
+    check_length,
     mean_spectrum,
     prepare,
     prepared_spectrum,
@@ -54,8 +55,9 @@ def fit_texture(
 ) -> TextureModel:
     """Model one texture over its grid of speeds and forces.
 
-    Repeats of a condition are averaged. Conditions of the rectangular grid without a recording, or
-    with a silent one, are interpolated from their neighbours and marked in `interpolated`.
+    Repeats of a condition are averaged; silent recordings count as not made. Conditions of the
+    rectangular grid without a recording are interpolated from their neighbours and marked in
+    `interpolated`.
     Recordings at force 0 are taken as the sensor's floor and subtracted in power.
 
     Parameters
@@ -104,8 +106,8 @@ def fit_spectra(
     _check_layers(layers, chosen)
     first, spectrum_of_first = measured[0]
     repeats = spectra_by_condition(measured)
-    spectra = {condition: mean_spectrum(found) for condition, found in repeats.items()}
-    spectra = {condition: s for condition, s in spectra.items() if not is_silent(s)}
+    heard = {c: [s for s in found if not is_silent(s)] for c, found in repeats.items()}
+    spectra = {condition: mean_spectrum(found) for condition, found in heard.items() if found}
     if not spectra:
         raise InputError(
             f"{first.texture}: expected a recording with vibration, got silence in all of "
@@ -211,25 +213,34 @@ def recording_spectra(
             f"expected recordings with a speed and a force above 0, got {got}; correct the labels."
         )
     rate_hz = min(rate_hz, *(r.rate_hz for r in contact))
-    prepared = [prepare(r, rate_hz=rate_hz) for r in contact]
-    hum = [()] * len(contact) if keep_hum else common_hum(prepared, rate_hz)
-    spectra = [
+    floors = [r for r in records.recordings if r.force_n == 0]
+    # Hum is told by data of one rate; a slower floor has to do without.
+    every = [*contact, *(r for r in floors if r.rate_hz >= rate_hz)]
+    prepared = [prepare(r, rate_hz=rate_hz) for r in every]
+    speeds = [r.speed_mm_s if r.force_n > 0 else 0.0 for r in every]
+    hum = common_hum(prepared, rate_hz, speeds_mm_s=speeds) if not keep_hum else [()] * len(every)
+    measured = [
         _spectrum_of(record, samples, rate_hz, hum_hz=lines)
-        for record, samples, lines in zip(contact, prepared, hum, strict=True)
+        for record, samples, lines in zip(contact, prepared, hum, strict=False)
     ]
-    floors = [spectrum(r, rate_hz=rate_hz) for r in records.recordings if r.force_n == 0]
     if floors:
-        floor = mean_spectrum(floors)
-        spectra = [subtract_floor(measured, floor) for measured in spectra]
-    return list(zip(contact, spectra, strict=True))
+        lines_of = dict(zip(map(id, every), hum, strict=True))
+        floor = mean_spectrum(
+            [spectrum(r, rate_hz=rate_hz, hum_hz=lines_of.get(id(r), ())) for r in floors]
+        )
+        measured = [subtract_floor(one, floor) for one in measured]
+    return list(zip(contact, measured, strict=True))
 
 
 def _spectrum_of(
     record: Recording, samples: Floats, rate_hz: float, *, hum_hz: Sequence[float]
 ) -> Spectrum:
     """The spectrum of one prepared record, mended and told of."""
+    check_length(samples, rate_hz, record)
     notes = []
     if hum_hz:
+        hum = sinusoids_near(samples, rate_hz, np.asarray(hum_hz, dtype=np.float64))
+        samples = samples - hum.samples(samples.size, rate_hz)
         lines = ", ".join(f"{f:.0f}" for f in hum_hz)
         notes.append(f"hum of the mains at {lines} Hz taken out")
     drift = drift_of(samples, rate_hz)

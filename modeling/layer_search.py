@@ -373,8 +373,9 @@ def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Soluti
             axes[axis] = nodes[0] + np.array([-1.0, 1.0])
             values = np.repeat(values, 2, axis=axis)
     wanted = np.log(np.array(grid.conditions))[:, [by_row, 1 - by_row]]
-    theta = RegularGridInterpolator(tuple(axes), values)(wanted)
-    return fitted(grid, np.asarray(theta, dtype=np.float64), solution.signs, steps=10)
+    theta = np.asarray(RegularGridInterpolator(tuple(axes), values)(wanted), dtype=np.float64)
+    theta[:, np.r_[0, 1 + 2 * solution.count : theta.shape[1]]] += np.log(part.scale / grid.scale)
+    return fitted(grid, theta, solution.signs, steps=10)
 
 
 def hidden(grid: TextureGrid, solution: Solution) -> Solution:

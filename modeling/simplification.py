@@ -276,6 +276,7 @@ def _decide(
         known = np.nan_to_num(distances.max(axis=0), nan=-np.inf)
         loudest = int(np.argmax(np.where(fills < 0, known, -np.inf)))
         decided[loudest] = (True, "below threshold, kept as the last layer")
+        _keep_together(decided, fills)
     return decided
 
 

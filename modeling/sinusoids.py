@@ -12,9 +12,11 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modeling.peq import Floats
 
+Bools = NDArray[np.bool_]
 TIME_BANDWIDTH = 3.0
 TAPERS = 5
 # Of all lines of a record that stand out, so few are taken for a sinusoid that is not there.
@@ -91,40 +93,53 @@ def mains_harmonics(samples: Floats, rate_hz: float, mains_hz: float) -> Sinusoi
     return tested.sinusoids.only(right & (tested.p < PROBABLE))
 
 
-def common_hum(records: Sequence[Floats], rate_hz: float) -> list[tuple[float, ...]]:
+def common_hum(
+    records: Sequence[Floats], rate_hz: float, *, speeds_mm_s: Sequence[float]
+) -> list[tuple[float, ...]]:
     """The mains' lines (Hz) in each of some records of one texture.
 
-    Hum is there whatever the speed: a line counts where half of the records hold it. Of a lone
-    record one line must be beyond doubt, since a grating may stand at the mains' frequency.
+    Hum is there whatever the speed: a line counts where half of the records hold it, and more than
+    half of the speeds, two at least; at one speed a grating might stand at the mains' frequency.
 
     Parameters
     ----------
     records : sequence of (n,) ndarray
         Prepared, at one rate.
     rate_hz : float
+    speeds_mm_s : sequence of float
+        Of each record; those without contact have one of their own, such as 0.
     """
+    speeds = np.asarray(speeds_mm_s, dtype=np.float64)
+    most = 0
+    lines: list[tuple[float, ...]] = [()] * len(records)
+    if np.unique(speeds).size < 2:
+        return lines
     step = max(1, len(records) // LOOKED_AT)
     for mains_hz in MAINS_HZ:
         looked_at = [mains_harmonics(x, rate_hz, mains_hz) for x in records[::step]]
-        holding = [found for found in looked_at if found.frequency_hz.size]
-        if 2 * len(holding) < len(looked_at) or (
-            len(records) == 1 and not _beyond_doubt(records[0], holding, rate_hz)
-        ):
+        if 2 * sum(bool(found.frequency_hz.size) for found in looked_at) < len(looked_at):
             continue
         found = [mains_harmonics(x, rate_hz, mains_hz) for x in records]
         numbers = [np.rint(f.frequency_hz / mains_hz) for f in found]
-        every, counts = np.unique(np.concatenate(numbers), return_counts=True)
-        common = every[2 * counts >= len(records)]
-        if common.size:
-            return [
+        every = np.unique(np.concatenate(numbers))
+        held = np.array([np.isin(every, n) for n in numbers])
+        common = every[_of_all_speeds(held, speeds)]
+        here = int(held[:, np.isin(every, common)].sum())
+        if here > most:  # of harmonics that both mains share the one with more besides
+            most = here
+            lines = [
                 tuple(f.frequency_hz[np.isin(n, common)].tolist())
                 for f, n in zip(found, numbers, strict=True)
             ]
-    return [()] * len(records)
+    return lines
 
 
-def _beyond_doubt(samples: Floats, holding: Sequence[Sinusoids], rate_hz: float) -> bool:
-    return any((_tested(samples, rate_hz, f.frequency_hz).p < CERTAIN).any() for f in holding)
+def _of_all_speeds(held: Bools, speeds_mm_s: Floats) -> Bools:
+    """Which lines are in half of the records and at most of the speeds; `held` is (records, k)."""
+    at_speed = np.array([held[speeds_mm_s == v].any(axis=0) for v in np.unique(speeds_mm_s)])
+    wide = (2 * at_speed.sum(axis=0) > len(at_speed)) & (at_speed.sum(axis=0) > 1)
+    of_all: Bools = wide & (2 * held.sum(axis=0) >= len(held))
+    return of_all
 
 
 def sinusoids_near(samples: Floats, rate_hz: float, frequencies_hz: Floats) -> Sinusoids:

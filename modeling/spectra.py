@@ -137,6 +137,15 @@ def spectrum(
     return prepared_spectrum(samples, min(rate_hz, recording.rate_hz), recording, hum_hz=hum_hz)
 
 
+def check_length(samples: Floats, rate_hz: float, recording: Recording) -> None:
+    """InputError for (n,) prepared samples that are too few for a spectrum."""
+    if samples.size < 64:
+        raise InputError(
+            f"{recording.describe()}: expected at least 64 samples at {rate_hz:g} Hz, got "
+            f"{samples.size}; record longer."
+        )
+
+
 def prepared_spectrum(
     samples: Floats,
     rate_hz: float,
@@ -149,11 +158,7 @@ def prepared_spectrum(
 
     `notes` go before those of the spectrum's own.
     """
-    if samples.size < 64:
-        raise InputError(
-            f"{recording.describe()}: expected at least 64 samples at {rate_hz:g} Hz, got "
-            f"{samples.size}; record longer."
-        )
+    check_length(samples, rate_hz, recording)
     frequency = np.fft.rfftfreq(samples.size, 1 / rate_hz)
     share: Floats | float = 1.0
     if hum_hz:
@@ -273,5 +278,5 @@ def subtract_floor(spectrum: Spectrum, floor: Spectrum) -> Spectrum:
         spectrum,
         magnitude=spectrum.magnitude * np.sqrt(share),
         tapered_magnitude=spectrum.without_leakage * np.sqrt(share),
-        share=share,
+        share=spectrum.share * share,
     )

@@ -77,7 +77,10 @@ def _frequency_drift(power: Floats, frequency_hz: Floats) -> float:
     step = frequency_hz[1]
     highest_hz = (frequency_hz[-1] - step) / (1 + LARGEST_DRIFT / 2)
     reach = int(np.ceil(np.log1p(LARGEST_DRIFT) / FINE))  # to both sides of the lowest border
-    count = int((np.log(highest_hz / LOWEST_HZ)) / (PARTS * FINE)) * PARTS + 1
+    cells = np.log(max(highest_hz / LOWEST_HZ, 1.0)) / (PARTS * FINE)
+    count = int(cells) * PARTS + 1
+    if count < 2 * PARTS + 1:  # too slow, or too short, to see anything move
+        return 0.0
     places = LOWEST_HZ * np.exp(FINE * np.arange(-reach, count + reach))
     edges = np.append(frequency_hz - step / 2, frequency_hz[-1] + step / 2)
     summed = np.concatenate((np.zeros((SEGMENTS, 1)), np.cumsum(power, axis=1)), axis=1)

@@ -64,6 +64,12 @@ class TextureGrid:
         return min(power.step_hz for power in self._known)
 
     @cached_property
+    def steps_hz(self) -> Floats:
+        """Distance of spectral lines in each condition, (C,); the finest where unknown."""
+        steps = [self.step_hz if power is None else power.step_hz for power in self.powers]
+        return np.array(steps)
+
+    @cached_property
     def places(self) -> Floats:
         """Log speed and log force of each condition, less their means, (C, 2)."""
         places = np.log(np.array(self.conditions))

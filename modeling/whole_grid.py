@@ -175,7 +175,7 @@ def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     level_sd = level_deviations(theta, after.conditions, rate_hz=grid.rate_hz)
     inherited = absent | _told_by_neighbours(after, records, m)
     width = np.exp(bandwidth)
-    unresolved = grid.recorded[:, None] & (absent | (width < 2 * grid.step_hz))
+    unresolved = grid.recorded[:, None] & (absent | (width < 2 * grid.steps_hz[:, None]))
     gains = grid.scale * solution.signs * np.exp(gain)
     layers = {
         condition: Layers(

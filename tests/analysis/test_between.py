@@ -121,6 +121,16 @@ def test_small_grids(speeds: Floats, forces: Floats) -> None:
     )
 
 
+def test_silent_conditions_are_not_left_out() -> None:
+    records = planted_records(SPEEDS, FORCES[:2])
+    floor = replace(records.recordings[0], samples=1e-3 * records.recordings[0].samples, force_n=0)
+    silent = [
+        replace(r, samples=floor.samples) if r.condition == (200.0, 1.0) else r for r in records
+    ]
+    table = left_out_table(recording_spectra(RecordingSet([*silent, floor])), joint_fit())
+    assert list(zip(table["speed_mm_s"], table["force_n"], strict=True)) == [(200.0, 2.0)]
+
+
 def test_median_and_worst_are_named() -> None:
     table = pd.DataFrame(
         {

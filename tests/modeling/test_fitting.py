@@ -463,3 +463,75 @@ def test_a_silent_condition_is_interpolated(make_model: ModelMaker, estimator: s
     assert np.array_equal(model.gains, fit_texture(others, estimator=estimator).gains)
     with pytest.raises(InputError, match="expected a recording with vibration, got silence in all"):
         fit_texture([silent, floor], estimator=estimator)
+
+
+def test_hum_of_the_floor_takes_nothing_from_the_texture(make_recording: RecordingMaker) -> None:
+    """A floor that hums as the records do: what lies beside the lines stays."""
+    rng = np.random.default_rng(0)
+    time = np.arange(5000) / 5000
+    hum = 0.5 * np.cos(2 * np.pi * 50 * time) + 0.5 * np.cos(2 * np.pi * 150 * time)
+
+    def set_with(added: np.ndarray | float) -> RecordingSet:
+        labels = [(100.0, 1.0), (200.0, 1.0), (100.0, 2.0), (200.0, 2.0), (0.0, 0.0)]
+        levels = [0.1, 0.1, 0.1, 0.1, 1e-3]
+        return RecordingSet(
+            Recording(level * noise + added, 5000.0, v, f, "oak")
+            for (v, f), level, noise in zip(
+                labels, levels, rng.standard_normal((5, 5000)), strict=True
+            )
+        )
+
+    (_, clean), (_, hummed) = (recording_spectra(set_with(x))[0] for x in (0.0, hum))
+    band = (clean.frequency_hz > 30) & (clean.frequency_hz < 90)
+    level = [10 * np.log10(np.mean(s.magnitude[band] ** 2)) for s in (clean, hummed)]
+    assert level[1] == pytest.approx(level[0], abs=2)
+    assert (hummed.share[hummed.frequency_hz == 50] == 0).all()
+    assert (hummed.share[hummed.frequency_hz == 70] > 0.9).all()
+
+
+def test_hum_of_a_drifting_record_is_taken_out(make_model: ModelMaker) -> None:
+    steady = record(make_model(0.05, LAYERS), duration_s=2.0)
+    n = steady[0].samples.size // 2
+    share = np.arange(n) / n
+    at = (share + 0.3 * (share**2 - share) / 2) * n + n / 4
+    hum = 0.5 * np.cos(2 * np.pi * 50 * np.arange(n) / 5000)
+    faster = [np.interp(at, np.arange(2 * n), r.samples) for r in steady]
+    clean, hummed = (
+        recording_spectra(
+            RecordingSet(replace(r, samples=x + added) for r, x in zip(steady, faster, strict=True))
+        )
+        for added in (0.0, hum)
+    )
+    for (_, without), (_, mended) in zip(clean, hummed, strict=True):
+        assert "hum of the mains at 50 Hz taken out" in mended.notes
+        assert any("drift" in note for note in mended.notes)
+        near = (np.abs(mended.frequency_hz - 50) < 10) & (mended.share > 0)
+        left, noise = (np.sum(s.magnitude[near] ** 2) for s in (mended, without))
+        assert left < 1.5 * noise
+
+
+@pytest.mark.parametrize(("samples", "rate_hz"), [(64, 44_100.0), (100, 44_100.0)])
+def test_records_too_short_for_a_spectrum_are_refused(
+    make_recording: RecordingMaker, samples: int, rate_hz: float
+) -> None:
+    short = make_recording(np.random.default_rng(0).standard_normal(samples), rate_hz=rate_hz)
+    with pytest.raises(InputError, match="expected at least 64 samples"):
+        recording_spectra(RecordingSet([short]))
+
+
+@pytest.mark.parametrize(("samples", "rate_hz"), [(200, 45.0), (64, 48.0), (70, 5000.0)])
+def test_records_that_are_slow_or_short_do_not_drift(
+    make_recording: RecordingMaker, samples: int, rate_hz: float
+) -> None:
+    short = make_recording(np.random.default_rng(0).standard_normal(samples), rate_hz=rate_hz)
+    [(_, found)] = recording_spectra(RecordingSet([short]))
+    assert np.isfinite(found.magnitude).all()
+    assert not any("drift" in note for note in found.notes)
+
+
+def test_a_silent_repeat_does_not_count(make_model: ModelMaker) -> None:
+    recordings = record(make_model(0.05, LAYERS))
+    floor = replace(recordings[0], samples=1e-4 * recordings[0].samples, force_n=0.0)
+    silent = replace(recordings[1], samples=floor.samples, repeat=2)
+    with_it, without = fit_texture([*recordings, silent, floor]), fit_texture([*recordings, floor])
+    assert np.array_equal(with_it.gains, without.gains)

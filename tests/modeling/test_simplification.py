@@ -334,6 +334,13 @@ def test_a_layer_stays_with_what_fills_its_shape(make_model: ModelMaker) -> None
     assert result.layers[0].reason == "below threshold, but layer 2 fills its shape"
 
 
+def test_what_fills_the_shape_of_the_last_layer_stays(make_model: ModelMaker) -> None:
+    """Nothing can be felt; the loudest layer is kept, and with it what belongs to it."""
+    result = run(make_model(0.0, [(280.0, 80.0, 0.04), (330.0, 80.0, -0.03)]))
+    assert verdicts(result) == ["kept", "kept"]
+    assert result.layers[0].reason == "below threshold, kept as the last layer"
+
+
 def test_margin_lowers_the_bar(make_model: ModelMaker) -> None:
     model = make_model(0.0, at_db(10, -5))
     assert verdicts(run(model, margin_db=4.9)) == ["kept", "dropped"]

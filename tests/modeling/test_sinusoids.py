@@ -110,7 +110,7 @@ def humming(seed: int, *, mains_hz: float, off: float = 0.0) -> np.ndarray:
 @pytest.mark.parametrize("off", [-1e-3, 0.0, 1e-3])
 def test_hum_of_every_record_is_found_and_named(mains_hz: float, off: float) -> None:
     records = [humming(seed, mains_hz=mains_hz, off=off) for seed in range(12)]
-    lines = common_hum(records, RATE_HZ)
+    lines = common_hum(records, RATE_HZ, speeds_mm_s=4 * [50.0, 100.0, 200.0])
     holding = sum(len(found) == 2 for found in lines)
     assert holding >= 10
     for found in lines:
@@ -122,20 +122,39 @@ def test_hum_of_every_record_is_found_and_named(mains_hz: float, off: float) -> 
 def test_textures_without_hum_keep_everything() -> None:
     for seed in range(20):
         records = [noise(5000, 100 * seed + n) for n in range(10)]
-        assert common_hum(records, RATE_HZ) == [()] * 10
+        assert common_hum(records, RATE_HZ, speeds_mm_s=range(10)) == [()] * 10
 
 
 def test_a_grating_that_passes_the_mains_frequency_is_no_hum() -> None:
     """Its line moves with speed: at 50 Hz in one record of seven only."""
     records = [noise(5000, n) + tone(5000, 25.0 * (n + 1), 1.5) for n in range(7)]
-    lines = common_hum(records, RATE_HZ)
-    assert not any(lines)
+    assert not any(common_hum(records, RATE_HZ, speeds_mm_s=range(7)))
 
 
-def test_a_lone_record_needs_a_line_beyond_doubt() -> None:
-    [found] = common_hum([noise(5000, 0) + tone(5000, 50.0, 2.0)], RATE_HZ)
-    assert found == pytest.approx((50.0,), abs=0.2)
-    assert common_hum([noise(5000, 0)], RATE_HZ) == [()]
+@pytest.mark.parametrize("speeds", [[100.0], [100.0, 200.0]])
+def test_a_grating_at_a_harmonic_of_the_mains_is_no_hum(speeds: list[float]) -> None:
+    """A millimetre long, three records at each speed: 100 Hz, and 200 Hz."""
+    each = [speed for speed in speeds for _ in range(3)]
+    records = [noise(5000, n) + tone(5000, speed, 1.5) for n, speed in enumerate(each)]
+    assert not any(common_hum(records, RATE_HZ, speeds_mm_s=each))
+
+
+def test_at_one_speed_a_record_without_contact_tells_hum() -> None:
+    records = [humming(seed, mains_hz=50.0) for seed in range(4)]
+    assert not any(common_hum(records, RATE_HZ, speeds_mm_s=[100.0] * 4))
+    lines = common_hum(records, RATE_HZ, speeds_mm_s=[100.0] * 3 + [0.0])
+    assert all(min(found) == pytest.approx(50.0, abs=0.2) for found in lines)
+
+
+def test_harmonics_of_both_mains_belong_to_the_one_with_more() -> None:
+    """300 Hz is six times 50 Hz, too."""
+    records = [
+        noise(5000, seed) + sum(tone(5000, f, 2.0, seed) for f in (60.0, 180.0, 300.0))
+        for seed in range(6)
+    ]
+    for found in common_hum(records, RATE_HZ, speeds_mm_s=range(6)):
+        assert min(found) == pytest.approx(60.0, abs=0.2)
+        assert set(np.rint(np.array(found) / 60)) <= {1, 3, 5}
 
 
 def test_hum_that_is_taken_out_leaves_the_noise() -> None:
