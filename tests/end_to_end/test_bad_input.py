@@ -86,20 +86,20 @@ def test_a_silent_recording_is_named_and_left_out(main, tmp_path: Path, silence:
     assert "oak: interpolated for want of a recording: 50 mm/s at 2 N" in done.stdout
 
 
-def test_recordings_that_are_all_damaged_are_refused(run, tmp_path: Path) -> None:
+def test_recordings_that_are_all_damaged_are_refused(main, tmp_path: Path) -> None:
     def damage(folder: Path) -> None:
         for number in range(1, 5):
             (folder / f"{number:04d}.csv").write_text("")
 
     make_set(tmp_path / "set", damage)
-    assert_refused(run("model", "set", "--out", "models"), "got an empty file")
+    assert_refused(main("model", "set", "--out", "models"), "got an empty file")
     assert not (tmp_path / "models").exists()
 
 
-def test_one_condition_twice_is_refused(run, tmp_path: Path) -> None:
+def test_one_condition_twice_is_refused(main, tmp_path: Path) -> None:
     """One of the labels is wrong, nobody knows which."""
     make_set(tmp_path / "set", edit("recordings.tsv", "50.0\t2.0", "50.0\t1.0"))
-    assert_refused(run("model", "set", "--out", "models"), "one recording per condition")
+    assert_refused(main("model", "set", "--out", "models"), "one recording per condition")
     assert not (tmp_path / "models").exists()
 
 
@@ -111,30 +111,30 @@ def assert_refused(result, sentence: str) -> None:
     assert result.stderr.startswith("error: ")
 
 
-def test_a_folder_that_is_not_one(run, tmp_path: Path) -> None:
+def test_a_folder_that_is_not_one(main, tmp_path: Path) -> None:
     (tmp_path / "notes").mkdir()
     (tmp_path / "notes/a.txt").write_text("hello")
-    assert_refused(run("model", "nowhere"), "expected a folder of recordings")
-    assert_refused(run("model", "notes"), "import the files first")
-    assert_refused(run("model", "notes/a.txt"), "expected a folder of recordings")
-    assert_refused(run("analyze", "notes"), "expected")
+    assert_refused(main("model", "nowhere"), "expected a folder of recordings")
+    assert_refused(main("model", "notes"), "import the files first")
+    assert_refused(main("model", "notes/a.txt"), "expected a folder of recordings")
+    assert_refused(main("analyze", "notes"), "expected")
     assert not (tmp_path / "models").exists()
 
 
-def test_a_model_of_a_newer_version(run, tmp_path: Path) -> None:
+def test_a_model_of_a_newer_version(main, tmp_path: Path) -> None:
     path = tmp_path / "new.json"
     planted_texture("canvas").save(path)
     values = json.loads(path.read_text())
     values["version"] = 2
     path.write_text(json.dumps(values))
     for command in (["simplify", "new.json"], ["stimuli", "new.json"]):
-        assert_refused(run(*command), "got version 2; update tactileq")
+        assert_refused(main(*command), "got version 2; update tactileq")
     path.write_text("{")
-    assert_refused(run("simplify", "new.json"), "expected JSON")
+    assert_refused(main("simplify", "new.json"), "expected JSON")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["new.json"]
 
 
-def test_options_without_meaning(run, tmp_path: Path) -> None:
+def test_options_without_meaning(main, tmp_path: Path) -> None:
     planted_texture("canvas").save(tmp_path / "m.json")
     cases = {
         ("simplify", "m.json", "--margin-db", "-1"): "margin of at least 0 dB",
@@ -148,11 +148,11 @@ def test_options_without_meaning(run, tmp_path: Path) -> None:
         ("import", "wav", "a.wav", "--speed", "1", "--force", "1"): "expected a WAV file",
     }
     for command, sentence in cases.items():
-        assert_refused(run(*command), sentence)
+        assert_refused(main(*command), sentence)
     assert [p.name for p in tmp_path.iterdir()] == ["m.json"]
 
 
-def test_results_do_not_overwrite_foreign_folders(run, tmp_path: Path) -> None:
+def test_results_do_not_overwrite_foreign_folders(main, tmp_path: Path) -> None:
     planted_texture("canvas").save(tmp_path / "m.json")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/thesis.txt").write_text("years of work")
@@ -161,5 +161,5 @@ def test_results_do_not_overwrite_foreign_folders(run, tmp_path: Path) -> None:
         ["record", "mine", "--texture", "canvas"],
         ["demo", "--out", "mine"],
     ):
-        assert_refused(run(*command), "mine")
+        assert_refused(main(*command), "mine")
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.txt"]

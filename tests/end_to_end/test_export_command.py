@@ -64,9 +64,9 @@ def test_a_header_is_a_renderer_of_its_own(run, model: Path, tmp_path: Path) -> 
     assert "#define TQ_REAL float" in (tmp_path / "canvas.h").read_text(encoding="utf-8")
 
 
-def test_a_wav_is_told_with_its_level(run, model: Path, tmp_path: Path) -> None:
+def test_a_wav_is_told_with_its_level(main, model: Path, tmp_path: Path) -> None:
     options = ("--speed", 150, "--force", 1, "--duration", 2, "--rate", 44100)
-    done = run("export", "wav", "canvas.json", *options, "--out", "new/x.wav")
+    done = main("export", "wav", "canvas.json", *options, "--out", "new/x.wav")
     assert done.returncode == 0, done.stderr
     samples, rate_hz = soundfile.read(tmp_path / "new/x.wav")
     assert (rate_hz, samples.size) == (44100, 88200)
@@ -76,18 +76,18 @@ def test_a_wav_is_told_with_its_level(run, model: Path, tmp_path: Path) -> None:
         f"{np.abs(samples).max():.3g} g: new/x.wav\n"
     )
     assert provenance(tmp_path / "new/x.wav")["command"] == "tactileq export wav"
-    beyond = run("export", "wav", "canvas.json", "--speed", 500, "--force", 1, "--duration", 0.1)
+    beyond = main("export", "wav", "canvas.json", "--speed", 500, "--force", 1, "--duration", 0.1)
     assert beyond.returncode == 0
     assert "was recorded up to 350 mm/s" in beyond.stdout
     assert (tmp_path / "canvas.wav").exists()
 
 
-def test_json_of_the_grid_and_of_one_condition(run, model: Path, tmp_path: Path) -> None:
+def test_json_of_the_grid_and_of_one_condition(main, model: Path, tmp_path: Path) -> None:
     for options, count, told in (
         ((), 49, "49 conditions of canvas (simulated): canvas_peq.json\n"),
         (("--speed", 75, "--force", 2), 1, "1 condition of canvas (simulated): canvas_peq.json\n"),
     ):
-        done = run("export", "json", "canvas.json", *options)
+        done = main("export", "json", "canvas.json", *options)
         assert (done.returncode, done.stdout) == (0, told)
         exported = json.loads((tmp_path / "canvas_peq.json").read_text(encoding="utf-8"))
         assert len(exported["conditions"]) == count
@@ -118,9 +118,9 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("arguments", REFUSED, ids=lambda a: " ".join(map(str, a)))
-def test_what_is_refused_changes_nothing(run, model: Path, tmp_path: Path, arguments) -> None:
+def test_what_is_refused_changes_nothing(main, model: Path, tmp_path: Path, arguments) -> None:
     before = model.read_bytes()
-    done = run("export", *arguments)
+    done = main("export", *arguments)
     assert done.returncode == 1
     assert done.stderr.startswith("error: expected")
     assert done.stderr.count("\n") == 1

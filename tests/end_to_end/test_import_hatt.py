@@ -45,8 +45,8 @@ def test_two_textures_become_recordings_and_models(run, tmp_path: Path, files: l
     assert RecordingSet.load(tmp_path / "again") == records
 
 
-def test_default_grid_leaves_out_what_lies_beyond(run, tmp_path: Path, files: list[str]) -> None:
-    imported = run("import", "hatt", files[0], "--duration", 0.2, "--rate", 800, "--out", "set")
+def test_default_grid_leaves_out_what_lies_beyond(main, tmp_path: Path, files: list[str]) -> None:
+    imported = main("import", "hatt", files[0], "--duration", 0.2, "--rate", 800, "--out", "set")
     assert imported.returncode == 0, imported.stderr
     # 350 mm/s is beyond the 300 of the file, at each of seven forces.
     assert "beyond its models" in imported.stdout
@@ -57,10 +57,10 @@ def test_default_grid_leaves_out_what_lies_beyond(run, tmp_path: Path, files: li
 
 
 def test_broken_file_is_named_and_nothing_is_written(
-    run, tmp_path: Path, files: list[str], hatt_xml: Xml
+    main, tmp_path: Path, files: list[str], hatt_xml: Xml
 ) -> None:
     (tmp_path / files[1]).write_text(hatt_xml().replace("<var>", "<var>-"), encoding="utf-8")
-    refused = run("import", "hatt", *files, "--out", "set")
+    refused = main("import", "hatt", *files, "--out", "set")
     assert refused.returncode == 1
     assert "expected a var of at least 0 in Models_MDF.xml" in refused.stderr
     assert "Traceback" not in refused.stderr

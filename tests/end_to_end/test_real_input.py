@@ -87,31 +87,31 @@ def test_ten_files_at_one_force_give_models_of_that_force(run, tmp_path: Path) -
     assert rendered.returncode == 0, rendered.stderr
 
 
-def test_repeats_of_a_condition_need_numbers(run, tmp_path: Path) -> None:
+def test_repeats_of_a_condition_need_numbers(main, tmp_path: Path) -> None:
     for number in (1, 2):
         samples = vibration(100, 1, rate_hz=10_000, seconds=1, seed=number)
         write_wav(tmp_path / f"{number}.wav", samples)
     labels = ["--speed", 100, "--force", 1, "--texture", "oak", "--out", "set"]
-    refused = run("import", "wav", "1.wav", "2.wav", *labels)
+    refused = main("import", "wav", "1.wav", "2.wav", *labels)
     assert refused.returncode == 1
     assert "expected one recording per condition" in refused.stderr
     assert not (tmp_path / "set").exists()
     (tmp_path / "labels.tsv").write_text(
         "file\tspeed_mm_s\tforce_n\trepeat\n1.wav\t100\t1\t1\n2.wav\t100\t1\t2\n"
     )
-    taken = run("import", "wav", "1.wav", "2.wav", "--labels", "labels.tsv", "--out", "set")
+    taken = main("import", "wav", "1.wav", "2.wav", "--labels", "labels.tsv", "--out", "set")
     assert taken.returncode == 0, taken.stderr
     assert len(RecordingSet.load(tmp_path / "set")) == 2
 
 
-def test_grid_with_holes_is_modelled_named_and_marked(run, tmp_path: Path) -> None:
+def test_grid_with_holes_is_modelled_named_and_marked(main, tmp_path: Path) -> None:
     holes = {(120.0, 1.0), (240.0, 2.0)}
     table = write_grid_of_wavs(tmp_path, forces=(0.5, 1.0, 2.0), leave_out=holes)
     wavs = sorted(p.name for p in tmp_path.glob("*.wav"))
     options = ["--labels", table.name, "--texture", "canvas", "--out", "set"]
-    imported = run("import", "wav", *wavs, *options, "--g-per-fullscale", G_PER_FULLSCALE)
+    imported = main("import", "wav", *wavs, *options, "--g-per-fullscale", G_PER_FULLSCALE)
     assert imported.returncode == 0, imported.stderr
-    fitted = run("model", "set", "--out", "models")
+    fitted = main("model", "set", "--out", "models")
     assert fitted.returncode == 0, fitted.stderr
     assert "120 mm/s at 1 N; 240 mm/s at 2 N" in fitted.stdout
     model = TextureModel.load(tmp_path / "models/canvas.json")
@@ -125,10 +125,10 @@ def test_grid_with_holes_is_modelled_named_and_marked(run, tmp_path: Path) -> No
     truth = planted_texture("canvas").peq(300.0, 2.0).frequencies_hz
     found = model.peq(300.0, 2.0).frequencies_hz
     assert np.abs(found - truth[0]).min() < 15
-    simplified = run("simplify", "models/canvas.json", "--out", "fewer")
+    simplified = main("simplify", "models/canvas.json", "--out", "fewer")
     assert simplified.returncode == 0, simplified.stderr
     assert TextureModel.load(tmp_path / "fewer/canvas.json").n_layers <= model.n_layers
-    rendered = run("stimuli", "models/canvas.json", "fewer/canvas.json", "--out", "wavs")
+    rendered = main("stimuli", "models/canvas.json", "fewer/canvas.json", "--out", "wavs")
     assert rendered.returncode == 0, rendered.stderr
     manifest = pd.read_csv(tmp_path / "wavs/manifest.tsv", sep="\t")
     assert set(manifest.model) == {"models", "fewer"}
@@ -142,17 +142,17 @@ def write_axes(path: Path, samples: NDArray[np.float64], rate_hz: float) -> None
     path.write_text("time_s,x_g,y_g,z_g\n" + "\n".join(lines) + "\n", encoding="utf-8")
 
 
-def test_three_axis_csv_at_1_khz_says_which_band_is_lost(run, tmp_path: Path) -> None:
+def test_three_axis_csv_at_1_khz_says_which_band_is_lost(main, tmp_path: Path) -> None:
     for speed in (100, 200):
         for force in (1, 2):
             samples = vibration(speed, force, rate_hz=1000, seconds=2, seed=speed + force)
             name = f"{speed}_{force}.csv"
             write_axes(tmp_path / name, samples, 1000.0)
             labels = ["--speed", speed, "--force", force, "--texture", "felt", "--out", "set"]
-            added = run("import", "csv", name, *labels, "--axis", "dft321")
+            added = main("import", "csv", name, *labels, "--axis", "dft321")
             assert added.returncode == 0, added.stderr
     assert "1 recordings added at 1000 Hz, 4 in set" in added.stdout
-    fitted = run("model", "set")
+    fitted = main("model", "set")
     assert fitted.returncode == 0, fitted.stderr
     assert "the band from 500 to 2500 Hz is lost" in fitted.stdout
     model = TextureModel.load(tmp_path / "models/felt.json")
@@ -164,25 +164,25 @@ def test_three_axis_csv_at_1_khz_says_which_band_is_lost(run, tmp_path: Path) ->
     assert np.std(stored) == pytest.approx(np.std(expected), rel=0.02)
 
 
-def test_clipping_is_accepted_with_its_share(run, tmp_path: Path) -> None:
+def test_clipping_is_accepted_with_its_share(main, tmp_path: Path) -> None:
     samples = np.clip(np.sin(2 * np.pi * 60 * np.arange(10_000) / 10_000) * 2, -1, 1)
     wavfile.write(tmp_path / "loud.wav", 10_000, np.round(samples * 32767).astype(np.int16))
-    result = run("import", "wav", "loud.wav", "--speed", 100, "--force", 1, "--out", "set")
+    result = main("import", "wav", "loud.wav", "--speed", 100, "--force", 1, "--out", "set")
     assert result.returncode == 0
     # |2 sin| exceeds 1 for two thirds of the time.
     share = float(result.stderr.split("clipped in ")[1].split("%")[0])
     assert share == pytest.approx(66.7, abs=1.0)
 
 
-def test_models_in_arbitrary_units_are_not_simplified(run, tmp_path: Path) -> None:
+def test_models_in_arbitrary_units_are_not_simplified(main, tmp_path: Path) -> None:
     records = record_texture(planted_texture("MDF"), duration_s=0.5)
     arbitrary = RecordingSet(
         Recording(r.samples, r.rate_hz, r.speed_mm_s, r.force_n, r.texture, unit="arbitrary")
         for r in records.recordings
     )
     arbitrary.save(tmp_path / "set")
-    assert run("model", "set").returncode == 0
-    refused = run("simplify", "models/MDF.json")
+    assert main("model", "set").returncode == 0
+    refused = main("simplify", "models/MDF.json")
     assert refused.returncode == 1
     assert "got the unit 'arbitrary'" in refused.stderr
     assert not (tmp_path / "simplified").exists()

@@ -70,24 +70,24 @@ def test_a_set_and_once_more_from_its_own_recipe(run, tmp_path: Path, study: Pat
     assert hashes(tmp_path / "a") == hashes(tmp_path / "b")
 
 
-def test_options_make_a_recipe(run, tmp_path: Path, study: Path) -> None:
+def test_options_make_a_recipe(main, tmp_path: Path, study: Path) -> None:
     options = ["--speed", 120, "--speed", 350, "--force", 1, "--rate", 8000, "--duration", 0.1]
     models = ["study/models/PVC.json", "study/models/PVC_provenance.json"]
-    made = run("stimuli", *models, *options, "--seed", 3, "--out", "c")
+    made = main("stimuli", *models, *options, "--seed", 3, "--out", "c")
     assert made.returncode == 0, made.stderr
     recipe = Recipe.load(tmp_path / "c/recipe.toml")
     assert (recipe.name, recipe.rates_hz, recipe.seeds) == ("c", (8000,), (3,))
     assert [(t.speed_mm_s, t.force_n) for t in recipe.trajectories] == [(120, 1), (350, 1)]
     assert "350mms_1N reaches 350 mm/s" in made.stdout
     assert "120mms" not in made.stdout
-    assert run("stimuli", "c/recipe.toml", "--out", "d").returncode == 0
+    assert main("stimuli", "c/recipe.toml", "--out", "d").returncode == 0
     assert hashes(tmp_path / "d") == hashes(tmp_path / "c")
 
 
-def test_a_set_goes_where_a_link_leads(run, tmp_path: Path, study: Path) -> None:
+def test_a_set_goes_where_a_link_leads(main, tmp_path: Path, study: Path) -> None:
     (tmp_path / "disk/sets").mkdir(parents=True)
     (tmp_path / "link").symlink_to("disk/sets")
-    made = run("stimuli", "study/models/PVC.json", "--duration", 0.1, "--out", "link")
+    made = main("stimuli", "study/models/PVC.json", "--duration", 0.1, "--out", "link")
     assert made.returncode == 0, made.stderr
     assert (tmp_path / "link").is_symlink()
     assert [p.name for p in (tmp_path / "disk").iterdir()] == ["sets"]
@@ -96,15 +96,15 @@ def test_a_set_goes_where_a_link_leads(run, tmp_path: Path, study: Path) -> None
 
 
 def test_other_files_among_the_models_are_named_and_passed_over(
-    run, tmp_path: Path, study: Path
+    main, tmp_path: Path, study: Path
 ) -> None:
-    made = run("export", "json", "study/models/PVC.json", "--out", "study/models/x.json")
+    made = main("export", "json", "study/models/PVC.json", "--out", "study/models/x.json")
     assert made.returncode == 0, made.stderr
     (study / "set.toml").write_text(RECIPE.replace("[5000, 44100]", "5000"))
     note = "note: study/models/x.json says that it is no model and is passed over.\n"
     every = [path.relative_to(tmp_path) for path in sorted((study / "models").glob("*.json"))]
     for named in (["study/set.toml"], every):
-        made = run("stimuli", *named, "--out", "set")
+        made = main("stimuli", *named, "--out", "set")
         assert made.returncode == 0, made.stderr
         assert made.stdout.count(note) == 1
         assert set(pd.read_csv(tmp_path / "set/manifest.tsv", sep="\t").texture) == {
@@ -150,11 +150,11 @@ REFUSED = {
 }
 
 
-def test_what_is_refused(run, tmp_path: Path, study: Path) -> None:
+def test_what_is_refused(main, tmp_path: Path, study: Path) -> None:
     (tmp_path / "dangling").symlink_to("nowhere")
     before = sorted(tmp_path.rglob("*"))
     for command, sentence in REFUSED.items():
-        result = run(*command)
+        result = main(*command)
         assert result.returncode == 1
         assert sentence in result.stderr
         assert result.stderr.startswith("error: ")
@@ -166,7 +166,7 @@ def test_what_is_refused(run, tmp_path: Path, study: Path) -> None:
     for (old, new, file), sentence in zip(edit, sentences, strict=True):
         text = (study / file).read_text()
         (study / file).write_text(text.replace(old, new))
-        result = run("stimuli", "study/set.toml")
+        result = main("stimuli", "study/set.toml")
         assert result.returncode == 1
         assert sentence in result.stderr
         assert result.stderr.count("\n") == 1, result.stderr

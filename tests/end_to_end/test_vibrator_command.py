@@ -62,14 +62,14 @@ def test_a_test_becomes_a_file_a_picture_and_one_line(run, tmp_path: Path, recor
         assert list(provenance["inputs_sha256"]) == [str(recorded)]
 
 
-def test_what_is_found_goes_into_stimuli_and_exports(run, tmp_path: Path, recorded: Path) -> None:
+def test_what_is_found_goes_into_stimuli_and_exports(main, tmp_path: Path, recorded: Path) -> None:
     for _ in range(2):  # its own files are replaced
-        done = run("vibrator", recorded, "--out", "pen.json", "--plot", "pen.png", "--simulated")
+        done = main("vibrator", recorded, "--out", "pen.json", "--plot", "pen.png", "--simulated")
         assert done.returncode == 0, done.stderr
     model = planted_texture("canvas")
     model.save(tmp_path / "canvas.json")
     found = Vibrator.load(tmp_path / "pen.json")
-    done = run("stimuli", "canvas.json", "--vibrator", "pen.json", "--rate", 22050, "--out", "set")
+    done = main("stimuli", "canvas.json", "--vibrator", "pen.json", "--rate", 22050, "--out", "set")
     assert done.returncode == 0, done.stderr
     (row,) = read_table(tmp_path / "set/manifest.tsv", ("vibrator", "simulated"))
     assert row["vibrator"] == "compensated"
@@ -77,12 +77,12 @@ def test_what_is_found_goes_into_stimuli_and_exports(run, tmp_path: Path, record
     assert set(inputs) == {"canvas.json", "pen.json"}
     # The same vibration, in a file of its own.
     where = ("--speed", 150, "--force", 1.5, "--rate", 22050, "--out", "x.wav")
-    done = run("export", "wav", "canvas.json", "--vibrator", "pen.json", *where)
+    done = main("export", "wav", "canvas.json", "--vibrator", "pen.json", *where)
     assert done.returncode == 0, done.stderr
     assert "as drive for the vibrator: x.wav" in done.stdout
     assert (tmp_path / "x.wav").read_bytes() == (tmp_path / "set" / row["file"]).read_bytes()
     limits = ("--peak", 0.5, "--rms", 0.2, "--duration", 60)
-    done = run("export", "c", "canvas.json", "--vibrator", "pen.json", *limits)
+    done = main("export", "c", "canvas.json", "--vibrator", "pen.json", *limits)
     assert done.stdout == ("texture_canvas (simulated) for a vibrator (simulated): canvas.h\n"), (
         done.stderr
     )
@@ -99,7 +99,7 @@ def test_what_is_found_goes_into_stimuli_and_exports(run, tmp_path: Path, record
     assert settings["limits"] == {"peak": 0.5, "rms": 0.2, "duration_s": 60.0}
 
 
-def test_other_files_are_not_overwritten(run, tmp_path: Path, recorded: Path) -> None:
+def test_other_files_are_not_overwritten(main, tmp_path: Path, recorded: Path) -> None:
     planted_texture("canvas").save(tmp_path / "canvas.json")
     (tmp_path / "photo.png").write_bytes(b"mine")
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
@@ -107,13 +107,13 @@ def test_other_files_are_not_overwritten(run, tmp_path: Path, recorded: Path) ->
         (("--out", "canvas.json"), "canvas.json"),
         (("--plot", "photo.png"), "photo.png"),
     ):
-        refused = run("vibrator", recorded, *options)
+        refused = main("vibrator", recorded, *options)
         assert refused.returncode == 1
         assert f"earlier result of tactileq vibrator at {name}, got something" in refused.stderr
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-def test_what_is_no_test_writes_nothing(run, tmp_path: Path, recorded: Path) -> None:
+def test_what_is_no_test_writes_nothing(main, tmp_path: Path, recorded: Path) -> None:
     poor = record(tmp_path / "poor.wav", sensor_noise=2.0)
     samples, _ = soundfile.read(recorded)
     soundfile.write(tmp_path / "mono.wav", samples[:, 0], RATE_HZ)
@@ -125,7 +125,7 @@ def test_what_is_no_test_writes_nothing(run, tmp_path: Path, recorded: Path) -> 
         ((recorded, "--out", "pen.txt"), "expected a name that ends in .json, got pen.txt"),
         ((recorded, "--plot", "pen.pdf"), "expected a name that ends in .png, got pen.pdf"),
     ):
-        refused = run("vibrator", *arguments)
+        refused = main("vibrator", *arguments)
         assert refused.returncode == 1
         assert refused.stderr.startswith("error: ")
         assert sentence in refused.stderr
