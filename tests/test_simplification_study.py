@@ -52,7 +52,9 @@ def test_far_from_threshold_no_verdict_is_wrong_or_flips(table: pd.DataFrame) ->
     far_below = table["true_distance_db"] < 0
     assert (table.loc[~far_below, ["dropped_plain", "dropped"]] == 0).all(axis=None)
     # Below by 60 dB is everything, the louder layer, too: the sum stays far below, one layer stays.
-    assert (table.loc[far_below, ["dropped_plain", "dropped"]] == 1).all(axis=None)
+    assert (table.loc[far_below, "dropped_plain"] == 1).all()
+    # But what only fills the shape of the one that stays, stays with it: here in one of eight.
+    assert (table.loc[far_below, "dropped"] >= 7 / 8).all()
     assert (table[["flipped_plain", "flipped", "contradicted"]] == 0).all(axis=None)
     assert (table["mean_flip_probability"] < 1e-6).all()
 

@@ -46,31 +46,31 @@ def test_record_does_not_replace_recordings(run, tmp_path: Path) -> None:
     assert contents(tmp_path / "oak") == before
 
 
-def test_demo_does_not_replace_a_study(run, tmp_path: Path) -> None:
+def test_demo_does_not_replace_a_study(main, tmp_path: Path) -> None:
     (tmp_path / "study/data").mkdir(parents=True)
     (tmp_path / "study/data/answers.tsv").write_text("from people")
-    refused = run("demo", "--out", "study")
+    refused = main("demo", "--out", "study")
     assert refused.returncode == 1
     assert "earlier results of tactileq demo" in refused.stderr
     assert contents(tmp_path / "study") == {"data/answers.tsv": b"from people"}
 
 
-def test_models_of_two_textures_stand_side_by_side(run, tmp_path: Path) -> None:
+def test_models_of_two_textures_stand_side_by_side(main, tmp_path: Path) -> None:
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / name)
-        assert run("model", name, "--out", "models").returncode == 0
+        assert main("model", name, "--out", "models").returncode == 0
     names = {p.name for p in (tmp_path / "models").iterdir()}
     endings = ("_layers.tsv", "_spectra.tsv", "_provenance.json", ".json")
     assert names == {name + ending for name in ("canvas", "MDF") for ending in endings}
 
 
-def test_full_and_simplified_models_do_not_replace_each_other(run, tmp_path: Path) -> None:
+def test_full_and_simplified_models_do_not_replace_each_other(main, tmp_path: Path) -> None:
     grid("canvas").save(tmp_path / "canvas")
-    assert run("model", "canvas", "--out", "models").returncode == 0
+    assert main("model", "canvas", "--out", "models").returncode == 0
     full = TextureModel.load(tmp_path / "models/canvas.json")
-    assert run("simplify", "models/canvas.json", "--out", "fewer").returncode == 0
-    over_full = run("simplify", "fewer/canvas.json", "--out", "models")
-    over_simplified = run("model", "canvas", "--out", "fewer")
+    assert main("simplify", "models/canvas.json", "--out", "fewer").returncode == 0
+    over_full = main("simplify", "fewer/canvas.json", "--out", "models")
+    over_simplified = main("model", "canvas", "--out", "fewer")
     for refused in (over_full, over_simplified):
         assert refused.returncode == 1
         assert "expected a folder without models of another command" in refused.stderr
@@ -78,15 +78,15 @@ def test_full_and_simplified_models_do_not_replace_each_other(run, tmp_path: Pat
 
 
 @pytest.fixture
-def study(run, tmp_path: Path) -> Path:
+def study(main, tmp_path: Path) -> Path:
     """A small simulated study, from recordings to answers, in `tmp_path`."""
     (tmp_path / "study.toml").write_text(SMALL_STUDY)
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / "recordings" / name)
-        assert run("model", f"recordings/{name}", "--out", "models").returncode == 0
-        made = run("simplify", f"models/{name}.json", "--out", "simplified", "--margin-db", 3)
+        assert main("model", f"recordings/{name}", "--out", "models").returncode == 0
+        made = main("simplify", f"models/{name}.json", "--out", "simplified", "--margin-db", 3)
         assert made.returncode == 0
-    simulated = run("simulate", "--study", "study.toml", "--data", "data")
+    simulated = main("simulate", "--study", "study.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr
     return tmp_path
 
@@ -107,23 +107,23 @@ def test_analysis_holds_to_the_models_that_were_presented(run, study: Path) -> N
     assert "give all three or none" in partial.stderr
 
 
-def test_a_new_analysis_replaces_the_whole_old_one(run, study: Path) -> None:
+def test_a_new_analysis_replaces_the_whole_old_one(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
-    assert run("analyze", "data", *folders, "--margin-db", 3).returncode == 0
+    assert main("analyze", "data", *folders, "--margin-db", 3).returncode == 0
     assert (study / "analysis-results/tables/gfc.tsv").is_file()
-    assert run("analyze", "data").returncode == 0
+    assert main("analyze", "data").returncode == 0
     assert not (study / "analysis-results/tables/gfc.tsv").exists()
     before = contents(study / "analysis-results")
-    refused = run("analyze", "nowhere")
+    refused = main("analyze", "nowhere")
     assert refused.returncode == 1
     assert contents(study / "analysis-results") == before
     (study / "analysis-results/notes.txt").write_text("mine")
-    refused = run("analyze", "data")
+    refused = main("analyze", "data")
     assert "notes.txt" in refused.stderr
     assert (study / "analysis-results/notes.txt").read_text() == "mine"
 
 
-def test_provenance_names_seed_settings_and_inputs(run, study: Path) -> None:
+def test_provenance_names_seed_settings_and_inputs(main, study: Path) -> None:
     import json
 
     note = json.loads((study / "data/sourcedata/simulate_provenance.json").read_text())
