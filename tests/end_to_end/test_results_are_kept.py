@@ -91,19 +91,19 @@ def study(main, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_analysis_holds_to_the_models_that_were_presented(run, study: Path) -> None:
+def test_analysis_holds_to_the_models_that_were_presented(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
-    same = run("analyze", "data", *folders, "--margin-db", 3)
+    same = main("analyze", "data", *folders, "--margin-db", 3)
     assert same.returncode == 0, same.stderr
     assert Path(same.stdout.splitlines()[-1]) == study / "analysis-results/report.html"
     planted_texture("canvas").save(study / "simplified/canvas.json")
-    refused = run("analyze", "data", *folders, "--margin-db", 3)
+    refused = main("analyze", "data", *folders, "--margin-db", 3)
     assert refused.returncode == 1
     assert "expected the simplified model of canvas to be the one" in refused.stderr
     (study / "models/canvas.json").unlink()
-    refused = run("analyze", "data", *folders, "--margin-db", 3)
+    refused = main("analyze", "data", *folders, "--margin-db", 3)
     assert "expected a model of each texture in the answers, got none of canvas" in refused.stderr
-    partial = run("analyze", "data", "--models", "models")
+    partial = main("analyze", "data", "--models", "models")
     assert "give all three or none" in partial.stderr
 
 
