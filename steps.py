@@ -392,20 +392,21 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
     from analysis.between import left_out_by_model
     from analysis.tables import TextureResult
-    from modeling import RecordingSet, fit_texture
+    from modeling import RecordingSet
     from modeling import simplify as drop_layers
     from modeling.files import file_stem
-    from modeling.fitting import recording_spectra
+    from modeling.fitting import fit_spectra, recording_spectra
     from stimuli.planted import planted_texture, record_texture
 
     truth = planted_texture(name)
     place = folder / "recordings" / file_stem(name)
     record_texture(truth, seed=seed).save(place)
     records = RecordingSet.load(place)
-    full = fit_texture(records)
+    measured = recording_spectra(records)
+    full = fit_spectra(measured)
     simplification = drop_layers(full, threshold)
     full.save(folder / "models" / f"{file_stem(name)}.json")
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
-    others = (fit_texture(records, estimator="paper"),)
-    left_out = left_out_by_model(recording_spectra(records), full)
+    others = (fit_spectra(measured, estimator="paper"),)
+    left_out = left_out_by_model(measured, full)
     return TextureResult(records, full, simplification, truth, others, left_out)

@@ -84,10 +84,11 @@ def distances_to_recordings(filter_at: FilterAt, measured: Measured) -> pd.DataF
     ----------
     filter_at : callable
     measured : sequence of (Recording, Spectrum)
-        From `modeling.fitting.recording_spectra`; repeats of a condition are averaged.
+        From `modeling.fitting.recording_spectra`; repeats of a condition are averaged, silent
+        recordings left out.
     """
     rows = []
-    for (speed, force), found in spectra_by_condition(measured).items():
+    for (speed, force), found in spectra_by_condition(_heard(measured)).items():
         spectrum = mean_spectrum(found)
         frequency = spectrum.frequency_hz
         highest = similarity.HIGHEST_SHARE * spectrum.rate_hz / 2
@@ -100,6 +101,11 @@ def distances_to_recordings(filter_at: FilterAt, measured: Measured) -> pd.DataF
         power = 4 / np.pi * np.sum(response[heard] ** 2) / np.sum(spectrum.magnitude[heard] ** 2)
         rows.append((speed, force, 10 * float(np.log10(power)), distance))
     return pd.DataFrame(rows, columns=["speed_mm_s", "force_n", LEVEL, DISTANCE])
+
+
+def _heard(measured: Measured) -> Measured:
+    """What a model can be fitted to."""
+    return [pair for pair in measured if not is_silent(pair[1])]
 
 
 def _errors(model: Floats, true: Floats) -> tuple[float, float]:
@@ -147,7 +153,7 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
         As `distances_to_recordings`, one row per condition that was left out; none where the grid
         is too small to leave any out.
     """
-    measured = [pair for pair in measured if not is_silent(pair[1])]
+    measured = _heard(measured)
     tables = []
     for colour in (1, 0):
         out = _squares(measured, colour)

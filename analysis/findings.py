@@ -89,10 +89,9 @@ def find_in(
     model, why_not, quality, left_out = None, "", pd.DataFrame(), None
     try:
         model = fit_spectra(measured, estimator=estimator, layers=layers)
-        heard = [pair for pair in measured if pair[1].magnitude.any()]
-        quality = distances_to_recordings(model.peq, heard)
+        quality = distances_to_recordings(model.peq, measured)
         if check:
-            left_out = left_out_table(heard, joint_fit(estimator=estimator, layers=layers))
+            left_out = left_out_table(measured, joint_fit(estimator=estimator, layers=layers))
     except GridError as error:
         why_not = str(error)
     each = () if model and not alone else layers_of_recordings(measured, estimator=estimator)

@@ -23,18 +23,16 @@ from modeling.likelihood import is_silent
 from modeling.model import TextureModel
 from modeling.peq import Floats
 from modeling.recording import Recording, RecordingSet
-from modeling.sinusoids import common_hum, sinusoids_near
+from modeling.sinusoids import common_hum, without_hum
 from modeling.spectra import (
     MODEL_RATE_HZ,
     Spectrum,
-    check_length,
     mean_spectrum,
     prepare,
     prepared_spectrum,
-    spectrum,
     subtract_floor,
 )
-from modeling.stationarity import drift_of, straightened
+from modeling.stationarity import Drift, drift_of, straightened
 from modeling.tracking import assign_peaks, reference_of, visiting_order
 from modeling.whole_grid import fit_grid_jointly
 
@@ -214,36 +212,44 @@ def recording_spectra(
         )
     rate_hz = min(rate_hz, *(r.rate_hz for r in contact))
     floors = [r for r in records.recordings if r.force_n == 0]
-    # Hum is told by data of one rate; a slower floor has to do without.
-    every = [*contact, *(r for r in floors if r.rate_hz >= rate_hz)]
+    every = [*contact, *floors]
     prepared = [prepare(r, rate_hz=rate_hz) for r in every]
-    speeds = [r.speed_mm_s if r.force_n > 0 else 0.0 for r in every]
-    hum = common_hum(prepared, rate_hz, speeds_mm_s=speeds) if not keep_hum else [()] * len(every)
-    measured = [
-        _spectrum_of(record, samples, rate_hz, hum_hz=lines)
-        for record, samples, lines in zip(contact, prepared, hum, strict=False)
+    hum = [()] * len(every) if keep_hum else _hum_in(every, prepared, rate_hz)
+    spectra = [
+        _spectrum_of(record, samples, min(rate_hz, record.rate_hz), hum_hz=lines)
+        for record, samples, lines in zip(every, prepared, hum, strict=True)
     ]
+    measured = spectra[: len(contact)]
     if floors:
-        lines_of = dict(zip(map(id, every), hum, strict=True))
-        floor = mean_spectrum(
-            [spectrum(r, rate_hz=rate_hz, hum_hz=lines_of.get(id(r), ())) for r in floors]
-        )
+        floor = mean_spectrum(spectra[len(contact) :])
         measured = [subtract_floor(one, floor) for one in measured]
     return list(zip(contact, measured, strict=True))
+
+
+def _hum_in(
+    records: Sequence[Recording], prepared: Sequence[Floats], rate_hz: float
+) -> list[tuple[float, ...]]:
+    """Lines of the mains in each; hum is told by data of one rate, so slower ones have none."""
+    quick = [n for n, record in enumerate(records) if record.rate_hz >= rate_hz]
+    speeds = [records[n].speed_mm_s if records[n].force_n > 0 else 0.0 for n in quick]
+    found = common_hum([prepared[n] for n in quick], rate_hz, speeds_mm_s=speeds)
+    lines: list[tuple[float, ...]] = [()] * len(records)
+    for n, here in zip(quick, found, strict=True):
+        lines[n] = here
+    return lines
 
 
 def _spectrum_of(
     record: Recording, samples: Floats, rate_hz: float, *, hum_hz: Sequence[float]
 ) -> Spectrum:
     """The spectrum of one prepared record, mended and told of."""
-    check_length(samples, rate_hz, record)
     notes = []
     if hum_hz:
-        hum = sinusoids_near(samples, rate_hz, np.asarray(hum_hz, dtype=np.float64))
-        samples = samples - hum.samples(samples.size, rate_hz)
+        samples = without_hum(samples, rate_hz, hum_hz)
         lines = ", ".join(f"{f:.0f}" for f in hum_hz)
         notes.append(f"hum of the mains at {lines} Hz taken out")
-    drift = drift_of(samples, rate_hz)
+    # Without contact there is nothing that could drift.
+    drift = drift_of(samples, rate_hz) if record.force_n > 0 else Drift(0.0, 0.0)
     if drift.frequency:
         samples = straightened(samples, drift.frequency)
         notes.append(

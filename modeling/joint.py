@@ -24,8 +24,8 @@ from modeling.coherent import (
     without_layer,
 )
 from modeling.layers import Layers, no_layers
-from modeling.likelihood import Bools, Power, bins_near, misfit_of, power_sum, signal_power, split
-from modeling.peaks import Peaks, find_peaks_jointly, penalty, theta_of
+from modeling.likelihood import Bools, Power, bins_near, signal_power, split
+from modeling.peaks import Peaks, find_peaks_jointly, penalty, power_sum_misfit
 from modeling.spectra import Spectrum
 
 # The coherent response holds where it fits as well as the power sum does, in log likelihood.
@@ -51,7 +51,7 @@ def fit_jointly(spectrum: Spectrum) -> Layers:
     bins = bins_near(power, peaks.frequencies_hz, peaks.bandwidths_hz)
     observed = one_spectrum(bins, line_hz=LINE_WIDTH * power.step_hz)
     fitted = _fitted_to(peaks, power, observed, move=True)
-    alone = misfit_of(bins, power_sum(theta_of(peaks), peaks.gains.size, bins)[0])
+    alone = power_sum_misfit(peaks, bins)
     if fitted.misfit <= alone + COHERENT_BY:
         fitted = _pruned(fitted, power, observed)
     else:

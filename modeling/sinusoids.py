@@ -142,6 +142,14 @@ def _of_all_speeds(held: Bools, speeds_mm_s: Floats) -> Bools:
     return of_all
 
 
+def without_hum(samples: Floats, rate_hz: float, hum_hz: Sequence[float]) -> Floats:
+    """The record (n,) without the likeliest sinusoid near each of the mains' lines (Hz)."""
+    if not hum_hz:
+        return samples
+    hum = sinusoids_near(samples, rate_hz, np.asarray(hum_hz, dtype=np.float64))
+    return samples - hum.samples(samples.size, rate_hz)
+
+
 def sinusoids_near(samples: Floats, rate_hz: float, frequencies_hz: Floats) -> Sinusoids:
     """The likeliest sinusoid near each of some frequencies (k,), certain or not."""
     return _tested(samples, rate_hz, frequencies_hz).sinusoids

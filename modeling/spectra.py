@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from modeling.errors import InputError
 from modeling.peq import Floats
 from modeling.recording import Recording
-from modeling.sinusoids import Sinusoids, find_sinusoids, sinusoids_near
+from modeling.sinusoids import Sinusoids, find_sinusoids, without_hum
 
 MODEL_RATE_HZ = 5000.0
 HIGH_PASS_HZ = 10.0
@@ -93,7 +93,7 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     Returns
     -------
     (n,) ndarray
-        In the recording's unit, at min(rate_hz, recording.rate_hz).
+        In the recording's unit, at min(rate_hz, recording.rate_hz); n ≥ 64.
     """
     from scipy.signal import resample, sosfilt
 
@@ -106,6 +106,11 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
     samples = recording.samples - recording.samples.mean()
     if target_hz != recording.rate_hz:
         samples = resample(samples, round(samples.size * target_hz / recording.rate_hz))
+    if samples.size < 64:
+        raise InputError(
+            f"{recording.describe()}: expected at least 64 samples at {target_hz:g} Hz, got "
+            f"{samples.size}; record longer."
+        )
     filtered: Floats = sosfilt(_high_pass(target_hz), samples)
     return filtered
 
@@ -134,16 +139,9 @@ def spectrum(
         it tell nothing.
     """
     samples = prepare(recording, rate_hz=rate_hz)
-    return prepared_spectrum(samples, min(rate_hz, recording.rate_hz), recording, hum_hz=hum_hz)
-
-
-def check_length(samples: Floats, rate_hz: float, recording: Recording) -> None:
-    """InputError for (n,) prepared samples that are too few for a spectrum."""
-    if samples.size < 64:
-        raise InputError(
-            f"{recording.describe()}: expected at least 64 samples at {rate_hz:g} Hz, got "
-            f"{samples.size}; record longer."
-        )
+    rate_hz = min(rate_hz, recording.rate_hz)
+    samples = without_hum(samples, rate_hz, hum_hz)
+    return prepared_spectrum(samples, rate_hz, recording, hum_hz=hum_hz)
 
 
 def prepared_spectrum(
@@ -154,16 +152,13 @@ def prepared_spectrum(
     hum_hz: Sequence[float] = (),
     notes: Sequence[str] = (),
 ) -> Spectrum:
-    """As `spectrum`, of (n,) samples that `prepare` has made of the recording.
+    """As `spectrum`, of (n,) samples that are prepared and without hum already.
 
     `notes` go before those of the spectrum's own.
     """
-    check_length(samples, rate_hz, recording)
     frequency = np.fft.rfftfreq(samples.size, 1 / rate_hz)
     share: Floats | float = 1.0
     if hum_hz:
-        hum = sinusoids_near(samples, rate_hz, np.asarray(hum_hz, dtype=np.float64))
-        samples = samples - hum.samples(samples.size, rate_hz)
         apart = np.abs(frequency[:, None] - np.asarray(hum_hz)).min(axis=1)
         share = np.where(apart <= HUM_LINES * frequency[1], 0.0, 1.0)
     tones = find_sinusoids(samples, rate_hz, lowest_hz=HIGH_PASS_HZ)

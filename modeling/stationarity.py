@@ -27,6 +27,7 @@ CLEAR_SLOPE = 0.08  # of log power, from cell to cell
 OVERSAMPLING = 4
 LEAST_LEVEL_CHANGE_DB = 3.0
 LEVEL_DEVIATIONS = 5.0
+TINY = 1e-300
 
 
 class Drift(NamedTuple):
@@ -123,6 +124,3 @@ def _level_change_db(power: Floats) -> float:
     change = float(np.ptp(levels_db))
     limit = max(LEAST_LEVEL_CHANGE_DB, LEVEL_DEVIATIONS * float(deviation_db))
     return change if change > limit else 0.0
-
-
-TINY = 1e-300

@@ -218,11 +218,8 @@ def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:
     if not absent.any():
         return solution.theta
     untold = np.zeros(solution.theta.shape, dtype=bool)
-    untold[:, 1 : 1 + m] = untold[:, 1 + m : 1 + 2 * m] = absent
     # Of a layer that no record shows nothing is foretold.
-    shown = ~absent.all(axis=0)
-    untold[:, 1 : 1 + m] &= shown
-    untold[:, 1 + m : 1 + 2 * m] &= shown
+    untold[:, 1 : 1 + m] = untold[:, 1 + m : 1 + 2 * m] = absent & ~absent.all(axis=0)
     # Each parameter by itself: a layer that vanishes must not pull its frequency along.
     alone = replace(field, precision=np.diag(np.diag(field.precision)))
     held = np.where(untold, 0.0, HELD)

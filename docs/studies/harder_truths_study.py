@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -143,25 +143,14 @@ def truth_of(case: Case, rng: np.random.Generator) -> RandomTruth:
         names = ("frequencies_hz", "bandwidths_hz", "gains")
         f, b, g = (np.concatenate([getattr(p, name) for p in parts])[:wanted] for name in names)
         order = np.argsort(f)
-        drawn = RandomTruth(
-            layered(drawn.layers.noise_gain, f[order], b[order], g[order]), "coherent"
+        many = replace(
+            drawn.layers, frequencies_hz=f[order], bandwidths_hz=b[order], gains=g[order]
         )
+        drawn = RandomTruth(many, "coherent")
     if case.floor_slope:  # the floor of its own takes the place of the white one
-        few = drawn.layers
-        quiet = layered(1e-3 * NOISE_GAIN, few.frequencies_hz, few.bandwidths_hz, few.gains)
+        quiet = replace(drawn.layers, noise_gain=1e-3 * NOISE_GAIN)
         drawn = RandomTruth(quiet, "coherent")
     return drawn
-
-
-def layered(noise_gain: float, frequency: Floats, bandwidth: Floats, gain: Floats) -> PEQ:
-    """A PEQ at the study's rate."""
-    return PEQ(
-        noise_gain=noise_gain,
-        frequencies_hz=frequency,
-        bandwidths_hz=bandwidth,
-        gains=gain,
-        rate_hz=RATE_HZ,
-    )
 
 
 def judged(case: Case, seed: int) -> list[dict[str, float]]:
