@@ -17,6 +17,7 @@ from steps import (
     progress,
     sentence_of,
     simulated_note,
+    usable_recordings,
     write_provenance,
 )
 
@@ -356,11 +357,11 @@ def draw_condition(
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:
     """The recordings of one texture in a folder, or in the sub-folder that holds them."""
-    from modeling.recording import load_usable, textures_in
+    from modeling.recording import textures_in
 
     for found in recording_folders(folder):
         if texture in textures_in(found):
-            return load_usable(found, texture=texture)[0]
+            return usable_recordings(found, texture)
     raise ValueError(
         f"expected recordings of {texture!r} in {folder}, got none; give the folder that the model "
         "came from."

@@ -159,6 +159,16 @@ def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, flo
         )
 
 
+def usable_recordings(folder: Path, texture: str) -> RecordingSet:
+    """The recordings of one texture; what cannot be used is told and left out."""
+    from modeling.recording import load_usable
+
+    records, unusable = load_usable(folder, texture=texture)
+    for sentence in unusable:
+        print(f"warning: {texture}: left out: {sentence}", file=sys.stderr)
+    return records
+
+
 def results_of_study(
     responses: Responses,
     *,
@@ -172,7 +182,6 @@ def results_of_study(
     from analysis.tables import TextureResult
     from modeling.files import file_stem
     from modeling.fitting import recording_spectra
-    from modeling.recording import load_usable
 
     asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
     missing = [texture for texture in asked if texture not in full]
@@ -183,9 +192,7 @@ def results_of_study(
         )
     results = []
     for texture in asked:
-        records, unusable = load_usable(recordings / file_stem(texture), texture=texture)
-        for sentence in unusable:
-            print(f"warning: {texture}: left out: {sentence}", file=sys.stderr)
+        records = usable_recordings(recordings / file_stem(texture), texture)
         model = full[texture]
         left_out = left_out_by_model(recording_spectra(records), model)
         simplified = verdict(model, shown.get(texture))

@@ -238,8 +238,6 @@ def solve(field: Field, blocks: Floats, right: Floats) -> Floats:
     """
     from scipy.linalg import solveh_banded
 
-    if len(right) == 1:
-        return np.asarray(np.linalg.solve(blocks, right[..., None])[..., 0])
     band = _band(field, blocks)
     solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, check_finite=False)
     return np.asarray(solution, dtype=np.float64).reshape(right.shape)
@@ -258,7 +256,7 @@ def _band(field: Field, blocks: Floats) -> Floats:
     for far, first in ((1, _has_next_column(field)), (field.columns, _has_next_row(field))):
         if first.size:
             band[(far * p + row - column)[None, :], starts[first][:, None] + column] = coupling
-    return band
+    return band[: count * p]
 
 
 def log_evidence(fit: FieldFit) -> float:
