@@ -22,9 +22,9 @@ install: .venv/installed
 	@touch $@
 
 # The project itself and its C parts; says so where there is no compiler.
-.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/kernel.h analysis/rivals.h
+.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/kernel.h analysis/benches/rivals.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
-	@$(BIN)/python -c "from modeling.kernel import is_compiled; is_compiled()"
+	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
 	@touch $@
 
 demo: install
@@ -47,4 +47,4 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv demo build *.egg-info modeling/_kernel.* analysis/_rivals.* .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv demo build *.egg-info modeling/rendering/_kernel.* analysis/benches/_rivals.* .mypy_cache .pytest_cache .ruff_cache .hypothesis

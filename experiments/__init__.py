@@ -1,14 +1,14 @@
 """Experiments: designs and orders, protocols, store, console and simulated participants."""
 
-from experiments.absolute import run_absolute
-from experiments.design import SessionPlan, fisher_yates, plan_session
-from experiments.models import ModelSets
-from experiments.participants import Psychometrics
-from experiments.relative import run_relative
-from experiments.simulate import simulate_study
-from experiments.store import StoreError
-from experiments.study import Study
-from experiments.trial_loop import SessionResult
+from experiments.observers.simulated import Psychometrics
+from experiments.observers.whole_study import simulate_study
+from experiments.sessions.store import StoreError
+from experiments.sessions.trial_loop import SessionResult
+from experiments.study.design import SessionPlan, fisher_yates, plan_session
+from experiments.study.models import ModelSets
+from experiments.study.study import Study
+from experiments.tasks.absolute import run_absolute
+from experiments.tasks.relative import run_relative
 
 __all__ = [
     "ModelSets",

@@ -1,52 +1,68 @@
-"""Texture models: from recordings to parameters, to fewer parameters, to vibration."""
+"""Texture models: from recordings to parameters, to fewer parameters, to vibration.
 
-from modeling import similarity
-from modeling.autoregressive import ARFilter, ARModel, fit_ar
-from modeling.errors import GridError, InputError
-from modeling.estimators import ESTIMATORS, find_layers
-from modeling.fitting import fit_texture, missing_conditions
-from modeling.identification import identify_vibrator
-from modeling.layers import Layers
-from modeling.limits import Limits
-from modeling.model import TextureModel
-from modeling.peq import PEQ
-from modeling.recording import Recording, RecordingSet
-from modeling.regressed import RegressedModel
-from modeling.renderer import Renderer
-from modeling.simplification import CRITERIA, LayerVerdict, Simplification, simplify
-from modeling.spectra import Spectrum, spectrum
-from modeling.thresholds import Threshold
-from modeling.vibrator import Compensation, Vibrator, compensation_for, flat_band
+Each name is loaded when it is first asked for, so that `import modeling.errors` loads no numerics.
+"""
 
-__all__ = [
-    "CRITERIA",
-    "ESTIMATORS",
-    "PEQ",
-    "ARFilter",
-    "ARModel",
-    "Compensation",
-    "GridError",
-    "InputError",
-    "LayerVerdict",
-    "Layers",
-    "Limits",
-    "Recording",
-    "RecordingSet",
-    "RegressedModel",
-    "Renderer",
-    "Simplification",
-    "Spectrum",
-    "TextureModel",
-    "Threshold",
-    "Vibrator",
-    "compensation_for",
-    "find_layers",
-    "fit_ar",
-    "fit_texture",
-    "flat_band",
-    "identify_vibrator",
-    "missing_conditions",
-    "similarity",
-    "simplify",
-    "spectrum",
-]
+from typing import TYPE_CHECKING
+
+from modeling.face import lazily
+
+HOMES = {
+    "errors": "GridError InputError",
+    "recordings.recording": "Recording",
+    "recordings.recording_set": "RecordingSet",
+    "recordings.spectrum": "Spectrum spectrum",
+    "equalizer.peq": "PEQ",
+    "models.texture_model": "TextureModel",
+    "models.regressed_model": "RegressedModel",
+    "models.ar_model": "ARFilter ARModel",
+    "estimation.layers": "ESTIMATORS Layers",
+    "estimation.estimators": "find_layers",
+    "fitting.texture": "fit_texture missing_conditions",
+    "fitting.autoregressive": "fit_ar",
+    "regression.driving": "regressed",
+    "perception.thresholds": "Threshold",
+    "perception.simplification": "CRITERIA LayerVerdict Simplification simplify",
+    "vibrators.vibrator": "Vibrator",
+    "vibrators.compensation": "Compensation compensation_for flat_band",
+    "vibrators.identification": "identify_vibrator",
+    "rendering.limits": "Limits",
+    "rendering.renderer": "Renderer",
+    "similarity": "",
+}
+
+if TYPE_CHECKING:
+    from modeling import similarity as similarity
+    from modeling.equalizer.peq import PEQ as PEQ
+    from modeling.errors import GridError as GridError
+    from modeling.errors import InputError as InputError
+    from modeling.estimation.estimators import find_layers as find_layers
+    from modeling.estimation.layers import ESTIMATORS as ESTIMATORS
+    from modeling.estimation.layers import Layers as Layers
+    from modeling.fitting.autoregressive import fit_ar as fit_ar
+    from modeling.fitting.texture import fit_texture as fit_texture
+    from modeling.fitting.texture import missing_conditions as missing_conditions
+    from modeling.models.ar_model import ARFilter as ARFilter
+    from modeling.models.ar_model import ARModel as ARModel
+    from modeling.models.regressed_model import RegressedModel as RegressedModel
+    from modeling.models.texture_model import TextureModel as TextureModel
+    from modeling.perception.simplification import CRITERIA as CRITERIA
+    from modeling.perception.simplification import LayerVerdict as LayerVerdict
+    from modeling.perception.simplification import Simplification as Simplification
+    from modeling.perception.simplification import simplify as simplify
+    from modeling.perception.thresholds import Threshold as Threshold
+    from modeling.recordings.recording import Recording as Recording
+    from modeling.recordings.recording_set import RecordingSet as RecordingSet
+    from modeling.recordings.spectrum import Spectrum as Spectrum
+    from modeling.recordings.spectrum import spectrum as spectrum
+    from modeling.regression.driving import regressed as regressed
+    from modeling.rendering.limits import Limits as Limits
+    from modeling.rendering.renderer import Renderer as Renderer
+    from modeling.vibrators.compensation import Compensation as Compensation
+    from modeling.vibrators.compensation import compensation_for as compensation_for
+    from modeling.vibrators.compensation import flat_band as flat_band
+    from modeling.vibrators.identification import identify_vibrator as identify_vibrator
+    from modeling.vibrators.vibrator import Vibrator as Vibrator
+
+__getattr__ = lazily(__name__, HOMES)
+__all__ = [name for module, names in HOMES.items() for name in names.split() or [module]]

@@ -10,11 +10,12 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from modeling.autoregressive import ARModel
+from modeling.arrays import Floats
+from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
-from modeling.peq import PEQ, Floats
-from modeling.recording import Recording
-from modeling.spectra import Spectrum, smooth, spectrum
+from modeling.models.ar_model import ARModel
+from modeling.recordings.recording import Recording
+from modeling.recordings.spectrum import Spectrum, smooth, spectrum
 
 LOWEST_HZ = 10.0
 HIGHEST_SHARE = 0.98

@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modeling import InputError, Renderer, TextureModel
+from modeling.arrays import Floats
+from modeling.hand import Hand
 from rig.interface import RigReading
 
 STEP_S = 0.01
@@ -49,7 +50,7 @@ class SimulatedRig:
         return True
 
     @property
-    def last_vibration(self) -> NDArray[np.float64]:
+    def last_vibration(self) -> Floats:
         """What the hand felt during the last reading's 10 ms, in g at the model's rate."""
         return self._last_vibration
 
@@ -93,7 +94,7 @@ class SimulatedRig:
         pressed, self._button = self._button, False
         return RigReading(time_s, float(speed[0]), float(force[0]), pressed, simulated=True)
 
-    def _felt(self, time_s: float) -> NDArray[np.float64]:
+    def _felt(self, time_s: float) -> Floats:
         if self._renderer is None:
             return np.zeros(0)
         samples = round(STEP_S * self._renderer.rate_hz)
@@ -101,7 +102,9 @@ class SimulatedRig:
         return self._renderer.render(*_hand(moments))
 
 
-def _hand(time_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Speed (mm/s) and force (N) of the stroking hand at (n,) moments."""
+def _hand(time_s: Floats) -> Hand:
+    """The stroking hand at (n,) moments."""
     phase = 2 * np.pi * STROKE_HZ * time_s
-    return PEAK_SPEED_MM_S * np.abs(np.sin(phase)), MEAN_FORCE_N + FORCE_SWING_N * np.cos(phase)
+    return Hand(
+        PEAK_SPEED_MM_S * np.abs(np.sin(phase)), MEAN_FORCE_N + FORCE_SWING_N * np.cos(phase)
+    )

@@ -1,6 +1,7 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
-`modeling._kernel` is the rendering kernel, `analysis._rivals` what its bench compares it with.
+`modeling.rendering._kernel` is the rendering kernel, `analysis.benches._rivals` what its bench
+compares it with.
 """
 
 from __future__ import annotations
@@ -11,8 +12,8 @@ from pathlib import Path
 from cffi import FFI
 
 ROOT = Path(__file__).resolve().parent.parent
-KERNEL = ROOT / "modeling" / "kernel.h"
-RIVALS = ROOT / "analysis" / "rivals.h"
+KERNEL = ROOT / "modeling" / "rendering" / "kernel.h"
+RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 
@@ -44,5 +45,5 @@ def binding(name: str, *headers: Path) -> FFI:
     return builder
 
 
-kernel = binding("modeling._kernel", KERNEL)
-rivals = binding("analysis._rivals", KERNEL, RIVALS)
+kernel = binding("modeling.rendering._kernel", KERNEL)
+rivals = binding("analysis.benches._rivals", KERNEL, RIVALS)

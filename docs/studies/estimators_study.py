@@ -15,9 +15,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from analysis.drawing import LAYER_COLOURS, LAYER_MARKERS, finish_axes, shared_legend
-from analysis.drawing import stamp_if_simulated as stamp
-from analysis.estimators import ALL_KINDS, FROM_THE_TRUTH, estimators_table
+from analysis.benches.estimators import ALL_KINDS, FROM_THE_TRUTH, estimators_table
+from analysis.figures.drawing import (
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    finish_axes,
+    shared_legend,
+)
+from analysis.figures.drawing import stamp_if_simulated as stamp
 
 TEXTURES = 200
 SEED = 1

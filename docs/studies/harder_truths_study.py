@@ -1,7 +1,7 @@
 """What `joint` makes of textures that are harder than sums of layers on white noise.
 
-Simulated: random layers whose places are known (`stimuli.random_truth`), over 2 × 2 conditions of
-one level each, with what laboratories meet: coloured floors, hum of the mains, a pure tone, many
+Simulated: random layers whose places are known (`stimuli.planted.spectra`), over 2 × 2 conditions
+of one level each, with what laboratories meet: coloured floors, hum of the mains, a pure tone, many
 layers, short and long records, a turntable that slows down, a level that changes.
 
 Example: python docs/studies/harder_truths_study.py writes harder_truths_study.tsv beside this file
@@ -18,15 +18,13 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from analysis.planted import match_layers
+from analysis.textures.recovery import match_layers
 from modeling import PEQ, Recording, RecordingSet, fit_texture
-from modeling.own_peaks import own_peaks
-from stimuli.random_truth import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
-
-Floats = NDArray[np.float64]
+from modeling.arrays import Floats
+from modeling.models.own_peaks import own_peaks
+from stimuli.planted.spectra import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
 
 TEXTURES = 40
 CONDITIONS = ((100.0, 1.0), (100.0, 2.0), (200.0, 1.0), (200.0, 2.0))

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 import pandas as pd
 from rich.progress import track
 
-from analysis.orders import layers_and_orders
+from analysis.benches.layers_and_orders import layers_and_orders
 from modeling import InputError, Recording
 from modeling.similarity import SpectralFilter
-from rig.hatt import HattTexture, load_hatt
+from rig.importing.hatt import HattTexture, load_hatt
 
 
 def cases_of(texture: HattTexture) -> list[tuple[Recording, SpectralFilter]]:

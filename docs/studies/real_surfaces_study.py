@@ -1,7 +1,7 @@
 """How close models of real surfaces are at the recorded conditions, and between them.
 
 Simulated: random surfaces with the statistics of 100 real ones and no layers of their own
-(`stimuli.drawn`), whose spectra are known at every speed and force.
+(`stimuli.planted.drawn`), whose spectra are known at every speed and force.
 
 Example: python docs/studies/real_surfaces_study.py writes real_surfaces_study*.tsv and .png beside
 this file and prints the tables.
@@ -20,12 +20,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
-from analysis.between import FilterAt, halfway, truth_summary
-from analysis.drawing import LAYER_COLOURS, LAYER_MARKERS, finish_axes, shared_legend
-from analysis.drawing import stamp_if_simulated as stamp
+from analysis.figures.drawing import (
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    finish_axes,
+    shared_legend,
+)
+from analysis.figures.drawing import stamp_if_simulated as stamp
+from analysis.textures.between import FilterAt, halfway, truth_summary
 from modeling import RecordingSet, fit_ar, fit_texture
-from modeling.grid import Condition
-from stimuli.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
+from modeling.models.grid import Condition
+from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
 
 SURFACES = 40
 FIRST = 1000  # surfaces that no constant of the estimator was chosen by

@@ -13,17 +13,15 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.figures_stability import figure_clicks, figure_stability
-from analysis.moving import (
+from analysis.benches.accuracy import accuracy_row, reading_rows
+from analysis.benches.clicks import (
     STEPS,
     THIS_RENDERER,
-    accuracy_row,
     click_table,
     level_above_click_hz,
-    reading_rows,
     step_signals,
 )
-from analysis.stability import (
+from analysis.benches.stability import (
     FORMS,
     RATE_HZ,
     excess_db,
@@ -32,7 +30,8 @@ from analysis.stability import (
     moving_variances,
     stability_table,
 )
-from stimuli.planted import TEXTURES, planted_texture
+from analysis.figures.stability import figure_clicks, figure_stability
+from stimuli.planted.textures import TEXTURES, planted_texture
 
 MOTION = "30 % jitter"
 SHOWN_SAMPLES = 200

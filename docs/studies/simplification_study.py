@@ -21,10 +21,16 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.progress import track
 
-from analysis.drawing import GREY, LAYER_COLOURS, LAYER_MARKERS, finish_axes, shared_legend
+from analysis.figures.drawing import (
+    GREY,
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    finish_axes,
+    shared_legend,
+)
 from modeling import CRITERIA, RecordingSet, TextureModel, Threshold, fit_texture, simplify
-from modeling.simplification import layer_amplitudes_g
-from stimuli.planted import record_texture
+from modeling.perception.simplification import layer_amplitudes_g
+from stimuli.planted.textures import record_texture
 
 DURATIONS_S = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0)
 DISTANCES_DB = tuple(float(d) for d in range(-6, 7))

@@ -15,10 +15,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.drawing import LAYER_COLOURS, LAYER_MARKERS, finish_axes, shared_legend
-from analysis.drawing import stamp_if_simulated as stamp
+from analysis.figures.drawing import (
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    finish_axes,
+    shared_legend,
+)
+from analysis.figures.drawing import stamp_if_simulated as stamp
 from modeling import CRITERIA, TextureModel, Threshold, simplify
-from modeling.thresholds import SHIPPED
+from modeling.perception.thresholds import SHIPPED
 
 TEXTURES = 100
 RATE_HZ = 5000.0

@@ -1,7 +1,7 @@
 """What compensating a vibrator gains, and how well its test must be recorded.
 
-Simulated: second-order vibrators (mass, spring, damper; `stimuli.vibrators`) are tested with white
-noise, identified and compensated (METHOD 9).
+Simulated: second-order vibrators (mass, spring, damper; `stimuli.planted.vibrators`) are tested
+with white noise, identified and compensated (METHOD 9).
 
 Example: python docs/studies/vibrator_study.py writes vibrator_study.png and two tables,
 vibrator_study.tsv and vibrator_study_coherence.tsv, beside this file.
@@ -15,10 +15,10 @@ import numpy as np
 import pandas as pd
 from rich.progress import track
 
-from analysis.figures_vibrator import figure_vibrator
-from analysis.vibrator import CompensatedVibrator, compensated
+from analysis.figures.vibrator import figure_vibrator
+from analysis.spectra.vibrator import CompensatedVibrator, compensated
 from modeling import InputError, Vibrator, compensation_for, flat_band, identify_vibrator
-from stimuli.vibrators import SimulatedVibrator
+from stimuli.planted.vibrators import SimulatedVibrator
 
 RATE_HZ = 5000.0
 DURATION_S = 120.0

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.tables import TextureResult
+from analysis.textures.results import TextureResult
 from modeling import TextureModel, Threshold, fit_texture, simplify
-from stimuli.planted import planted_texture, record_texture
+from stimuli.planted.textures import planted_texture, record_texture
 
 TEXTURES = ("aluminum", "canvas", "leather", "MDF", "polyester", "PVC", "wall paper")
 ABSOLUTE = (

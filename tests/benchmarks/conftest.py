@@ -11,7 +11,7 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from modeling import Recording, RecordingSet
-from stimuli.planted import TEXTURES, planted_texture, record_texture
+from stimuli.planted.textures import TEXTURES, planted_texture, record_texture
 
 RIVAL = "rival"
 

@@ -11,7 +11,7 @@ from joblib import Parallel, cpu_count, delayed
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import resample, resample_poly
 
-from analysis.findings import find_in
+from analysis.report.findings import find_in
 from modeling import (
     ESTIMATORS,
     Recording,
@@ -19,12 +19,13 @@ from modeling import (
     find_layers,
     fit_ar,
     fit_texture,
+    regressed,
     spectrum,
 )
-from modeling.autoregressive import fit_filter
-from modeling.spectra import MODEL_RATE_HZ
-from modeling_steps import HowToModel, model_textures
-from stimuli.planted import planted_texture
+from modeling.fitting.autoregressive import fit_filter
+from modeling.recordings.spectrum import MODEL_RATE_HZ
+from stimuli.planted.textures import planted_texture
+from tactileq.many_textures import HowToModel, model_textures
 
 RECORDER_RATE_HZ = 22704.0
 AR_ORDER = 20
@@ -162,7 +163,7 @@ def test_command_on_a_study(
 def test_parameters_of_a_stroke(benchmark: BenchmarkFixture, driven_by: str) -> None:
     """A model driven by its grid, and by regressions instead."""
     planted = planted_texture("canvas")
-    model = planted if driven_by == "grid" else planted.regressed(by=driven_by)
+    model = planted if driven_by == "grid" else regressed(planted, by=driven_by)
     time_s = np.arange(20_000) / MODEL_RATE_HZ
     speed = 400 * np.abs(np.sin(2 * np.pi * time_s))
     benchmark.extra_info |= {"what": f"by {driven_by}"}

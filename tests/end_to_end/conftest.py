@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-import tactileq
+from tactileq import app
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
@@ -44,7 +44,7 @@ def main(
         words += ["--jobs", "1"] if words[0] == "model" else []
         monkeypatch.setattr("sys.argv", ["tactileq", *words])
         with pytest.raises(SystemExit) as end:
-            tactileq.main()
+            app.main()
         told = capsys.readouterr()
         return subprocess.CompletedProcess(words, int(end.value.code or 0), told.out, told.err)
 

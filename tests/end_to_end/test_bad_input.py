@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from modeling import Recording, RecordingSet
-from stimuli.planted import planted_texture
+from stimuli.planted.textures import planted_texture
 
 NOISE = np.random.default_rng(3).normal(0, 0.1, 3000)
 

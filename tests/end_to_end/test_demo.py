@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from modeling import RecordingSet, TextureModel
-from stimuli.planted import TEXTURES
+from stimuli.planted.textures import TEXTURES
 
 
 def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 import soundfile
 
 from modeling import Renderer
-from stimuli.planted import planted_texture
+from stimuli.planted.textures import planted_texture
 
 CANVAS = planted_texture("canvas")
 

@@ -12,7 +12,7 @@ import pytest
 from PIL import Image
 
 from modeling import Recording, RecordingSet, TextureModel
-from stimuli.planted import planted_texture, record_texture
+from stimuli.planted.textures import planted_texture, record_texture
 
 AXES = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 ENDINGS = (".json", "_layers.tsv", "_spectra.tsv", "_provenance.json")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from modeling import Recording, RecordingSet, TextureModel
-from stimuli.planted import planted_texture, record_texture
+from stimuli.planted.textures import planted_texture, record_texture
 
 SMALL_STUDY = """
 name = "small"

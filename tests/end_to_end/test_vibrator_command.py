@@ -11,10 +11,10 @@ import soundfile
 from PIL import Image
 
 from modeling import Limits, Vibrator, compensation_for
-from modeling.files import read_table
-from stimuli.exports import write_c_header
-from stimuli.planted import planted_texture
-from stimuli.vibrators import SimulatedVibrator
+from modeling.files.tables import read_table
+from stimuli.exports.c_header import write_c_header
+from stimuli.planted.textures import planted_texture
+from stimuli.planted.vibrators import SimulatedVibrator
 
 RATE_HZ = 22050
 

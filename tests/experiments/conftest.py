@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from experiments.design import AbsoluteTrial, RelativeTrial
-from experiments.models import ModelSets
-from experiments.study import Study, TaskPlan
-from experiments.trial_loop import Choice, Rating, Surfaces
+from experiments.sessions.trial_loop import Choice, Rating, Surfaces
+from experiments.study.design import AbsoluteTrial, RelativeTrial
+from experiments.study.models import ModelSets
+from experiments.study.study import Study, TaskPlan
 from modeling import TextureModel, Threshold, simplify
 from rig.interface import RigReading
-from stimuli.planted import planted_texture
+from stimuli.planted.textures import planted_texture
 
 TEXTURES = ("canvas", "MDF", "PVC")
 

@@ -20,7 +20,7 @@ from modeling import (
     similarity,
     spectrum,
 )
-from modeling.spectra import Spectrum
+from modeling.recordings.spectrum import Spectrum
 
 ModelMaker = Callable[..., TextureModel]
 RecordingMaker = Callable[..., Recording]

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from modeling import TextureModel, Vibrator
-from stimuli.planted import planted_texture
-from stimuli.recipe import ModelEntry, Recipe, TrajectoryEntry
-from stimuli.vibrators import planted_vibrator
+from stimuli.planted.textures import planted_texture
+from stimuli.planted.vibrators import planted_vibrator
+from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 

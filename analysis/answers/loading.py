@@ -1,0 +1,360 @@
+"""Read what the experiments wrote: one folder of tab-separated files, checked before use."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from analysis.labels import MODELS
+from modeling import InputError
+
+_NUMBERS: Mapping[str, Mapping[str, tuple[float, float]]] = {
+    "absolute": {
+        "trial": (0, np.inf),
+        "magnitude_similarity": (0, 100),
+        "frequency_similarity": (0, 100),
+        "toggles": (0, np.inf),
+        "response_time_s": (0, np.inf),
+    },
+    "relative": {
+        "trial": (0, np.inf),
+        "correct": (0, 1),
+        "presses": (0, np.inf),
+        "response_time_s": (0, np.inf),
+    },
+}
+_CHOICES = {
+    "phase": ("training", "main"),
+    "model": MODELS,
+    "first_surface": ("real", "virtual"),
+    "simulated": ("true", "false"),
+}
+_TEXTS = {
+    "absolute": ("phase", "texture", "model", "tray", "first_surface", "simulated"),
+    "relative": ("phase", "texture", "model", "tray", "layout", "answer", "simulated"),
+}
+_SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
+_REQUIRED = ("trial", "phase", "texture", "model", "simulated")
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Every answer of one study, checked.
+
+    Parameters
+    ----------
+    absolute : DataFrame
+        Main trials of the absolute evaluation, one row each: participant_id, session, trial,
+        texture, model (full|simplified), tray, first_surface, magnitude_similarity and
+        frequency_similarity (0-100, NaN where not answered), toggles, response_time_s (s).
+    relative : DataFrame
+        Main trials of the seven-alternative forced choice: participant_id, session, trial,
+        texture, model, tray, layout, answer, correct (0, 1 or NaN), presses, response_time_s (s).
+    simulated_participants : bool
+        True where no person took part.
+    simulated_rig : bool
+        True where no real rig was used, so that nobody felt a real surface.
+    absolute_training, relative_training : DataFrame
+        The training trials, same columns; no statistic uses them.
+    name : str
+        The study's name.
+    warnings : tuple of str
+        What was dropped on reading and why, and which sessions ended early, one sentence each.
+    """
+
+    absolute: pd.DataFrame
+    relative: pd.DataFrame
+    simulated_participants: bool
+    simulated_rig: bool
+    absolute_training: pd.DataFrame
+    relative_training: pd.DataFrame
+    name: str = ""
+    warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def simulated(self) -> bool:
+        """True where participants or rig were simulated."""
+        return self.simulated_participants or self.simulated_rig
+
+
+def load_responses(data_folder: str | Path) -> Responses:
+    """Load and check all answers of a study.
+
+    Parameters
+    ----------
+    data_folder : str or Path
+        Folder holding dataset_description.json, participants.tsv and
+        sub-*/ses-*/beh/sub-*_ses-*_task-(absolute|relative)_beh.tsv; beside each its sidecar, and
+        below sourcedata/ the order of its trials, where they are there.
+
+    Returns
+    -------
+    Responses
+        A last line cut short by a killed process is dropped and named in `warnings`; so is a
+        session with fewer answers than planned trials.
+
+    Raises
+    ------
+    InputError
+        Where the folder is none, a file is malformed, a value is out of range, or answers are
+        mixed that differ in whether participants or rig were simulated.
+    """
+    folder = Path(data_folder)
+    description = _description(folder)
+    simulated = {key: bool(description.get(key)) for key in _SIMULATED}
+    warnings: list[str] = []
+    participants = simulated["SimulatedParticipant"]
+    _check_participants(folder / "participants.tsv", participants, warnings=warnings)
+    tables = {
+        task: _load_task(folder, task, simulated=simulated, warnings=warnings) for task in _TEXTS
+    }
+    if all(table is None for table in tables.values()):
+        raise InputError(
+            f"expected answers such as sub-01/ses-01/beh/sub-01_ses-01_task-absolute_beh.tsv in "
+            f"{folder}, found none; run a session first or name the study's data folder."
+        )
+    absolute, absolute_training = _split(tables["absolute"], "absolute")
+    relative, relative_training = _split(tables["relative"], "relative")
+    return Responses(
+        absolute=absolute,
+        relative=relative,
+        simulated_participants=participants,
+        simulated_rig=simulated["SimulatedRig"],
+        absolute_training=absolute_training,
+        relative_training=relative_training,
+        name=str(description.get("Name", "")),
+        warnings=tuple(warnings),
+    )
+
+
+def _description(folder: Path) -> Mapping[str, object]:
+    path = folder / "dataset_description.json"
+    if not folder.is_dir():
+        raise InputError(
+            f"expected a data folder, but {folder} is not one; name the folder that holds "
+            f"dataset_description.json."
+        )
+    if not path.is_file():
+        raise InputError(
+            f"expected {path}, which is not there; name the folder of a study, the one that "
+            f"holds dataset_description.json."
+        )
+    description = _json_object(path)
+    if not isinstance(description.get("Simulated"), bool):
+        raise InputError(
+            f'expected "Simulated": true or false in {path}; add it, so that no one takes '
+            f"simulated answers for a person's."
+        )
+    parts = [description.get(key, False) for key in _SIMULATED[1:]]
+    if any(parts) != description["Simulated"] or not all(isinstance(p, bool) for p in parts):
+        raise InputError(
+            f'expected "SimulatedParticipant" and "SimulatedRig" in {path}, one of them true '
+            f'exactly where "Simulated" is, got {parts[0]} and {parts[1]}; say what was simulated.'
+        )
+    return description
+
+
+def _json_object(path: Path) -> Mapping[str, object]:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise InputError(
+            f"expected JSON in {path}, but it cannot be read ({problem}); restore the file."
+        ) from None
+    return values if isinstance(values, dict) else {}
+
+
+def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> None:
+    if not path.is_file():
+        raise InputError(f"expected {path}, which is not there; restore the list of participants.")
+    table = _read_lines(path, warnings)
+    _require_columns(table, ("participant_id", "simulated"), path=path)
+    _check_simulated(table, simulated, path=path)
+
+
+def _load_task(
+    folder: Path, task: str, *, simulated: Mapping[str, bool], warnings: list[str]
+) -> pd.DataFrame | None:
+    """All sessions of one task beneath each other, or None where there is none."""
+    sessions = []
+    for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
+        participant, session = path.parts[-4], path.parts[-3]
+        if path.name != f"{participant}_{session}_task-{task}_beh.tsv":
+            raise InputError(
+                f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
+                f"move the file back to its own participant's folder."
+            )
+        _check_sidecar(path.with_suffix(".json"), simulated)
+        table = _read_lines(path, warnings)
+        order = folder / "sourcedata" / participant / session
+        order /= path.name.removesuffix("beh.tsv") + "order.json"
+        if len(table) < (planned := _planned_trials(order)):
+            warnings.append(
+                f"{participant} {task} {session} answered {len(table)} of {planned} trials "
+                "(ended early)."
+            )
+        if table.columns.empty:
+            continue
+        _check_session(table, task, path=path, simulated=simulated["Simulated"])
+        table.insert(0, "participant_id", participant)
+        table.insert(1, "session", session)
+        sessions.append(table)
+    return pd.concat(sessions, ignore_index=True) if sessions else None
+
+
+def _check_sidecar(path: Path, simulated: Mapping[str, bool]) -> None:
+    """Refuse a session that says otherwise than the data set what was simulated."""
+    sidecar = _json_object(path) if path.is_file() else {}
+    for key, value in simulated.items():
+        if sidecar.get(key, value) is not value:
+            raise InputError(
+                f"expected {key} {json.dumps(value)} in {path}, as dataset_description.json says, "
+                f"never a mixture, but found {json.dumps(sidecar[key])}; correct the file or leave "
+                "its session out."
+            )
+
+
+def _planned_trials(order: Path) -> int:
+    """Number of trials in a session's stored order; 0 where there is none."""
+    if not order.is_file():
+        return 0
+    trials = _json_object(order).get("trials")
+    if not isinstance(trials, list):
+        raise InputError(f"expected a list of trials in {order}, found none; restore the file.")
+    return len(trials)
+
+
+def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
+    """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
+    numbers = _NUMBERS[task]
+    _require_columns(table, (*numbers, *_TEXTS[task]), path=path)
+    for column in _REQUIRED:
+        _refuse(
+            table[column].isna(), table[column], expected=f"a value in column {column}", path=path
+        )
+    for column, allowed in _CHOICES.items():
+        if column in table:
+            known = table[column].isin(allowed) | table[column].isna()
+            expected = f"{' or '.join(allowed)} in column {column}"
+            _refuse(~known, table[column], expected=expected, path=path)
+    _check_simulated(table, simulated, path=path)
+    for column, limits in numbers.items():
+        table[column] = _number_column(table[column], limits, path=path)
+    twice = table.duplicated(["phase", "trial"])
+    _refuse(twice, table["trial"], expected="every trial once", path=path)
+    if task == "relative":
+        _check_answers(table, path)
+
+
+def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:
+    low, high = limits
+    values = pd.to_numeric(column, errors="coerce").astype(float)
+    wrong = column.notna() & ~(np.isfinite(values) & (values >= low) & (values <= high))
+    wanted = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}"
+    _refuse(wrong, column, expected=f"a number {wanted} in column {column.name}", path=path)
+    return values
+
+
+def _check_answers(table: pd.DataFrame, path: Path) -> None:
+    answered = table[table["answer"].notna()]
+    layouts = [str(layout).split("|") for layout in answered["layout"]]
+    absent = [
+        answer not in layout for answer, layout in zip(answered["answer"], layouts, strict=True)
+    ]
+    _refuse(
+        pd.Series(absent, index=answered.index, dtype=bool),
+        answered["answer"],
+        expected="an answer that stands in its trial's layout",
+        path=path,
+    )
+    right = (answered["answer"] == answered["texture"]).astype(float)
+    _refuse(
+        right != answered["correct"],
+        answered["correct"],
+        expected="correct = 1 exactly where answer and texture agree",
+        path=path,
+    )
+
+
+def _check_simulated(table: pd.DataFrame, simulated: bool, *, path: Path) -> None:
+    expected = "true" if simulated else "false"
+    _refuse(
+        table["simulated"] != expected,
+        table["simulated"],
+        expected=f"simulated = {expected}, as dataset_description.json says, never a mixture,",
+        path=path,
+    )
+
+
+def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -> None:
+    if wrong.any():
+        row = int(np.flatnonzero(wrong.to_numpy())[0])
+        value = column.loc[wrong[wrong].index[0]]
+        shown = "n/a" if pd.isna(value) else value
+        raise InputError(
+            f"expected {expected} in {path}, but answer {row + 1} has {shown!r}; correct the file "
+            f"or leave it out."
+        )
+
+
+def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], *, path: Path) -> None:
+    missing = [column for column in dict.fromkeys(columns) if column not in table]
+    if missing:
+        raise InputError(
+            f"expected the column{'s' * (len(missing) > 1)} {', '.join(missing)} in {path}, "
+            f"but the first line does not name {'them' if len(missing) > 1 else 'it'}; restore "
+            f"the first line."
+        )
+
+
+def _read_lines(path: Path, warnings: list[str]) -> pd.DataFrame:
+    """All complete lines as text; n/a becomes missing. No columns where even the first is cut."""
+    try:
+        complete, _, rest = path.read_bytes().rpartition(b"\n")
+        lines = [line.rstrip("\r") for line in complete.decode("utf-8-sig").split("\n")]
+    except (OSError, UnicodeDecodeError) as problem:
+        raise InputError(
+            f"expected UTF-8 text in {path}, but it cannot be read ({problem}); restore the file."
+        ) from None
+    if not complete:
+        warnings.append(
+            f"{path.name}: the first line was cut short (a killed session?); no answers."
+        )
+        return pd.DataFrame()
+    header = lines[0].split("\t")
+    rows = [line.split("\t") for line in lines[1:]]
+    if rest:
+        tail = rest.decode("utf-8", errors="replace")
+        if _is_whole(tail, header):
+            rows.append(tail.split("\t"))
+        else:
+            warnings.append(
+                f"{path.name}: the last line was cut short (a killed session?) and is left out."
+            )
+    for number, row in enumerate(rows, start=2):
+        if len(row) != len(header):
+            raise InputError(
+                f"expected {len(header)} values in line {number} of {path}, but found {len(row)}; "
+                f"correct the line."
+            )
+    return pd.DataFrame(rows, columns=header, dtype=object).replace("n/a", np.nan)
+
+
+def _is_whole(tail: str, header: list[str]) -> bool:
+    """Only a last value known in full (true or false) proves that nothing is missing."""
+    values = tail.split("\t")
+    return len(values) == len(header) and values[-1] in _CHOICES["simulated"]
+
+
+def _split(table: pd.DataFrame | None, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    if table is None:
+        columns = ["participant_id", "session", *dict.fromkeys((*_NUMBERS[task], *_TEXTS[task]))]
+        table = pd.DataFrame({column: pd.Series(dtype=object) for column in columns})
+        table = table.astype(dict.fromkeys(_NUMBERS[task], float))
+    main = table["phase"] == "main"
+    return table[main].reset_index(drop=True), table[~main].reset_index(drop=True)

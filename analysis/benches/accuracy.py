@@ -1,0 +1,148 @@
+"""How exact a rendering is while the hand moves: late parameters and levels."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from analysis.benches.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
+from modeling import Recording, Renderer, TextureModel, similarity
+from modeling.hand import Hand
+from modeling.models.parameter_table import Parameters
+from modeling.rendering.plan import RenderPlan
+from modeling.rendering.reference.hand import Extrapolator
+
+FASTEST_MM_S = 300.0
+FORCE_N = 2.0
+HELD_MM_S = 200.0
+UPDATES_SAMPLES = (1, 5, 32)
+# How often the speed is read (Hz), and the noise of a reading (mm/s).
+READINGS = (
+    *((1000.0, noise) for noise in (0.0, 1.0, 2.0, 5.0, 10.0)),
+    *((rate, 2.0) for rate in (500.0, 250.0, 125.0)),
+)
+
+
+def stroke(rate_hz: float, *, duration_s: float = 1.0) -> Hand:
+    """A hand that goes to and fro at 2 Hz, up to 300 mm/s, pressing with 2 N."""
+    time_s = np.arange(round(duration_s * rate_hz)) / rate_hz
+    speed = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * time_s)
+    return Hand(speed, np.full(speed.size, FORCE_N))
+
+
+def update_error_db(
+    model: TextureModel,
+    hand: Hand,
+    update_samples: int,
+    *,
+    seed: int = 0,
+    readings: Hand | None = None,
+) -> float:
+    """RMS difference from a rendering with an update at every sample, dB re that rendering.
+
+    `readings` are what is known of the hand where that is not the hand itself.
+    """
+    rendered = Renderer(model, seed=seed, update_samples=update_samples).render(*(readings or hand))
+    exact = Renderer(model, seed=seed, update_samples=1).render(*hand)
+    return float(10 * np.log10(np.mean((rendered - exact) ** 2) / np.mean(exact**2)))
+
+
+def reading_rows(model: TextureModel) -> list[dict[str, object]]:
+    """Errors where the speed is read with noise, or seldom, with updates every 1 and 5 samples."""
+    hand, rows = stroke(model.rate_hz), list[dict[str, object]]()
+    noise = np.random.default_rng(0).normal(0, 1, hand.speed_mm_s.size)
+    at = np.arange(noise.size)
+    for reading_hz, noise_mm_s in READINGS:
+        period = round(model.rate_hz / reading_hz)
+        speed = (hand.speed_mm_s + noise_mm_s * noise)[at // period * period]
+        readings = Hand(speed, hand.force_n)
+        row: dict[str, object] = {"reading_hz": reading_hz, "noise_mm_s": noise_mm_s}
+        for name, update in (("every_1", 1), ("every_5", 5), ("as_read", period)):
+            row[f"error_db_{name}"] = update_error_db(model, hand, update, readings=readings)
+        rows.append(row | {"simulated": True})
+    return rows
+
+
+def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) -> Parameters:
+    """The parameters that a renderer at the model's rate applies at each sample (METHOD 9).
+
+    Frequencies and widths are held from update to update; gains move.
+    """
+    plan = RenderPlan(rate_hz=model.rate_hz, update_samples=update_samples)
+    readings = (reading[::update_samples] for reading in hand)
+    amid, end = (model.parameters(*at) for at in Extrapolator(plan)(Hand(*readings)))
+    gains = np.column_stack([end.noise_gain, end.gains])
+    reached = [gains[0], *gains]
+    for n in range(1, len(reached)):
+        slews = plan.slews(model.table.largest_gains)
+        reached[n] = reached[n - 1] + np.clip(reached[n] - reached[n - 1], -slews, slews)
+    passed = np.arange(1, update_samples + 1)[:, None] / update_samples
+    course = np.concatenate([a + (b - a) * passed for a, b in pairwise(reached)])
+    count = hand.speed_mm_s.size
+    held = np.arange(count) // update_samples
+    return Parameters(
+        course[:count, 0],
+        amid.frequencies_hz[held],
+        amid.bandwidths_hz[held],
+        course[:count, 1:],
+    )
+
+
+class LevelErrors(NamedTuple):
+    """How far a moving rendering's level is from the model's own at the speed of each sample.
+
+    `within_grid_db`: largest absolute error in dB while speed and force are on the grid.
+    `below_grid`: largest error of the RMS below it, as a share of the RMS on its edge (dB say
+    nothing where the level goes to 0).
+    """
+
+    within_grid_db: float
+    below_grid: float
+
+
+def level_errors(model: TextureModel, hand: Hand, update_samples: int) -> LevelErrors:
+    """Exact levels of a rendering along a stroke against those of the model held there.
+
+    For one force on the grid.
+    """
+    rendered = rendered_parameters(model, hand, update_samples)
+    level, wanted = (
+        np.sqrt(variances.total)
+        for variances in (
+            moving_variances(rendered, FORMS[OURS], rate_hz=model.rate_hz),
+            held_variances(model.parameters(*hand), FORMS[OURS], rate_hz=model.rate_hz),
+        )
+    )
+    below = np.abs(hand.speed_mm_s) < model.speeds_mm_s[0]
+    edge = model.parameters(model.speeds_mm_s[:1], hand.force_n[:1])
+    at_edge = np.sqrt(held_variances(edge, FORMS[OURS], rate_hz=model.rate_hz).total[0])
+    return LevelErrors(
+        float(np.abs(20 * np.log10(level[~below] / wanted[~below])).max()),
+        float(np.abs(level - wanted)[below].max(initial=0.0) / at_edge),
+    )
+
+
+def held_gfc30(model: TextureModel, speed_mm_s: float, *, seed: int = 0) -> tuple[float, float]:
+    """GFC30 of the second after a stroke in which the speed is held, and its ceiling."""
+    renderer = Renderer(model, seed=seed)
+    renderer.render(*stroke(model.rate_hz, duration_s=0.6))
+    held = renderer.render(speed_mm_s, FORCE_N, samples=round(model.rate_hz))
+    recording = Recording(held, model.rate_hz, speed_mm_s, FORCE_N, model.texture, simulated=True)
+    report = similarity.report(recording, model)
+    return report.gfc30, report.ceiling_gfc30
+
+
+def accuracy_row(model: TextureModel) -> dict[str, object]:
+    """All measures of one texture along a 2 Hz stroke, with updates every 1, 5 and 32 samples."""
+    hand = stroke(model.rate_hz)
+    row: dict[str, object] = {"texture": model.texture}
+    for period in UPDATES_SAMPLES:
+        errors = level_errors(model, hand, period)
+        row[f"level_error_db_every_{period}"] = errors.within_grid_db
+        row[f"level_error_below_grid_every_{period}"] = errors.below_grid
+        if period > 1:
+            row[f"error_db_every_{period}"] = update_error_db(model, hand, period)
+    gfc30, ceiling = held_gfc30(model, HELD_MM_S)
+    return row | {"gfc30": gfc30, "ceiling_gfc30": ceiling, "simulated": True}

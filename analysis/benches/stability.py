@@ -1,0 +1,287 @@
+"""How loud a filter becomes while its parameters move: exact variances, no random numbers.
+
+White noise of unit variance drives m bands of a PEQ whose parameters change at every sample. The
+covariance of all states together follows P′ = A·P·Aᵀ + b·bᵀ exactly, and with it the variance of
+each band and of their sum at each sample, for any realisation of the bands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol
+
+import numpy as np
+import pandas as pd
+
+from modeling.arrays import Floats
+from modeling.equalizer.bands import (
+    HIGHEST_BANDWIDTH_SHARE,
+    HIGHEST_FREQUENCY_SHARE,
+    LOWEST_BANDWIDTH_HZ,
+    LOWEST_FREQUENCY_HZ,
+    band_coefficients,
+    band_rms,
+)
+from modeling.models.parameter_table import Parameters
+from stimuli.planted.textures import planted_texture
+
+RATE_HZ = 5000.0
+SAMPLES = 5000
+STROKE_HZ = 2.0
+STEP_S = 0.05
+CENTRES_HZ = (80.0, 300.0, 900.0)
+WIDTHS_HZ = (25.0, 40.0, 120.0)
+
+
+class StateEquations(NamedTuple):
+    """A band as s′ = A·s + b·w, band = c·s + d·w: (…, 2, 2), (…, 2), (…, 2) and (…)."""
+
+    matrix: Floats
+    drive: Floats
+    readout: Floats
+    through: Floats
+
+
+class Form(Protocol):
+    """A realisation of unit-gain bands of frequency f and width B, any shape, at a rate."""
+
+    def __call__(
+        self, frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
+    ) -> StateEquations: ...
+
+
+def unit_covariance_form(
+    frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
+) -> StateEquations:
+    """The kernel's own coefficients (METHOD 3)."""
+    c = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=rate_hz)
+    return StateEquations(
+        _matrix(1 + c.p, -c.q, c.q, 1 + c.r),
+        np.stack([c.b1, c.b2], axis=-1),
+        c.tap[..., None] * np.stack([2 + c.p, -c.q], axis=-1),
+        c.tap * c.b1,
+    )
+
+
+def state_variable_form(
+    frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
+) -> StateEquations:
+    """The usual topology-preserving state-variable filter: input unscaled, band = K·v1."""
+    g, k = _tangents(frequency_hz, bandwidth_hz, rate_hz)
+    damping = k * (1 + g * g) / g
+    a1 = 1 / (1 + g * (g + damping))
+    a2, a3 = g * a1, g * g * a1
+    return StateEquations(
+        _matrix(2 * a1 - 1, -2 * a2, 2 * a2, 1 - 2 * a3),
+        np.stack([2 * a2, 2 * a3], axis=-1),
+        damping[..., None] * np.stack([a1, -a2], axis=-1),
+        damping * a2,
+    )
+
+
+def direct_form(frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float) -> StateEquations:
+    """A transposed direct form II, as in `scipy.signal.sosfilt`."""
+    g, k = _tangents(frequency_hz, bandwidth_hz, rate_hz)
+    gain = k / (1 + k)
+    a1 = -2 * (1 - g * g) / (1 + g * g) / (1 + k)
+    a2 = (1 - k) / (1 + k)
+    none = np.zeros_like(gain)
+    return StateEquations(
+        _matrix(-a1, none + 1, -a2, none),
+        gain[..., None] * np.stack([-a1, -1 - a2], axis=-1),
+        np.stack([none + 1, none], axis=-1),
+        gain,
+    )
+
+
+OURS = "unit covariance"
+FORMS: dict[str, Form] = {
+    OURS: unit_covariance_form,
+    "plain state-variable": state_variable_form,
+    "direct form": direct_form,
+}
+
+
+def _tangents(f: Floats, b: Floats, rate_hz: float) -> tuple[Floats, Floats]:
+    return np.tan(np.pi * f / rate_hz), np.tan(np.pi * b / rate_hz)
+
+
+def _matrix(a: Floats, b: Floats, c: Floats, d: Floats) -> Floats:
+    return np.stack([np.stack([a, b], axis=-1), np.stack([c, d], axis=-1)], axis=-2)
+
+
+class Variances(NamedTuple):
+    """Variance of each band's output alone, (n, m), and of the whole sum, (n,)."""
+
+    bands: Floats
+    total: Floats
+
+
+def moving_variances(at: Parameters, form: Form, *, rate_hz: float) -> Variances:
+    """Exact output variances while parameters move; the state starts stationary.
+
+    Parameters
+    ----------
+    at : Parameters
+        In force at each of n samples; gains multiply the bands' outputs.
+    form : Form
+        How the bands are realised.
+    rate_hz : float
+        At which w has unit variance.
+    """
+    bands = form(at.frequencies_hz, at.bandwidths_hz, rate_hz=rate_hz)
+    matrix, drive = _block_diagonal(bands.matrix), _flat(bands.drive)
+    covariance = _stationary(StateEquations(*(part[:1] for part in bands)))[0]
+    course = np.empty_like(matrix)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for n in range(len(course)):
+            course[n] = covariance
+            covariance = matrix[n] @ covariance @ matrix[n].T + np.outer(drive[n], drive[n])
+        return _output_variances(course, bands, at)
+
+
+def held_variances(at: Parameters, form: Form, *, rate_hz: float) -> Variances:
+    """What the variances would be if the parameters of each sample had been in force for ever."""
+    bands = form(at.frequencies_hz, at.bandwidths_hz, rate_hz=rate_hz)
+    return _output_variances(_stationary(bands), bands, at)
+
+
+def _flat(vectors: Floats) -> Floats:
+    """(n, m, 2) as (n, 2m)."""
+    return vectors.reshape(len(vectors), -1)
+
+
+def _block_diagonal(matrices: Floats) -> Floats:
+    """(n, m, 2, 2) as (n, 2m, 2m)."""
+    count, m = matrices.shape[:2]
+    blocks = np.zeros((count, m, 2, m, 2))
+    for i in range(m):
+        blocks[:, i, :, i, :] = matrices[:, i]
+    return blocks.reshape(count, 2 * m, 2 * m)
+
+
+def _stationary(bands: StateEquations) -> Floats:
+    """Covariance (n, 2m, 2m) of all states for parameters that are held.
+
+    Block (i, j) solves X = A_i·X·A_jᵀ + b_i·b_jᵀ.
+    """
+    a, b = bands.matrix, bands.drive
+    count, m = b.shape[:2]
+    kronecker = np.einsum("niab,njcd->nijacbd", a, a).reshape(count, m, m, 4, 4)
+    noise = np.einsum("nia,njc->nijac", b, b).reshape(count, m, m, 4, 1)
+    blocks = np.linalg.solve(np.eye(4) - kronecker, noise).reshape(count, m, m, 2, 2)
+    return blocks.transpose(0, 1, 3, 2, 4).reshape(count, 2 * m, 2 * m)
+
+
+def _output_variances(covariance: Floats, bands: StateEquations, at: Parameters) -> Variances:
+    count, m = at.gains.shape
+    own = np.einsum("niaib->niab", covariance.reshape(count, m, 2, m, 2))
+    readout = at.gains[..., None] * bands.readout
+    through = at.gains * bands.through
+    of_bands = np.einsum("nia,niab,nib->ni", readout, own, readout) + through**2
+    of_sum = np.einsum("na,nab,nb->n", _flat(readout), covariance, _flat(readout))
+    return Variances(of_bands, of_sum + (at.noise_gain + through.sum(axis=1)) ** 2)
+
+
+def excess_db(moving: Variances, held: Variances) -> Variances:
+    """Level in dB of what moves against what is held; infinite where it has overflowed."""
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ratios = (10 * np.log10(a / b) for a, b in zip(moving, held, strict=True))
+        return Variances(*(np.where(np.isnan(ratio), np.inf, ratio) for ratio in ratios))
+
+
+def simulate(at: Parameters, form: Form, noise: Floats, *, rate_hz: float) -> Floats:
+    """The (…, n) outputs for (…, n) noise, by the recursion with at's parameters at each sample."""
+    bands = form(at.frequencies_hz, at.bandwidths_hz, rate_hz=rate_hz)
+    output = at.noise_gain * noise
+    state = np.zeros((*noise.shape[:-1], *at.gains.shape[1:], 2))
+    for n in range(noise.shape[-1]):
+        w = noise[..., n, None]
+        band = np.einsum("ia,...ia->...i", bands.readout[n], state) + bands.through[n] * w
+        output[..., n] += band @ at.gains[n]
+        state = np.einsum("iab,...ib->...ia", bands.matrix[n], state)
+        state += bands.drive[n] * w[..., None]
+    return output
+
+
+# --- Motions of METHOD 3
+
+
+def motions(
+    rng: np.random.Generator, *, rate_hz: float = RATE_HZ, samples: int = SAMPLES
+) -> dict[str, Parameters]:
+    """The trajectories of METHOD 3 by name: parameters at each of n samples.
+
+    Strokes are those of a planted texture. All others move three bands of equal level and
+    alternating sign over a floor 10 dB below each of them.
+
+    Parameters
+    ----------
+    rng : Generator
+        Draws jitter (log-normal, standard deviation 30 % of f and of B), steps (every 50 ms) and
+        jumps (every sample); steps and jumps go anywhere in the legal range, evenly in octaves.
+    rate_hz : float
+        5 kHz or above.
+    samples : int
+    """
+    odd = (np.arange(samples) % 2 == 1)[:, None]
+    jumping = np.where(odd, [20.0, 1500.0, 300.0], [1500.0, 20.0, 300.0])
+    jitter = np.exp(0.3 * rng.standard_normal((2, samples, 3)))
+    held = np.arange(samples) // round(STEP_S * rate_hz)
+    steps = _anywhere(rng, rate_hz, count=1 + int(held[-1]))
+    moved = {
+        "jumping 20 ↔ 1500 Hz": (jumping, np.full((samples, 3), 50.0)),
+        "30 % jitter": (np.array(CENTRES_HZ) * jitter[0], np.array(WIDTHS_HZ) * jitter[1]),
+        "steps": (steps[0][held], steps[1][held]),
+        "random jumps": _anywhere(rng, rate_hz, count=samples),
+    }
+    time_s = np.arange(samples) / rate_hz
+    speed = 200 + 150 * np.sin(2 * np.pi * STROKE_HZ * time_s)
+    strokes = planted_texture("polyester").at_rate(rate_hz).parameters(speed, np.full(samples, 2.0))
+    return {
+        "smooth strokes": strokes,
+        **{name: _equally_loud(*bands, rate_hz=rate_hz) for name, bands in moved.items()},
+    }
+
+
+def _anywhere(rng: np.random.Generator, rate_hz: float, *, count: int) -> tuple[Floats, Floats]:
+    """(count, 3) frequencies and widths all over the legal range."""
+    edges = (
+        (LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz),
+        (LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * rate_hz),
+    )
+    octaves = [rng.uniform(np.log(low), np.log(high), (count, 3)) for low, high in edges]
+    return np.exp(octaves[0]), np.exp(octaves[1])
+
+
+def _equally_loud(frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float) -> Parameters:
+    gains = np.array([1.0, -1.0, 1.0]) / band_rms(1.0, bandwidth_hz, rate_hz=rate_hz)
+    return Parameters(np.full(len(gains), 10**-0.5), frequency_hz, bandwidth_hz, gains)
+
+
+def stability_table(moved: Mapping[str, Parameters], *, rate_hz: float = RATE_HZ) -> pd.DataFrame:
+    """Excess variance of every form on every motion: highest and lowest, in dB.
+
+    Returns
+    -------
+    DataFrame
+        One row per motion and form: band_highest_db and band_lowest_db over all bands and samples,
+        sum_highest_db and sum_lowest_db; infinite where a form has overflowed. `simulated` is
+        True: the variances are exact, the motions are made up.
+    """
+    rows = []
+    for motion, at in moved.items():
+        for name, form in FORMS.items():
+            held = held_variances(at, form, rate_hz=rate_hz)
+            excess = excess_db(moving_variances(at, form, rate_hz=rate_hz), held)
+            row = {
+                "motion": motion,
+                "form": name,
+                "band_highest_db": excess.bands.max(),
+                "band_lowest_db": excess.bands.min(),
+                "sum_highest_db": excess.total.max(),
+                "sum_lowest_db": excess.total.min(),
+                "simulated": True,
+            }
+            rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,161 @@
+"""Figures of people's answers: ratings, correct rates, confusions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures.drawing import (
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    axes_or_new,
+    finish_axes,
+    shared_legend,
+    stamp_if_simulated,
+)
+from analysis.labels import ALL_TEXTURES, LEVELS, MODELS, SCALES
+from analysis.statistics.confusion import ConfusionMatrix
+
+MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
+MODEL_HATCHES = {"full": "", "simplified": "///"}
+LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
+BAR_WIDTH = 0.38
+
+
+def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
+    """Rated similarity, both scales, before and after simplification (PAPER fig. 9).
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `statistics.rating_tests`.
+    simulated : bool
+        Written into the figure.
+    """
+    figure = Figure(figsize=(10.5, 4.6), layout="constrained")
+    for panel, ax, scale in zip("ab", figure.subplots(1, 2), SCALES.values(), strict=True):
+        chosen = tests[tests["scale"] == scale]
+        plot_paired_bars(chosen, simulated=simulated, ax=ax)
+        ax.set_title(f"({panel}) {scale}", loc="left")
+        ax.set_ylabel(f"rated similarity of {scale} (0–100)")
+        ax.set_ylim(0, 115)
+        ax.set_yticks(range(0, 101, 20))
+    shared_legend(figure, figure.axes[:1])
+    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    return figure
+
+
+def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float = 1 / 7) -> Figure:
+    """Correct rates before and after simplification against chance (PAPER fig. 11).
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `statistics.rate_tests`; the row over all textures is left out.
+    simulated : bool
+        Written into the figure.
+    chance : float
+        Rate of a guessing participant, drawn as a line.
+    """
+    figure = Figure(figsize=(8, 4.6), layout="constrained")
+    ax = figure.subplots()
+    plot_paired_bars(tests[tests["texture"] != ALL_TEXTURES], simulated=simulated, ax=ax)
+    ax.axhline(chance, color=BLACK, ls="--", lw=1)
+    ax.text(1.0, chance, f" chance\n {chance:.1%}", transform=ax.get_yaxis_transform(), va="center")
+    ax.set_ylabel("correct rate (share of trials, 0–1)")
+    ax.set_ylim(0, 1.15)
+    ax.set_yticks(np.arange(0, 1.01, 0.2))
+    shared_legend(figure, figure.axes[:1])
+    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    return figure
+
+
+def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """Mean ± standard error per texture, full beside simplified, with significance marks."""
+    ax = axes_or_new(ax)
+    place = np.arange(len(tests))
+    for side, model in zip((-0.5, 0.5), MODELS, strict=True):
+        ax.bar(
+            place + side * BAR_WIDTH,
+            tests[f"mean_{model}"],
+            BAR_WIDTH,
+            yerr=tests[f"se_{model}"].fillna(0.0),
+            capsize=3,
+            color=MODEL_COLOURS[model],
+            hatch=MODEL_HATCHES[model],
+            edgecolor="white",
+            label=f"{model} model",
+        )
+    columns = zip(MODELS, ("se_full", "se_simplified"), strict=True)
+    tops = [tests[f"mean_{model}"] + tests[se].fillna(0.0) for model, se in columns]
+    for x, full_top, top, p in zip(place, *tops, tests["p_holm"], strict=True):
+        _significance_bracket(ax, float(x), top=max(full_top, top), p=float(p))
+    ax.set_xticks(place, list(tests["texture"]), rotation=30, ha="right")
+    ax.set_xlabel("texture")
+    finish_axes(ax)
+    stamp_if_simulated(ax, simulated)
+    return ax
+
+
+def _significance_bracket(ax: Axes, x: float, *, top: float, p: float) -> None:
+    mark = next((mark for level, mark in LEVELS if p < level), "")
+    if mark:
+        ax.annotate(
+            "",
+            (x - BAR_WIDTH / 2, top),
+            (x + BAR_WIDTH / 2, top),
+            arrowprops={
+                "arrowstyle": "-",
+                "connectionstyle": "bar,fraction=0.25",
+                "shrinkB": 3,
+                "shrinkA": 3,
+            },
+        )
+        ax.annotate(
+            mark, (x, top), xytext=(0, 8), textcoords="offset points", ha="center", va="bottom"
+        )
+
+
+def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool) -> Figure:
+    """Who was taken for whom, full beside simplified (PAPER fig. 10)."""
+    figure = Figure(figsize=(12.5, 6.2), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for panel, ax, model in zip("ab", axes, MODELS, strict=True):
+        plot_confusion(matrices[model], simulated=simulated, ax=ax)
+        ax.set_title(f"({panel}) {model} model", loc="left")
+    axes[1].set_ylabel("")
+    bar = figure.colorbar(axes[1].images[0], ax=axes, shrink=0.8, pad=0.01)
+    bar.set_label("share of the row's answers (%)")
+    chance = 1 / len(matrices["full"].textures)
+    figure.supxlabel(
+        f"rows: real surface presented; columns: virtual surface answered; each row adds up to "
+        f"100%; chance {chance:.1%}; in brackets: number of answers",
+        fontsize=9,
+        color=GREY,
+    )
+    return figure
+
+
+def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """One confusion matrix: row shares in per cent with counts."""
+    ax = axes_or_new(ax)
+    shares = 100 * matrix.row_shares
+    ax.imshow(shares, vmin=0, vmax=100, cmap="Blues", aspect="auto")
+    for (row, column), share in np.ndenumerate(shares):
+        text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
+        shade = "black" if not share > 55 else "white"
+        shade = shade if np.isfinite(share) else GREY
+        ax.text(column, row, text, ha="center", va="center", fontsize=9, color=shade)
+    names = list(matrix.textures)
+    ax.set_xticks(range(len(names)), names, rotation=30, ha="right")
+    ax.set_yticks(range(len(names)), names)
+    ax.set_xlabel("virtual surface answered")
+    ax.set_ylabel("real surface presented")
+    stamp_if_simulated(ax, simulated)
+    return ax

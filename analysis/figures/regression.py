@@ -1,0 +1,58 @@
+"""The spectral centroid over speed (PAPER fig. 5); draws what it is given and computes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures.drawing import (
+    GREY,
+    LAYER_COLOURS,
+    LAYER_MARKERS,
+    axes_or_new,
+    finish_axes,
+    shared_legend,
+    stamp_if_simulated,
+)
+from analysis.textures.regressions import CentroidCourse
+
+
+def figure_centroid(courses: Sequence[CentroidCourse]) -> Figure:
+    """Spectral centroid over speed, one line per texture, with its regression (PAPER fig. 5)."""
+    figure = Figure(figsize=(8.6, 5), layout="constrained")
+    ax = figure.subplots()
+    plot_centroid(courses, ax=ax)
+    shared_legend(figure, [ax], loc="outside right center", ncols=1)
+    figure.supxlabel(
+        "mean ± standard deviation over the forces; thin dashed lines: regression on speed alone",
+        fontsize=9,
+        color=GREY,
+    )
+    return figure
+
+
+def plot_centroid(courses: Sequence[CentroidCourse], *, ax: Axes | None = None) -> Axes:
+    """Mean over the forces with its standard deviation, and the regression on speed."""
+    ax = axes_or_new(ax)
+    for number, course in enumerate(courses):
+        colour = LAYER_COLOURS[number % 7]
+        ax.errorbar(
+            course.speeds_mm_s,
+            course.mean_hz,
+            course.sd_hz,
+            color=colour,
+            marker=LAYER_MARKERS[(number + number // 7) % 7],
+            lw=1.6,
+            elinewidth=0.9,
+            capsize=3,
+            label=course.texture,
+        )
+        ax.plot(course.speeds_mm_s, course.regression_hz, color=colour, ls="--", lw=0.9)
+    ax.set_xlabel("probing speed (mm/s)")
+    ax.set_ylabel("spectral centroid SC (Hz)")
+    ax.set_ylim(bottom=0)
+    finish_axes(ax)
+    stamp_if_simulated(ax, any(course.simulated for course in courses))
+    return ax

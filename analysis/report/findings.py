@@ -1,0 +1,148 @@
+"""What the recordings of one texture say, and the files that hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.textures.between import distances_to_recordings, joint_fit, left_out_table
+from analysis.textures.recordings import (
+    RecordingLayers,
+    layers_of_recordings,
+    layers_table,
+    model_layers_table,
+    spectra_table,
+)
+from modeling import GridError, Recording, RecordingSet, Spectrum, TextureModel
+from modeling.files.writing import file_stem, write_text
+from modeling.fitting.conditions import only_unit, recording_spectra
+from modeling.fitting.texture import fit_spectra
+
+DOTS_PER_INCH = 110
+
+
+@dataclass(frozen=True, eq=False)
+class Findings:
+    """Layers and spectra of one texture's recordings, and its model if they span a grid.
+
+    Parameters
+    ----------
+    texture, estimator : str
+    measured : sequence of (Recording, Spectrum)
+        Each recording with contact and its spectrum.
+    alone : tuple of RecordingLayers
+        The layers found in each recording alone, where that was asked for or there is no model.
+    model : TextureModel, optional
+        Fitted where the recordings span a grid.
+    why_not : str
+        One sentence, where they do not.
+    quality : DataFrame
+        Level error and distance of the model to its recordings (`textures.between`); empty
+        without a model.
+    left_out : DataFrame, optional
+        The same of conditions that were left out and foretold, where that was asked for.
+    """
+
+    texture: str
+    estimator: str
+    measured: Sequence[tuple[Recording, Spectrum]]
+    alone: tuple[RecordingLayers, ...]
+    model: TextureModel | None
+    why_not: str
+    quality: pd.DataFrame
+    left_out: pd.DataFrame | None
+
+
+def find_in(
+    records: RecordingSet,
+    *,
+    estimator: str,
+    layers: int | None = None,
+    keep_hum: bool = False,
+    check: bool = False,
+    alone: bool = False,
+) -> Findings:
+    """Fit the texture's model where the recordings span a grid, else find each one's layers.
+
+    Parameters
+    ----------
+    records : RecordingSet
+        Of one texture.
+    estimator, layers
+        As in `modeling.fit_texture`.
+    keep_hum : bool
+        As in `modeling.fitting.conditions.recording_spectra`.
+    check : bool
+        Also leave conditions out and foretell them.
+    alone : bool
+        Also find the layers of each recording by itself.
+
+    Raises
+    ------
+    InputError
+        For records that cannot be used, as in `modeling.fit_texture`.
+    """
+    only_unit(records)
+    measured = recording_spectra(records, keep_hum=keep_hum)
+    model, why_not, quality, left_out = None, "", pd.DataFrame(), None
+    try:
+        model = fit_spectra(measured, estimator=estimator, layers=layers)
+        quality = distances_to_recordings(model.peq, measured)
+        if check:
+            left_out = left_out_table(measured, joint_fit(estimator=estimator, layers=layers))
+    except GridError as error:
+        why_not = str(error)
+    each = () if model and not alone else layers_of_recordings(measured, estimator=estimator)
+    return Findings(records.texture, estimator, measured, each, model, why_not, quality, left_out)
+
+
+def save_findings(found: Findings, out: Path, *, plot: bool) -> Path:
+    """Write the tables and the model, if there is one, into `out`; pictures on request.
+
+    Parameters
+    ----------
+    found : Findings
+    out : Path
+        Made if it is not there.
+    plot : bool
+        Also draw spectra of conditions in all parts of the grid, and the layers over the grid.
+
+    Returns
+    -------
+    Path
+        What all files begin with: TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv,
+        TEXTURE_alone.tsv, TEXTURE_check.tsv, TEXTURE_spectra.png and TEXTURE_layers.png.
+    """
+    start = out / file_stem(found.texture)
+    tables = {"spectra": spectra_table(found.measured)}
+    if found.model is not None:
+        tables["layers"] = model_layers_table(found.model)
+    if found.alone:
+        tables["alone"] = layers_table(found.alone)
+    if found.left_out is not None:
+        simulated = any(recording.simulated for recording, _ in found.measured)
+        tables["check"] = found.left_out.assign(texture=found.texture, simulated=simulated)
+    for name, table in tables.items():
+        write_text(f"{start}_{name}.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
+    if found.model is not None:
+        found.model.save(f"{start}.json")
+    if plot:
+        _draw(found, start)
+    return start
+
+
+def _draw(found: Findings, start: Path) -> None:
+    # Late: without pictures there is nothing to load Matplotlib for.
+    from analysis.figures.layers_over_grid import figure_layers_over_grid
+    from analysis.figures.spectra import figure_spectra
+    from analysis.spectra.comparison import spectrum_panels
+    from analysis.spectra.layers_over_grid import layers_over_grid
+
+    panels = spectrum_panels(found.measured, estimator=found.estimator, model=found.model)
+    figure_spectra(panels).savefig(f"{start}_spectra.png", dpi=DOTS_PER_INCH)
+    if found.model is not None:
+        figure = figure_layers_over_grid(layers_over_grid(found.model))
+        figure.savefig(f"{start}_layers.png", dpi=DOTS_PER_INCH)

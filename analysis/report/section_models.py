@@ -1,0 +1,187 @@
+"""The section on models: likeness, verdicts and pictures of each texture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.figures.layer_courses import figure_layer_courses
+from analysis.figures.spectra import figure_spectra_and_threshold
+from analysis.labels import MODELS
+from analysis.report.page import Fold, Item, Picture, Table
+from analysis.report.sections import Progress, Section
+from analysis.report.sentences import left_out_outcomes, simplification_outcomes
+from analysis.spectra.comparison import compare_spectra
+from analysis.spectra.layers_over_grid import layer_course
+from analysis.textures.between import left_out_summary
+from analysis.textures.likeness import gfc_table
+from analysis.textures.results import TextureResult, reference_condition, simplification_table
+from modeling.files.writing import file_stem
+
+GFC_COLUMNS = (
+    *("texture", "model", "layers", "parameters", "gfc30_mean", "gfc30_min", "gfc30_floor"),
+    *("gfc30_ceiling", "gfc5_mean", "gfc5_floor", "gfc5_ceiling", "log_spectral_distance_db"),
+    *("rms_error_db", "band_energy_error_db"),
+)
+VERDICT_COLUMNS = (
+    *("layer", "verdict", "reason", "distance_db", "worst_speed_mm_s", "worst_force_n"),
+    *("worst_frequency_hz", "flip_probability"),
+)
+
+
+def model_section(
+    textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
+) -> Section:
+    """Models, what was dropped, and how alike the spectra stay (PAPER V).
+
+    Parameters
+    ----------
+    textures : sequence of TextureResult
+        At least one.
+    rng : Generator
+        Draws behind the GFC ceilings.
+    progress : callable
+        Called with a share (0–1) and what comes next.
+    """
+    rows, folds = [], []
+    for number, result in enumerate(textures):
+        progress(number / len(textures), f"comparing models of {result.texture}")
+        simplified = result.simplification.model
+        rows.append(gfc_table(result.recordings, result.model, simplified, rng=rng))
+        folds.append(_texture_fold(result, number=number))
+    gfc = pd.concat(rows, ignore_index=True)
+    table = Table(
+        "gfc",
+        "Simplification rate and quality",
+        "Means over the recorded conditions. GFC30, GFC5: likeness of the model's response and the "
+        "recording's spectrum, both smoothed with σ = 30 or 5 Hz; floor: white noise of equal RMS; "
+        "ceiling: draws of the recording's own smoothed spectrum. "
+        "RMS error and band energy error: means of absolute values. Cf. the paper's table 3.",
+        gfc,
+        any(result.simulated for result in textures),
+        GFC_COLUMNS,
+    )
+    left_out = left_out_summary(textures)
+    foretold = _left_out_items(left_out, simulated=any(r.simulated for r in textures))
+    return Section(
+        "models",
+        "Models and their simplification",
+        (table, *foretold, *folds),
+        outcomes=(
+            *simplification_outcomes(gfc),
+            *left_out_outcomes(left_out),
+        ),
+        done=_models_done(textures),
+        tiles=_model_tiles(gfc),
+    )
+
+
+def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ...]:
+    if not len(summary):
+        return ()
+    table = Table(
+        "left_out",
+        "Conditions foretold that the model was not shown",
+        "A hand is hardly ever at a recorded condition. Every second condition was left out and "
+        "foretold from its neighbours, by the model and by an autoregressive one. Level error "
+        "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) to the "
+        "recording that was left out, whose own scatter is in them.",
+        summary,
+        simulated,
+    )
+    return (table,)
+
+
+def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
+    simplification = textures[0].simplification
+    threshold = simplification.threshold
+    contact = [r for result in textures for r in result.recordings.recordings if r.force_n > 0]
+    simulated = sum(r.simulated for r in contact)
+    estimators = ", ".join(sorted({result.model.estimator for result in textures}))
+    whose = "simulated " if simulated == len(contact) else ""
+    part = f", {simulated} of them simulated" if simulated and not whose else ""
+    return (
+        f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to "
+        f"{len(contact)} {whose}recordings{part} (estimator {estimators}). A layer was "
+        f"dropped only where it lies below the threshold “{threshold.name}” in every condition "
+        f"(criterion “{simplification.criterion}”, margin {simplification.margin_db:g} dB).",
+        f"Source of the threshold “{threshold.name}”: {threshold.source.rstrip('.')}. Caveat: "
+        f"{threshold.caveat.rstrip('.')}.",
+    )
+
+
+def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
+    full, simple = (gfc[gfc["model"] == model] for model in MODELS)
+    floor, ceiling = full["gfc30_floor"].mean(), full["gfc30_ceiling"].mean()
+    return (
+        (f"{full['layers'].sum()} → {simple['layers'].sum()}", "layers, full → simplified"),
+        (
+            f"{full['gfc30_mean'].mean():.3f} → {simple['gfc30_mean'].mean():.3f}",
+            f"mean GFC30, full → simplified (floor {floor:.3f}, ceiling {ceiling:.3f})",
+        ),
+    )
+
+
+def _texture_fold(result: TextureResult, *, number: int) -> Fold:
+    stem = f"{number + 1}_{file_stem(result.texture)}"
+    verdicts = Table(
+        f"verdicts_{stem}",
+        f"{result.texture}: verdict on each layer",
+        "Distance to the threshold in the condition where the layer stands highest against it "
+        "(+ above); flip probability: chance that the level's sampling error, which the records' "
+        "length leaves, would turn the verdict in other records; whether the estimator would find "
+        f"the layer again, and its bias, are not in it.{_unresolved_note(result)}",
+        simplification_table(result.simplification),
+        result.simulated,
+        VERDICT_COLUMNS,
+    )
+    kept, all_layers = result.simplification.model.n_layers, result.model.n_layers
+    return Fold(
+        f"{result.texture}: {kept} of {all_layers} layers kept",
+        (verdicts, _threshold_picture(result, stem), _course_picture(result, stem)),
+        opened=number == 0,
+    )
+
+
+def _unresolved_note(result: TextureResult) -> str:
+    unresolved = result.model.unresolved
+    if not unresolved.any():
+        return ""
+    return (
+        f" In {unresolved.sum()} of {unresolved.size} layer-conditions (a layer in a condition) "
+        "the full model's width or level is not resolved by the 30 Hz smoothing."
+    )
+
+
+def _threshold_picture(result: TextureResult, stem: str) -> Picture:
+    speed_mm_s, force_n = reference_condition(result)
+    comparison = compare_spectra(result, speed_mm_s=speed_mm_s, force_n=force_n)
+    return Picture(
+        f"threshold_{stem}",
+        f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
+        "Above: smoothed spectrum of the recording and of each model; thin lines: each layer "
+        "alone, and in black the gain at which it would be just felt. Below: each layer's "
+        "amplitude by the criterion against the threshold; open crosses mark dropped layers. A "
+        "layer may lie below the threshold here and yet be kept, because another condition, its "
+        "uncertainty or the sum of the dropped layers decides. Cf. the paper's figure 6.",
+        figure_spectra_and_threshold(comparison),
+        result.simulated,
+    )
+
+
+def _course_picture(result: TextureResult, stem: str) -> Picture:
+    force_n = reference_condition(result)[1]
+    courses = [layer_course(result.model, force_n=force_n)]
+    note = "Frequency and amplitude of each layer."
+    if result.truth is not None and force_n in result.truth.forces_n:
+        courses.append(layer_course(result.truth, force_n=force_n))
+        note += " Dashed: what was planted."
+    return Picture(
+        f"layers_{stem}",
+        f"{result.texture}: layers over speed at {force_n:g} N",
+        note,
+        figure_layer_courses(courses),
+        result.simulated,
+    )

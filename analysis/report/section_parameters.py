@@ -1,0 +1,164 @@
+"""What the report says about the parameters' response to speed and force (PAPER IV, IX-B)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.figures.regression import figure_centroid
+from analysis.report.page import Fold, Item, Picture, Table
+from analysis.report.sections import Progress, Section
+from analysis.report.sentences import driving_outcomes, regression_outcomes
+from analysis.textures.regressions import (
+    NAMES,
+    centroid_amplitude_table,
+    centroid_courses,
+    centroid_table,
+    coefficient_table,
+    driving_table,
+    regression_table,
+    support_table,
+)
+from analysis.textures.results import TextureResult
+from modeling import TextureModel
+
+REGRESSION_COLUMNS = (
+    *("texture", "parameter", "peak", "conditions", "inherited", "multiple_r"),
+    *("adjusted_r_squared", "p", "mark", "reduced"),
+)
+CENTROID_COLUMNS = (
+    *("texture", "mean_centroid_hz", "multiple_r", "adjusted_r_squared", "p", "mark"),
+    *("speed_coefficient", "p_speed", "force_coefficient", "p_force", "speed_force_coefficient"),
+    *("p_speed_force", "slope_speed_alone", "p_speed_alone", "amplitude_r", "p_amplitude"),
+)
+DRIVING_COLUMNS = (
+    *("texture", "driven_by", "numbers", "gfc30_mean", "gfc30_floor", "gfc30_ceiling"),
+    *("oracle_gap", "log_spectral_distance_db", "rms_error_db", "band_energy_error_db"),
+)
+AMPLITUDE_COLUMNS = ("texture", "peak", "conditions", "amplitude_r", "p_amplitude", "mark")
+NO_CORRECTION = "The paper corrects for no multiple testing, and neither does this table."
+
+
+def parameter_section(
+    textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
+) -> Section:
+    """Regressions of the full models' parameters, and the models that they drive (METHOD 6).
+
+    Parameters
+    ----------
+    textures : sequence of TextureResult
+        At least one.
+    rng : Generator
+        Draws behind the GFC ceilings.
+    progress : callable
+        Called with a share (0–1) and what comes next.
+    """
+    models = [result.model for result in textures]
+    simulated = any(result.simulated for result in textures)
+    progress(0.0, "regressing parameters on speed and force")
+    found = regression_table(models)
+    support = support_table(found)
+    progress(0.3, "driving models by regressions")
+    driving = driving_table(textures, rng=rng)
+    return Section(
+        "parameters",
+        "What the parameters say",
+        (
+            *_parameter_tables(found, support, simulated=simulated),
+            *_centroid_items(models, simulated=simulated),
+            _driving_table(driving, simulated=simulated),
+        ),
+        outcomes=(
+            *regression_outcomes(support),
+            *driving_outcomes(driving),
+        ),
+    )
+
+
+def _parameter_tables(
+    found: pd.DataFrame, support: pd.DataFrame, *, simulated: bool
+) -> tuple[Item, ...]:
+    validity = Table(
+        "regressions",
+        "Regressions of each parameter by peak",
+        "P = β + α1·v + α2·F + α3·v·F by ordinary least squares over the recorded conditions; a "
+        "frequency that a condition inherited is a copy and left out of the frequency's. p: F test "
+        "of the model. * p < .05, ** p < .01, *** p < .001. Reduced: the terms that are left when "
+        "the least significant one is dropped until all have p < .05; an interaction may stay "
+        "without its main effects. n/a: nothing varies, or no residual degree of freedom. "
+        f"{NO_CORRECTION} Coefficients are in the file. Cf. the paper's table 1.",
+        found.assign(parameter=found["parameter"].map(NAMES)),
+        simulated,
+        REGRESSION_COLUMNS,
+    )
+    ratings = Table(
+        "regression_support",
+        "Support ratings beside the published ones",
+        "Share of the layers (for the noise gain: of the textures) whose coefficient has p < .05 "
+        "in the full regression, and mean adjusted R². Published: from other surfaces, by the "
+        f"paper's own estimator. {NO_CORRECTION} Cf. the paper's table 2.",
+        support,
+        simulated,
+    )
+    coefficients = Table(
+        "regression_coefficients",
+        "Mean coefficients beside the published ones",
+        "Means over layers (for the noise gain: over textures) of the full regressions. Gains are "
+        "per unit noise. The published coefficients name no units; their sizes suggest forces in "
+        "mN, so the last column multiplies those of F and v·F by 1000; the unit of the published "
+        "amplitudes and noise gains is unknown. Cf. the paper's table 2.",
+        coefficient_table(found),
+        simulated,
+    )
+    return ratings, coefficients, Fold("Regressions of each parameter by peak", (validity,))
+
+
+def _centroid_items(models: Sequence[TextureModel], *, simulated: bool) -> tuple[Item, ...]:
+    """Figure 5 and its numbers; nothing where no texture has a layer."""
+    courses = centroid_courses(models)
+    if not courses:
+        return ()
+    picture = Picture(
+        "centroid",
+        "Response of the spectral centroid to the probing speed",
+        "SC = Σ G²f / Σ G² over the layers; mean ± standard deviation over the forces at each "
+        "speed. Dashed: regression on speed alone. Cf. the paper's figure 5.",
+        figure_centroid(courses),
+        simulated,
+    )
+    table = Table(
+        "centroid",
+        "Regressions of the spectral centroid",
+        "SC in Hz on speed, force and their product, and on speed alone; Pearson's r of SC with "
+        f"the amplitude √ΣG² over the conditions (published: above 0.6). {NO_CORRECTION}",
+        centroid_table(models),
+        simulated,
+        CENTROID_COLUMNS,
+    )
+    by_peak = Table(
+        "centroid_amplitude",
+        "Correlation of the spectral centroid with the amplitude of each peak",
+        f"Pearson's r over the recorded conditions. {NO_CORRECTION}",
+        centroid_amplitude_table(models),
+        simulated,
+        AMPLITUDE_COLUMNS,
+    )
+    return picture, table, Fold("Centroid and amplitude by peak", (by_peak,))
+
+
+def _driving_table(driving: pd.DataFrame, *, simulated: bool) -> Table:
+    return Table(
+        "driving",
+        "Models driven by the grid, by regressions and by the centroid",
+        "Numbers: stored in all; of regressions only the coefficients that are not 0. conditions: "
+        "reduced regressions on speed, force and their product. centroid: SC as a straight line in "
+        "speed and every parameter as one in SC (PAPER IX-B); force then changes nothing, nor does "
+        "speed where SC shows no significant response to it. All three are held against the very "
+        "recordings that they were fitted to. Measures as in the table of simplification rate and "
+        "quality; oracle gap: 1 − GFC30/ceiling.",
+        driving,
+        simulated,
+        DRIVING_COLUMNS,
+    )

@@ -1,0 +1,88 @@
+"""The section on planted textures: what was found of the layers that are there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from analysis.labels import ALL_LAYERS
+from analysis.report.page import Fold, Item, Table
+from analysis.report.sections import Section
+from analysis.report.sentences import planted_outcomes
+from analysis.textures.between import planted_between_table
+from analysis.textures.recovery import planted_layers_table, planted_truth_table
+from analysis.textures.results import TextureResult, reference_condition
+from stimuli.planted.textures import TEXTURES
+
+
+def planted_section(textures: Sequence[TextureResult]) -> Section:
+    """How well the estimators find what was planted; every texture has a truth."""
+    scores, layers = [], []
+    for result in textures:
+        assert result.truth is not None
+        estimates = (result.model, *result.other_estimates)
+        scores.append(planted_truth_table(result.truth, estimates))
+        speed_mm_s, force_n = reference_condition(result)
+        layers += [
+            planted_layers_table(result.truth, model, speed_mm_s=speed_mm_s, force_n=force_n)
+            for model in estimates
+        ]
+    score = pd.concat(scores, ignore_index=True)
+    tables = _planted_tables(score, pd.concat(layers, ignore_index=True))
+    between = _planted_between(textures)
+    return Section(
+        "planted",
+        "Planted truth",
+        (tables[0], *between, *tables[1:]),
+        outcomes=tuple(planted_outcomes(score)),
+    )
+
+
+def _planted_between(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
+    known = [result for result in textures if result.texture in TEXTURES]
+    if not known:
+        return ()
+    table = Table(
+        "planted_between",
+        "Distance to the planted spectrum at the conditions and between them",
+        "RMS of the log ratio of the two responses over all conditions (15 Hz to 0.96 of the "
+        "Nyquist frequency, unsmoothed), at the recorded conditions and half-way between four of "
+        "them, where the truth is known by its formula; level errors are those half-way between.",
+        planted_between_table(known),
+        simulated=True,
+    )
+    return (table,)
+
+
+def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ...]:
+    found = Table(
+        "planted_truth",
+        "Planted layers found",
+        "Planted and estimated layers are paired one to one within max(B/2, 10 Hz) in every "
+        "condition. Precision: share of the estimated layers nearest to this planted layer that "
+        "have a partner; recall: share of the conditions in which it was found; median errors over "
+        "the pairs. Levels compare |G| at one rate.",
+        score,
+        simulated=True,
+    )
+    overall = Table(
+        "planted_overall",
+        "Planted layers found, by texture",
+        "The rows for all layers of the table below; its caption explains the columns.",
+        score[score["layer"] == ALL_LAYERS].drop(columns="layer"),
+        simulated=True,
+    )
+    detail = Table(
+        "planted_layers",
+        "Planted and estimated parameters, layer by layer",
+        "At the strongest force and highest speed of each texture; gains are |G| at the planted "
+        "model's rate; surplus: estimated where nothing was planted.",
+        layers,
+        simulated=True,
+    )
+    return (
+        overall,
+        Fold("Layer by layer", (detail,), opened=True),
+        Fold("Scores by estimator and layer", (found,)),
+    )

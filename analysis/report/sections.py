@@ -1,0 +1,40 @@
+"""What a section of the report is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import pandas as pd
+
+from analysis.report.page import Item
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Section:
+    """One part of the report.
+
+    Parameters
+    ----------
+    anchor, heading : str
+    items : tuple of Table, Picture or Fold
+        In the order of the page.
+    outcomes : tuple of str
+        What came out, one sentence each, computed from the numbers.
+    done : tuple of str
+        What was done.
+    tiles : tuple of (str, str)
+        Key figures: value, and what it is.
+    tests : DataFrame, optional
+        The paired tests shown here.
+    """
+
+    anchor: str
+    heading: str
+    items: tuple[Item, ...]
+    outcomes: tuple[str, ...] = ()
+    done: tuple[str, ...] = ()
+    tiles: tuple[tuple[str, str], ...] = ()
+    tests: pd.DataFrame | None = None

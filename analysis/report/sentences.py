@@ -1,0 +1,259 @@
+"""What the tables say, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES, MODELS, SCALES
+from analysis.report.page import p_value
+from analysis.statistics.confusion import ConfusionMatrix
+
+ALPHA = 0.05
+
+
+def rating_outcomes(tests: pd.DataFrame) -> list[str]:
+    """One sentence per rating scale, from `statistics.rating_tests`."""
+    return [
+        f"Rated similarity of {scale}: "
+        + _differences(tests[tests["scale"] == scale], unit="points", factor=1.0)
+        for scale in SCALES.values()
+    ]
+
+
+def rate_outcomes(
+    rates: pd.DataFrame, tests: pd.DataFrame, *, matrices: Mapping[str, ConfusionMatrix]
+) -> list[str]:
+    """Sentences on the forced choice, from the three results of `statistics`."""
+    sentences = []
+    for model in MODELS:
+        chosen = rates[rates["model"] == model]
+        if not chosen.empty:
+            chance = 1 / len(matrices[model].textures)
+            sentences.append(_against_chance(chosen, model=model, chance=chance))
+            sentences.extend(_strongest_confusion(matrices[model]))
+    family = tests[tests["texture"] != ALL_TEXTURES]
+    sentences.append(
+        "Correct rates: " + _differences(family, unit="percentage points", factor=100.0)
+    )
+    return sentences
+
+
+def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
+    """Sentences on what was dropped and what it cost, from `tables.gfc_table` rows."""
+    full = gfc[gfc["model"] == "full"].set_index("texture")
+    simple = gfc[gfc["model"] == "simplified"].set_index("texture")
+    dropped = full["layers"] - simple["layers"]
+    loss = full["gfc30_mean"] - simple["gfc30_mean"]
+    sentences = [
+        f"Simplification dropped {dropped.sum()} of {full['layers'].sum()} layers, in "
+        f"{(dropped > 0).sum()} of {len(full)} textures; the models need "
+        f"{simple['parameters'].sum()} instead of {full['parameters'].sum()} numbers per "
+        "condition.",
+        f"GFC30 (mean over conditions and textures) is {full['gfc30_mean'].mean():.4f} with the "
+        f"full and {simple['gfc30_mean'].mean():.4f} with the simplified models; white noise of "
+        f"equal RMS scores {full['gfc30_floor'].mean():.4f}, and the recordings' own smoothed "
+        f"spectra {full['gfc30_ceiling'].mean():.4f} against draws of themselves.",
+    ]
+    if (dropped > 0).any():
+        change = -loss[dropped > 0].sort_values(ascending=False)
+        sentences.append(
+            f"Where layers were dropped, GFC30 changed by {_signed(change.iloc[0], 4)} "
+            f"({change.index[0]}) to {_signed(change.iloc[-1], 4)} ({change.index[-1]})."
+        )
+    return sentences
+
+
+def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
+    """How well conditions are foretold, from `between.left_out_summary`; none without any."""
+    sentences = []
+    for name, rows in summary.groupby("foretold_by", sort=False) if len(summary) else ():
+        worst = rows.iloc[int(rows["worst_level_error_db"].abs().to_numpy().argmax())]
+        sentences.append(
+            f"Conditions that were left out are foretold by {name} with a level error of "
+            f"{rows['median_level_error_db'].median():.2f} dB (median over textures; at worst "
+            f"{_signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
+            f"{worst['worst_level_error_at']}) and a log-spectral distance of "
+            f"{rows['median_distance_db'].median():.2f} dB."
+        )
+    return sentences
+
+
+def regression_outcomes(support: pd.DataFrame) -> list[str]:
+    """How well speed and force explain the parameters, from `regressions.support_table`."""
+    explained = "; ".join(
+        f"{row['parameter']} {row['adjusted_r_squared']:.2f} "
+        f"({row['published_adjusted_r_squared']:.2f})"
+        for row in support.to_dict("records")
+        if np.isfinite(row["adjusted_r_squared"])
+    )
+    if not explained:
+        return []
+    return [
+        "Regressions on speed, force and their product: mean adjusted R² (in brackets the "
+        f"published one) {explained}."
+    ]
+
+
+def driving_outcomes(driving: pd.DataFrame) -> list[str]:
+    """What the grid's numbers buy, from `regressions.driving_table`; means over the textures."""
+    overall = driving[driving["texture"] == ALL_TEXTURES]
+    ways = {"grid": "the grid", "conditions": "regressions", "centroid": "the centroid alone"}
+    shown = [
+        f"{ways[row['driven_by']]} {row['numbers']:.0f} numbers, GFC30 {row['gfc30_mean']:.4f}, "
+        f"log-spectral distance {row['log_spectral_distance_db']:.2f} dB"
+        for row in overall.to_dict("records")
+    ]
+    return [f"A full model driven by (means over the textures): {'; '.join(shown)}."] * bool(shown)
+
+
+def planted_outcomes(planted: pd.DataFrame) -> list[str]:
+    """One sentence per estimator, from `planted.planted_truth_table` rows; means over textures."""
+    overall = planted[planted["layer"] == ALL_LAYERS]
+    return [
+        _planted_outcome(str(estimator), rows)
+        for estimator, rows in overall.groupby("estimator", sort=False)
+    ]
+
+
+def _planted_outcome(estimator: str, rows: pd.DataFrame) -> str:
+    if not rows["recall"].any():
+        return f"The estimator {estimator} found 0% of the planted layers."
+    return (
+        f"The estimator {estimator} found {rows['recall'].mean():.0%} of the planted layers, and "
+        f"{rows['precision'].mean():.0%} of the layers it reports were planted; median errors: "
+        f"{rows['median_frequency_error_hz'].mean():.1f} Hz in frequency, a factor of "
+        f"{rows['median_bandwidth_ratio'].mean():.2f} in bandwidth, "
+        f"{_signed(rows['median_level_error_db'].mean(), 1)} dB in level, "
+        f"{_signed(rows['median_noise_gain_error_db'].mean(), 1)} dB in noise gain (medians over "
+        f"the conditions, averaged over {len(rows)} texture{'s' * (len(rows) != 1)})."
+    )
+
+
+def cautions(
+    families: Sequence[pd.DataFrame],
+    *,
+    simulated_participants: bool,
+    simulated_rig: bool,
+    models: bool,
+) -> list[str]:
+    """What may not be concluded.
+
+    Parameters
+    ----------
+    families : sequence of DataFrame
+        Paired tests that the report shows, from `statistics`.
+    simulated_participants, simulated_rig : bool
+        Whether the answers are simulated, and whether the rig was.
+    models : bool
+        Whether the report shows likeness of spectra.
+    """
+    sentences = []
+    if families and simulated_participants:
+        sentences.append(
+            "Simulated participants follow a model that was written down beforehand: their "
+            "answers test the procedure and say nothing about what people feel."
+        )
+    elif families and simulated_rig:
+        sentences.append(
+            "The participants are people, but the rig was simulated and nobody felt a real "
+            "surface: their answers test the procedure and say nothing about what people feel."
+        )
+    if families:
+        unshown = sum(int((tests["p_holm"] >= ALPHA).sum()) for tests in families)
+        sentences.append(
+            f"A t-test that is not significant ({unshown} here) does not show that full and "
+            "simplified models are equal; showing that takes an equivalence test with a bound "
+            "fixed before the data, which is not part of this version."
+        )
+    named = {name for tests in families for cell in tests["excluded"] for name in cell.split(", ")}
+    missing = sorted(named - {""})
+    if missing:
+        sentences.append(
+            "Some pairs are incomplete; these participants are left out of at least one "
+            f"comparison: {', '.join(missing)}."
+        )
+    if models:
+        sentences.append(
+            "GFC judges the shape of a spectrum, not its level, and even white noise scores high: "
+            "read it between its floor and its ceiling, beside the distances in dB."
+        )
+    return sentences
+
+
+def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
+    """Which textures differ between the models, after Holm."""
+    count = len(tests)
+    different = tests[tests["p_holm"] < ALPHA]
+    undefined = tests[tests["p_holm"].isna()]
+    rest = count - len(different) - len(undefined)
+    if different.empty:
+        text = f"no difference between the models was shown in any of {count} textures"
+    else:
+        shown = "; ".join(
+            f"{row['texture']} {_signed(factor * row['mean_difference'], 1)} {unit} (95% CI "
+            f"{_signed(factor * row['ci_low'], 1)} to {_signed(factor * row['ci_high'], 1)}, "
+            f"t({row['df']}) = {_signed(row['t'], 2)}, Holm p {_p(row['p_holm'])}, "
+            f"d_z = {_signed(row['d_z'], 2)})"
+            for row in different.to_dict("records")
+        )
+        text = f"simplified and full models differ in {len(different)} of {count} textures: {shown}"
+        if rest:
+            text += f"; no difference was shown in the other {rest}"
+    if not undefined.empty:
+        text += f"; the test is undefined for {_names(undefined['texture'])} (see the notes)"
+    return text + "."
+
+
+def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
+    overall = rates[rates["texture"] == ALL_TEXTURES].iloc[0]
+    family = rates[rates["texture"] != ALL_TEXTURES]
+    significant = family["p_holm"] < ALPHA
+    above = family[significant & (family["mean"] > chance)]
+    below = family[significant & (family["mean"] < chance)]
+    interval = "no interval, for want of variation between participants"
+    if not overall["note"]:
+        interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"
+    text = (
+        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right "
+        f"({interval}; participants: {overall['participants']}; chance {chance:.1%}); above chance "
+        f"after Holm: {_names(above['texture'])}"
+    )
+    if not below.empty:
+        text += f"; below chance: {_names(below['texture'])}"
+    unclear = family[~significant & family["p_holm"].notna()]
+    if not unclear.empty:
+        text += f"; not told from chance: {_names(unclear['texture'])}"
+    undefined = family[family["p_holm"].isna()]
+    if not undefined.empty:
+        text += f"; test undefined (see the notes): {_names(undefined['texture'])}"
+    return text + "."
+
+
+def _strongest_confusion(matrix: ConfusionMatrix) -> list[str]:
+    wrong = matrix.counts.copy()
+    np.fill_diagonal(wrong, 0)
+    if not wrong.any():
+        return []
+    shares = np.where(wrong > 0, matrix.row_shares, 0.0)
+    row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
+    return [
+        f"Most frequent confusion with the {matrix.model} model: {matrix.textures[row]} was taken "
+        f"for {matrix.textures[column]} in {shares[row, column]:.0%} of its trials "
+        f"({wrong[row, column]} answers)."
+    ]
+
+
+def _names(textures: Sequence[str] | pd.Series) -> str:
+    return ", ".join(textures) or "none"
+
+
+def _signed(value: float, digits: int) -> str:
+    return f"{value:+.{digits}f}".replace("-", "−")
+
+
+def _p(p: float) -> str:
+    shown = p_value(p)
+    return shown if shown.startswith("<") else f"= {shown}"

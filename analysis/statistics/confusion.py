@@ -1,0 +1,64 @@
+"""Confusion matrices of the relative task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.labels import MODELS
+from modeling.arrays import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ConfusionMatrix:
+    """Answers of the forced choice for one model.
+
+    Parameters
+    ----------
+    model : str
+        full or simplified.
+    textures : (k,) tuple of str
+        Names of rows and columns.
+    counts : (k, k) ndarray of int
+        Row: the real surface presented; column: the virtual surface answered.
+    """
+
+    model: str
+    textures: tuple[str, ...]
+    counts: NDArray[np.int64]
+
+    @property
+    def row_shares(self) -> Floats:
+        """(k, k) shares of a row's answers, each row adding up to 1; NaN in rows without any."""
+        totals = self.counts.sum(axis=1, keepdims=True)
+        shares = np.full(self.counts.shape, np.nan)
+        np.divide(self.counts, totals, out=shares, where=totals > 0)
+        return shares
+
+
+def confusion_matrices(relative: pd.DataFrame) -> dict[str, ConfusionMatrix]:
+    """Count who was taken for whom, for the full and the simplified model (PAPER fig. 10).
+
+    Parameters
+    ----------
+    relative : DataFrame
+        `Responses.relative`; trials without an answer are left out.
+
+    Returns
+    -------
+    dict
+        By model, both over the same textures: all that were presented or on offer.
+    """
+    answered = relative[relative["answer"].notna()]
+    offered = {name for layout in answered["layout"] for name in str(layout).split("|")}
+    textures = tuple(sorted(offered | set(answered["texture"]), key=str.casefold))
+    matrices = {}
+    for model in MODELS:
+        chosen = answered[answered["model"] == model]
+        counts = pd.crosstab(chosen["texture"], chosen["answer"])
+        square = counts.reindex(index=list(textures), columns=list(textures), fill_value=0)
+        matrices[model] = ConfusionMatrix(model, textures, square.to_numpy(dtype=np.int64))
+    return matrices

@@ -1,0 +1,222 @@
+"""Paired t-tests of full and simplified models, with effect sizes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+from scipy import special, stats
+
+from analysis.labels import MODELS, SCALES
+from modeling import InputError
+from modeling.arrays import Floats
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class PairedTest:
+    """Full against simplified model over the participants who gave both.
+
+    Differences are simplified − full, in the unit of the values. `ci_*` is the 95 % confidence
+    interval of the mean difference; `d_z` is the mean difference over the standard deviation of
+    the differences. What cannot be computed is NaN and `note` says why.
+    """
+
+    n: int
+    mean_full: float
+    se_full: float
+    mean_simplified: float
+    se_simplified: float
+    mean_difference: float
+    ci_low: float
+    ci_high: float
+    t: float
+    df: int
+    p: float
+    d_z: float
+    d_z_low: float
+    d_z_high: float
+    shapiro_p: float
+    wilcoxon_w: float
+    wilcoxon_p: float
+    note: str
+
+
+def paired_test(full: ArrayLike, simplified: ArrayLike) -> PairedTest:
+    """Paired t-test, effect size d_z and Wilcoxon signed-rank test (METHOD 12).
+
+    Parameters
+    ----------
+    full, simplified : (n,) array_like
+        One finite value per participant, in the same order.
+
+    Returns
+    -------
+    PairedTest
+        With t undefined (fewer than two pairs, or all differences equal) t, p, d_z and the
+        interval are NaN.
+
+    Raises
+    ------
+    InputError
+        For different lengths or values that are not finite.
+    """
+    before, after = np.asarray(full, dtype=float), np.asarray(simplified, dtype=float)
+    if before.shape != after.shape or before.ndim != 1 or not np.isfinite(before + after).all():
+        raise InputError(
+            f"expected two lists of finite values of one length, got shapes {before.shape} and "
+            f"{after.shape}; leave participants out of both where one value is missing."
+        )
+    differences = without_rounding_noise(after - before)
+    undefined = why_undefined(differences)
+    t, p, low, high = (np.nan,) * 4 if undefined else t_test(differences)
+    d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, differences.size)
+    wilcoxon_w, wilcoxon_p = _wilcoxon(differences)
+    return PairedTest(
+        n=before.size,
+        mean_full=mean(before),
+        se_full=standard_error(before),
+        mean_simplified=mean(after),
+        se_simplified=standard_error(after),
+        mean_difference=mean(differences),
+        ci_low=low,
+        ci_high=high,
+        t=t,
+        df=max(before.size - 1, 0),
+        p=p,
+        d_z=float(t / np.sqrt(differences.size)) if differences.size else np.nan,
+        d_z_low=d_low,
+        d_z_high=d_high,
+        shapiro_p=_shapiro(differences),
+        wilcoxon_w=wilcoxon_w,
+        wilcoxon_p=wilcoxon_p,
+        note=undefined,
+    )
+
+
+def standard_error(values: Floats) -> float:
+    """Standard deviation over √n; NaN below two values."""
+    return float(stats.sem(values)) if values.size > 1 else float("nan")
+
+
+def d_z_interval(t: float, n: int, *, confidence: float = CONFIDENCE) -> tuple[float, float]:
+    """Confidence interval of d_z = t/√n by inverting the noncentral t distribution.
+
+    Parameters
+    ----------
+    t : float
+        Paired t value.
+    n : int
+        Pairs, ≥ 2.
+    confidence : float
+        0 … 1.
+
+    Notes
+    -----
+    Steiger and Fouladi (1997): the limits are the noncentralities that put the observed t at the
+    upper and lower tail.
+    """
+    tail = (1 - confidence) / 2
+    low, high = special.nctdtrinc(n - 1, [1 - tail, tail], t) / np.sqrt(n)
+    return float(low), float(high)
+
+
+def holm(p_values: ArrayLike) -> Floats:
+    """Holm-adjusted p values; NaN (a test that could not be made) stays outside the family."""
+    from pingouin import multicomp  # late: it takes a second to import
+
+    p = np.asarray(p_values, dtype=float)
+    if np.isnan(p).all():
+        return p.copy()
+    adjusted: Floats = np.asarray(multicomp(p, method="holm")[1], dtype=float)
+    return adjusted
+
+
+def rating_tests(absolute: pd.DataFrame) -> pd.DataFrame:
+    """Paired tests of both rating scales (PAPER VIII-A), Holm over the textures of a scale.
+
+    Parameters
+    ----------
+    absolute : DataFrame
+        `Responses.absolute`; ratings 0–100.
+
+    Returns
+    -------
+    DataFrame
+        One row per scale and texture: scale, texture, the fields of `PairedTest`, p_holm, and
+        excluded (participants without both values, by name).
+    """
+    families = [
+        paired_family(absolute, column).assign(scale=scale) for column, scale in SCALES.items()
+    ]
+    return columns_first(
+        pd.concat(families, ignore_index=True), ["scale", "texture", "n", "excluded"]
+    )
+
+
+def paired_family(table: pd.DataFrame, column: str) -> pd.DataFrame:
+    """Test every texture of a table; the Holm family is these textures."""
+    rows = []
+    for texture, cells in table.groupby("texture", sort=False):
+        means = cells.pivot_table(
+            index="participant_id", columns="model", values=column, aggfunc="mean", dropna=False
+        ).reindex(columns=list(MODELS))
+        # Named against everybody in the table, so that a whole missing cell is seen too.
+        means = means.reindex(sorted(table["participant_id"].unique()))
+        both = means.dropna()
+        result = asdict(paired_test(both["full"], both["simplified"]))
+        excluded = ", ".join(means.index.difference(both.index))
+        rows.append({"texture": texture, **result, "excluded": excluded})
+    if not rows:
+        raise InputError(f"expected answers in column {column}, got none; run a session first.")
+    family = pd.DataFrame(rows).sort_values("texture", key=ignoring_case)
+    return family.assign(p_holm=holm(family["p"]))
+
+
+def t_test(differences: Floats) -> tuple[float, float, float, float]:
+    """t, two-sided p and the confidence limits of the mean."""
+    result = stats.ttest_1samp(differences, 0.0)
+    interval = result.confidence_interval(CONFIDENCE)
+    return float(result.statistic), float(result.pvalue), float(interval.low), float(interval.high)
+
+
+def _wilcoxon(differences: Floats) -> tuple[float, float]:
+    if not differences.any():
+        return float("nan"), float("nan")
+    result = stats.wilcoxon(differences)
+    return float(result.statistic), float(result.pvalue)
+
+
+def _shapiro(differences: Floats) -> float:
+    if differences.size < 3 or np.ptp(differences) == 0:
+        return float("nan")
+    return float(stats.shapiro(differences).pvalue)
+
+
+def without_rounding_noise(differences: Floats) -> Floats:
+    """Make 2/3 − 1/3 and 1 − 2/3 the same number, so that ties and zero variance are seen."""
+    rounded: Floats = np.round(differences, 12)
+    return rounded
+
+
+def why_undefined(differences: Floats) -> str:
+    if differences.size < 2:
+        return f"t undefined: {differences.size} participant(s)"
+    if np.ptp(differences) == 0:
+        return "t undefined: no variation between participants"
+    return ""
+
+
+def mean(values: Floats) -> float:
+    return float(values.mean()) if values.size else float("nan")
+
+
+def columns_first(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
+    return table[names + [name for name in table if name not in names]]
+
+
+def ignoring_case(column: pd.Series) -> pd.Series:
+    return column.str.casefold()

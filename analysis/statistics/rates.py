@@ -1,0 +1,128 @@
+"""Correct rates of the relative task, against chance and between models."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis.labels import ALL_TEXTURES, MODELS
+from analysis.statistics.paired import (
+    CONFIDENCE,
+    columns_first,
+    holm,
+    ignoring_case,
+    mean,
+    paired_family,
+    standard_error,
+    t_test,
+    why_undefined,
+    without_rounding_noise,
+)
+from modeling import InputError
+from modeling.arrays import Floats
+
+BOOTSTRAP_RESAMPLES = 5000
+
+
+def rate_tests(relative: pd.DataFrame) -> pd.DataFrame:
+    """Paired tests of the correct rates (PAPER VIII-B), Holm over the textures.
+
+    Parameters
+    ----------
+    relative : DataFrame
+        `Responses.relative`; rates are shares 0–1 per participant.
+
+    Returns
+    -------
+    DataFrame
+        One row per texture as in `rating_tests`, then one over all textures, which is not part
+        of the family (its p_holm is NaN).
+    """
+    family = paired_family(relative, "correct")
+    overall = paired_family(relative.assign(texture=ALL_TEXTURES), "correct")
+    return columns_first(
+        pd.concat([family, overall.assign(p_holm=np.nan)], ignore_index=True),
+        ["texture", "n", "excluded"],
+    )
+
+
+def correct_rates(
+    relative: pd.DataFrame, *, rng: np.random.Generator, chance: float = 1 / 7
+) -> pd.DataFrame:
+    """Correct rates per texture and model against chance, participants as units (METHOD 12).
+
+    Parameters
+    ----------
+    relative : DataFrame
+        Columns participant_id, texture, model, correct (0, 1 or NaN).
+    rng : Generator
+        Draws the participants of the bootstrap.
+    chance : float
+        Rate of a guessing participant, 0 … 1.
+
+    Returns
+    -------
+    DataFrame
+        texture, model, participants, trials, mean, se, ci_low, ci_high (95 %, bias-corrected and
+        accelerated bootstrap over participants), t, df, p (one-sample t of the participants'
+        rates against chance, two-sided), p_holm (over the textures of one model), note. The rows
+        `all textures` pool a participant's trials and stand outside the family.
+    """
+    pooled = relative.assign(texture=ALL_TEXTURES)
+    rows = []
+    for model in MODELS:
+        for table in (relative, pooled):
+            chosen = table[table["model"] == model]
+            family = pd.DataFrame(
+                _rate_row(cell, rng=rng, chance=chance) | {"texture": texture, "model": model}
+                for texture, cell in chosen.groupby("texture", sort=False)
+            )
+            if family.empty:
+                continue
+            family["p_holm"] = holm(family["p"]) if table is relative else np.nan
+            rows.append(family.sort_values("texture", key=ignoring_case))
+    if not rows:
+        raise InputError("expected answers of the forced choice, got none; run a session first.")
+    return columns_first(pd.concat(rows, ignore_index=True), ["texture", "model"])
+
+
+def participant_rates(relative: pd.DataFrame) -> pd.DataFrame:
+    """Correct rate (0–1) of each participant (rows) per texture and model (columns)."""
+    return relative.pivot_table(
+        index="participant_id", columns=["texture", "model"], values="correct", aggfunc="mean"
+    )
+
+
+def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:
+    rates = cell.groupby("participant_id")["correct"].mean().dropna().to_numpy(dtype=float)
+    against_chance = without_rounding_noise(rates - chance)
+    undefined = why_undefined(against_chance)
+    t, p = (np.nan, np.nan) if undefined else t_test(against_chance)[:2]
+    low, high = (np.nan, np.nan) if undefined else _bootstrap_interval(rates, rng)
+    return {
+        "participants": rates.size,
+        "trials": int(cell["correct"].notna().sum()),
+        "mean": mean(rates),
+        "se": standard_error(rates),
+        "ci_low": low,
+        "ci_high": high,
+        "t": t,
+        "df": max(rates.size - 1, 0),
+        "p": p,
+        "note": undefined,
+    }
+
+
+def _bootstrap_interval(rates: Floats, rng: np.random.Generator) -> tuple[float, float]:
+    interval = stats.bootstrap(
+        (rates,),
+        np.mean,
+        n_resamples=BOOTSTRAP_RESAMPLES,
+        confidence_level=CONFIDENCE,
+        method="BCa",
+        rng=rng,
+    ).confidence_interval
+    return float(interval.low), float(interval.high)

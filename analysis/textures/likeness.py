@@ -1,0 +1,114 @@
+"""How alike models are to recordings, by texture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import pandas as pd
+
+from modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
+from modeling.fitting.conditions import recording_spectra
+
+
+def gfc_table(
+    recordings: RecordingSet,
+    full: TextureModel,
+    simplified: TextureModel,
+    *,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """Simplification rate and quality of one texture (PAPER table 3).
+
+    Parameters
+    ----------
+    recordings : RecordingSet
+        What both models are held against, condition by condition; those at force 0 are the
+        sensor's floor and are subtracted.
+    full, simplified : TextureModel
+        Before and after simplification.
+    rng : Generator
+        Draws behind the ceiling (METHOD 8), the same for both models.
+
+    Returns
+    -------
+    DataFrame
+        Two rows (model = full, simplified): texture, layers, parameters, conditions (recordings
+        above the sensor's floor), then means over them: gfc30_mean (and gfc30_min), gfc30_floor
+        (white noise of equal RMS), gfc30_ceiling (draws of the recording's own spectrum),
+        gfc5_mean, gfc5_floor, gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of
+        |error|), band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
+    """
+    models = {"full": full, "simplified": simplified}
+    table = likeness_table(recordings, models, rng=rng)
+    table.insert(3, "parameters", [model.n_parameters for model in models.values()])
+    return table
+
+
+def likeness_table(
+    recordings: RecordingSet,
+    models: Mapping[str, TextureModel | RegressedModel],
+    *,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """How alike recordings and each of these models of one texture are, one row per model.
+
+    Parameters, errors and columns as in `gfc_table`, but for `parameters`.
+    """
+    first = next(iter(models.values()))
+    above_floor = [
+        (recording, measured)
+        for recording, measured in recording_spectra(recordings, rate_hz=first.rate_hz)
+        if measured.magnitude.any()
+    ]
+    if not above_floor:
+        raise InputError(
+            f"{first.texture}: expected recordings above the sensor's floor, got none; check those "
+            "at force 0."
+        )
+    seeds = rng.integers(2**63, size=len(above_floor))
+    by_condition = [
+        similarity.reports(
+            measured,
+            [model.peq(*recording.condition) for model in models.values()],
+            rng=np.random.default_rng(seed),
+        )
+        for (recording, measured), seed in zip(above_floor, seeds, strict=True)
+    ]
+    rows = []
+    for (name, model), reports in zip(models.items(), zip(*by_condition, strict=True), strict=True):
+        labels = {
+            "texture": first.texture,
+            "model": name,
+            "layers": model.n_layers,
+            "conditions": len(reports),
+        }
+        rows.append(labels | _means(reports))
+    return pd.DataFrame(rows)
+
+
+def _means(reports: Sequence[similarity.SimilarityReport]) -> dict[str, float]:
+    """Means over the conditions, and the lowest GFC30."""
+
+    def mean_of(field: str) -> float:
+        return float(np.mean([getattr(report, field) for report in reports]))
+
+    return {
+        "gfc30_mean": mean_of("gfc30"),
+        "gfc30_min": min(report.gfc30 for report in reports),
+        "gfc30_floor": mean_of("floor_gfc30"),
+        "gfc30_ceiling": mean_of("ceiling_gfc30"),
+        "gfc5_mean": mean_of("gfc5"),
+        "gfc5_floor": mean_of("floor_gfc5"),
+        "gfc5_ceiling": mean_of("ceiling_gfc5"),
+        "log_spectral_distance_db": mean_of("log_spectral_distance_db"),
+        "rms_error_db": float(np.mean([abs(report.rms_error_db) for report in reports])),
+        "band_energy_error_db": float(np.mean([_band_error_db(report) for report in reports])),
+        "oracle_gap": mean_of("oracle_gap"),
+    }
+
+
+def _band_error_db(report: similarity.SimilarityReport) -> float:
+    """RMS over the bands that hold energy; a short record leaves narrow bands empty."""
+    errors = report.band_energy_error_db[np.isfinite(report.band_energy_error_db)]
+    return float(np.sqrt(np.mean(errors**2))) if errors.size else float("nan")

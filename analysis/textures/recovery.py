@@ -1,0 +1,225 @@
+"""How well an estimated model finds what was planted: layers matched one to one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from analysis.labels import ALL_LAYERS
+from modeling import InputError, TextureModel
+from modeling.arrays import Floats
+
+Integers = NDArray[np.int64]
+
+LEAST_TOLERANCE_HZ = 10.0
+NO_PARTNER = -1
+_PARAMETERS = {"frequency_hz": "frequencies_hz", "bandwidth_hz": "bandwidths_hz", "gain": "gains"}
+
+
+def match_layers(
+    true_frequency_hz: Floats, true_bandwidth_hz: Floats, *, estimated_frequency_hz: Floats
+) -> Integers:
+    """Pair true and estimated layers of one condition, one to one.
+
+    A pair may lie at most max(B/2, 10 Hz) apart, B being the true layer's bandwidth. Among all
+    assignments with the most pairs, the one with the smallest summed distance is taken.
+
+    Parameters
+    ----------
+    true_frequency_hz, true_bandwidth_hz : (m,) ndarray
+        Frequencies and −3 dB widths in Hz.
+    estimated_frequency_hz : (k,) ndarray
+        Frequencies in Hz.
+
+    Returns
+    -------
+    (m,) ndarray of int
+        For each true layer the index of its estimated layer, −1 where there is none.
+    """
+    partner = np.full(true_frequency_hz.size, NO_PARTNER, dtype=np.int64)
+    if not estimated_frequency_hz.size:
+        return partner
+    distance = np.abs(true_frequency_hz[:, None] - estimated_frequency_hz[None, :])
+    allowed = distance <= np.maximum(true_bandwidth_hz / 2, LEAST_TOLERANCE_HZ)[:, None]
+    # A forbidden pair costs more than all allowed ones together, so it never displaces one.
+    forbidden_cost = 1.0 + distance.sum()
+    rows, columns = linear_sum_assignment(np.where(allowed, distance, forbidden_cost))
+    valid = allowed[rows, columns]
+    partner[rows[valid]] = columns[valid]
+    return partner
+
+
+@dataclass(frozen=True, eq=False)
+class _Pairing:
+    """Matches of a whole grid: partner (C, m) and nearest true layer (C, k) per condition."""
+
+    truth: TextureModel
+    estimated: TextureModel
+    conditions: NDArray[np.bool_]
+    partner: Integers
+    nearest: Integers
+
+
+def planted_truth_table(truth: TextureModel, estimates: Sequence[TextureModel]) -> pd.DataFrame:
+    """Precision, recall and parameter errors of estimated models against the planted one.
+
+    Parameters
+    ----------
+    truth : TextureModel
+        The planted model, at least one layer.
+    estimates : sequence of TextureModel
+        Models of the same texture and grid; their rate may differ. Interpolated conditions, which
+        no recording stands behind, are left out.
+
+    Returns
+    -------
+    DataFrame
+        Per estimator one row per true layer and one for all: texture, estimator, layer, precision
+        (share of the estimated layers nearest to this true layer that have a partner), recall
+        (share of conditions where the true layer has a partner), median_frequency_error_hz
+        (|Δf|), median_bandwidth_ratio (estimated/true), median_level_error_db and
+        median_absolute_level_error_db (20·log10 |G|/|G|, estimated over true), and, in the row
+        for all layers, median_noise_gain_error_db.
+
+    Raises
+    ------
+    InputError
+        Where grids differ or nothing was planted.
+    """
+    rows = []
+    for estimated in estimates:
+        pairing = _pair(truth, estimated)
+        layers = [(str(i + 1), np.array([i])) for i in range(truth.n_layers)]
+        layers.append((ALL_LAYERS, np.arange(truth.n_layers)))
+        for name, chosen in layers:
+            scores = _scores(pairing, chosen)
+            if name == ALL_LAYERS:
+                scores["median_noise_gain_error_db"] = _noise_gain_error_db(pairing)
+            labels = {
+                "texture": truth.texture,
+                "estimator": estimated.estimator,
+                "layer": name,
+            }
+            rows.append(labels | scores)
+    return pd.DataFrame(rows)
+
+
+def planted_layers_table(
+    truth: TextureModel, estimated: TextureModel, *, speed_mm_s: float, force_n: float
+) -> pd.DataFrame:
+    """True and estimated frequency, bandwidth and gain of each layer in one condition.
+
+    Parameters
+    ----------
+    truth, estimated : TextureModel
+        Gains are given for noise of unit variance at the truth's rate.
+    speed_mm_s, force_n : float
+        The condition; between grid points both models are interpolated.
+
+    Returns
+    -------
+    DataFrame
+        One row per true layer (partner's columns NaN where it was missed), then one per surplus
+        estimated layer (true columns NaN). Gains are amplitudes |G|.
+    """
+    true = truth.peq(speed_mm_s, force_n)
+    found = estimated.at_rate(truth.rate_hz).peq(speed_mm_s, force_n)
+    partner = match_layers(
+        true.frequencies_hz, true.bandwidths_hz, estimated_frequency_hz=found.frequencies_hz
+    )
+    surplus = sorted(set(range(found.gains.size)) - set(partner.tolist()))
+    pairs: list[tuple[int | None, int | None]] = [
+        (i, None if j == NO_PARTNER else int(j)) for i, j in enumerate(partner)
+    ]
+    rows = []
+    for i, j in pairs + [(None, j) for j in surplus]:
+        row: dict[str, object] = {
+            "texture": truth.texture,
+            "estimator": estimated.estimator,
+            "layer": "surplus" if i is None else str(i + 1),
+        }
+        for label, name in _PARAMETERS.items():
+            row[f"true_{label}"] = np.nan if i is None else abs(getattr(true, name)[i])
+            row[f"estimated_{label}"] = np.nan if j is None else abs(getattr(found, name)[j])
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _pair(truth: TextureModel, estimated: TextureModel) -> _Pairing:
+    if not (
+        np.array_equal(truth.speeds_mm_s, estimated.speeds_mm_s)
+        and np.array_equal(truth.forces_n, estimated.forces_n)
+    ):
+        raise InputError(
+            f"expected a model of {truth.texture!r} on the planted grid, got speeds "
+            f"{estimated.speeds_mm_s.tolist()} mm/s and forces {estimated.forces_n.tolist()} N; "
+            "record the planted texture on its own grid."
+        )
+    if not truth.n_layers:
+        raise InputError(
+            f"expected planted layers in {truth.texture!r}, got none; plant at least one."
+        )
+    same_rate = estimated.at_rate(truth.rate_hz)
+    conditions = ~np.asarray(same_rate.interpolated, dtype=bool)
+    true_f, true_b = truth.frequencies_hz[conditions], truth.bandwidths_hz[conditions]
+    found_f = same_rate.frequencies_hz[conditions]
+    partner = [
+        match_layers(f, b, estimated_frequency_hz=g)
+        for f, b, g in zip(true_f, true_b, found_f, strict=True)
+    ]
+    nearest = np.abs(found_f[:, :, None] - true_f[:, None, :]).argmin(axis=2)
+    return _Pairing(truth, same_rate, conditions, np.array(partner), nearest)
+
+
+def _scores(pairing: _Pairing, layers: Integers) -> dict[str, float]:
+    """Scores of the true layers with these indices."""
+    condition, chosen = np.nonzero(pairing.partner[:, layers] != NO_PARTNER)
+    true_index = layers[chosen]
+    found_index = pairing.partner[condition, true_index]
+
+    def matched(name: str) -> tuple[Floats, Floats]:
+        true = getattr(pairing.truth, name)[pairing.conditions][condition, true_index]
+        found = getattr(pairing.estimated, name)[pairing.conditions][condition, found_index]
+        return np.abs(true), np.abs(found)
+
+    has_partner = np.zeros(pairing.nearest.shape, dtype=bool)
+    rows, true_layers = np.nonzero(pairing.partner != NO_PARTNER)
+    has_partner[rows, pairing.partner[rows, true_layers]] = True
+    attributed = np.isin(pairing.nearest, layers)
+    true_f, found_f = matched("frequencies_hz")
+    true_b, found_b = matched("bandwidths_hz")
+    level_error_db = _ratio_db(*matched("gains"))
+    return {
+        "precision": _mean(has_partner[attributed].astype(float)),
+        "recall": _mean((pairing.partner[:, layers] != NO_PARTNER).astype(float)),
+        "median_frequency_error_hz": _median(np.abs(found_f - true_f)),
+        "median_bandwidth_ratio": _median(found_b / true_b),
+        "median_level_error_db": _median(level_error_db),
+        "median_absolute_level_error_db": _median(np.abs(level_error_db)),
+    }
+
+
+def _noise_gain_error_db(pairing: _Pairing) -> float:
+    true = pairing.truth.noise_gains[pairing.conditions]
+    return _median(_ratio_db(true, pairing.estimated.noise_gains[pairing.conditions]))
+
+
+def _ratio_db(true: Floats, found: Floats) -> Floats:
+    """20·log10(found/true); infinite where only one is 0, left out where the truth is 0."""
+    positive = true > 0
+    with np.errstate(divide="ignore"):
+        ratio: Floats = 20 * np.log10(found[positive] / true[positive])
+    return ratio
+
+
+def _median(values: Floats) -> float:
+    return float(np.median(values)) if values.size else float("nan")
+
+
+def _mean(values: Floats) -> float:
+    return float(values.mean()) if values.size else float("nan")

@@ -1,0 +1,95 @@
+"""Everything about one texture: recordings, models and verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+
+import numpy as np
+import pandas as pd
+
+from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
+from modeling.fitting.conditions import recording_spectra
+
+
+@dataclass(frozen=True, eq=False)
+class TextureResult:
+    """What the modeling half says about one texture.
+
+    Parameters
+    ----------
+    recordings : RecordingSet
+        Of this texture.
+    model : TextureModel
+        The full model, fitted to the recordings.
+    simplification : Simplification
+        Its simplified model and the verdict on every layer.
+    truth : TextureModel, optional
+        What was planted, where the recordings are simulated from a known model.
+    other_estimates : tuple of TextureModel
+        Models of other estimators, to be held against the truth beside `model`.
+    left_out : mapping of str to DataFrame
+        By model (joint, AR(20)): conditions foretold by one that was fitted without them
+        (`analysis.textures.between.left_out_table`); empty where that was not tried.
+    """
+
+    recordings: RecordingSet
+    model: TextureModel
+    simplification: Simplification
+    truth: TextureModel | None = None
+    other_estimates: tuple[TextureModel, ...] = ()
+    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+
+    @property
+    def texture(self) -> str:
+        """Name of the surface."""
+        return self.model.texture
+
+    @property
+    def simulated(self) -> bool:
+        """True where no real surface was touched."""
+        return self.model.simulated or any(r.simulated for r in self.recordings.recordings)
+
+    def spectrum_at(self, speed_mm_s: float, force_n: float) -> Spectrum:
+        """The first recording of a condition at the model's rate, sensor's floor subtracted.
+
+        Raises
+        ------
+        InputError
+            Where there is none.
+        """
+        condition = (speed_mm_s, force_n)
+        here = [r for r in self.recordings if r.condition == condition]
+        if not here:
+            raise InputError(
+                f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and "
+                f"{force_n:g} N, got none; choose a recorded condition."
+            )
+        floor = [r for r in self.recordings if r.force_n == 0]
+        spectra = recording_spectra(RecordingSet([here[0], *floor]), rate_hz=self.model.rate_hz)
+        return spectra[0][1]
+
+
+def simplification_table(simplification: Simplification) -> pd.DataFrame:
+    """The verdict on every layer and its reason (METHOD 7).
+
+    Returns
+    -------
+    DataFrame
+        texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
+        worst_frequency_hz (the condition where the layer stands highest against the threshold),
+        distance_db (to the threshold there, + above), flip_probability (0–1), simulated.
+    """
+    columns = [each.name for each in fields(LayerVerdict)]
+    table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
+    worst = ["worst_speed_mm_s", "worst_force_n", "worst_frequency_hz"]
+    # No condition is the worst one where no threshold is known in any.
+    table.loc[table["distance_db"].isna(), worst] = np.nan
+    table.insert(0, "texture", simplification.model.texture)
+    return table.assign(simulated=simplification.model.simulated)
+
+
+def reference_condition(result: TextureResult) -> tuple[float, float]:
+    """(speed, force): the strongest force and the highest speed recorded at it."""
+    conditions = [recording.condition for recording in result.recordings.recordings]
+    return max(conditions, key=lambda condition: (condition[1], condition[0]))

@@ -1,0 +1,70 @@
+"""Checks of single values, each with one sentence for what is wrong."""
+
+from __future__ import annotations
+
+from numbers import Integral, Real
+from sys import float_info
+from typing import TypeGuard
+
+from modeling.errors import InputError
+
+UNITS = ("g", "arbitrary")
+
+
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether this is a number, and not a bool, which Python counts among them."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether this is a whole number, and not a bool."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def check_texture_name(name: object) -> None:
+    """Refuse what cannot be a texture's name in a table: anything but one line of text."""
+    if not isinstance(name, str) or not name.strip() or any(c in name for c in "\t\r\n"):
+        raise InputError(
+            f"expected a texture name of one line without tabs, got {name!r}; name it."
+        )
+
+
+def is_rate(value: object) -> TypeGuard[float]:
+    """Whether this can be a sampling rate: a finite number above 0."""
+    return is_number(value) and 0 < value <= float_info.max
+
+
+def check_rate(rate_hz: object) -> None:
+    """Refuse what cannot be a sampling rate: anything but a finite number above 0."""
+    if not is_rate(rate_hz):
+        got = str(rate_hz) if is_number(rate_hz) else repr(rate_hz)
+        raise InputError(f"expected a rate above 0 Hz, got {got}; give the rate.")
+
+
+def check_name(what: str, name: object) -> None:
+    """Refuse all but printable text in one line."""
+    if not isinstance(name, str) or not name.strip() or not name.isprintable():
+        raise InputError(f"expected printable text in one line as {what}, got {name!r}; rename it.")
+
+
+def check_choice(what: str, value: object, choices: tuple[str, ...]) -> None:
+    """Refuse all but one of the choices."""
+    if value not in choices:
+        either = " or ".join(f'"{choice}"' for choice in choices)
+        raise InputError(f"expected {what} to be {either}, got {value!r}; choose one.")
+
+
+def check_number(what: str, value: object, *, low: float = 0.0, high: float) -> None:
+    """Refuse all but a number from `low` to `high`."""
+    if not (is_number(value) and low <= value <= high):
+        raise InputError(
+            f"expected a number from {low:g} to {high:g} for {what}, got {value!r}; correct it."
+        )
+
+
+def check_whole(what: str, value: object, *, low: int, high: int) -> None:
+    """Refuse all but a whole number from `low` to `high`."""
+    if not (is_whole(value) and low <= value <= high):
+        raise InputError(
+            f"expected a whole number from {low} to {high} for {what}, got {value!r}; correct it."
+        )

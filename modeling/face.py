@@ -1,0 +1,28 @@
+"""A package's public names, each loaded when it is first asked for (PEP 562)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from typing import Any
+
+
+def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
+    """The `__getattr__` of a package whose names live in modules below it.
+
+    Parameters
+    ----------
+    package : str
+        Its name.
+    homes : mapping of module name to public names, separated by spaces
+        Module names are relative to the package; without names the module itself is public.
+    """
+    places = {name: module for module, names in homes.items() for name in names.split() or [module]}
+
+    def find(name: str) -> Any:
+        if name not in places:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        module = import_module(f"{package}.{places[name]}")
+        return module if name == places[name] else getattr(module, name)
+
+    return find

@@ -1,0 +1,99 @@
+"""What models of every kind share: versioned files that a person can open, and equality."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Container, Iterable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.errors import InputError
+from modeling.files.documents import dump_json
+from modeling.files.writing import write_text
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance as _Base
+else:
+    _Base = object
+
+
+class SavedModel(_Base):
+    """A frozen dataclass of arrays, numbers and text that is saved as JSON and loads back equal."""
+
+    FORMAT: ClassVar[str]
+    VERSION: ClassVar[int] = 1
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset()  # fields that a file may lack
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as versioned JSON; the file is there whole or not at all."""
+        values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
+        write_text(path, dump_json({"format": self.FORMAT, "version": self.VERSION, **values}))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a model written by `save`.
+
+        Raises
+        ------
+        InputError
+            If the file is missing, is no such model, or has another version.
+        """
+        values = _load_json(Path(path), cls.FORMAT, version=cls.VERSION)
+        names = {f.name for f in fields(cls)}
+        wrong = ", ".join(sorted((names - cls.OPTIONAL - set(values)) | (set(values) - names)))
+        if wrong:
+            raise InputError(
+                f"expected the fields of a {cls.FORMAT} in {path}, got too few or too many "
+                f"({wrong}); make the file again."
+            )
+        try:
+            return cls(**values)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{path}: {error}") from None
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return all(
+            np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _freeze(self, names: Iterable[str], *, booleans: Container[str] = ()) -> None:
+        """Make these fields read-only arrays, of floats or, where named so, of booleans."""
+        for name in names:
+            kind = np.bool_ if name in booleans else np.float64
+            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+
+def _plain(value: Any) -> Any:
+    return value.tolist() if isinstance(value, np.ndarray) else value
+
+
+def _load_json(source: Path, file_format: str, *, version: int) -> dict[str, Any]:
+    """The fields of a model file of this format and version."""
+    if not source.is_file():
+        raise InputError(f"expected a model file at {source}, got no file there; give its path.")
+    try:
+        values = json.loads(source.read_text(encoding="utf-8"))
+    except ValueError:
+        raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
+    if not isinstance(values, dict) or values.pop("format", None) != file_format:
+        raise InputError(
+            f"expected the format {file_format} in {source}, got another; give a model of "
+            "that kind."
+        )
+    found = values.pop("version", None)
+    if found != version:
+        raise InputError(
+            f"expected a model of version {version} in {source}, got version {found!r}; "
+            "update tactileq or fit the model again."
+        )
+    return values

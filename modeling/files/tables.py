@@ -1,0 +1,90 @@
+"""Small tab-separated tables, and numbers in their cells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from modeling.errors import InputError
+from modeling.files.writing import write_text
+
+
+def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a TSV with a header line; cells must not hold tabs or line ends."""
+    lines = ["\t".join(columns)]
+    for row in rows:
+        cells = [str(cell) for cell in row]
+        if any(c in cell for cell in cells for c in "\t\r\n"):
+            raise InputError(f"expected cells without tabs and line ends, got {cells}; rename.")
+        lines.append("\t".join(cells))
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]]:
+    """Rows of a TSV as dictionaries by column name; lines that begin with # are comments.
+
+    Raises
+    ------
+    InputError
+        If the file is not there, is empty, lacks a required column, or a row has another number
+        of cells than the header.
+    """
+    source = Path(path)
+    if not source.is_file():
+        raise InputError(f"expected a table at {source}, got no file there; give its path.")
+    try:
+        text = source.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(
+            f"expected a text table, got other bytes in {source}; save it as UTF-8."
+        ) from None
+    # Not splitlines(): that would also break cells at characters that `write_table` allows.
+    lines = [line for line in text.split("\n") if line.strip() and not line.startswith("#")]
+    header = lines[0].split("\t") if lines else []
+    missing = [name for name in required if name not in header]
+    if missing:
+        raise InputError(
+            f"expected the columns {', '.join(required)} in {source}, got "
+            f"{', '.join(header) or 'an empty file'}; add {', '.join(missing)} (tab-separated)."
+        )
+    rows = []
+    for line in lines[1:]:
+        cells = line.split("\t")
+        if len(cells) != len(header):
+            raise InputError(
+                f"expected {len(header)} cells in each row of {source}, got {len(cells)} in "
+                f"{line!r}; the table is damaged or not tab-separated."
+            )
+        rows.append(dict(zip(header, cells, strict=True)))
+    return rows
+
+
+def is_number(text: str) -> bool:
+    """Whether a text reads as a number."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def number(text: str, name: str) -> float:
+    """A number from a table's cell.
+
+    Raises
+    ------
+    InputError
+        Naming `name`, where the cell is empty or no number.
+    """
+    if not is_number(text):
+        got = repr(text) if text.strip() else "nothing"
+        raise InputError(f"expected a number for {name}, got {got}; fill it in.")
+    return float(text)
+
+
+def whole_number(text: str, name: str) -> int:
+    """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
+    value = number(text, name)
+    if not (value.is_integer() and value >= 1):
+        raise InputError(f"expected a whole number for {name}, at least 1, got {text}; correct it.")
+    return int(value)

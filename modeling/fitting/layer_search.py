@@ -1,0 +1,384 @@
+"""Which layers a texture may have: how many, where, with which signs (METHOD 3 and 5).
+
+The search runs on a coarse part of the grid, with a stiff field. Layers grow one by one as
+independent ones, whose powers add and which need no signs; then signs are tried; layers that the
+coherent response does not need are taken away, and such as it lacks are added. Spectra without
+clear peaks are also begun from layers spread over them, with every sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+from modeling.arrays import Floats
+from modeling.equalizer.signs import neighbouring_patterns
+from modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
+from modeling.estimation.given_count import starts_of
+from modeling.estimation.likelihood import split
+from modeling.fitting.field import FieldFit, fit_field, log_evidence, usual_changes
+from modeling.fitting.growth import (
+    CLEAR_EVIDENCE,
+    candidates,
+    inserted,
+    inserted_independently,
+)
+from modeling.fitting.texture_grid import TextureGrid
+
+MOST_LAYERS = 12
+STIFFNESS = 3.0  # of the field while searching: layers must not change places
+# A layer must raise the log likelihood by so much per record to be looked at.
+LEAST_GAIN = 4.0
+DECIDING_CONDITIONS = 6
+STARTING_CONDITIONS = 2
+CARRIED_CONDITIONS = 3
+MOST_SPREAD_LAYERS = 3
+ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
+TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
+CONTENDERS = 2  # per number of layers
+NOT_WORSE = 3.0  # in log evidence per record, for a solution to be looked at in full
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Layers of a whole texture: parameters (C, p) relative to the grid's scale, and signs (m,).
+
+    `value` is the penalised misfit, less what scatter alone gives in these bins, so that solutions
+    in different bins can be compared; `observed` are the bins.
+    """
+
+    theta: Floats
+    signs: Floats
+    value: float
+    observed: Observed
+    fit: FieldFit
+
+    @property
+    def count(self) -> int:
+        """Number of layers."""
+        return self.signs.size
+
+    @cached_property
+    def evidence(self) -> float:
+        """Log evidence, comparable between solutions in different bins."""
+        return log_evidence(self.fit) + float(self.observed.scatter.sum())
+
+
+def fitted(
+    grid: TextureGrid,
+    theta: Floats,
+    signs: Floats,
+    *,
+    precision: Floats | None = None,
+    observed: Observed | None = None,
+    steps: int = 12,
+    enough: float = 1.0,
+) -> Solution:
+    """The field near a start (C, p); by default with the stiff one of the search."""
+    if precision is None:
+        precision = stiff(signs.size)
+    observed = grid.observed(theta) if observed is None else observed
+    fit = fit_field(
+        theta,
+        signs,
+        observed,
+        grid.field(precision),
+        limits=grid.limits(signs.size),
+        steps=steps,
+        enough=enough,
+    )
+    value = fit.value - float(observed.scatter.sum())
+    return Solution(fit.theta, signs, value, observed, fit)
+
+
+def stiff(m: int) -> Floats:
+    """Precision of the field of m layers while they are searched."""
+    return np.asarray(np.linalg.inv(usual_changes(m)) * STIFFNESS)
+
+
+def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
+    """Contenders on the whole grid, two per number of layers at most, the likelier first.
+
+    Parameters
+    ----------
+    grid : TextureGrid
+        One condition or more with a spectrum.
+    count : int, optional
+        The only number of layers to be considered.
+    """
+    part = grid.coarse()
+    pool = _Pool(part, count)
+    _grow(pool)
+    _reduce(pool)
+    if pool.best().count <= MOST_SPREAD_LAYERS:
+        _spread(pool)
+    if _complete(pool):
+        _reduce(pool)
+    _carry(pool)
+    if part is grid:
+        return pool.contenders()
+    return [expanded(grid, part, s) for s in pool.contenders()]
+
+
+class _Pool:
+    """Solutions on the coarse grid, by number of layers."""
+
+    def __init__(self, grid: TextureGrid, count: int | None) -> None:
+        self.grid, self.count = grid, count
+        self.records = int(grid.recorded.sum())
+        self.most = MOST_LAYERS if count is None else max(count, 1)
+        noise = fitted(grid, grid.levels()[:, None], np.zeros(0))
+        self._solutions: dict[int, list[Solution]] = {0: [noise]}
+
+    def add(self, solutions: Sequence[Solution]) -> None:
+        for solution in solutions:
+            self._solutions.setdefault(solution.count, []).append(solution)
+
+    def of(self, count: int) -> Solution | None:
+        """The best with so many layers."""
+        return max(self._solutions.get(count, []), key=lambda s: s.evidence, default=None)
+
+    def rank(self, solution: Solution) -> tuple[int, float]:
+        """The larger the better: as many layers as are asked for, then the evidence."""
+        off = 0 if self.count is None else abs(solution.count - self.count)
+        return -off, solution.evidence
+
+    def best(self) -> Solution:
+        return max(self._every(), key=self.rank)
+
+    def largest(self) -> int:
+        """The largest number of layers among the solutions."""
+        return max(self._solutions)
+
+    def contenders(self) -> list[Solution]:
+        best = self.best()
+        least = best.evidence - NOT_WORSE * self.records
+        chosen: list[Solution] = []
+        for solution in sorted(self._every(), key=self.rank, reverse=True):
+            off = self.rank(solution)[0] != self.rank(best)[0] or solution.evidence < least
+            alike = [s for s in chosen if s.count == solution.count]
+            near = any(abs(solution.value - s.value) < 1.0 for s in alike)
+            if not (off or near or len(alike) == CONTENDERS):
+                chosen.append(solution)
+        return chosen
+
+    def _every(self) -> list[Solution]:
+        return [s for solutions in self._solutions.values() for s in solutions]
+
+
+def _grow(pool: _Pool) -> None:
+    """Independent layers, one by one, along laws over the grid; each number of them with signs.
+
+    Where coherent layers dig holes or add up, independent ones go on growing for ever; it ends
+    when two more have not made the coherent solution any better.
+    """
+    grid = pool.grid
+    theta, now, idle = pool.best().theta, pool.best().value, 0
+    for m in range(1, pool.most + 1):
+        found = candidates(grid, theta, None)
+        if not found:
+            return
+        start = inserted_independently(theta, found[0], rate_hz=grid.rate_hz)
+        observed = grid.observed(start)
+        field, limits = grid.field(stiff(m)), grid.limits(m)
+        fit = fit_field(start, None, observed, field, limits=limits, steps=12, enough=1.0)
+        value = fit.value - float(observed.scatter.sum())
+        if now - value < LEAST_GAIN * pool.records:
+            return
+        theta, now, best = fit.theta, value, pool.best()
+        pool.add(_with_signs(grid, theta))
+        idle = 0 if pool.best() is not best else idle + 1
+        if idle == 2:
+            return
+
+
+def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
+    """Independent layers made coherent, with the signs that suit them best."""
+    m = (theta.shape[1] - 1) // 3
+    noise, frequency, bandwidth, gain = split(theta, m)
+    patterns = np.array(list(product((1.0, -1.0), repeat=m)))
+    if m > ALL_PATTERNS:
+        patterns = neighbouring_patterns(np.median(np.exp(frequency), axis=0))
+    starts = []
+    for signs in patterns:
+        # At its peak alone, G_w + s·G has the power G_w² + gain².
+        amplitude = np.hypot(np.exp(noise), np.exp(gain)) - signs * np.exp(noise)
+        amplitude = np.maximum(amplitude, 1e-3 * np.exp(noise))
+        starts.append((np.hstack((noise, frequency, bandwidth, np.log(amplitude))), signs))
+    return [fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_SIGNS)]
+
+
+def _reduce(pool: _Pool) -> None:
+    """From the most layers downwards: the one that is missed least goes."""
+    for m in range(pool.largest(), 1, -1):
+        solution = pool.of(m)
+        if solution is None:
+            continue
+        starts = [
+            (without_layer(solution.theta, layer), np.delete(solution.signs, layer))
+            for layer in range(m)
+        ]
+        likeliest = _likeliest(pool.grid, starts, TRIED_REMOVALS)
+        pool.add([fitted(pool.grid, *start) for start in likeliest])
+
+
+def _complete(pool: _Pool) -> bool:
+    """Further layers where the coherent response lacks them; whether any was worth it."""
+    completed = False
+    while True:
+        best = pool.best()
+        if best.count >= pool.most:
+            return completed
+        grid = pool.grid
+        starts = [
+            inserted(best.theta, best.signs, found, sign=sign, rate_hz=grid.rate_hz)
+            for found in candidates(grid, best.theta, best.signs)
+            for sign in (1.0, -1.0)
+        ]
+        if not starts:
+            return completed
+        pool.add([fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_GROWTH)])
+        if pool.best() is best:
+            return completed
+        completed = True
+
+
+def completed(grid: TextureGrid, solution: Solution, *, count: int | None = None) -> Solution:
+    """The solution, with layers added where some condition clearly lacks them.
+
+    The coarse grid may not show a layer that is heard at one speed alone.
+    """
+    excess = solution.fit.slopes.misfit - solution.observed.scatter
+    if count is not None or not (excess[grid.recorded] > CLEAR_EVIDENCE).any():
+        return solution
+    pool = _Pool(grid, count)
+    pool.add([solution])
+    _complete(pool)
+    return pool.best()
+
+
+def uncrossed(grid: TextureGrid, solution: Solution) -> Solution:
+    """The solution with layers in the order of their frequencies, where two speeds allow for it.
+
+    They do not tell which layers have crossed; that none has is likelier if it is as near.
+    """
+    _, frequency, _, _ = split(solution.theta, solution.count)
+    order = np.argsort(frequency, axis=1, kind="stable")
+    if len({speed for speed, _ in grid.conditions}) != 2 or (order == order[0]).all():
+        return solution
+    columns = np.hstack([part * solution.count + order for part in range(3)])
+    theta = solution.theta.copy()
+    theta[:, 1:] = np.take_along_axis(theta[:, 1:], columns, axis=1)
+    patterns = neighbouring_patterns(np.median(np.exp(theta[:, 1 : 1 + solution.count]), axis=0))
+    likeliest = _likeliest(grid, [(theta, signs) for signs in patterns], TRIED_SIGNS)
+    tried = [fitted(grid, *start, observed=solution.observed) for start in likeliest]
+    return max([solution, *tried], key=lambda s: s.evidence)
+
+
+def _carry(pool: _Pool) -> None:
+    """The layers of single conditions that are fitted well, carried to all others.
+
+    Frequencies and gains follow their trend, widths stay. A few conditions that have gone astray
+    together, mostly in their widths, hold each other there.
+    """
+    grid, count = pool.grid, pool.best().count
+    for solution in map(pool.of, (count - 1, count)):
+        if solution is None or not solution.count:
+            continue
+        m = solution.count
+        excess = solution.fit.slopes.misfit - solution.observed.scatter
+        rows = np.argsort(np.where(grid.recorded, excess, np.inf), kind="stable")
+        for row in rows[:CARRIED_CONDITIONS]:
+            along = (grid.places - grid.places[row]) @ solution.fit.field.trend
+            along[:, 1 + m : 1 + 2 * m] = 0.0
+            pool.add([fitted(grid, solution.theta[row] + along, solution.signs)])
+
+
+def _spread(pool: _Pool) -> None:
+    """Two or three layers spread over single spectra, every sign, carried to all conditions."""
+    counts = range(2, MOST_SPREAD_LAYERS + 1) if pool.count is None else [pool.count]
+    for count in counts:
+        if count <= MOST_SPREAD_LAYERS:
+            pool.add(_spread_layers(pool.grid, count))
+
+
+def _spread_layers(grid: TextureGrid, count: int) -> list[Solution]:
+    levels, bins = grid.levels(), grid.observed(np.zeros((len(grid.powers), 1)))
+    patterns = np.array(list(product((1.0, -1.0), repeat=count)))
+    carried = []
+    for row in grid.spread(STARTING_CONDITIONS):
+        power = grid.powers[row]
+        assert power is not None, "only recorded conditions are spread"
+        starts = starts_of(power, count)
+        starts[:, np.r_[0, 1 + 2 * count : 1 + 3 * count]] += np.log(power.scale / grid.scale)
+        theta = np.repeat(starts, len(patterns), axis=0)
+        signs = np.tile(patterns, (len(starts), 1))
+        here = bins.rows(np.full(len(theta), row))
+        fits = climb(theta, signs, here, limits=grid.limits(count), steps=20, enough=1.0)
+        for best in _distinct(fits, TRIED_STARTS - 1):
+            everywhere = np.tile(best.theta, (len(levels), 1))
+            gains = np.r_[0, 1 + 2 * count : 1 + 3 * count]
+            everywhere[:, gains] += (levels - levels[row])[:, None]
+            carried.append((everywhere, best.signs))
+    rough = [fitted(grid, *c, observed=bins, steps=8, enough=5.0) for c in carried]
+    rough.sort(key=lambda s: s.value)
+    return [fitted(grid, s.theta, s.signs) for s in rough[:TRIED_STARTS]]
+
+
+def _distinct(fits: Climbed, count: int) -> list[Climbed]:
+    """The likeliest rows that do not say the same."""
+    chosen: list[Climbed] = []
+    for row in np.argsort(fits.objective, kind="stable"):
+        fit = fits.row(int(row))
+        if all(abs(fit.objective - c.objective) > 1.0 for c in chosen):
+            chosen.append(fit)
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _likeliest(
+    grid: TextureGrid, starts: Sequence[tuple[Floats, Floats]], count: int
+) -> list[tuple[Floats, Floats]]:
+    """The best of some starts of as many layers, by what they come to in a few conditions."""
+    some = grid.spread(DECIDING_CONDITIONS)
+    theta = np.concatenate([theta[some] for theta, _ in starts])
+    signs = np.concatenate([np.tile(signs, (some.size, 1)) for _, signs in starts])
+    m = signs.shape[1]
+    _, frequency, bandwidth, _ = split(theta, m)
+    powers = [grid.powers[i] for i in some] * len(starts)
+    observed = observe(powers, np.exp(frequency), np.exp(bandwidth), scale=grid.scale)
+    fits = climb(theta, signs, observed, limits=grid.limits(m), steps=10, enough=1.0)
+    loss = np.sort((fits.objective - observed.scatter).reshape(len(starts), -1), axis=1)
+    # In a few conditions a start may go astray.
+    held = loss[:, : max(1, round(0.67 * some.size))].sum(axis=1)
+    return [starts[i] for i in np.argsort(held, kind="stable")[:count]]
+
+
+def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Solution:
+    """A solution of the coarse grid on the whole one: linear in log speed and log force."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    places = np.log(np.array(part.conditions)).reshape(part.rows, part.columns, 2)
+    by_row = int(np.argmax(np.ptp(places[:, 0], axis=0)))
+    axes = [places[:, 0, by_row], places[0, :, 1 - by_row]]
+    values = solution.theta.reshape(part.rows, part.columns, -1)
+    for axis, nodes in enumerate(axes):
+        if nodes.size == 1:  # constant along an axis of one node
+            axes[axis] = nodes[0] + np.array([-1.0, 1.0])
+            values = np.repeat(values, 2, axis=axis)
+    wanted = np.log(np.array(grid.conditions))[:, [by_row, 1 - by_row]]
+    theta = np.asarray(RegularGridInterpolator(tuple(axes), values)(wanted), dtype=np.float64)
+    theta[:, np.r_[0, 1 + 2 * solution.count : theta.shape[1]]] += np.log(part.scale / grid.scale)
+    return fitted(grid, theta, solution.signs, steps=10)
+
+
+def hidden(grid: TextureGrid, solution: Solution) -> Solution:
+    """The same field without every second condition, which it then foretells."""
+    seen = solution.observed.without(grid.every_second())
+    refit = fitted(grid, solution.theta, solution.signs, observed=seen, enough=0.5)
+    return replace(refit, observed=solution.observed)

@@ -1,0 +1,207 @@
+"""The rival: an autoregressive model over a grid of speeds and forces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from modeling.arrays import Floats
+from modeling.checks import UNITS, check_rate, check_texture_name
+from modeling.errors import InputError
+from modeling.files.saved_model import SavedModel
+from modeling.models.grid import Cells, check_axes, within_grid
+from modeling.models.line_spectral import (
+    check_line_spectral,
+    prediction_coefficients,
+    reflection_coefficients,
+)
+
+
+class ARParameters(NamedTuple):
+    """At n points: line spectral frequencies (n, p) in radians per sample, gain (n,)."""
+
+    line_spectral_frequencies: Floats
+    gain: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ARFilter:
+    """An all-pole filter driven by white noise w: y[n] = gain·w[n] − Σ a_k·y[n−k].
+
+    Parameters
+    ----------
+    coefficients : (p,) array_like
+        a₁ … a_p, p ≥ 1; the filter must be stable.
+    gain : float
+        Standard deviation of the innovation, ≥ 0, in g per unit noise.
+    rate_hz : float
+        The rate at which it runs and w has unit variance.
+
+    Raises
+    ------
+    InputError
+        For values that are not finite, a negative gain, or an unstable filter.
+    """
+
+    coefficients: Floats
+    gain: float
+    rate_hz: float
+
+    def __post_init__(self) -> None:
+        coefficients = np.array(self.coefficients, dtype=np.float64)
+        coefficients.setflags(write=False)
+        object.__setattr__(self, "coefficients", coefficients)
+        if coefficients.ndim != 1 or not coefficients.size:
+            raise InputError(
+                "expected one row of filter coefficients, got an array of shape "
+                f"{coefficients.shape}; give a₁ … a_p without the leading 1."
+            )
+        reflection = reflection_coefficients(coefficients)
+        if not (np.abs(reflection) < 1).all():
+            raise InputError(
+                f"expected a stable all-pole filter, got {coefficients.tolist()}, whose poles are "
+                "not all within the unit circle; fit it again."
+            )
+        if not (np.isfinite(self.gain) and self.gain >= 0):
+            raise InputError(f"expected a gain of at least 0, got {self.gain}; fix it.")
+        check_rate(self.rate_hz)
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        """Magnitude response gain/|A| at (n,) frequencies of 0 … rate/2, in g per unit noise.
+
+        The one-sided power spectral density of the output is response² · 2/rate_hz (g²/Hz).
+        """
+        from scipy.signal import freqz
+
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        inverse = np.concatenate([[1.0], self.coefficients])
+        _, response = freqz([self.gain], inverse, worN=frequency, fs=self.rate_hz)
+        return np.abs(response)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ARModel(SavedModel):
+    """An all-pole filter of order p in each condition of a grid of S speeds × F forces.
+
+    Parameters
+    ----------
+    texture : str
+        Name of the surface.
+    rate_hz : float
+        The rate at which the filters run and the driving noise has unit variance.
+    speeds_mm_s, forces_n : (S,), (F,) array_like
+        Rising, > 0, one at least.
+    line_spectral_frequencies : (S, F, p) array_like
+        Radians per sample, rising in (0, π); p ≥ 1.
+    gains : (S, F) array_like
+        Standard deviation of the innovation, ≥ 0, in `unit` per unit noise.
+    level_sd_db : (S, F) array_like
+        Standard deviation of the overall level in dB, from the length of the records.
+    unit : {"g", "arbitrary"}
+    simulated : bool
+        True where the recordings behind it were simulated.
+    interpolated : (S, F) array_like of bool, optional
+        Condition without a recording, filled from its neighbours.
+
+    Raises
+    ------
+    InputError
+        For wrong shapes or values out of range.
+    """
+
+    FORMAT = "tactileq.ar-model"
+
+    texture: str
+    rate_hz: float
+    speeds_mm_s: Floats
+    forces_n: Floats
+    line_spectral_frequencies: Floats
+    gains: Floats
+    level_sd_db: Floats
+    unit: str = "g"
+    simulated: bool = False
+    interpolated: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        check_texture_name(self.texture)
+        check_rate(self.rate_hz)
+        if self.unit not in UNITS or not isinstance(self.simulated, bool):
+            raise InputError(
+                f"{self.texture}: expected a unit among {', '.join(UNITS)} and true or false for "
+                f"simulated, got {self.unit!r} and {self.simulated!r}; fit the model again."
+            )
+        if np.size(self.interpolated) == 0:
+            object.__setattr__(self, "interpolated", np.zeros(np.shape(self.gains), dtype=bool))
+        self._freeze(_ARRAYS, booleans=("interpolated",))
+        check_axes(self.speeds_mm_s, self.forces_n)
+        self._check_arrays()
+
+    def _check_arrays(self) -> None:
+        grid = (self.speeds_mm_s.size, self.forces_n.size)
+        for name in _ARRAYS[2:]:
+            shape = getattr(self, name).shape
+            filters = name == "line_spectral_frequencies"
+            if shape[:2] != grid or len(shape) != 2 + filters or 0 in shape:
+                raise InputError(
+                    f"expected {name} on the model's grid of {grid[0]} speeds × {grid[1]} forces, "
+                    f"got the shape {shape}; fit the model again."
+                )
+        for name in ("gains", "level_sd_db"):
+            values = getattr(self, name)
+            if not (np.isfinite(values).all() and (values >= 0).all()):
+                raise InputError(
+                    f"expected finite {name} of at least 0, got {values.min()}; fit it again."
+                )
+        check_line_spectral(self.line_spectral_frequencies, f"the model of {self.texture}")
+
+    @property
+    def order(self) -> int:
+        """Order of the filters, p."""
+        return int(self.line_spectral_frequencies.shape[2])
+
+    @property
+    def n_parameters(self) -> int:
+        """Numbers per condition: p + 1."""
+        return self.order + 1
+
+    def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> ARParameters:
+        """Bilinear interpolation over the grid, with the edges of METHOD 9.
+
+        Line spectral frequencies are blended, not coefficients: any mean of rising frequencies
+        rises, so every blend is stable. The gain is blended linearly, as a `TextureModel`'s gains
+        are: it may be 0 in a condition, where a mean of logarithms would be 0 all around it.
+
+        Parameters
+        ----------
+        speed_mm_s, force_n : (n,) array_like
+            As in `TextureModel.parameters`.
+        """
+        hand, ramp = within_grid(
+            self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n
+        )
+        cells = Cells(self.speeds_mm_s, self.forces_n, hand=hand)
+        return ARParameters(
+            cells.blend(self.line_spectral_frequencies), cells.blend(self.gains) * ramp
+        )
+
+    def filter(self, speed_mm_s: float, force_n: float) -> ARFilter:
+        """The filter at one speed (mm/s) and force (N), interpolated as in `parameters`."""
+        at = self.parameters(speed_mm_s, force_n)
+        return ARFilter(
+            coefficients=prediction_coefficients(at.line_spectral_frequencies[0]),
+            gain=float(at.gain[0]),
+            rate_hz=self.rate_hz,
+        )
+
+
+_ARRAYS = (
+    "speeds_mm_s",
+    "forces_n",
+    "line_spectral_frequencies",
+    "gains",
+    "level_sd_db",
+    "interpolated",
+)

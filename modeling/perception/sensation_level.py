@@ -1,0 +1,57 @@
+"""How far above the detection threshold a vibration is: its sensation level (METHOD 7)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.errors import InputError
+from modeling.perception.thresholds import Threshold
+
+
+class SensationLevel(NamedTuple):
+    """Level in dB above threshold (dB SL), and the share of power that it says nothing about.
+
+    `share_without_threshold` (0 … 1) is the power at frequencies where no threshold is known.
+    """
+
+    level_db: float
+    share_without_threshold: float
+
+
+def sensation_level(
+    vibration_g: NDArray[np.float64], rate_hz: float, *, threshold: Threshold
+) -> SensationLevel:
+    """Threshold-weighted RMS of a vibration.
+
+    The power sum over frequency of (√2·RMS/threshold)²: every line of the spectrum counts as the
+    sinusoid of equal power (criterion `energy` of METHOD 7) against the threshold at its frequency,
+    so a sinusoid at threshold has 0 dB. Frequencies where no threshold is known are left out.
+
+    Parameters
+    ----------
+    vibration_g : (n,) ndarray
+        n ≥ 1, in g.
+    rate_hz : float
+    threshold : Threshold
+
+    Raises
+    ------
+    InputError
+        For silence, or where all power lies at frequencies without a known threshold.
+    """
+    lines = np.abs(np.fft.rfft(vibration_g)) ** 2 / vibration_g.size**2
+    lines[1 : (vibration_g.size + 1) // 2] *= 2  # two-sided power, but for 0 Hz and Nyquist
+    at = threshold.at(np.fft.rfftfreq(vibration_g.size, 1 / rate_hz))
+    known = np.isfinite(at)
+    weighted = float(np.sum(2 * lines[known] / at[known] ** 2))
+    if not weighted > 0:
+        low, high = threshold.valid_range_hz
+        raise InputError(
+            f"expected vibration between {low:g} and {high:g} Hz, where the threshold "
+            f"{threshold.name} is known, got none; leave this stimulus out or match RMS levels."
+        )
+    share = float(lines[~known].sum() / lines.sum())
+    return SensationLevel(10 * float(np.log10(weighted)), share)

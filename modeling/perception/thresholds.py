@@ -1,0 +1,171 @@
+"""Detection thresholds: the weakest sinusoid that is felt, by frequency (eq. 5, METHOD 7)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modeling.arrays import Floats
+from modeling.errors import InputError
+from modeling.files.tables import number, read_table
+
+STANDARD_GRAVITY_M_S2 = 9.80665
+SHIPPED = ("codec", "pen-hold", "mobile")
+LEVEL_COLUMNS = ("acceleration_g", "displacement_um")
+
+
+def displacement_to_acceleration_g(frequency_hz: ArrayLike, displacement_um: ArrayLike) -> Floats:
+    """Peak acceleration (g) of a sinusoid of peak displacement x (µm): (2πf)²·x (eq. 5)."""
+    omega = 2 * np.pi * np.asarray(frequency_hz, dtype=np.float64)
+    acceleration: Floats = omega**2 * np.asarray(displacement_um) * 1e-6 / STANDARD_GRAVITY_M_S2
+    return acceleration
+
+
+@dataclass(frozen=True, eq=False)
+class Threshold:
+    """A detection threshold, valid from its first to its last frequency.
+
+    Parameters
+    ----------
+    name : str
+    frequency_hz : (n,) array_like
+        Rising, > 0, n ≥ 2.
+    acceleration_g : (n,) array_like
+        Peak acceleration at threshold, > 0.
+    source, caveat : str
+        Where the numbers come from and what speaks against them.
+
+    Raises
+    ------
+    InputError
+        Naming the first value that cannot be part of a threshold.
+    """
+
+    name: str
+    frequency_hz: Floats
+    acceleration_g: Floats
+    source: str
+    caveat: str
+
+    def __post_init__(self) -> None:
+        for name in ("frequency_hz", "acceleration_g"):
+            value = np.array(getattr(self, name), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        wrong = _what_is_wrong(self.frequency_hz, self.acceleration_g)
+        if wrong:
+            raise InputError(
+                "expected at least two rising frequencies with levels above 0 in the threshold "
+                f"{self.name!r}, got {wrong}; correct the table."
+            )
+
+    @property
+    def valid_range_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the table; outside nothing is known."""
+        return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
+
+    def at(self, frequency_hz: ArrayLike) -> Floats:
+        """Threshold in g (peak) at any frequencies, log–log interpolated; NaN outside the range."""
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            level = np.exp(
+                np.interp(np.log(frequency), np.log(self.frequency_hz), np.log(self.acceleration_g))
+            )
+        known = (frequency >= self.frequency_hz[0]) & (frequency <= self.frequency_hz[-1])
+        return np.where(known, level, np.nan)
+
+    def held(self, frequency_hz: ArrayLike) -> Floats:
+        """As `at`, but above the range its last level (g): a lower bound, which is assumed.
+
+        Thresholds rise there: the P channel is the most sensitive at 250 to 300 Hz (METHOD 7).
+        """
+        above = np.asarray(frequency_hz, dtype=np.float64) > self.frequency_hz[-1]
+        finite = above & np.isfinite(frequency_hz)
+        return np.where(finite, self.acceleration_g[-1], self.at(frequency_hz))
+
+    @staticmethod
+    def load(path: str | Path) -> Threshold:
+        """Read a TSV with frequency_hz and displacement_um or acceleration_g (both peak).
+
+        Lines `# source: …` and `# caveat: …` above the header are kept with the table.
+
+        Raises
+        ------
+        InputError
+            For a missing file, missing or doubled columns or values that are no thresholds.
+        """
+        source = Path(path)
+        rows = read_table(source, ("frequency_hz",))
+        columns = [name for name in LEVEL_COLUMNS if name in (rows or [{}])[0]]
+        if len(columns) != 1:
+            got = "both" if columns else ("neither" if rows else "no rows")
+            raise InputError(
+                f"expected one column, {' or '.join(LEVEL_COLUMNS)}, with values in {source}, got "
+                f"{got}; a threshold needs one level (peak) for each frequency."
+            )
+        column = columns[0]
+        cells = [
+            [number(row[name], f"{name} in {source.name}") for row in rows]
+            for name in ("frequency_hz", column)
+        ]
+        frequency, level = (np.array(values) for values in cells)
+        if column == "displacement_um":
+            level = displacement_to_acceleration_g(frequency, level)
+        notes = _notes(source)
+        return Threshold(
+            source.stem,
+            frequency,
+            level,
+            notes.get("source", "not stated in the file"),
+            notes.get("caveat", "not stated in the file"),
+        )
+
+    @staticmethod
+    def named(name: str | Path) -> Threshold:
+        """One that comes along, by name, or a user's own, by the path of its TSV."""
+        return Threshold.load(name) if Path(name).suffix else Threshold.shipped(str(name))
+
+    @staticmethod
+    def shipped(name: str) -> Threshold:
+        """One of the thresholds that come along: one of `SHIPPED` (METHOD 7)."""
+        if name not in SHIPPED:
+            raise InputError(
+                f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got {name!r}; "
+                "give one of them."
+            )
+        with resources.as_file(
+            resources.files("modeling.perception") / "shipped" / f"{name}.tsv"
+        ) as path:
+            return Threshold.load(path)
+
+
+def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
+    """The first reason why these numbers are no threshold; empty where they are one."""
+    if frequency_hz.ndim != 1 or frequency_hz.shape != acceleration_g.shape:
+        return f"arrays of shapes {frequency_hz.shape} and {acceleration_g.shape}"
+    if frequency_hz.size < 2:
+        return f"{frequency_hz.size} of them"
+    wrong = ~(np.isfinite(frequency_hz) & (frequency_hz > 0))
+    if wrong.any():
+        return f"a frequency of {frequency_hz[wrong][0]:g} Hz"
+    falls = np.diff(frequency_hz) <= 0
+    if falls.any():
+        at = int(np.argmax(falls))
+        return f"{frequency_hz[at + 1]:g} Hz after {frequency_hz[at]:g} Hz"
+    wrong = ~(np.isfinite(acceleration_g) & (acceleration_g > 0))
+    if wrong.any():
+        return f"the level {acceleration_g[wrong][0]:g} at {frequency_hz[wrong][0]:g} Hz"
+    return ""
+
+
+def _notes(path: Path) -> dict[str, str]:
+    notes = {}
+    for line in path.read_text(encoding="utf-8-sig").splitlines():
+        if line.startswith("#") and ":" in line:
+            key, value = line[1:].split(":", 1)
+            notes[key.strip().lower()] = value.strip()
+    return notes

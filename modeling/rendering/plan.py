@@ -1,0 +1,199 @@
+"""What is rendered and how: all that the compiled and the Python renderer must agree on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from modeling.arrays import Floats
+from modeling.checks import is_whole
+from modeling.errors import InputError
+from modeling.models.parameter_table import ParameterTable
+from modeling.rendering.limits import Limits
+
+UPDATE_S = 1e-3
+FADE_S = 5e-3
+# Over which the slope of a reading is smoothed before the hand is foreseen by it.
+SLOPE_S = 4e-3
+# A reading that changes faster is a step of the device, not a hand's motion (2 g; a sharp tap).
+FASTEST_SPEED_CHANGE_MM_S2 = 2e4
+FASTEST_FORCE_CHANGE_N_S = 200.0
+_EDGE_SHARE = 0.2
+_LONGEST_UPDATE = 1_000_000
+_FOR_EVER = 2**62
+
+
+class LayeredModel(Protocol):
+    """A model that gives PEQ parameters for any speed and force."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def table(self) -> ParameterTable: ...
+
+
+class Notch(Protocol):
+    """A vibrator compensation (eq. 7): the signal less a share of it in a unit-gain band."""
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def frequency_hz(self) -> float: ...
+
+    @property
+    def bandwidth_hz(self) -> float: ...
+
+    @property
+    def band_share(self) -> float: ...
+
+
+@dataclass
+class RenderCounters:
+    """What a renderer had to correct so far.
+
+    `lift_offs`: samples with a speed or force that is not finite. `clamped`: parameter values
+    moved into the legal range. The rest: samples that each of the `Limits` touched.
+    """
+
+    lift_offs: int = 0
+    clamped: int = 0
+    limited_peak: int = 0
+    limited_rms: int = 0
+    limited_duration: int = 0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RenderPlan:
+    """How a stream is rendered.
+
+    Parameters
+    ----------
+    rate_hz : float
+    update_samples : int
+        From one parameter update to the next, 1 … 1 000 000.
+    limits : Limits
+        None by default.
+    compensation : Notch, optional
+        At this rate.
+
+    Raises
+    ------
+    InputError
+        For an update period out of range, or a compensation for another rate.
+    """
+
+    rate_hz: float
+    update_samples: int
+    limits: Limits = field(default_factory=Limits)
+    compensation: Notch | None = None
+
+    def __post_init__(self) -> None:
+        if not (is_whole(self.update_samples) and 1 <= self.update_samples <= _LONGEST_UPDATE):
+            raise InputError(
+                f"expected parameter updates every 1 to {_LONGEST_UPDATE} samples, got "
+                f"{self.update_samples!r}; give a whole number of update_samples in that range."
+            )
+        if self.compensation is not None and self.compensation.rate_hz != self.rate_hz:
+            raise InputError(
+                f"expected a vibrator compensation for {self.rate_hz:g} Hz, got one for "
+                f"{self.compensation.rate_hz:g} Hz; make it for the rate of rendering."
+            )
+
+    @property
+    def hand_changes(self) -> tuple[float, float]:
+        """The furthest that a hand's speed (mm/s) and force (N) get in one update."""
+        update_s = self.update_samples / self.rate_hz
+        return FASTEST_SPEED_CHANGE_MM_S2 * update_s, FASTEST_FORCE_CHANGE_N_S * update_s
+
+    @property
+    def slope_share(self) -> float:
+        """How much of a new change of a reading counts at once towards its smoothed slope."""
+        return min(1.0, self.update_samples / (SLOPE_S * self.rate_hz))
+
+    @property
+    def mean_share(self) -> float:
+        """What a new square adds to the running mean square."""
+        return float(-np.expm1(-1 / (self.limits.rms_window_s * self.rate_hz)))
+
+    def slews(self, largest_gains: Floats) -> Floats:
+        """How far each of (k,) gains moves in one update at most, (k,), given the largest it has.
+
+        The largest takes 5 ms: no hand is faster, but sensors and lift-off are.
+        """
+        share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
+        share *= 1 + 1e-12  # five fifths are to be a whole, whatever they round to
+        return largest_gains * share
+
+    def texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
+        """Everything that `tq_texture` in `kernel.h` holds, by name and in its order."""
+        table, lowpass = model.table, noise_lowpass(model.rate_hz, self.rate_hz)
+        speed_change, force_change = self.hand_changes
+        fields: dict[str, int | float | Floats] = {
+            "speeds": table.speeds_mm_s.size,
+            "forces": table.forces_n.size,
+            "layers": table.n_layers,
+            "speed_mm_s": table.speeds_mm_s,
+            "force_n": table.forces_n,
+            "values": table.values.reshape(-1, table.values.shape[-1]),
+            "signs": table.signs,
+            "rate_hz": self.rate_hz,
+            "noise_scale": float(np.sqrt(self.rate_hz / model.rate_hz)),
+            "lowpass": lowpass,
+            "taps": lowpass.size,
+            "update_samples": self.update_samples,
+            "speed_change": speed_change,
+            "force_change": force_change,
+            "slope_share": self.slope_share,
+            "slews": self.slews(table.largest_gains),
+        }
+        if self.compensation is not None:
+            fields["notch_hz"] = self.compensation.frequency_hz
+            fields["notch_width_hz"] = self.compensation.bandwidth_hz
+            fields["notch_share"] = self.compensation.band_share
+        return fields | self._limits()
+
+    def _limits(self) -> dict[str, int | float | Floats]:
+        """Those that there are; without them the structure's zeros stand for none."""
+        fields: dict[str, int | float | Floats] = {}
+        if np.isfinite(self.limits.peak):
+            fields["peak"] = self.limits.peak
+        if np.isfinite(self.limits.rms):
+            fields["mean_square"] = self.limits.mean_square
+            fields["mean_share"] = self.mean_share
+        if np.isfinite(self.limits.duration_s):
+            fields["longest"] = self.samples(self.limits.duration_s)
+            fields["pause"] = self.samples(self.limits.pause_s)
+            fields["silence"] = self.limits.silence
+        return fields
+
+    def samples(self, seconds: float) -> int:
+        """A limit's time in samples, at least 1; 0 stands for no limit."""
+        return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))
+
+
+def noise_lowpass(model_rate_hz: float, rate_hz: float) -> Floats:
+    """Taps of a linear-phase low-pass at the model's Nyquist frequency; [1] at its own rate.
+
+    Raises
+    ------
+    InputError
+        For a rate below the model's, or not finite.
+    """
+    if not (np.isfinite(rate_hz) and rate_hz >= model_rate_hz):
+        raise InputError(
+            f"expected a rendering rate of at least the model's {model_rate_hz:g} Hz, got "
+            f"{rate_hz:g}; render at that rate and resample."
+        )
+    if rate_hz == model_rate_hz:
+        return np.ones(1)
+    from scipy.signal import firwin
+
+    transition_hz = _EDGE_SHARE * model_rate_hz / 2
+    taps = 2 * round(1.65 * rate_hz / transition_hz) + 1  # Hamming: 3.3 fs/transition
+    cutoff_hz = min(model_rate_hz / 2, rate_hz / 2 * 0.999)
+    lowpass: Floats = firwin(taps, cutoff_hz, fs=rate_hz)
+    return lowpass

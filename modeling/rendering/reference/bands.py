@@ -1,0 +1,81 @@
+"""The bands of a layered model on a stream, in Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modeling.equalizer.bands import band_coefficients, clamp_bands
+from modeling.hand import Hand
+from modeling.rendering.noise import white_noise
+from modeling.rendering.plan import LayeredModel, RenderPlan, noise_lowpass
+from modeling.rendering.reference.hand import Extrapolator, GainRamps
+
+
+class BandFilter:
+    """A PEQ of m bands (METHOD 3) at the model's rate or above.
+
+    Parameters are those for the hand as it will be: those for the hand as it is read would be
+    late. Frequencies and bandwidths are set for the middle of the time to the next update; gains
+    move in a straight line to those for its last sample, and at most by the plan's slews. The first
+    update sets all at once.
+    """
+
+    def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
+        self.clamped = 0
+        self._table, self._plan = model.table, plan
+        self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
+        self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
+        self._extrapolate = Extrapolator(plan)
+        self._gains = GainRamps(plan, self._table.largest_gains)
+        self._bands = [(0.0,) * 5] * self._table.n_layers
+        self._state = [(0.0, 0.0)] * self._table.n_layers
+
+    def settings(self, hand: Hand) -> list[Any]:
+        """All gains that are wanted, and the coefficients of every band, at each update."""
+        amid, end = (self._table.at(*at) for at in self._extrapolate(hand))
+        frequency, bandwidth, clamped = clamp_bands(
+            amid.frequencies_hz, amid.bandwidths_hz, rate_hz=self._plan.rate_hz
+        )
+        self.clamped += clamped
+        c = band_coefficients(frequency, bandwidth, rate_hz=self._plan.rate_hz)
+        gains = np.concatenate([end.noise_gain[:, None], end.gains], axis=1)
+        taps = np.concatenate([np.ones((gains.shape[0], 1)), c.tap], axis=1)
+        table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
+        bands = [[tuple(band) for band in update] for update in table.tolist()]
+        return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
+
+    def update(self, setting: Any) -> None:
+        """Put coefficients into force, and start every gain on its way to what is wanted."""
+        wanted, taps, self._bands = setting
+        self._gains.update(wanted, taps)
+
+    def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
+        """The next noise for the bands and, low-passed without delay, for the noise branch.
+
+        The noise is known ahead, so the low-pass has zero phase and the sum stays coherent.
+        """
+        half = self._lowpass.size // 2
+        wide = self._scale * white_noise(key, start - half, count + 2 * half)
+        # Tap by tap: the order of additions, and so the result, is the same for any block size.
+        floor_noise = np.zeros(count)
+        for tap, weight in enumerate(self._lowpass):
+            floor_noise += weight * wide[tap : tap + count]
+        return wide[half : half + count].tolist(), floor_noise.tolist()
+
+    def filter(self, *inputs: list[float]) -> list[float]:
+        """The recursion of METHOD 3 with the parameters in force."""
+        noise, floor_noise = inputs
+        floor_gains = self._gains.course(0, len(noise))
+        output = [gain * w for gain, w in zip(floor_gains, floor_noise, strict=True)]
+        for layer, (p, q, r, b1, b2) in enumerate(self._bands):
+            s1, s2 = self._state[layer]
+            course = self._gains.course(1 + layer, len(noise))
+            for n, w in enumerate(noise):
+                turned = (s1 + b1 * w) + (p * s1 - q * s2)
+                s2 = (s2 + b2 * w) + (r * s2 + q * s1)
+                output[n] += course[n] * (s1 + turned)
+                s1 = turned
+            self._state[layer] = (s1, s2)
+        return output

@@ -1,0 +1,72 @@
+"""Rendering in Python: what `kernel.h` does, where there is no compiler; and of all-pole models.
+
+The filters pass white noise through orthogonal steps, so that their states keep unit variance (or
+lose some) at every sample, whatever the parameters do from one update to the next. Plain Python
+floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bits are the same.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+
+from modeling.arrays import Floats
+from modeling.hand import Hand
+from modeling.rendering.plan import RenderCounters, RenderPlan
+from modeling.rendering.reference.compensator import Compensator
+from modeling.rendering.reference.limiter import Limiter
+
+
+class StreamFilter(Protocol):
+    """A filter whose state carries on from block to block.
+
+    A setting holds its coefficients from one parameter update to the next.
+    """
+
+    clamped: int
+
+    def settings(self, hand: Hand) -> list[Any]:
+        """One setting for each of the n readings of the hand."""
+
+    def update(self, setting: Any) -> None:
+        """Put a setting into force."""
+
+    def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
+        """Its driving noise from position `start` on: one or more lists of `count` samples."""
+
+    def filter(self, *inputs: list[float]) -> list[float]:
+        """The output for the next samples of its inputs."""
+
+
+class PythonEngine:
+    """Renders with any `StreamFilter`: updates, filters, compensates and limits."""
+
+    def __init__(self, stream_filter: StreamFilter, plan: RenderPlan, *, key: np.uint64) -> None:
+        self._filter, self._plan, self._key = stream_filter, plan, key
+        self._position = 0
+        self._lift_offs = 0
+        self._limiter = Limiter(plan)
+        self._compensator = Compensator(plan)
+
+    @property
+    def counters(self) -> RenderCounters:
+        """What had to be corrected so far."""
+        return RenderCounters(self._lift_offs, self._filter.clamped, *self._limiter.touched)
+
+    def render(self, hand: Hand) -> Floats:
+        """The next samples, (n,), for n samples of the hand."""
+        speed_mm_s, force_n = hand
+        count, period = speed_mm_s.size, self._plan.update_samples
+        finite = np.isfinite(speed_mm_s) & np.isfinite(force_n)
+        self._lift_offs += count - int(np.count_nonzero(finite))
+        inputs = self._filter.inputs(self._key, self._position, count=count)
+        starts = list(range(-self._position % period, count, period))
+        bounds = [*starts, count]
+        output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
+        settings = self._filter.settings(Hand(speed_mm_s[starts], force_n[starts]))
+        for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
+            self._filter.update(setting)
+            output += self._filter.filter(*(part[start:stop] for part in inputs))
+        self._position += count
+        return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)

@@ -1,0 +1,92 @@
+"""How parameters follow the hand: linear extrapolation, and ramps of gains (METHOD 9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from modeling.arrays import Floats
+from modeling.hand import Hand
+from modeling.rendering.plan import RenderPlan
+
+
+class Extrapolator:
+    """Linear extrapolation of the hand by the exponentially smoothed slope of its readings.
+
+    A step, which is a change beyond what a hand can do, and a reading of 0 reset the slope: neither
+    is extrapolated.
+    """
+
+    def __init__(self, plan: RenderPlan) -> None:
+        self._furthest, self._share = plan.hand_changes, plan.slope_share
+        self._to_end = (plan.update_samples - 1) / plan.update_samples
+        self._last: list[float] = []
+        self._slopes = [0.0, 0.0]
+
+    def __call__(self, hand: Hand) -> tuple[Hand, Hand]:
+        """The hand in the middle of the time to the next readings, and just before them."""
+        read = np.stack(hand)
+        slopes = np.array([self._slopes_at(now) for now in read.T.tolist()]).reshape(-1, 2).T
+        with np.errstate(over="ignore"):
+            amid, end = read + slopes * (self._to_end / 2), read + slopes * self._to_end
+        return Hand(*amid), Hand(*end)
+
+    def _slopes_at(self, now: list[float]) -> list[float]:
+        """The smoothed changes per update of speed and force with the next reading."""
+        if self._last:
+            readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
+            self._slopes = [self._slope(*reading) for reading in readings]
+        self._last = now
+        return self._slopes
+
+    def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
+        change = now - last
+        goes_on = -furthest <= change <= furthest and now != 0
+        return slope + self._share * (change - slope) if goes_on else 0.0
+
+
+class GainRamps:
+    """Gains that move in straight lines from update to update, no faster than the plan lets them.
+
+    Parameters
+    ----------
+    plan : RenderPlan
+    largest : (k,) ndarray
+        Largest amplitude that each gain ever has.
+    """
+
+    def __init__(self, plan: RenderPlan, largest: Floats) -> None:
+        self._slews = plan.slews(largest).tolist()
+        self._per_sample = 1 / plan.update_samples
+        self._gains: list[float] = []
+        self._courses = [(0.0, 0.0)] * len(self._slews)
+
+    def update(self, wanted: list[float], factors: Sequence[float]) -> None:
+        """Start (k,) gains on their way to what is wanted, each heard times a factor.
+
+        The first update sets all at once.
+        """
+        now = self._gains or wanted
+        self._gains = [_towards(*move) for move in zip(now, wanted, self._slews, strict=True)]
+        self._courses = [
+            (start * factor, (end - start) * self._per_sample * factor)
+            for start, end, factor in zip(now, self._gains, factors, strict=True)
+        ]
+
+    def course(self, which: int, count: int) -> list[float]:
+        """One gain, times its factor, at each of the next samples."""
+        now, step = self._courses[which]
+        course = []
+        for _ in range(count):
+            now += step
+            course.append(now)
+        self._courses[which] = (now, step)
+        return course
+
+
+def _towards(gain: float, wanted: float, slew: float) -> float:
+    change = wanted - gain
+    if change > slew:
+        return gain + slew
+    return gain - slew if change < -slew else wanted

@@ -1,0 +1,77 @@
+"""The all-pole rival's filter, in Python."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from modeling.errors import InputError
+from modeling.hand import Hand
+from modeling.models.ar_model import ARModel
+from modeling.models.line_spectral import prediction_coefficients, reflection_coefficients
+from modeling.rendering.noise import white_noise
+from modeling.rendering.plan import RenderPlan
+from modeling.rendering.reference.hand import Extrapolator, GainRamps
+
+# Rounding must not put a pole on the unit circle.
+_HIGHEST_REFLECTION = 1 - 1e-12
+
+
+class LatticeFilter:
+    """An all-pole filter as a normalised lattice (Gray and Markel 1975), at the model's rate.
+
+    Every stage turns (its input, its state) by an angle, so with white noise of unit variance all
+    states and the unscaled output have unit variance too; the gain is applied behind it. A direct
+    form, stable as each of its filters is, can grow without bound when they change.
+    """
+
+    def __init__(self, model: ARModel, plan: RenderPlan) -> None:
+        if plan.rate_hz != model.rate_hz:
+            raise InputError(
+                f"expected the AR model's own rate of {model.rate_hz:g} Hz, got "
+                f"{plan.rate_hz:g} (an all-pole filter has no equal at another rate); render at "
+                "that rate and resample."
+            )
+        self.clamped = 0
+        self._model = model
+        self._state = [0.0] * model.order
+        self._stages = [(0.0, 1.0)] * model.order
+        self._extrapolate = Extrapolator(plan)
+        self._gain = GainRamps(plan, np.array([model.gains.max()]))
+
+    def settings(self, hand: Hand) -> list[Any]:
+        """Gain, RMS per gain, and sine and cosine of every stage from the highest order down."""
+        amid, end = (self._model.parameters(*at) for at in self._extrapolate(hand))
+        sine = reflection_coefficients(prediction_coefficients(amid.line_spectral_frequencies))
+        sine = np.nan_to_num(np.clip(sine, -_HIGHEST_REFLECTION, _HIGHEST_REFLECTION))
+        cosine = np.sqrt((1 - sine) * (1 + sine))
+        rms = 1 / cosine.prod(axis=-1)
+        table = np.stack([sine, cosine], axis=-1)[:, ::-1]
+        stages = [[tuple(stage) for stage in update] for update in table.tolist()]
+        return list(zip(end.gain.tolist(), rms.tolist(), stages, strict=True))
+
+    def update(self, setting: Any) -> None:
+        """Put angles into force, and start the gain on its way."""
+        gain, rms, self._stages = setting
+        self._gain.update([gain], [rms])
+
+    def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
+        """The next noise, of unit variance."""
+        return (white_noise(key, start, count).tolist(),)
+
+    def filter(self, *inputs: list[float]) -> list[float]:
+        """The lattice with the angles in force."""
+        state, output = self._state, []
+        highest = len(self._stages) - 1
+        levels = self._gain.course(0, len(inputs[0]))
+        for forward, level in zip(inputs[0], levels, strict=True):
+            for stage, (sine, cosine) in enumerate(self._stages):
+                held = state[highest - stage]
+                backward = sine * forward + cosine * held
+                forward = cosine * forward - sine * held
+                if stage:
+                    state[highest - stage + 1] = backward
+            state[0] = forward
+            output.append(level * forward)
+        return output

@@ -1,0 +1,434 @@
+"""Models of the Penn Haptic Texture Toolkit as recordings.
+
+The toolkit (Culbertson, Lopez Delgado and Kuchenbecker, IEEE Haptics Symposium 2014) holds one XML
+file per texture: filters driven by white noise, at scattered speeds (mm/s) and forces (N) that a
+triangulation joins, for an acceleration in m/s². It may not be redistributed; users bring it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NoReturn
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import freqz, lfilter, resample
+
+from modeling import InputError, Recording, RecordingSet
+from modeling.arrays import Floats
+from modeling.models.line_spectral import check_line_spectral, prediction_coefficients
+from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
+from modeling.seeds import generator, number_of
+
+AGREEMENT = 5e-5
+UNITS = {"AccelUnits": "m/s^2", "SpeedUnits": "mm/s", "ForceUnits": "N"}
+# A pole 2 Hz wide has forgotten where it began to 1e-5 by then.
+_RUN_IN_S = 2.0
+_INSIDE = -1e-9
+# Toolkit models are short to fit and tell of their surfaces as of any length of record.
+DURATION_S = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class ARMAFilter:
+    """Numerator and denominator of a filter of white noise of unit variance at its rate; in g."""
+
+    numerator: Floats
+    denominator: Floats
+    rate_hz: float
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        """Magnitude response at (n,) frequencies of 0 … rate/2, in g per unit noise."""
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        _, response = freqz(self.numerator, self.denominator, worN=frequency, fs=self.rate_hz)
+        return np.abs(response)
+
+
+@dataclass(frozen=True, eq=False)
+class HattTexture:
+    """One texture of the toolkit: n filters at scattered conditions, joined by t triangles.
+
+    Parameters
+    ----------
+    material : str
+    rate_hz : float
+        The rate at which the filters run.
+    conditions : (n, 2) ndarray
+        Speed (mm/s) and force (N) of each filter.
+    triangles : (t, 3) ndarray of int
+        Rows of `conditions`, from 0.
+    ar_frequencies, ma_frequencies : (n, p), (n, q) ndarray
+        Line spectral frequencies, radians per sample; q may be 0.
+    variances : (n,) ndarray
+        Of the driving noise, (m/s²)².
+    gains : (n,) ndarray
+        Of the moving-average part; 1 where there is none.
+    """
+
+    material: str
+    rate_hz: float
+    conditions: Floats
+    triangles: NDArray[np.intp]
+    ar_frequencies: Floats
+    ma_frequencies: Floats
+    variances: Floats
+    gains: Floats
+
+    def weights(self, speed_mm_s: float, force_n: float) -> Floats:
+        """Barycentric weights (n,) of the filters at one condition, two or three of them not 0.
+
+        Outside all triangles those of the nearest point of their hull count; distances are taken
+        relative to the fastest speed and the strongest force.
+        """
+        scale = self.conditions.max(axis=0)
+        point = np.array([speed_mm_s, force_n]) / scale
+        corners = (self.conditions / scale)[self.triangles]
+        shares = _barycentric(corners, point)
+        chosen = int(np.argmax(shares.min(axis=1)))
+        weights = np.zeros(len(self.conditions))
+        if shares[chosen].min() >= _INSIDE:
+            inside = np.clip(shares[chosen], 0.0, 1.0)
+            weights[self.triangles[chosen]] = inside / inside.sum()
+            return weights
+        triangle, side, along = _nearest_on_sides(corners, point)
+        first, second = self.triangles[triangle, [side, (side + 1) % 3]]
+        weights[first], weights[second] = 1 - along, along
+        return weights
+
+    def nearest(self, speed_mm_s: float, force_n: float) -> tuple[float, float]:
+        """The condition itself, or the nearest one within the hull of the triangles."""
+        speed, force = self.weights(speed_mm_s, force_n) @ self.conditions
+        return float(speed), float(force)
+
+    def filter(self, speed_mm_s: float, force_n: float) -> ARMAFilter:
+        """The filter at one speed (mm/s) and force (N).
+
+        Line spectral frequencies, variance and gain are weighted linearly, as the toolkit's own
+        renderer does: between two conditions the power of the driving noise is blended, not its
+        amplitude. Its filters at rest and at no force have variance 0, so levels fade there.
+        """
+        weights = self.weights(speed_mm_s, force_n)
+        denominator = prediction_coefficients(weights @ self.ar_frequencies)
+        numerator = np.ones(1)
+        if self.ma_frequencies.shape[1]:
+            moving = prediction_coefficients(weights @ self.ma_frequencies)
+            numerator = np.concatenate([numerator, moving])
+        level_g = float(np.sqrt(weights @ self.variances)) * float(weights @ self.gains)
+        return ARMAFilter(
+            numerator * level_g / STANDARD_GRAVITY_M_S2,
+            np.concatenate([[1.0], denominator]),
+            self.rate_hz,
+        )
+
+    def recordings(
+        self,
+        speeds_mm_s: Sequence[float],
+        forces_n: Sequence[float],
+        *,
+        duration_s: float = DURATION_S,
+        rate_hz: float | None = None,
+        seed: int = 0,
+    ) -> RecordingSet:
+        """Simulated recordings over a grid: Gaussian noise through the filter of each condition.
+
+        Conditions outside the hull of the file's models, and silent ones, have no recording.
+
+        Parameters
+        ----------
+        speeds_mm_s, forces_n : sequence of float
+            > 0.
+        duration_s : float
+            > 0.
+        rate_hz : float, optional
+            At most the toolkit's (the default): there is nothing above its Nyquist frequency.
+        seed : int
+            Textures of one seed differ in their noise.
+
+        Raises
+        ------
+        InputError
+            For values out of range, and where no condition lies within the hull and vibrates.
+        """
+        rate = self.rate_hz if rate_hz is None else rate_hz
+        if not 0 < rate <= self.rate_hz:
+            raise InputError(
+                f"{self.material}: expected a rate above 0 and up to the file's {self.rate_hz:g} "
+                f"Hz, got {rate:g}; leave it out to keep the file's."
+            )
+        if not 0 < duration_s < np.inf:
+            raise InputError(f"expected a duration above 0 s, got {duration_s:g}; give another.")
+        grid = [(float(speed), float(force)) for speed in speeds_mm_s for force in forces_n]
+        for condition in grid:
+            self._check_condition(*condition)
+        inside = self.conditions_inside(grid)
+        if not inside:
+            raise InputError(
+                f"{self.material}: expected a condition within the file's models and with "
+                f"vibration, got none of {len(grid)}; choose another grid."
+            )
+        own = [seed, number_of(self.material)]
+        return RecordingSet(
+            self._recording(*condition, rate, duration_s=duration_s, rng=generator(own, number))
+            for number, condition in enumerate(grid)
+            if condition in inside
+        )
+
+    def conditions_inside(
+        self, conditions: Sequence[tuple[float, float]]
+    ) -> list[tuple[float, float]]:
+        """Those of some (speed, force) conditions that the file tells of, and not as silence."""
+        return [
+            (speed, force)
+            for speed, force in conditions
+            if np.allclose((speed, force), self.nearest(speed, force), rtol=1e-9)
+            and self.filter(speed, force).numerator.any()
+        ]
+
+    def _check_condition(self, speed_mm_s: float, force_n: float) -> None:
+        if not (0 < speed_mm_s < np.inf and 0 < force_n < np.inf):
+            raise InputError(
+                f"{self.material}: expected speeds and forces above 0, got {speed_mm_s:g} mm/s and "
+                f"{force_n:g} N; choose others."
+            )
+
+    def _recording(
+        self,
+        speed_mm_s: float,
+        force_n: float,
+        rate_hz: float,
+        *,
+        duration_s: float,
+        rng: np.random.Generator,
+    ) -> Recording:
+        fitted = self.filter(speed_mm_s, force_n)
+        run_in = round(_RUN_IN_S * self.rate_hz)
+        noise = rng.standard_normal(run_in + round(duration_s * self.rate_hz))
+        samples = lfilter(fitted.numerator, fitted.denominator, noise)[run_in:]
+        if rate_hz != self.rate_hz:
+            samples = resample(samples, round(samples.size * rate_hz / self.rate_hz))
+        return Recording(samples, rate_hz, speed_mm_s, force_n, self.material, simulated=True)
+
+
+def load_hatt(path: str | Path) -> HattTexture:
+    """Read one `Models_….xml` of the toolkit.
+
+    Raises
+    ------
+    InputError
+        If the file is no such XML, lacks a field, holds lists of wrong lengths, values that are no
+        finite numbers, triangles of models that are not there, an unstable filter, or filter
+        coefficients that differ by more than 5e-5 from their line spectral frequencies.
+    """
+    file = _Reader(Path(path).name)
+    root = _root(Path(path))
+    for name, unit in UNITS.items():
+        if (given := root.findtext(name, unit).strip()) != unit:
+            file.refuse(f"{name} of {unit}", given, "convert its models")
+    rate_hz = file.number(root, "SampleRate")
+    if rate_hz <= 0:
+        file.refuse("a SampleRate above 0 Hz", f"{rate_hz:g}", "correct it")
+    speeds, forces = file.values(root, "speedList"), file.values(root, "forceList")
+    if speeds.size != forces.size or not speeds.size or min(speeds.min(), forces.min()) < 0:
+        file.refuse(
+            "as many speeds as forces, all of at least 0",
+            f"{speeds.size} in speedList and {forces.size} in forceList",
+            "download it again",
+        )
+    conditions = np.stack([speeds, forces], axis=-1)
+    models = _models_of(file, root, conditions)
+    return HattTexture(
+        material=file.text(root, "material"),
+        rate_hz=rate_hz,
+        conditions=conditions,
+        triangles=_triangles(file, root, conditions),
+        ar_frequencies=np.array([m.ar_frequencies for m in models]),
+        ma_frequencies=np.array([m.ma_frequencies for m in models]),
+        variances=np.array([m.variance for m in models]),
+        gains=np.array([m.gain for m in models]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """One filter of a file."""
+
+    condition: tuple[float, float]
+    ar_frequencies: Floats
+    ma_frequencies: Floats
+    variance: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class _Reader:
+    """Looks up fields of one file and names the file where one is not as expected."""
+
+    name: str
+
+    def refuse(self, expected: str, got: str, remedy: str) -> NoReturn:
+        raise InputError(f"expected {expected} in {self.name}, got {got}; {remedy}.")
+
+    def text(self, element: ElementTree.Element, field: str) -> str:
+        found = (element.findtext(field) or "").strip()
+        if not found:
+            self.refuse(f"the field {field}", "none", "download it again")
+        return found
+
+    def number(self, element: ElementTree.Element, field: str) -> float:
+        return float(self._floats([self.text(element, field)], field)[0])
+
+    def values(self, element: ElementTree.Element, field: str) -> Floats:
+        """The numbers of a list, which may be empty but must be there."""
+        if (found := element.find(field)) is None:
+            self.refuse(f"the list {field}", "none", "download it again")
+        return self.values_of(found, field)
+
+    def values_of(self, found: ElementTree.Element, field: str) -> Floats:
+        return self._floats([value.text or "" for value in found.findall("value")], field)
+
+    def _floats(self, texts: Sequence[str], field: str) -> Floats:
+        try:
+            numbers = np.array(texts, dtype=np.float64)
+        except ValueError:
+            self.refuse(f"numbers in {field}", f"{list(texts)[:3]}", "download it again")
+        if not np.isfinite(numbers).all():
+            self.refuse(f"finite numbers in {field}", "NaN or infinity", "download it again")
+        return numbers
+
+
+def _root(path: Path) -> ElementTree.Element:
+    if not path.is_file():
+        raise InputError(f"expected a file at {path}, got none there; give its path.")
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(
+            f"expected XML in {path.name}, got something else ({error}); give a Models_….xml of "
+            "the toolkit."
+        ) from None
+    if root.tag != "modelSet":
+        raise InputError(
+            f"expected a modelSet in {path.name}, got the XML element {root.tag}; give a "
+            "Models_….xml of the toolkit."
+        )
+    return root
+
+
+def _models_of(file: _Reader, root: ElementTree.Element, conditions: Floats) -> list[_Model]:
+    """The models in the order of the listed conditions, which the triangles count."""
+    models = [_model(file, element) for element in root.findall("model")]
+    found = {model.condition: model for model in models}
+    listed = [_key(speed, force) for speed, force in conditions]
+    if missing := [condition for condition in listed if condition not in found]:
+        speed, force = missing[0]
+        file.refuse(
+            f"a model for each of {len(listed)} listed speeds and forces",
+            f"{len(models)} models and none at {speed:g} mm/s and {force:g} N",
+            "download it again",
+        )
+    for field, sizes in (
+        ("ARlsf", {m.ar_frequencies.size for m in models}),
+        ("MAlsf", {m.ma_frequencies.size for m in models}),
+    ):
+        if len(sizes) > 1:
+            file.refuse(f"one length of {field} in all models", f"{sorted(sizes)}", "repair it")
+    return [found[condition] for condition in listed]
+
+
+def _model(file: _Reader, element: ElementTree.Element) -> _Model:
+    ar_frequencies = _checked_frequencies(file, element, "AR")
+    if not ar_frequencies.size:
+        file.refuse("at least one value in ARlsf", "an empty list", "download it again")
+    # The original files at 10 kHz are purely autoregressive and have no such part.
+    moving = element.find("MAlsf") is not None
+    ma_frequencies = _checked_frequencies(file, element, "MA") if moving else np.zeros(0)
+    variance = file.number(element, "var")
+    if variance < 0:
+        file.refuse("a var of at least 0", f"{variance:g}", "download it again")
+    return _Model(
+        _key(file.number(element, "speedMod"), file.number(element, "forceMod")),
+        ar_frequencies,
+        ma_frequencies,
+        variance,
+        file.number(element, "gain") if ma_frequencies.size else 1.0,
+    )
+
+
+def _key(speed_mm_s: float, force_n: float) -> tuple[float, float]:
+    """A condition to the six decimals that the files hold."""
+    return round(float(speed_mm_s), 6), round(float(force_n), 6)
+
+
+def _checked_frequencies(file: _Reader, element: ElementTree.Element, part: str) -> Floats:
+    """Line spectral frequencies that are stable and agree with the coefficients beside them."""
+    frequencies = file.values(element, f"{part}lsf")
+    coefficients = file.values(element, f"{part}coeff")
+    if coefficients.size != frequencies.size + 1 or coefficients[0] != 1:
+        file.refuse(
+            f"{frequencies.size + 1} values in {part}coeff, the first one 1, beside "
+            f"{frequencies.size} in {part}lsf",
+            f"{coefficients.size} values",
+            "download it again",
+        )
+    check_line_spectral(frequencies, f"{part}lsf of {file.name}")
+    if not frequencies.size:
+        return frequencies
+    difference = float(np.abs(prediction_coefficients(frequencies) - coefficients[1:]).max())
+    if difference > AGREEMENT:
+        file.refuse(
+            f"{part}coeff and {part}lsf that agree to {AGREEMENT:g}",
+            f"a difference of {difference:.2g}",
+            "one of them is wrong, download it again",
+        )
+    return frequencies
+
+
+def _triangles(file: _Reader, root: ElementTree.Element, conditions: Floats) -> NDArray[np.intp]:
+    rows = [file.values_of(triangle, "tri") for triangle in root.findall("tri")]
+    count = len(conditions)
+    for row in rows:
+        whole = row.size == 3 and bool((row == np.round(row)).all())
+        if not whole or row.min() < 1 or row.max() > count or len(set(row.tolist())) < 3:
+            file.refuse(
+                f"three different models of 1 to {count} in each tri",
+                f"{row.tolist()}",
+                "download it again",
+            )
+    if not rows:
+        file.refuse("at least one triangle tri", "none", "download it again")
+    triangles = np.array(rows, dtype=np.intp) - 1
+    first, second, third = (conditions[triangles[:, corner]] for corner in range(3))
+    if not _cross(second - first, third - first).any():
+        file.refuse("a triangle with an area", "only lines", "download it again")
+    return triangles
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    area: Floats = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    return area
+
+
+def _barycentric(corners: Floats, point: Floats) -> Floats:
+    """Barycentric coordinates (t, 3) of a point (2,) in each triangle (t, 3, 2); −inf in lines."""
+    to_corners = corners - point
+    areas = np.stack(
+        [_cross(to_corners[:, (i + 1) % 3], to_corners[:, (i + 2) % 3]) for i in range(3)], axis=-1
+    )
+    whole = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat = np.abs(whole) < 1e-12
+    shares = areas / np.where(flat, 1.0, whole)[:, None]
+    return np.where(flat[:, None], -np.inf, shares)
+
+
+def _nearest_on_sides(corners: Floats, point: Floats) -> tuple[int, int, float]:
+    """Triangle, side (from corner i to i+1) and share along it of the point nearest to `point`."""
+    start, stop = corners, np.roll(corners, -1, axis=1)
+    side = stop - start
+    along = ((point - start) * side).sum(axis=-1) / np.maximum((side**2).sum(axis=-1), 1e-300)
+    along = np.clip(along, 0.0, 1.0)
+    distance = np.linalg.norm(start + along[..., None] * side - point, axis=-1)
+    triangle, which = np.unravel_index(int(np.argmin(distance)), distance.shape)
+    return int(triangle), int(which), float(along[triangle, which])

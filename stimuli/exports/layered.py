@@ -1,0 +1,18 @@
+"""What can be exported as an equalizer: models with layers."""
+
+from __future__ import annotations
+
+from modeling import ARModel, InputError, RegressedModel, TextureModel
+from modeling.models.loading import AnyModel
+
+Layered = TextureModel | RegressedModel
+
+
+def check_layered(model: AnyModel) -> Layered:
+    """A model with layers; InputError for an autoregressive one."""
+    if isinstance(model, ARModel):
+        raise InputError(
+            f"expected a model with layers, got the autoregressive one of {model.texture}; export "
+            "a texture model, or this one as WAV."
+        )
+    return model

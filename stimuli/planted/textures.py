@@ -1,0 +1,260 @@
+"""Seven textures whose layers are known exactly, and their recording in silico.
+
+They carry the names of the paper's seven samples and 25 layers in all, but nothing in them was
+measured: they are truth by decree, against which estimators are tested. Levels and their growth are
+of the size that tool-on-surface recordings of like materials show (0.02–0.3 g RMS, growing with
+speed).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from modeling import InputError, Recording, RecordingSet, Renderer, TextureModel
+from modeling.equalizer.bands import band_rms
+from modeling.seeds import noise_seed
+
+SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
+FORCES_N = np.linspace(0.5, 3.5, 7)
+TRUTH_RATE_HZ = 5000.0
+RECORDER_RATE_HZ = 22704.0
+REFERENCE_SPEED_MM_S = 200.0
+REFERENCE_FORCE_N = 2.0
+SENSOR_STEP_G = 0.001907349
+SENSOR_LIMIT_G = 50.0
+SETTLING_S = 0.5
+
+
+@dataclass(frozen=True)
+class PlantedLayer:
+    """One layer at 200 mm/s and 2 N, and how it changes with speed v and force F.
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Grows as (v/200)^speed_law; a law of 1 is a spatial wavelength of 200/frequency_hz mm.
+    speed_law : float
+    bandwidth_hz : float
+        Constant.
+    rms_g : float
+        Level of the layer alone; grows as (v/200)^growth_speed · (F/2)^growth_force.
+    sign : {1, -1}
+        Of the gain, over the whole texture.
+    growth_speed, growth_force : float
+    """
+
+    frequency_hz: float
+    speed_law: float
+    bandwidth_hz: float
+    rms_g: float
+    sign: int
+    growth_speed: float
+    growth_force: float
+
+
+@dataclass(frozen=True)
+class PlantedTexture:
+    """Layers and noise (RMS in g over 0–2.5 kHz at 200 mm/s) of one planted texture."""
+
+    noise_g: float
+    layers: tuple[PlantedLayer, ...]
+
+
+CATALOGUE = {
+    "aluminum": PlantedTexture(
+        0.020,
+        (
+            PlantedLayer(80, 1.0, 30, 0.036, 1, 0.5, 0.2),
+            PlantedLayer(290, 0.05, 30, 0.015, 1, 0.5, 0.1),
+            PlantedLayer(700, 0.05, 110, 0.035, -1, 0.5, 0.2),
+        ),
+    ),
+    "canvas": PlantedTexture(
+        0.030,
+        (
+            PlantedLayer(52, 1.0, 25, 0.060, 1, 0.5, 0.35),
+            PlantedLayer(215, 0.1, 35, 0.050, -1, 0.5, 0.2),
+            PlantedLayer(345, 0.03, 35, 0.022, -1, 0.5, 0.1),
+            PlantedLayer(760, 0.05, 120, 0.050, 1, 0.5, 0.2),
+        ),
+    ),
+    "leather": PlantedTexture(
+        0.016,
+        (
+            PlantedLayer(42, 1.0, 20, 0.036, 1, 0.4, 0.3),
+            PlantedLayer(150, 0.05, 25, 0.026, 1, 0.4, 0.2),
+            PlantedLayer(255, 0.04, 30, 0.012, 1, 0.4, 0.1),
+            PlantedLayer(365, 0.03, 35, 0.017, 1, 0.4, 0.1),
+        ),
+    ),
+    "MDF": PlantedTexture(
+        0.020,
+        (
+            PlantedLayer(75, 1.0, 35, 0.045, 1, 0.5, 0.2),
+            PlantedLayer(320, 0.05, 40, 0.019, -1, 0.5, 0.1),
+            PlantedLayer(900, 0.05, 150, 0.045, 1, 0.5, 0.2),
+        ),
+    ),
+    "polyester": PlantedTexture(
+        0.030,
+        (
+            PlantedLayer(57, 1.0, 25, 0.056, 1, 0.5, 0.35),
+            PlantedLayer(226, 0.1, 35, 0.048, -1, 0.5, 0.2),
+            PlantedLayer(354, 0.03, 35, 0.022, -1, 0.5, 0.1),
+            PlantedLayer(800, 0.05, 120, 0.050, 1, 0.5, 0.2),
+        ),
+    ),
+    "PVC": PlantedTexture(
+        0.014,
+        (
+            PlantedLayer(40, 1.0, 18, 0.028, 1, 0.4, 0.2),
+            PlantedLayer(160, 0.05, 25, 0.022, 1, 0.4, 0.2),
+            PlantedLayer(265, 0.04, 30, 0.011, 1, 0.4, 0.1),
+            PlantedLayer(372, 0.02, 35, 0.015, 1, 0.4, 0.1),
+        ),
+    ),
+    "wall paper": PlantedTexture(
+        0.020,
+        (
+            PlantedLayer(40, 1.0, 20, 0.090, 1, 0.4, 0.4),
+            PlantedLayer(175, 0.1, 30, 0.045, 1, 0.4, 0.2),
+            PlantedLayer(300, 0.05, 40, 0.016, 1, 0.4, 0.1),
+        ),
+    ),
+}
+TEXTURES: tuple[str, ...] = tuple(CATALOGUE)
+# The published noise gain falls with speed (PAPER table 2, negative alpha 1).
+NOISE_GROWTH_SPEED = -0.1
+
+
+def planted_texture(
+    name: str,
+    *,
+    speeds_mm_s: NDArray[np.float64] = SPEEDS_MM_S,
+    forces_n: NDArray[np.float64] = FORCES_N,
+) -> TextureModel:
+    """The truth of one planted texture as a model (estimator "planted", simulated, 5 kHz).
+
+    Parameters
+    ----------
+    name : str
+        One of `TEXTURES`.
+    speeds_mm_s, forces_n : (S,), (F,) ndarray
+        The grid, rising, > 0; 50…350 mm/s × 0.5…3.5 N by default.
+
+    Raises
+    ------
+    InputError
+        For a name that is not in the catalogue.
+    """
+    if name not in CATALOGUE:
+        raise InputError(
+            f"expected a planted texture among {', '.join(TEXTURES)}, got {name!r}; choose one."
+        )
+    planted = CATALOGUE[name]
+    v = (np.asarray(speeds_mm_s) / REFERENCE_SPEED_MM_S)[:, None]
+    f = (np.asarray(forces_n) / REFERENCE_FORCE_N)[None, :]
+    layers = planted.layers
+    shape = (v.size, f.size)
+    bandwidths = [np.full(shape, float(layer.bandwidth_hz)) for layer in layers]
+    # Gain of a layer of 1 g RMS, the inverse of the PEQ's band variance.
+    gain_per_rms = [
+        1 / band_rms(1.0, layer.bandwidth_hz, rate_hz=TRUTH_RATE_HZ) for layer in layers
+    ]
+    return TextureModel(
+        texture=name,
+        rate_hz=TRUTH_RATE_HZ,
+        speeds_mm_s=np.asarray(speeds_mm_s),
+        forces_n=np.asarray(forces_n),
+        noise_gains=planted.noise_g * v**NOISE_GROWTH_SPEED * np.ones_like(f),
+        frequencies_hz=np.stack(
+            [np.broadcast_to(x.frequency_hz * v**x.speed_law, shape) for x in layers], axis=-1
+        ),
+        bandwidths_hz=np.stack(bandwidths, axis=-1),
+        gains=np.stack(
+            [
+                x.sign * x.rms_g * per_rms * v**x.growth_speed * f**x.growth_force
+                for x, per_rms in zip(layers, gain_per_rms, strict=True)
+            ],
+            axis=-1,
+        ),
+        level_sd_db=np.zeros((*shape, len(layers))),
+        estimator="planted",
+        simulated=True,
+        blending="logarithmic",
+    )
+
+
+@dataclass(frozen=True)
+class PlantedSurface:
+    """A planted texture as a recorder meets it: its spectrum at any speed and force, by formula.
+
+    The recorder's rate is higher than the model's, and filters warp less there, so that far skirts
+    differ by up to 2 dB from those of the planted model at its own rate.
+    """
+
+    texture: str
+    recorder_rate_hz: float = RECORDER_RATE_HZ
+
+    def magnitude(
+        self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float
+    ) -> NDArray[np.float64]:
+        """True magnitude (n,) in g per unit noise at 5 kHz; speed and force above 0."""
+        here = planted_texture(
+            self.texture, speeds_mm_s=np.array([speed_mm_s]), forces_n=np.array([force_n])
+        )
+        recorded = here.at_rate(self.recorder_rate_hz).peq(speed_mm_s, force_n)
+        scale = float(np.sqrt(TRUTH_RATE_HZ / self.recorder_rate_hz))
+        return recorded.response(frequency_hz) * scale
+
+
+def record_texture(
+    truth: TextureModel,
+    *,
+    rate_hz: float = RECORDER_RATE_HZ,
+    duration_s: float = 1.0,
+    seed: int = 0,
+) -> RecordingSet:
+    """Record a texture in silico, one record per condition of its grid.
+
+    The noise floor reaches to the recorder's Nyquist frequency; the sensor's step (0.001907349 g)
+    and range (±50 g) are those of the recorder's accelerometer.
+
+    Parameters
+    ----------
+    truth : TextureModel
+    rate_hz : float
+        The recorder's rate, at least twice the highest layer's frequency.
+    duration_s : float
+        Length of each record, > 0.
+    seed : int
+        Each texture and each condition has its own stream of noise under this seed.
+
+    Returns
+    -------
+    RecordingSet
+        All marked `simulated`.
+    """
+    at_rate = truth.at_rate(rate_hz)
+    settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
+    records = []
+    # Two textures under one seed must not share their noise.
+    texture_seed = noise_seed(seed, truth.texture)
+    conditions = [(v, f) for v in truth.speeds_mm_s.tolist() for f in truth.forces_n.tolist()]
+    for stream, (speed, force) in enumerate(conditions):
+        renderer = Renderer(at_rate, seed=texture_seed, stream=stream)
+        vibration = renderer.render(speed, force, samples=settling + samples)[settling:]
+        records.append(
+            Recording(sensed(vibration), rate_hz, speed, force, truth.texture, simulated=True)
+        )
+    return RecordingSet(records)
+
+
+def sensed(acceleration_g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """What the accelerometer reports of (n,) g: whole steps, limited to its range."""
+    steps = np.rint(np.clip(acceleration_g, -SENSOR_LIMIT_G, SENSOR_LIMIT_G) / SENSOR_STEP_G)
+    reported: NDArray[np.float64] = np.round(steps * SENSOR_STEP_G, 9)
+    return reported

@@ -1,0 +1,193 @@
+"""What a recipe names: models, hands, a threshold and a vibrator, read, checked and copied."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+
+from modeling import InputError, Threshold, Vibrator, compensation_for
+from modeling.files.writing import file_stem, write_text
+from modeling.models.loading import AnyModel, is_something_else, load_model, model_files
+from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.trajectories import Trajectory
+
+FOLDER = "sources"
+RECIPE = "recipe.toml"
+VIBRATOR = Path(FOLDER, "vibrator.json")
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledModel:
+    """A model, its label in the set, and the file that it came from."""
+
+    label: str
+    model: AnyModel
+    path: Path
+    sha256: str
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """Everything that a recipe names, in the recipe's order.
+
+    `passed_over`: JSON files in its folders of models that say they are something else.
+    """
+
+    models: tuple[LabelledModel, ...]
+    trajectories: tuple[Trajectory, ...]
+    threshold: Threshold | None
+    vibrator: Vibrator | None
+    vibrator_sha256: str | None
+    passed_over: tuple[Path, ...]
+
+
+def load_sources(recipe: Recipe) -> Sources:
+    """Read what a recipe names.
+
+    Raises
+    ------
+    InputError
+        For a file that is missing or no model (trajectory, threshold, vibrator), two models of one
+        texture under one label, a rate below a model's, a trajectory shorter than a sample, a model
+        in arbitrary units in a set that is to be matched in loudness, or a vibrator that cannot be
+        compensated at a rate, or not within the time to settle.
+    """
+    found = [(path, entry.label) for entry in recipe.models for path in _files(entry)]
+    # A model that the recipe names itself is to be one.
+    named = {entry.path for entry in recipe.models}
+    passed_over = [path for path, _ in found if path not in named and is_something_else(path)]
+    models = tuple(_labelled(path, label) for path, label in found if path not in passed_over)
+    _check_models(models, recipe)
+    trajectories = tuple(
+        Trajectory.of(entry, duration_s=recipe.duration_s) for entry in recipe.trajectories
+    )
+    for trajectory in trajectories:
+        _check_lasts(trajectory, recipe)
+    vibrator = None if recipe.vibrator is None else Vibrator.load(recipe.vibrator)
+    if vibrator is not None:
+        _check_compensated(vibrator, recipe)
+    named_threshold = recipe.level.threshold
+    return Sources(
+        models=models,
+        trajectories=trajectories,
+        threshold=None if named_threshold is None else Threshold.named(named_threshold),
+        vibrator=vibrator,
+        vibrator_sha256=None if recipe.vibrator is None else _sha256(recipe.vibrator),
+        passed_over=tuple(passed_over),
+    )
+
+
+def _labelled(path: Path, label: str) -> LabelledModel:
+    return LabelledModel(label, load_model(path), path, _sha256(path))
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _files(entry: ModelEntry) -> list[Path]:
+    return model_files(entry.path) if entry.path.is_dir() else [entry.path]
+
+
+def _check_models(models: Sequence[LabelledModel], recipe: Recipe) -> None:
+    names = [f"{labelled.model.texture} ({labelled.label})" for labelled in models]
+    _check_distinct(names, what="model of each texture under each label")
+    for labelled, name in zip(models, names, strict=True):
+        _check_fits(labelled.model, name, recipe)
+
+
+def _check_fits(model: AnyModel, name: str, recipe: Recipe) -> None:
+    slowest = min(recipe.rates_hz)
+    if slowest < model.rate_hz:
+        raise InputError(
+            f"expected a rendering rate of at least the model's {model.rate_hz:g} Hz for {name}, "
+            f"got {slowest} Hz; a lower one would lose part of the vibration."
+        )
+    if recipe.level.mode == "loudness" and model.unit != "g":
+        raise InputError(
+            f"expected models in g to match loudness, got the unit {model.unit!r} for {name}; "
+            "calibrate its recordings, or match RMS levels."
+        )
+
+
+def _check_lasts(trajectory: Trajectory, recipe: Recipe) -> None:
+    slowest = min(recipe.rates_hz)
+    if round(trajectory.duration_s * slowest) < 1:
+        raise InputError(
+            f"expected a trajectory of at least one sample at {slowest} Hz, got "
+            f"{trajectory.duration_s:g} s in {trajectory.name!r}; see whether its times are in "
+            "seconds."
+        )
+
+
+def _check_compensated(vibrator: Vibrator, recipe: Recipe) -> None:
+    needed_s = max(
+        compensation_for(vibrator, rate_hz=rate_hz).settling_s for rate_hz in recipe.rates_hz
+    )
+    if needed_s > recipe.settling_s:
+        raise InputError(
+            f"expected settling_s of at least {ceil(needed_s * 100) / 100:g} under [set], in which "
+            f"the compensation of {recipe.vibrator} settles, got {recipe.settling_s:g}; raise it."
+        )
+
+
+def _check_distinct(names: Iterable[str], *, what: str) -> None:
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise InputError(f"expected one {what}, got two of {name}; remove or rename one.")
+        seen.add(name)
+
+
+def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Path, Path]]:
+    """The recipe with copies of all that it names in the folder `sources`; which is of which.
+
+    Rendering from that recipe gives the same set, wherever the folder is moved and whatever
+    becomes of the originals.
+
+    Raises
+    ------
+    InputError
+        Where two sources would have one name.
+    """
+    models = {labelled: _copy_of_model(labelled) for labelled in sources.models}
+    hands = [_copy_of_trajectory(entry) for entry in recipe.trajectories]
+    named = recipe.level.threshold
+    threshold = Path(FOLDER, file_stem(named.name)) if isinstance(named, Path) else named
+    vibrator = None if recipe.vibrator is None else VIBRATOR
+    pairs: list[tuple[object, object]] = [(copy, m.path) for m, copy in models.items()]
+    pairs += [(copy.file, t.file) for t, copy in zip(recipe.trajectories, hands, strict=True)]
+    pairs += [(threshold, named), (vibrator, recipe.vibrator)]
+    copies = [(a, b) for a, b in pairs if isinstance(a, Path) and isinstance(b, Path)]
+    _check_distinct((copy.name for copy, _ in copies), what="name for each source")
+    copied = replace(
+        recipe,
+        models=tuple(ModelEntry(copy, labelled.label) for labelled, copy in models.items()),
+        trajectories=tuple(hands),
+        level=replace(recipe.level, threshold=threshold),
+        vibrator=vibrator,
+    )
+    return copied, dict(copies)
+
+
+def copy_sources(recipe: Recipe, sources: Sources, *, folder: Path) -> None:
+    """Copy all sources into `folder`/sources, and beside it the recipe that names the copies."""
+    copied, originals = recipe_of_copies(recipe, sources)
+    (folder / FOLDER).mkdir()
+    for copy, original in originals.items():
+        shutil.copyfile(original, folder / copy)
+    write_text(folder / RECIPE, copied.to_toml())
+
+
+def _copy_of_model(labelled: LabelledModel) -> Path:
+    return Path(FOLDER, file_stem(f"{labelled.model.texture}_{labelled.label}") + ".json")
+
+
+def _copy_of_trajectory(entry: TrajectoryEntry) -> TrajectoryEntry:
+    if entry.file is None:
+        return entry
+    return replace(entry, file=Path(FOLDER, file_stem(entry.name) + ".csv"))

@@ -1,0 +1,145 @@
+"""Speed and force of a hand over time: constant, or recorded."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from modeling import InputError
+from modeling.arrays import Floats
+from modeling.files.tables import number
+from modeling.hand import Hand
+from stimuli.sets.recipe import LONGEST_S, TrajectoryEntry
+
+COLUMNS = ("time_s", "speed_mm_s", "force_n")
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A stroke: speed and force at n ≥ 2 rising times, linear in between.
+
+    Parameters
+    ----------
+    name : str
+    time_s : (n,) array_like
+        Finite and rising, over at most an hour; it may begin anywhere.
+    speed_mm_s, force_n : (n,) array_like
+        Tangential speed (either direction) and normal force. NaN counts as lift-off, as does all
+        that is interpolated from it.
+
+    Raises
+    ------
+    InputError
+        Naming what is wrong with the times.
+    """
+
+    name: str
+    time_s: Floats
+    speed_mm_s: Floats
+    force_n: Floats
+
+    def __post_init__(self) -> None:
+        for column in COLUMNS:
+            value = np.array(getattr(self, column), dtype=np.float64)
+            value.setflags(write=False)
+            object.__setattr__(self, column, value)
+        wrong = self._what_is_wrong()
+        if wrong:
+            raise InputError(
+                "expected at least two rising times, with a speed and a force at each, in the "
+                f"trajectory {self.name!r}, got {wrong}; correct it."
+            )
+        if not 0 < self.duration_s <= LONGEST_S:
+            raise InputError(
+                f"expected a trajectory of at most {LONGEST_S:g} s, got {self.duration_s:g} s in "
+                f"{self.name!r}; cut it, and see whether the times are in seconds."
+            )
+
+    def _what_is_wrong(self) -> str:
+        """The first reason why these are no trajectory; empty where they are one."""
+        shapes = {self.time_s.shape, self.speed_mm_s.shape, self.force_n.shape}
+        if len(shapes) != 1 or self.time_s.ndim != 1:
+            return f"arrays of shapes {', '.join(map(str, sorted(shapes)))}"
+        if self.time_s.size < 2:
+            return f"{self.time_s.size} of them"
+        if not np.isfinite(self.time_s).all():
+            return f"the time {self.time_s[~np.isfinite(self.time_s)][0]} s"
+        falls = np.diff(self.time_s) <= 0
+        at = int(np.argmax(falls))
+        return f"{self.time_s[at + 1]:g} s after {self.time_s[at]:g} s" if falls.any() else ""
+
+    @property
+    def duration_s(self) -> float:
+        """From the first time to the last."""
+        return float(self.time_s[-1] - self.time_s[0])
+
+    @property
+    def highest_speed_mm_s(self) -> float:
+        """In either direction; 0 where the hand is never on the surface."""
+        return _highest(np.abs(self.speed_mm_s))
+
+    @property
+    def highest_force_n(self) -> float:
+        """0 where the hand is never on the surface."""
+        return _highest(self.force_n)
+
+    def at(self, elapsed_s: Floats) -> Hand:
+        """The hand at (n,) times since the start.
+
+        Before the start and after the end the first and the last condition are held.
+        """
+        time_s = self.time_s[0] + elapsed_s
+        hand = (np.interp(time_s, self.time_s, v) for v in (self.speed_mm_s, self.force_n))
+        return Hand(*(np.asarray(values, dtype=np.float64) for values in hand))
+
+    @staticmethod
+    def of(entry: TrajectoryEntry, *, duration_s: float) -> Trajectory:
+        """What a recipe's entry stands for; `duration_s` is that of constant ones."""
+        if entry.file is not None:
+            return load_trajectory(entry.file, name=entry.name)
+        speed, force = (
+            np.full(2, value, dtype=np.float64) for value in (entry.speed_mm_s, entry.force_n)
+        )
+        return Trajectory(entry.name, np.array([0.0, duration_s]), speed, force)
+
+
+def _highest(values: Floats) -> float:
+    return float(values[np.isfinite(values)].max(initial=0.0))
+
+
+def load_trajectory(path: str | Path, *, name: str) -> Trajectory:
+    """Read a CSV with the columns time_s, speed_mm_s and force_n (nan: lift-off).
+
+    Raises
+    ------
+    InputError
+        For a missing file, missing columns, cells that are no numbers, or times that do not rise.
+    """
+    source = Path(path)
+    try:
+        with source.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(file)
+            missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
+            if missing:
+                raise InputError(
+                    f"expected the columns {', '.join(COLUMNS)} in {source}, got no "
+                    f"{', '.join(missing)}; name them in the first line, separated by commas."
+                )
+            rows = [_row(row, f"line {reader.line_num} of {source}") for row in reader]
+    except OSError as error:
+        raise InputError(
+            f"expected a trajectory (CSV) at {source}, got {error.strerror}; give its path."
+        ) from None
+    except (UnicodeDecodeError, csv.Error):
+        raise InputError(
+            f"expected a CSV in {source}, got other bytes; save it as UTF-8 text."
+        ) from None
+    time_s, speed_mm_s, force_n = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    return Trajectory(name, time_s, speed_mm_s, force_n)
+
+
+def _row(row: dict[str, str], where: str) -> list[float]:
+    return [number(row[column] or "", f"{column} in {where}") for column in COLUMNS]

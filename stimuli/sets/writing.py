@@ -1,0 +1,335 @@
+"""Stimulus sets: WAV files rendered from a recipe, and the manifest that says what they are."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import ceil, floor, log10
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from modeling import InputError, compensation_for
+from modeling.arrays import Floats
+from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.writing import file_stem
+from modeling.perception.sensation_level import sensation_level
+from modeling.seeds import noise_stream
+from stimuli.sets.manifest import (
+    COLUMNS_FILE,
+    COMPENSATED,
+    MANIFEST,
+    Stimulus,
+    level_db,
+    measured,
+    write_manifest,
+)
+from stimuli.sets.recipe import Recipe, TrajectoryEntry
+from stimuli.sets.rendering import (
+    BITS,
+    at_rate,
+    highest_peak,
+    margin_samples,
+    render_with_margins,
+    start_sample,
+    steady_part,
+    wav_bytes,
+)
+from stimuli.sets.sources import (
+    FOLDER,
+    RECIPE,
+    LabelledModel,
+    Sources,
+    copy_sources,
+    load_sources,
+    recipe_of_copies,
+)
+from stimuli.sets.trajectories import Trajectory
+
+CONTACT_SHEET = "spectra.png"
+# 48 bits: few enough that a spreadsheet keeps them all.
+
+
+@dataclass(frozen=True, eq=False)
+class _Take:
+    """One model on one trajectory with one noise; every rate makes a file of it."""
+
+    source: LabelledModel
+    entry: TrajectoryEntry
+    trajectory: Trajectory
+    seed: int
+    stream: int
+    settling_s: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.source.model.texture}_{self.source.label}_{self.entry.name}"
+
+    def render(self) -> Floats:
+        """At the model's rate, with margins (`render_with_margins`)."""
+        return render_with_margins(
+            self.source.model,
+            self.trajectory,
+            seed=self.seed,
+            stream=self.stream,
+            settling_s=self.settling_s,
+        )
+
+    def steady(self) -> Floats:
+        """What its level is measured over, at the model's rate."""
+        rate_hz, vibration = self.source.model.rate_hz, self.render()
+        start = start_sample(rate_hz, settling_s=self.settling_s)
+        return steady_part(vibration[start : vibration.size - margin_samples(rate_hz)], rate_hz)
+
+
+class _Gain(NamedTuple):
+    """What brings a take to its level, and its sensation level then where that was matched."""
+
+    gain_db: float = 0.0
+    sensation_level_db: float | None = None
+    share_without_threshold: float | None = None
+
+
+def write_set(
+    folder: str | Path,
+    recipe: Recipe,
+    *,
+    sources: Sources | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> tuple[Stimulus, ...]:
+    """Render every model on every trajectory with every seed, at every rate, to a WAV file.
+
+    Beside the files: `manifest.tsv` with `manifest.json`, which describes its columns, and
+    `recipe.toml` with copies of all that it names in `sources`, from which the same set is made
+    again. The same recipe and sources give the same bytes (with one version of everything on one
+    kind of processor; elsewhere the last bit of a sample may differ).
+
+    Parameters
+    ----------
+    folder : path
+        Appears whole or not at all; replaced if it was a stimulus set, refused if it was not
+        (`check_place`).
+    recipe : Recipe
+    sources : Sources, optional
+        The recipe's, where they are loaded already.
+    progress : callable, optional
+        Called with the file's name after each file.
+
+    Returns
+    -------
+    tuple of Stimulus
+        The manifest's rows.
+
+    Raises
+    ------
+    InputError
+        For a recipe whose sources cannot be used, a silent stimulus that is to be brought to a
+        level, two stimuli of one name, samples beyond the full scale of 24-bit files, or a disk
+        that takes no more; then nothing is written.
+    """
+    target = Path(folder)
+    check_place(target)
+    sources = sources or load_sources(recipe)
+    files = rendered(recipe, sources)
+    stimuli = []
+    try:
+        with replace_folder(target) as fresh:
+            copy_sources(recipe, sources, folder=fresh)
+            for stimulus, data in files:
+                _write_new(fresh / stimulus.file, data)
+                stimuli.append(stimulus)
+                if progress:
+                    progress(stimulus.file)
+            check_clipping(stimuli)
+            write_manifest(fresh, stimuli)
+    except OSError as error:
+        where = f" at {error.filename}" if error.filename else ""
+        raise InputError(
+            f"expected to write a stimulus set to {target}, got {error.strerror or error}{where}; "
+            "check the path, its permissions and the space on the disk."
+        ) from None
+    return tuple(stimuli)
+
+
+def check_place(target: Path) -> None:
+    """Refuse a folder that holds anything but a set: its files and the copies of its sources."""
+    own = (RECIPE, COLUMNS_FILE, CONTACT_SHEET, FOLDER)
+    check_replaceable(target, index_name=MANIFEST, what="a stimulus set", beside=own)
+    if not (target / FOLDER).is_dir():
+        return
+    named = Recipe.load(target / RECIPE).files()
+    foreign = sorted(set((target / FOLDER).iterdir()) - set(named))
+    if foreign:
+        raise InputError(
+            f"expected a new folder or a stimulus set, got {target} with a file in it that its "
+            f"recipe does not name ({foreign[0]}); choose another folder."
+        )
+
+
+def _write_new(path: Path, data: bytes) -> None:
+    if path.exists():
+        raise InputError(
+            f"expected each stimulus to have a name of its own, got {path.name} twice; rename a "
+            "texture, label or trajectory."
+        )
+    path.write_bytes(data)
+
+
+def stimulus_count(recipe: Recipe, sources: Sources) -> int:
+    """How many stimuli a recipe has."""
+    takes = len(sources.models) * len(recipe.trajectories) * len(recipe.seeds)
+    return takes * len(recipe.rates_hz)
+
+
+def rendered(recipe: Recipe, sources: Sources) -> Iterator[tuple[Stimulus, bytes]]:
+    """Every stimulus of a recipe: its row of the manifest and its WAV file.
+
+    Gains are found at once, files rendered one by one as they are asked for.
+
+    Raises
+    ------
+    InputError
+        For a silent stimulus that is to be brought to a level.
+    """
+    takes = list(_takes(recipe, sources))
+    gains = _gains(takes, recipe, sources)
+    text = recipe_of_copies(recipe, sources)[0].to_toml()
+    maker = _FileMaker(recipe, sources, hashlib.sha256(text.encode()).hexdigest())
+    pairs = zip(takes, gains, strict=True)
+    return (made for take, gain in pairs for made in maker.files(take, gain))
+
+
+def _takes(recipe: Recipe, sources: Sources) -> Iterator[_Take]:
+    for source in sources.models:
+        for entry, trajectory in zip(recipe.trajectories, sources.trajectories, strict=True):
+            label = "" if recipe.noise == "frozen" else source.label
+            # By name, so that a stimulus stays the same when others are added to its set.
+            stream = noise_stream(source.model.texture, label, entry.name)
+            for seed in recipe.seeds:
+                yield _Take(source, entry, trajectory, seed, stream, recipe.settling_s)
+
+
+def _gains(takes: Sequence[_Take], recipe: Recipe, sources: Sources) -> list[_Gain]:
+    """One gain for each take. Rendered for this alone: keeping all takes would fill the memory."""
+    if recipe.level.mode == "as modelled":
+        return [_Gain() for _ in takes]
+    if recipe.level.rms_db is not None:
+        return [_Gain(recipe.level.rms_db - _audible_level_db(take)) for take in takes]
+    return _loudness_gains(takes, sources, wanted_db=recipe.level.sensation_level_db)
+
+
+def _audible_level_db(take: _Take) -> float:
+    level = level_db(float(np.sqrt(np.mean(take.steady() ** 2))))
+    if level == -np.inf:
+        raise InputError(
+            f"expected vibration to bring to a level, got silence in {take.name}; leave this "
+            "stimulus out or render the set as modelled."
+        )
+    return level
+
+
+def _loudness_gains(
+    takes: Sequence[_Take], sources: Sources, *, wanted_db: float | None
+) -> list[_Gain]:
+    """All takes to one sensation level: the wanted one, or the median of what they have."""
+    assert sources.threshold is not None  # a recipe that matches loudness names one
+    found = []
+    for take in takes:
+        rate_hz = take.source.model.rate_hz
+        try:
+            found.append(sensation_level(take.steady(), rate_hz, threshold=sources.threshold))
+        except InputError as error:
+            raise InputError(f"{take.name}: {error}") from None
+    if wanted_db is None:
+        wanted_db = float(np.median([sensation.level_db for sensation in found]))
+    return [_Gain(wanted_db - s.level_db, wanted_db, s.share_without_threshold) for s in found]
+
+
+@dataclass(frozen=True)
+class _FileMaker:
+    """Makes the files of a recipe's takes."""
+
+    recipe: Recipe
+    sources: Sources
+    recipe_sha256: str
+
+    def files(self, take: _Take, gain: _Gain) -> Iterator[tuple[Stimulus, bytes]]:
+        """The files of one take, one per rate, each with its row of the manifest."""
+        with_margins = take.render() * 10 ** (gain.gain_db / 20)
+        resampled = partial(
+            at_rate,
+            with_margins,
+            take.source.model.rate_hz,
+            duration_s=take.trajectory.duration_s,
+            settling_s=take.settling_s,
+        )
+        for rate_hz in self.recipe.rates_hz:
+            vibration = resampled(rate_hz=rate_hz)
+            written = vibration
+            if self.sources.vibrator is not None:
+                compensation = compensation_for(self.sources.vibrator, rate_hz=rate_hz)
+                written = resampled(rate_hz=rate_hz, compensation=compensation)
+            data = wav_bytes(written, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
+            stimulus = Stimulus(
+                file=self._file_name(take, rate_hz),
+                rate_hz=rate_hz,
+                duration_s=vibration.size / rate_hz,
+                sha256=hashlib.sha256(data).hexdigest(),
+                **gain._asdict(),
+                **measured(vibration, rate_hz, written=written),
+                **self._description(take),
+            )
+            yield stimulus, data
+
+    def _file_name(self, take: _Take, rate_hz: int) -> str:
+        """Seed and rate stand in the name only where there are several."""
+        seed = f"_seed{take.seed}" if len(self.recipe.seeds) > 1 else ""
+        rate = f"_{rate_hz}Hz" if len(self.recipe.rates_hz) > 1 else ""
+        return file_stem(take.name + seed + rate) + ".wav"
+
+    def _description(self, take: _Take) -> dict[str, Any]:
+        """What all files of a take have in common."""
+        model, recipe, vibrator = take.source.model, self.recipe, self.sources.vibrator
+        simulated = model.simulated or (vibrator is not None and vibrator.simulated)
+        return {
+            "texture": model.texture,
+            "model": take.source.label,
+            "layers": getattr(model, "n_layers", None),
+            "model_rate_hz": model.rate_hz,
+            "trajectory": take.entry.name,
+            "speed_mm_s": take.entry.speed_mm_s,
+            "force_n": take.entry.force_n,
+            "seed": take.seed,
+            "stream": take.stream,
+            # Brought to a level in dB re 1 g, samples are g whatever they were before.
+            "unit": "g" if recipe.level.mode == "rms" else model.unit,
+            "format": recipe.format,
+            "bits": BITS[recipe.format],
+            "full_scale_g": recipe.level.full_scale_g,
+            "model_sha256": take.source.sha256,
+            "recipe_sha256": self.recipe_sha256,
+            "vibrator": None if vibrator is None else COMPENSATED,
+            "vibrator_sha256": self.sources.vibrator_sha256,
+            "simulated": str(simulated).lower(),
+        }
+
+
+def check_clipping(stimuli: Sequence[Stimulus]) -> None:
+    """Refuse a set of 24-bit files of which one does not hold its samples."""
+    loudest = max(stimuli, key=lambda stimulus: stimulus.peak)
+    full_scale_g = loudest.full_scale_g
+    if full_scale_g is not None and loudest.peak > highest_peak(full_scale_g):
+        least = _rounded_up(loudest.peak * full_scale_g / highest_peak(full_scale_g))
+        raise InputError(
+            f"expected samples within the full scale of {full_scale_g:g} g, got a peak of "
+            f"{loudest.peak:.4g} g in {loudest.file}; set full_scale_g to {least:g} or more."
+        )
+
+
+def _rounded_up(value: float) -> float:
+    """To four significant digits."""
+    unit = 10.0 ** (floor(log10(value)) - 3)
+    return ceil(value / unit) * unit

@@ -1,0 +1,5 @@
+"""python -m tactileq."""
+
+from tactileq.app import main
+
+main()

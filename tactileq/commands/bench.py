@@ -1,0 +1,80 @@
+"""tactileq bench: what runs beside what would run instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.keeping import check_own_results
+from tactileq.options import Out
+from tactileq.telling import progress
+
+if TYPE_CHECKING:
+    from analysis.benches.rendering import RenderingBench
+
+bench = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Time what runs beside what would run instead.",
+)
+BENCH_CONTENTS = {"times.tsv", "layers.tsv", "aims.tsv", "rendering.png", "provenance.json"}
+
+
+@bench.command("render")
+def bench_render(
+    out: Out = Path("bench-render"),
+    quick: Annotated[bool, typer.Option("--quick", help="Measure briefly and roughly.")] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Draw the times.")] = False,
+) -> None:
+    """Time rendering per sample beside other filters in C and scipy's sosfilt, noise included.
+
+    Writes times.tsv, layers.tsv and aims.tsv, with --plot also rendering.png. The machine should
+    have nothing else to do.
+
+    Example: tactileq bench render --plot
+    """
+    bench_rendering_into(out, quick=quick, plot=plot)
+
+
+def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
+    """Time the renderer beside its rivals, print and write what was measured."""
+    from analysis.benches.rendering import PARTS, QUICK, bench_rendering
+    from analysis.figures.rendering import figure_rendering
+    from analysis.report.findings import DOTS_PER_INCH
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import write_provenance
+
+    check_own_results(out, "bench render", contents=BENCH_CONTENTS)
+    with progress("Timing", PARTS) as advance:
+        timed = bench_rendering(QUICK if quick else None, progress=advance)
+    with replace_folder(out) as fresh:
+        for name, table in (("times", timed.times), ("layers", timed.sweep), ("aims", timed.aims)):
+            table.to_csv(fresh / f"{name}.tsv", sep="\t", index=False)
+        if plot:
+            figure_rendering(timed).savefig(fresh / "rendering.png", dpi=DOTS_PER_INCH)
+        settings = {
+            "quick": quick,
+            "machine": timed.machine,
+            "memory_bytes": timed.memory_bytes,
+            "import_s": timed.import_s,
+        }
+        write_provenance(fresh / "provenance.json", "bench render", settings)
+    _tell_bench(timed)
+    print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} aims met: {out / 'aims.tsv'}")
+
+
+def _tell_bench(bench: RenderingBench) -> None:
+    """The tables, in ns per sample, and what else was measured."""
+    print(f"{bench.machine}; ns per sample, noise included")
+    for table in (bench.filters, bench.blocks):
+        print(table.to_string(index=False, float_format="%.2f"), end="\n\n")
+    line = bench.line
+    print(
+        f"kernel: {line.ns_at_none:.2f} ns + {line.ns_per_layer:.2f} ns per layer (R² = "
+        f"{line.r_squared:.4f}); {bench.memory_bytes} bytes a stream of 3 layers\n"
+        f"rendering in Python, 3 layers: {bench.python_ns:.0f} ns\n"
+    )
+    aims = bench.aims.assign(met=bench.aims["met"].map({True: "met", False: "not met"}))
+    print(aims.to_string(index=False, float_format="%.2f"), end="\n\n")

@@ -1,0 +1,120 @@
+"""tactileq demo: the whole study in silico."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactileq.commands.analyze import REPORT_CONTENTS
+from tactileq.commands.simulate import run_study
+from tactileq.commands.stimuli import render_set
+from tactileq.keeping import check_own_results
+from tactileq.options import Out, Seed
+from tactileq.telling import progress, share_of
+
+if TYPE_CHECKING:
+    from analysis.textures.results import TextureResult
+    from modeling import Threshold
+    from stimuli.sets.recipe import Recipe
+
+DEMO_CONTENTS = REPORT_CONTENTS | {"recordings", "models", "simplified", "stimuli", "data"}
+
+
+def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
+    """The whole study in silico: record, model, simplify, render, ask, analyze.
+
+    Example: tactileq demo --out demo
+    """
+    from joblib import Parallel, delayed
+
+    from analysis.answers.loading import load_responses
+    from analysis.report.report import write_report
+    from experiments.study.study import Study
+    from modeling import Threshold
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import write_provenance
+    from stimuli.planted.textures import TEXTURES
+
+    check_own_results(out, "demo", contents=DEMO_CONTENTS)
+    plan = Study.load()
+    threshold = Threshold.named("codec")
+    print("A study in silico: simulated surfaces, simulated participants, the real program.")
+    with replace_folder(out) as fresh:
+        with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
+            record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
+            results = []
+            for result in Parallel(n_jobs=2, return_as="generator")(
+                delayed(record)(name) for name in TEXTURES
+            ):
+                results.append(result)
+                advance(result.texture)
+        render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
+        full = {r.texture: r.model for r in results}
+        fewer = {r.texture: r.simplification.model for r in results}
+        real = {r.texture: r.truth for r in results if r.truth is not None}
+        run_study(
+            plan,
+            real=real,
+            full=full,
+            simplified=fewer,
+            data=fresh / "data",
+            threshold=threshold,
+            seed=seed,
+        )
+        settings = {
+            "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
+            "threshold": threshold.name,
+            "criterion": results[0].simplification.criterion,
+            "margin_db": results[0].simplification.margin_db,
+            "study": plan.to_dict(),
+        }
+        provenance = write_provenance(fresh / "provenance.json", "demo", settings, seed=seed)
+        with share_of("Analyzing") as tell:
+            write_report(
+                fresh / "report.html",
+                responses=load_responses(fresh / "data"),
+                textures=results,
+                provenance=provenance,
+                seed=seed,
+                progress=tell,
+            )
+    print((out / "report.html").resolve())
+
+
+def demo_recipe(folder: Path, *, seed: int) -> Recipe:
+    """One second of every full and simplified model of the demo at 150 mm/s and 1.5 N."""
+    from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+
+    models = {"full": folder / "models", "simplified": folder / "simplified"}
+    return Recipe(
+        name="demo",
+        models=tuple(ModelEntry(path, label) for label, path in models.items()),
+        trajectories=(TrajectoryEntry.constant(150.0, 1.5),),
+        seeds=(seed,),
+    )
+
+
+def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
+    """Record, model and simplify one planted texture; everything goes by way of the disk."""
+    from analysis.textures.between import left_out_by_model
+    from analysis.textures.results import TextureResult
+    from modeling import RecordingSet
+    from modeling import simplify as drop_layers
+    from modeling.files.writing import file_stem
+    from modeling.fitting.conditions import recording_spectra
+    from modeling.fitting.texture import fit_spectra
+    from stimuli.planted.textures import planted_texture, record_texture
+
+    truth = planted_texture(name)
+    place = folder / "recordings" / file_stem(name)
+    record_texture(truth, seed=seed).save(place)
+    records = RecordingSet.load(place)
+    measured = recording_spectra(records)
+    full = fit_spectra(measured)
+    simplification = drop_layers(full, threshold)
+    full.save(folder / "models" / f"{file_stem(name)}.json")
+    simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
+    others = (fit_spectra(measured, estimator="paper"),)
+    left_out = left_out_by_model(measured, full)
+    return TextureResult(records, full, simplification, truth, others, left_out)

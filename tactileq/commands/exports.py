@@ -1,0 +1,206 @@
+"""tactileq export: models for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactileq.commands.stimuli import recipe_from, tell_beyond_grid
+from tactileq.keeping import check_own_file
+from tactileq.options import ModelFile, Seed, VibratorFile
+from tactileq.telling import simulated_note
+
+exports = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Give a model to other programs.",
+)
+
+
+@exports.command("c")
+def export_c(
+    model_file: ModelFile,
+    out: Annotated[Path | None, typer.Option("--out", help="Header. [TEXTURE.h]")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Output rate in Hz; the model's without it.")
+    ] = None,
+    single: Annotated[bool, typer.Option("--single", help="Single precision.")] = False,
+    seed: Seed = 0,
+    vibrator: VibratorFile = None,
+    peak: Annotated[float | None, typer.Option("--peak", help="Largest sample, g.")] = None,
+    rms: Annotated[float | None, typer.Option("--rms", help="Largest running RMS, g.")] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", help="Longest vibration without a pause, s.")
+    ] = None,
+) -> None:
+    """Write a model and the renderer as one C99 header that needs nothing else.
+
+    A comment on top of it shows a whole program. In double precision it renders what this program
+    renders, bit for bit. Without --peak, --rms and --duration it has no limits.
+
+    Example: tactileq export c models/canvas.json --rate 48000 --peak 5 --out canvas.h
+    """
+    export_c_header(
+        model_file,
+        out,
+        rate_hz=rate_hz,
+        seed=seed,
+        single=single,
+        vibrator=vibrator,
+        limits={"peak": peak, "rms": rms, "duration_s": duration_s},
+    )
+
+
+@exports.command("wav")
+def export_wav(
+    model_file: ModelFile,
+    speed: Annotated[float, typer.Option("--speed", help="mm/s.")],
+    force: Annotated[float, typer.Option("--force", help="N.")],
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds.")] = 1.0,
+    rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 48000.0,
+    seed: Seed = 0,
+    vibrator: VibratorFile = None,
+    out: Annotated[Path | None, typer.Option("--out", help="WAV file. [TEXTURE.wav]")] = None,
+) -> None:
+    """Write the vibration at one speed and force as a WAV file (32-bit float samples in g).
+
+    Example: tactileq export wav models/canvas.json --speed 150 --force 1 --duration 2 --out x.wav
+    """
+    export_wav_file(
+        model_file,
+        out,
+        speed=speed,
+        force=force,
+        rate_hz=rate_hz,
+        duration_s=duration_s,
+        seed=seed,
+        vibrator=vibrator,
+    )
+
+
+@exports.command("json")
+def export_json(
+    model_file: ModelFile,
+    speed: Annotated[float | None, typer.Option("--speed", help="With --force: mm/s.")] = None,
+    force: Annotated[float | None, typer.Option("--force", help="With --speed: N.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="File. [TEXTURE_peq.json]")] = None,
+) -> None:
+    """Write a model's equalizer as JSON: one condition, or all of the grid.
+
+    Each condition has its noise gain and its layers with frequency, bandwidth, gain and the
+    coefficients of a biquad; the file says what the numbers mean.
+
+    Example: tactileq export json models/canvas.json --speed 150 --force 1 --out canvas_peq.json
+    """
+    export_peq_json(model_file, out, speed=speed, force=force)
+
+
+def export_c_header(
+    model_file: Path,
+    out: Path | None,
+    *,
+    rate_hz: float | None,
+    seed: int,
+    single: bool,
+    vibrator: Path | None,
+    limits: Mapping[str, float | None],
+) -> None:
+    """Write a model and the kernel as one C header, with provenance.
+
+    `limits` are those of `modeling.Limits`, None for none.
+    """
+    from modeling import Limits, Vibrator, compensation_for
+    from modeling.files.provenance import write_provenance
+    from modeling.files.writing import file_stem
+    from modeling.models.loading import load_model
+    from stimuli.exports.c_header import write_c_header
+
+    model = load_model(model_file)
+    target = out or Path(f"{file_stem(model.texture)}.h")
+    marker = check_own_file(target, "export c")
+    rate_hz = model.rate_hz if rate_hz is None else rate_hz
+    compensation, played_by = None, ""
+    if vibrator is not None:
+        found = Vibrator.load(vibrator)
+        compensation = compensation_for(found, rate_hz=rate_hz)
+        played_by = f" for a vibrator{' (simulated)' if found.simulated else ''}"
+    name = write_c_header(
+        target,
+        model,
+        rate_hz=rate_hz,
+        seed=seed,
+        single=single,
+        limits=Limits(**{what: value for what, value in limits.items() if value is not None}),
+        compensation=compensation,
+    )
+    settings = {"rate_hz": rate_hz, "single": single, "limits": dict(limits)}
+    inputs = [path for path in (model_file, vibrator) if path is not None]
+    write_provenance(marker, "export c", settings, seed=seed, inputs=inputs)
+    print(f"{name}{simulated_note(model)}{played_by}: {target}")
+
+
+def export_wav_file(
+    model_file: Path,
+    out: Path | None,
+    *,
+    speed: float,
+    force: float,
+    rate_hz: float,
+    duration_s: float,
+    seed: int,
+    vibrator: Path | None,
+) -> None:
+    """Write a model's vibration at one speed and force, with provenance, and tell its level."""
+    from modeling.files.provenance import write_provenance
+    from modeling.files.writing import file_stem
+    from modeling.models.loading import load_model
+    from stimuli.exports.wav import write_wav
+    from stimuli.sets.sources import load_sources
+
+    model = load_model(model_file)
+    target = out or Path(f"{file_stem(model.texture)}.wav")
+    marker = check_own_file(target, "export wav")
+    recipe = recipe_from(
+        [model_file],
+        target,
+        speeds=[speed],
+        forces=[force],
+        rate_hz=rate_hz,
+        duration_s=duration_s,
+        seed=seed,
+        vibrator=vibrator,
+    )
+    sources = load_sources(recipe)
+    stimulus = write_wav(target, recipe, sources=sources)
+    settings = {"recipe": recipe.to_toml()}
+    write_provenance(marker, "export wav", settings, seed=seed, inputs=recipe.files())
+    tell_beyond_grid(sources)
+    drive = "" if vibrator is None else ", as drive for the vibrator"
+    simulated = " (simulated)" if stimulus.simulated == "true" else ""
+    print(
+        f"{model.texture}{simulated}, {stimulus.duration_s:g} s at {stimulus.rate_hz} "
+        f"Hz, {stimulus.level_db:.1f} dB re 1 {stimulus.unit} (RMS), peak {stimulus.peak:.3g} "
+        f"{stimulus.unit}{drive}: {target}"
+    )
+
+
+def export_peq_json(
+    model_file: Path, out: Path | None, *, speed: float | None, force: float | None
+) -> None:
+    """Write a model's equalizer at one condition or over its grid as JSON, with provenance."""
+    from modeling.files.provenance import write_provenance
+    from modeling.files.writing import file_stem
+    from modeling.models.loading import load_model
+    from stimuli.exports.peq_json import write_peq_json
+
+    model = load_model(model_file)
+    target = out or Path(f"{file_stem(model.texture)}_peq.json")
+    marker = check_own_file(target, "export json")
+    count = write_peq_json(target, model, speed_mm_s=speed, force_n=force)
+    settings = {"speed_mm_s": speed, "force_n": force}
+    write_provenance(marker, "export json", settings, inputs=[model_file])
+    conditions = "1 condition" if count == 1 else f"{count} conditions"
+    print(f"{conditions} of {model.texture}{simulated_note(model)}: {target}")

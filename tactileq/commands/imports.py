@@ -1,0 +1,205 @@
+"""tactileq import: recordings that other equipment made."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from tactileq.options import Out, Seed
+from tactileq.telling import clipping_warnings, progress
+
+if TYPE_CHECKING:
+    from modeling import RecordingSet
+    from rig.importing.files import Label
+    from rig.importing.hatt import HattTexture
+
+imports = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Take in recordings that other equipment made.",
+)
+SurfaceName = Annotated[
+    str | None, typer.Option("--texture", help="Name of the surface; the name of --out without it.")
+]
+SpeedOfAll = Annotated[float | None, typer.Option("--speed", help="Speed of all files, mm/s.")]
+ForceOfAll = Annotated[float | None, typer.Option("--force", help="Force of all files, N.")]
+LabelTable = Annotated[
+    Path | None, typer.Option("--labels", help="TSV: file, speed_mm_s, force_n (texture, repeat).")
+]
+
+
+@imports.command("wav")
+def import_wav(
+    files: Annotated[list[Path], typer.Argument(help="Mono WAV files.")],
+    out: Out = Path("recordings"),
+    texture: SurfaceName = None,
+    speed: SpeedOfAll = None,
+    force: ForceOfAll = None,
+    labels: LabelTable = None,
+    g_per_fullscale: Annotated[
+        float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
+    ] = None,
+) -> None:
+    """Add WAV recordings to a recording set.
+
+    Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
+    """
+    from rig.importing.files import import_wav as read
+    from rig.importing.files import usable
+
+    named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
+    records, refused = usable(partial(read, g_per_fullscale=g_per_fullscale), files, named)
+    settings = {"g_per_fullscale": g_per_fullscale, "labels": str(labels)}
+    add_to_set(out, records, "import wav", settings=settings, files=files, left_out=refused)
+
+
+@imports.command("csv")
+def import_csv(
+    files: Annotated[list[Path], typer.Argument(help="CSV files with a header line.")],
+    out: Out = Path("recordings"),
+    texture: SurfaceName = None,
+    speed: SpeedOfAll = None,
+    force: ForceOfAll = None,
+    labels: LabelTable = None,
+    axis: Annotated[
+        Literal["x", "y", "z", "dft321"] | None, typer.Option(help="Axis, or all as one.")
+    ] = None,
+    unit: Annotated[str | None, typer.Option(help="g, mg, m/s2 or arbitrary.")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Sampling rate in Hz; else from the time.")
+    ] = None,
+) -> None:
+    """Add CSV recordings (time and one or three axes) to a recording set.
+
+    Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
+    """
+    from rig.importing.files import import_csv as read
+    from rig.importing.files import usable
+
+    named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
+    read_one = partial(read, axis=axis, unit=unit, rate_hz=rate_hz)
+    records, refused = usable(read_one, files, named)
+    settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
+    add_to_set(out, records, "import csv", settings=settings, files=files, left_out=refused)
+
+
+@imports.command("hatt")
+def import_hatt(
+    files: Annotated[list[Path], typer.Argument(help="Models_....xml of the toolkit.")],
+    out: Out = Path("recordings"),
+    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated.")] = None,
+    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated.")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Sampling rate in Hz; the file's without it.")
+    ] = None,
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 10.0,
+    seed: Seed = 0,
+) -> None:
+    """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
+
+    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. Conditions beyond a file's
+    models are left out, so that they count as holes. The toolkit is not included.
+
+    Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
+    """
+    from modeling import RecordingSet
+    from rig.importing.hatt import load_hatt
+
+    speeds = speed or [50.0 * step for step in range(1, 8)]
+    forces = force or [0.5 * step for step in range(1, 8)]
+    textures = [load_hatt(file) for file in files]
+    made = []
+    with progress("Synthesising", len(textures)) as advance:
+        for texture in textures:
+            made.append(
+                texture.recordings(
+                    speeds, forces, duration_s=duration_s, rate_hz=rate_hz, seed=seed
+                )
+            )
+            advance(texture.material)
+    records = RecordingSet(record for of_texture in made for record in of_texture)
+    settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
+    add_to_set(out, records, "import hatt", settings=settings, files=files)
+    for texture in textures:
+        tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
+
+
+def labels_of(
+    files: Sequence[Path],
+    table: Path | None,
+    *,
+    texture: str,
+    speed: float | None,
+    force: float | None,
+) -> list[Label]:
+    """Labels of the files from a table, or the same speed and force for all of them."""
+    from rig.importing.files import Label, labels_from_table
+
+    if table is not None:
+        if speed is not None or force is not None:
+            raise ValueError(
+                "expected labels from --labels or from --speed and --force, got both; give one."
+            )
+        return labels_from_table(table, files, texture=texture)
+    if speed is None or force is None:
+        raise ValueError(
+            "expected the speed and force of the files, got "
+            f"--speed {speed} and --force {force}; give both, or --labels with a TSV."
+        )
+    return [Label(texture, speed, force) for _ in files]
+
+
+def add_to_set(
+    out: Path,
+    new: RecordingSet,
+    command: str,
+    *,
+    settings: Mapping[str, object],
+    files: Sequence[Path],
+    left_out: Sequence[str] = (),
+) -> None:
+    """Save imported recordings, together with those that `out` already holds.
+
+    `left_out`: a sentence for each file that could not be used.
+    """
+    from modeling import RecordingSet
+    from modeling.files.documents import read_json_object
+    from modeling.files.provenance import write_provenance
+    from modeling.recordings.recording_set import INDEX_NAME
+
+    for warning in clipping_warnings(new):
+        print(warning, file=sys.stderr)
+    for sentence in left_out:
+        print(f"warning: left out: {sentence}", file=sys.stderr)
+    known = RecordingSet.load(out).recordings if (out / INDEX_NAME).is_file() else ()
+    earlier = out / "provenance.json"
+    before = read_json_object(earlier, advice="remove the file") if earlier.is_file() else None
+    everything = RecordingSet([*known, *new.recordings])
+    everything.save(out)
+    write_provenance(earlier, command, {**settings, "added to": before}, inputs=files)
+    if any(r.unit == "arbitrary" for r in new.recordings):
+        print(
+            "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "
+            "(WAV) or --unit (CSV)."
+        )
+    rates = sorted({f"{r.rate_hz:g}" for r in new.recordings})
+    if left_out:
+        print(f"note: {len(left_out)} of {len(files)} files left out")
+    print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {len(everything)} in {out}")
+
+
+def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:
+    """Say which conditions a toolkit's texture does not tell of, and so have no recording."""
+    inside = set(texture.conditions_inside(conditions))
+    outside = [condition for condition in conditions if condition not in inside]
+    if outside:
+        names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in outside)
+        print(
+            f"note: {texture.material}: {len(outside)} of {len(conditions)} conditions lie beyond "
+            f"its models, or are silent there, and are left out: {names}"
+        )

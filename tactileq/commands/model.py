@@ -1,0 +1,80 @@
+"""tactileq model: models of textures over their grids."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from tactileq.many_textures import HowToModel, Outcome, model_textures
+from tactileq.options import Out
+
+
+def model(
+    folders: Annotated[
+        list[Path],
+        typer.Argument(metavar="FOLDER…", help="Folders of recordings, or a folder of them."),
+    ],
+    out: Out = Path("models"),
+    estimator: Annotated[
+        Literal["joint", "paper", "paper-consistent"], typer.Option(help="How layers are found.")
+    ] = "joint",
+    layers: Annotated[
+        int | None, typer.Option(min=1, help="Number of layers; chosen without it (joint).")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Leave conditions out and foretell them.")
+    ] = False,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Find the layers of each recording by itself, too.")
+    ] = False,
+    keep_hum: Annotated[
+        bool, typer.Option("--keep-hum", help="Leave hum of the mains in the recordings.")
+    ] = False,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw some spectra, and the layers over the grid.")
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
+    ] = None,
+) -> None:
+    """Fit a model of each texture over its grid of speeds and forces.
+
+    Writes TEXTURE.json, TEXTURE_layers.tsv and TEXTURE_spectra.tsv, with --check TEXTURE_check.tsv,
+    with --alone TEXTURE_alone.tsv, with --plot TEXTURE_spectra.png and TEXTURE_layers.png. A
+    recording that cannot be used is left out, and a texture that cannot be modelled does not stop
+    the others.
+
+    Example: tactileq model recordings/* --out models --check
+    """
+    how = HowToModel(
+        estimator, layers=layers, keep_hum=keep_hum, check=check, alone=alone, plot=plot
+    )
+    _require_all(model_textures(folders, out, how=how, jobs=jobs))
+
+
+def _require_all(outcomes: Sequence[Outcome]) -> None:
+    """Tell of each texture in order; at the end name those that could not be modelled."""
+    failed = [outcome for outcome in outcomes if outcome.error]
+    if len(outcomes) == len(failed) == 1:
+        raise ValueError(failed[0].error)
+    for outcome in outcomes:
+        _tell(outcome)
+    if failed:
+        raise ValueError(
+            f"expected {len(outcomes)} textures that can be modelled, got {len(failed)} that "
+            f"cannot ({'; '.join(outcome.what for outcome in failed)}); correct them and model "
+            "them again."
+        )
+
+
+def _tell(outcome: Outcome) -> None:
+    for warning in outcome.warnings:
+        print(warning, file=sys.stderr)
+    for note in outcome.notes:
+        print(note)
+    if outcome.error:
+        print(f"error: {outcome.what}: {outcome.error}", file=sys.stderr)

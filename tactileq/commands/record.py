@@ -1,0 +1,39 @@
+"""tactileq record: recordings of planted textures, in silico."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactileq.options import Seed
+from tactileq.telling import progress
+
+
+def record(
+    folder: Annotated[Path, typer.Argument(help="New folder for the recordings.")],
+    texture: Annotated[str, typer.Option(help="Planted texture, such as canvas.")],
+    rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 22704.0,
+    duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 1.0,
+    seed: Seed = 0,
+) -> None:
+    """Record a planted texture in silico, 7 speeds x 7 forces; no device is driven yet.
+
+    Example: tactileq record recordings/canvas --texture canvas
+    """
+    from modeling.files.provenance import write_provenance
+    from stimuli.planted.textures import planted_texture, record_texture
+
+    if not duration_s > 0:
+        raise ValueError(f"expected a duration above 0 s, got {duration_s:g}; give a longer one.")
+    if folder.exists() and (folder.is_file() or any(folder.iterdir())):
+        raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")
+    truth = planted_texture(texture)
+    with progress(f"Recording {texture} in silico", 1) as advance:
+        records = record_texture(truth, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
+        records.save(folder)
+        advance("")
+    settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
+    write_provenance(folder / "provenance.json", "record", settings, seed=seed)
+    print(f"{len(records)} simulated recordings of {texture} in {folder}")

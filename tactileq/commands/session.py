@@ -1,0 +1,67 @@
+"""tactileq session: one participant's session at the console."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from tactileq.options import Data, Models, Simplified, StudyFile
+
+if TYPE_CHECKING:
+    from experiments.console.console import Console
+
+
+def session(
+    task: Annotated[Literal["absolute", "relative"], typer.Option(help="Which evaluation.")],
+    subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")],
+    models: Models = Path("models"),
+    simplified: Simplified = Path("simplified"),
+    data: Data = Path("data"),
+    number: Annotated[int, typer.Option("--session", min=1, help="Which day.")] = 1,
+    study: StudyFile = None,
+    fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
+    screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
+) -> None:
+    """Run one participant's session at the console, with the simulated rig.
+
+    Example: tactileq session --task absolute --subject 1 --data data
+    """
+    from experiments.observers.whole_study import PROTOCOLS
+    from experiments.study.models import ModelSets
+    from experiments.study.study import Study
+    from modeling.files.provenance import write_provenance
+    from modeling.models.loading import load_models
+    from rig.twin import SimulatedRig
+
+    plan = Study.load(study)
+    sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
+    sets.require(plan.textures)
+    print("note: the rig is the simulated one; its data are marked simulated.")
+    with open_console(fullscreen=fullscreen, screen=screen) as console:
+        result = PROTOCOLS[task](
+            plan,
+            subject=subject,
+            session=number,
+            models=sets,
+            rig=SimulatedRig(),
+            respondent=console,
+            data_folder=data,
+        )
+    note = data / "sourcedata" / f"{result.path.stem.removesuffix('_beh')}_provenance.json"
+    write_provenance(note, "session", {"task": task}, inputs=[models, simplified])
+    print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
+
+
+def open_console(*, fullscreen: bool, screen: int) -> Console:
+    """The console's window; where there is no screen, one sentence instead of a traceback."""
+    from experiments.console.console import Console
+
+    try:
+        return Console(fullscreen=fullscreen, screen=screen)
+    except Exception as error:  # whatever the window system raises means the same to a user
+        raise ValueError(
+            f"expected a screen for the console, got {error or type(error).__name__}; start a "
+            "graphical session (or Xvfb) and set DISPLAY."
+        ) from error

@@ -1,0 +1,138 @@
+"""tactileq simplify: models without the layers that nobody can feel."""
+
+from __future__ import annotations
+
+from functools import partial
+from math import isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.keeping import check_own_model
+from tactileq.many_textures import recording_folders
+from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
+from tactileq.telling import simulated_note, usable_recordings
+
+if TYPE_CHECKING:
+    from modeling import RecordingSet, Simplification, TextureModel
+
+
+def simplify(
+    model_file: ModelFile,
+    out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("simplified"),
+    threshold: ThresholdName = "codec",
+    criterion: Criterion = "energy",
+    margin_db: Margin = 0.0,
+    hold_above: HoldAbove = True,
+    plot: Annotated[
+        bool, typer.Option("--plot", help="Draw spectra, layers and threshold of one condition.")
+    ] = False,
+    recordings: Annotated[
+        Path | None, typer.Option(help="With --plot: recordings to draw the model beside.")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="With --plot: mm/s, else fastest.")] = None,
+    force: Annotated[float | None, typer.Option(help="With --plot: N, else strongest.")] = None,
+) -> None:
+    """Drop the layers that nobody can feel, with a reason for each.
+
+    Writes TEXTURE.json and TEXTURE_layers.tsv, with --plot also TEXTURE_threshold.png.
+
+    Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
+    """
+    from analysis.textures.results import simplification_table
+    from modeling import TextureModel, Threshold
+    from modeling import simplify as drop_layers
+    from modeling.files.provenance import write_provenance
+    from modeling.files.writing import file_stem, write_text
+
+    full = TextureModel.load(model_file)
+    start = out / file_stem(full.texture)
+    check_own_model(start, "simplify")
+    result = drop_layers(
+        full,
+        Threshold.named(threshold),
+        criterion=criterion,
+        margin_db=margin_db,
+        hold_above=hold_above,
+    )
+    if plot:
+        draw_condition(full, result, start, recordings=recordings, speed=speed, force=force)
+    elif (recordings, speed, force) != (None, None, None):
+        raise ValueError(
+            "expected --plot with --recordings, --speed or --force, got none; add --plot."
+        )
+    result.model.save(f"{start}.json")
+    table = simplification_table(result)
+    write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
+    tell_verdicts(result)
+    settings = {
+        "threshold": threshold,
+        "criterion": criterion,
+        "margin_db": margin_db,
+        "hold_above": hold_above,
+    }
+    provenance = Path(f"{start}_provenance.json")
+    write_provenance(provenance, "simplify", settings, inputs=[model_file])
+    print(f"{full.n_layers} layers to {result.model.n_layers}{simulated_note(full)}: {start}.json")
+
+
+def tell_verdicts(result: Simplification) -> None:
+    """Print what became of each layer and why, and what the threshold is."""
+    for verdict in result.layers:
+        line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"
+        if not isnan(verdict.distance_db):  # where a threshold is known
+            line += (
+                f"; {verdict.distance_db:+.1f} dB at {verdict.worst_speed_mm_s:g} mm/s, "
+                f"{verdict.worst_force_n:g} N ({verdict.worst_frequency_hz:.0f} Hz)"
+            )
+        print(line)
+    print(f"threshold: {result.threshold.name} ({result.threshold.caveat})")
+
+
+def draw_condition(
+    full: TextureModel,
+    result: Simplification,
+    start: Path,
+    *,
+    recordings: Path | None,
+    speed: float | None,
+    force: float | None,
+) -> None:
+    """Draw spectra, layers and threshold of one condition (PAPER fig. 6), beside its recording.
+
+    Writes `start`_threshold.png. Without speed (mm/s) or force (N) it is the fastest and strongest
+    condition, of the recordings if there are any, else of the grid.
+    """
+    from analysis.figures.spectra import figure_spectra_and_threshold
+    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.spectra.comparison import compare_condition, compare_spectra
+    from analysis.textures.results import TextureResult, reference_condition
+
+    if recordings is None:
+        fastest, strongest = float(full.speeds_mm_s[-1]), float(full.forces_n[-1])
+        compare = partial(compare_condition, full, result)
+    else:
+        texture = TextureResult(_recordings_of(full.texture, recordings), full, result)
+        fastest, strongest = reference_condition(texture)
+        compare = partial(compare_spectra, texture)
+    shown = compare(
+        speed_mm_s=fastest if speed is None else speed,
+        force_n=strongest if force is None else force,
+    )
+    start.parent.mkdir(parents=True, exist_ok=True)
+    picture = figure_spectra_and_threshold(shown)
+    picture.savefig(f"{start}_threshold.png", dpi=DOTS_PER_INCH)
+
+
+def _recordings_of(texture: str, folder: Path) -> RecordingSet:
+    """The recordings of one texture in a folder, or in the sub-folder that holds them."""
+    from modeling.recordings.recording_set import textures_in
+
+    for found in recording_folders(folder):
+        if texture in textures_in(found):
+            return usable_recordings(found, texture)
+    raise ValueError(
+        f"expected recordings of {texture!r} in {folder}, got none; give the folder that the model "
+        "came from."
+    )

@@ -1,0 +1,87 @@
+"""tactileq simulate: the whole study with simulated participants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactileq.options import Data, Models, Seed, Simplified, StudyFile, ThresholdName
+from tactileq.telling import progress
+
+if TYPE_CHECKING:
+    from experiments.study.study import Study
+    from modeling import TextureModel, Threshold
+
+
+def simulate(
+    models: Models = Path("models"),
+    simplified: Simplified = Path("simplified"),
+    data: Data = Path("data"),
+    study: StudyFile = None,
+    threshold: ThresholdName = "codec",
+    seed: Seed = 0,
+) -> None:
+    """Run the whole study with simulated participants of known truth.
+
+    What stands for the real surfaces are the planted textures of the same names.
+
+    Example: tactileq simulate --models models --simplified simplified --data data
+    """
+    from experiments.study.study import Study
+    from modeling import Threshold
+    from modeling.files.provenance import write_provenance
+    from modeling.models.loading import load_models
+    from stimuli.planted.textures import TEXTURES, planted_texture
+
+    plan = Study.load(study)
+    if unknown := [name for name in plan.textures if name not in TEXTURES]:
+        raise ValueError(
+            f"expected a study of the planted textures {', '.join(TEXTURES)}, which stand for the "
+            f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
+        )
+    real = {name: planted_texture(name) for name in plan.textures}
+    full, fewer = load_models(models), load_models(simplified)
+    run_study(
+        plan,
+        real=real,
+        full=full,
+        simplified=fewer,
+        data=data,
+        threshold=Threshold.named(threshold),
+        seed=seed,
+    )
+    note = data / "sourcedata" / "simulate_provenance.json"
+    settings = {"study": plan.to_dict(), "threshold": threshold}
+    write_provenance(note, "simulate", settings, seed=seed, inputs=[models, simplified])
+    print(f"simulated answers: {data}")
+
+
+def run_study(
+    plan: Study,
+    *,
+    real: Mapping[str, TextureModel],
+    full: Mapping[str, TextureModel],
+    simplified: Mapping[str, TextureModel],
+    data: Path,
+    threshold: Threshold,
+    seed: int,
+) -> None:
+    """Simulate all participants of a study at the simulated rig, with a progress bar."""
+    from experiments.observers.whole_study import simulate_study
+    from rig.twin import SimulatedRig
+
+    sessions = plan.absolute.participants * plan.absolute.sessions
+    sessions += plan.relative.participants * plan.relative.sessions
+    with progress("Simulated participants", sessions) as advance:
+        simulate_study(
+            plan,
+            real=real,
+            full=full,
+            simplified=simplified,
+            rig=SimulatedRig(real, seed=seed),
+            data_folder=data,
+            seed=seed,
+            threshold=threshold,
+            progress=lambda done, total, name: advance(name),
+        )

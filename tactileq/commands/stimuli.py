@@ -1,0 +1,168 @@
+"""tactileq stimuli: sets of stimuli as WAV files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.options import Out, VibratorFile
+from tactileq.telling import progress
+
+if TYPE_CHECKING:
+    from stimuli.sets.recipe import Recipe
+    from stimuli.sets.sources import Sources
+
+
+def stimuli(
+    named: Annotated[
+        list[Path],
+        typer.Argument(metavar="SET.toml|MODEL…", help="A recipe, or model files (JSON)."),
+    ],
+    out: Out = Path("stimuli-set"),
+    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated. [150]")] = None,
+    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated. [1.5]")] = None,
+    rate_hz: Annotated[
+        float | None, typer.Option("--rate", help="Sampling rate in Hz. [48000]")
+    ] = None,
+    duration_s: Annotated[
+        float | None, typer.Option("--duration", help="Seconds per file. [1]")
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=2**31, help="Seed of the noise. [0]")
+    ] = None,
+    vibrator: VibratorFile = None,
+) -> None:
+    """Render a set of stimuli to WAV files, with a manifest and a picture of all spectra.
+
+    A recipe (TOML) names models, trajectories (constant speed, or a hand's as CSV), seeds, rates,
+    24-bit or float samples, the level (as modelled, one RMS, or matched in loudness) and the
+    vibrator that plays it, for which it then holds the drive. The set holds its own recipe.toml
+    with copies of the models, from which it can be made again bit for bit.
+
+    Start from docs/stimuli.toml. A recipe needs version = 1; a name under [set]; for each model, or
+    folder of them, a path under [[model]]; for each stroke under [[trajectory]] speed_mm_s and
+    force_n, or a file (CSV: time_s, speed_mm_s, force_n).
+
+    The options are for model files without a recipe; there the manifest's column model holds the
+    folder that each model came from, and samples are g.
+
+    Example: tactileq stimuli set.toml --out stimuli-set
+
+    Example: tactileq stimuli models/*.json simplified/*.json --speed 150 --force 1.5
+    """
+    recipe = recipe_from(
+        named,
+        out,
+        speeds=speed,
+        forces=force,
+        rate_hz=rate_hz,
+        duration_s=duration_s,
+        seed=seed,
+        vibrator=vibrator,
+    )
+    render_stimuli(recipe, out, inputs=[path for path in named if path.suffix == ".toml"])
+
+
+def recipe_from(
+    named: Sequence[Path],
+    out: Path,
+    *,
+    speeds: Sequence[float] | None,
+    forces: Sequence[float] | None,
+    rate_hz: float | None,
+    duration_s: float | None,
+    seed: int | None,
+    vibrator: Path | None,
+) -> Recipe:
+    """The recipe of this file, or the one that model files and options make."""
+    from stimuli.sets.recipe import Recipe, TrajectoryEntry, model_entry, whole_or_as_it_is
+
+    recipes = [path for path in named if path.suffix.lower() == ".toml"]
+    options = {rate_hz, duration_s, seed, vibrator}
+    if recipes:
+        if len(named) > 1 or any((speeds, forces)) or options != {None}:
+            raise ValueError(
+                "expected one recipe and --out, or model files with options, got both; write all "
+                f"that {recipes[0]} lacks into it."
+            )
+        return Recipe.load(recipes[0])
+    return Recipe(
+        name=out.resolve().name,
+        models=tuple(map(model_entry, _models_among(named))),
+        trajectories=tuple(
+            TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]
+        ),
+        rates_hz=(48_000 if rate_hz is None else whole_or_as_it_is(rate_hz),),
+        seeds=(seed or 0,),
+        duration_s=1.0 if duration_s is None else duration_s,
+        vibrator=vibrator,
+    )
+
+
+def _models_among(named: Sequence[Path]) -> list[Path]:
+    """Without what else models/*.json names: provenance, vibrators, exported equalizers."""
+    from modeling.models.loading import is_something_else
+
+    files = [path for path in named if not path.name.endswith("provenance.json")]
+    others = [path for path in files if is_something_else(path)]
+    tell_passed_over(others)
+    return [path for path in files if path not in others]
+
+
+def tell_passed_over(others: Sequence[Path]) -> None:
+    """Name the JSON files among models that hold something else."""
+    for path in others:
+        print(f"note: {path} says that it is no model and is passed over.")
+
+
+def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
+    """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
+    from modeling.files.provenance import write_provenance
+
+    sources, count = render_set(recipe, out)
+    settings = {"recipe": recipe.to_toml()}
+    inputs = [*inputs, *recipe.files()]
+    write_provenance(out / "provenance.json", "stimuli", settings, inputs=inputs)
+    tell_passed_over(sources.passed_over)
+    tell_beyond_grid(sources)
+    print(f"{count} files: {out / 'manifest.tsv'}")
+
+
+def render_set(recipe: Recipe, out: Path) -> tuple[Sources, int]:
+    """Write a stimulus set with its contact sheet, behind a progress bar.
+
+    Returns what it was rendered from and how many files it has.
+    """
+    from stimuli.sets.sources import load_sources
+    from stimuli.sets.writing import CONTACT_SHEET, check_place, stimulus_count, write_set
+
+    # Wrong input is refused before there is a bar, and before what draws is loaded.
+    check_place(out)
+    sources = load_sources(recipe)
+    count = stimulus_count(recipe, sources)
+    from analysis.figures.stimuli import figure_contact_sheet
+    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.spectra.contact_sheet import contact_sheet
+
+    with progress("Rendering stimuli", count) as advance:
+        write_set(out, recipe, sources=sources, progress=advance)
+    figure_contact_sheet(contact_sheet(out)).savefig(out / CONTACT_SHEET, dpi=DOTS_PER_INCH)
+    return sources, count
+
+
+def tell_beyond_grid(sources: Sources) -> None:
+    """Say where a stimulus asks for more than was recorded."""
+    for labelled in sources.models:
+        model = labelled.model
+        fastest, strongest = float(model.speeds_mm_s[-1]), float(model.forces_n[-1])
+        for trajectory in sources.trajectories:
+            speed, force = trajectory.highest_speed_mm_s, trajectory.highest_force_n
+            if speed > fastest or force > strongest:
+                print(
+                    f"note: {model.texture} ({labelled.label}) was recorded up to {fastest:g} mm/s "
+                    f"and {strongest:g} N; {trajectory.name} reaches {speed:g} mm/s and {force:g} "
+                    "N, and what lies beyond is rendered as the nearest edge."
+                )

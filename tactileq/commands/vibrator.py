@@ -1,0 +1,100 @@
+"""tactileq vibrator: identify a vibrator, to compensate its resonance."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.keeping import check_own_file
+
+if TYPE_CHECKING:
+    from analysis.spectra.vibrator import CompensatedVibrator
+
+
+def vibrator(
+    test: Annotated[Path, typer.Argument(metavar="TEST", help="WAV: drive, acceleration.")],
+    out: Annotated[Path, typer.Option("--out", help="File of what is found.")] = Path(
+        "vibrator.json"
+    ),
+    plot: Annotated[
+        Path | None, typer.Option("--plot", help="PNG: response before and after, coherence.")
+    ] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="The test was simulated: say so wherever it goes.")
+    ] = False,
+) -> None:
+    """Identify a vibrator from a white-noise test, to compensate its resonance.
+
+    TEST has two channels recorded at once, the drive and the acceleration, for 8.25 s at least. A
+    poor coherence of the two is refused. What is found goes into a recipe (vibrator under [set]) or
+    to --vibrator of tactileq stimuli, export wav and export c.
+
+    Example: tactileq vibrator white-noise.wav --out vibrator.json --plot vibrator.png
+    """
+    identify_from(test, out, plot=plot, simulated=simulated)
+
+
+def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) -> None:
+    """Identify a vibrator from its white-noise test, save it, draw it and say what was found.
+
+    Parameters
+    ----------
+    test : Path
+        WAV of two channels: drive, acceleration.
+    out : Path
+        A JSON file.
+    plot : Path, optional
+        A PNG file. Beside either file goes its provenance, by which a later run knows its own.
+    simulated : bool
+        Whether the test was simulated.
+    """
+    from analysis.figures.vibrator import figure_vibrator
+    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.spectra.vibrator import compensated
+    from modeling import identify_vibrator
+    from modeling.files.provenance import write_provenance
+    from modeling.files.wav import read_wav_channels
+
+    files = {path: ending for path, ending in ((out, ".json"), (plot, ".png")) if path is not None}
+    for path, ending in files.items():
+        if path.suffix.lower() != ending:
+            raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
+    markers = {path: check_own_file(path, "vibrator") for path in files}
+    samples, rate_hz = read_wav_channels(test)
+    if samples.shape[1] != 2:
+        raise ValueError(
+            f"expected two channels in {test}, the drive and the acceleration, got "
+            f"{samples.shape[1]}; record both at once."
+        )
+    drive, acceleration = samples.T
+    shown = compensated(
+        identify_vibrator(drive, acceleration, rate_hz=rate_hz, simulated=simulated)
+    )
+    shown.vibrator.save(out)
+    tell_origin = partial(
+        write_provenance,
+        command="vibrator",
+        settings={"simulated": simulated},
+        inputs=[test],
+    )
+    tell_origin(markers[out])
+    if plot is not None:
+        plot.parent.mkdir(parents=True, exist_ok=True)
+        figure_vibrator(shown).savefig(plot, dpi=DOTS_PER_INCH)
+        tell_origin(markers[plot])
+    print(f"{_found(shown)}: {out}")
+
+
+def _found(shown: CompensatedVibrator) -> str:
+    """One line on a vibrator's resonance, the test's coherence and what compensation gains."""
+    vibrator, before, after = shown.vibrator, shown.flat_before_hz, shown.flat_after_hz
+    note = "simulated " if vibrator.simulated else ""
+    return (
+        f"{note}resonance {vibrator.frequency_hz:.1f} Hz, {vibrator.bandwidth_hz:.1f} Hz wide, "
+        f"{vibrator.height:.2f} times the flat part; coherence {vibrator.coherence:.2f}; flat to "
+        f"±{shown.within_db:g} dB from {before[0]:.0f} to {before[1]:.0f} Hz, compensated from "
+        f"{after[0]:.0f} to {after[1]:.0f} Hz"
+    )

@@ -1,0 +1,276 @@
+"""Modelling many textures at once, each in a process of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import BrokenExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tactileq.keeping import check_own_model
+from tactileq.telling import clipping_warnings, progress, sentence_of, simulated_note
+
+if TYPE_CHECKING:
+    from analysis.report.findings import Findings
+    from modeling import RecordingSet
+
+
+@dataclass(frozen=True)
+class Source:
+    """One texture in one folder of recordings."""
+
+    folder: Path
+    texture: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What modelling one texture led to.
+
+    Parameters
+    ----------
+    what : str
+        The texture and its folder.
+    notes, warnings : tuple of str
+        Lines to print when it went well.
+    error : str
+        One sentence when it did not; empty otherwise.
+    """
+
+    what: str
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class HowToModel:
+    """What `tactileq model` was asked for.
+
+    Parameters
+    ----------
+    estimator : str
+    layers : int, optional
+        Their number; chosen without it.
+    keep_hum, check, alone, plot : bool
+        Leave hum of the mains in; leave conditions out and foretell them; find the layers of each
+        recording by itself; draw pictures.
+    """
+
+    estimator: str = "joint"
+    layers: int | None = None
+    keep_hum: bool = False
+    check: bool = False
+    alone: bool = False
+    plot: bool = False
+
+
+def model_textures(
+    folders: Sequence[Path], out: Path, *, how: HowToModel, jobs: int | None
+) -> list[Outcome]:
+    """Model every texture in these folders, some at a time; what came of each, in order.
+
+    One that cannot be modelled does not stop the others.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Recording sets, or folders of them.
+    out : Path
+        Where the files go; a texture's are written once it is modelled.
+    how : HowToModel
+    jobs : int, optional
+        Textures at a time, in processes of their own; as many as there are cores without it. The
+        files do not depend on it.
+
+    Raises
+    ------
+    ValueError
+        Before any work where two textures would share a file, or other files are in the way.
+    """
+    sources, unreadable = _sources_in(folders)
+    _require_own_files(sources, out)
+    return [*unreadable, *_model_all(sources, out, how=how, jobs=jobs)]
+
+
+def _model_all(
+    sources: Sequence[Source], out: Path, *, how: HowToModel, jobs: int | None
+) -> list[Outcome]:
+    """Outcomes in the order of the sources, with a progress bar."""
+    outcomes: list[Outcome] = []
+    work = partial(_model_one, out=out, how=how)
+    with progress("Finding layers, fitting", len(sources)) as advance:
+        try:
+            for source, outcome in zip(sources, _each(work, sources, jobs), strict=True):
+                outcomes.append(outcome)
+                advance(source.texture)
+        except BrokenExecutor:
+            raise ValueError(
+                "expected every process to end by itself, got one that the system stopped, "
+                "perhaps for want of memory; run again with a smaller --jobs."
+            ) from None
+    return outcomes
+
+
+def _each(
+    work: Callable[[Source], Outcome], sources: Sequence[Source], jobs: int | None
+) -> Iterable[Outcome]:
+    """The work on each source, in processes of its own where there are several."""
+    if len(sources) < 2 or jobs == 1:
+        return map(work, sources)
+    from joblib import Parallel, cpu_count, delayed
+
+    parallel = Parallel(n_jobs=min(jobs or cpu_count(), len(sources)), return_as="generator")
+    results: Iterable[Outcome] = parallel(map(delayed(work), sources))
+    return results
+
+
+def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
+    """Load, model and write one texture; what is wrong with it becomes its outcome's error."""
+    from threadpoolctl import threadpool_limits
+
+    from analysis.report.findings import find_in, save_findings
+    from modeling.files.provenance import write_provenance
+    from modeling.recordings.recording_set import load_usable
+
+    what = f"{source.texture} in {source.folder}"
+    try:
+        # One thread each: sums must not depend on how many cores a process finds.
+        with threadpool_limits(limits=1):
+            records, unusable = load_usable(source.folder, texture=source.texture)
+            found = find_in(
+                records,
+                estimator=how.estimator,
+                layers=how.layers,
+                keep_hum=how.keep_hum,
+                check=how.check,
+                alone=how.alone,
+            )
+            start = save_findings(found, out, plot=how.plot)
+            settings = {
+                "estimator": how.estimator,
+                "layers": how.layers,
+                "keep_hum": how.keep_hum,
+                "left_out": list(unusable),
+            }
+            provenance = Path(f"{start}_provenance.json")
+            write_provenance(provenance, "model", settings, inputs=[source.folder])
+    except (ValueError, OSError, MemoryError) as error:
+        return Outcome(what, error=sentence_of(error))
+    notes = (*_rate_notes(records), *_told(found, start, plot=how.plot))
+    left_out = [f"warning: {source.texture}: left out: {sentence}" for sentence in unusable]
+    warnings = (*left_out, *clipping_warnings(records), *_mended(found))
+    return Outcome(what, notes=notes, warnings=warnings)
+
+
+def _mended(found: Findings) -> list[str]:
+    """One sentence for each thing that was found and mended in recordings, and for silent ones."""
+    by_note: dict[str, list[str]] = {}
+    for recording, spectrum in found.measured:
+        notes = spectrum.notes if spectrum.magnitude.any() else ("silent: left out",)
+        for note in notes:
+            by_note.setdefault(note, []).append(recording.describe())
+    return [
+        f"warning: {where[0]}{f' and {len(where) - 1} more' * (len(where) > 1)}: {note}."
+        for note, where in by_note.items()
+    ]
+
+
+def _rate_notes(records: RecordingSet) -> list[str]:
+    """A note where the data's rate is lower than the model's would be."""
+    from modeling.recordings.spectrum import MODEL_RATE_HZ
+
+    rate_hz = min(r.rate_hz for r in records.recordings if r.force_n > 0)
+    if rate_hz >= MODEL_RATE_HZ:
+        return []
+    return [
+        f"note: {records.texture}: the data's rate of {rate_hz:g} Hz becomes the model's; the "
+        f"band from {rate_hz / 2:g} to {MODEL_RATE_HZ / 2:g} Hz is lost."
+    ]
+
+
+def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
+    """What was found and where it is, with the conditions that were interpolated."""
+    from analysis.textures.between import sentence
+    from modeling import missing_conditions
+    from modeling.models.own_peaks import own_peaks
+
+    name, model = found.texture, found.model
+    lines = [f"{name}: layers of each recording alone in {start}_alone.tsv"] if found.alone else []
+    if model is None:
+        return [*lines, f"no full model of {found.why_not}"]
+    peaks = own_peaks(model)
+    filling = int((~peaks.is_peak).sum())
+    filled = f", {filling} of them without a peak of {'its' if filling == 1 else 'their'} own"
+    conditions, unknown = model.noise_gains.size, int(model.not_identifiable.any(axis=2).sum())
+    lines.append(
+        f"{name}{simulated_note(model)}: {model.n_layers} layers{filled * bool(filling)}, "
+        f"{model.n_parameters} numbers per condition; some layer's frequency is told by other "
+        f"conditions in {int(model.inherited.any(axis=2).sum())}, its width or level not resolved "
+        f"in {int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
+        f"{conditions} conditions: {start}.json"
+    )
+    lines.append(f"{name}: layers over the grid in {start}_layers.tsv")
+    lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
+    if found.left_out is not None:
+        lines.append(f"{name}: conditions left out and foretold: {sentence(found.left_out)}")
+    for axis, unit in ((model.speeds_mm_s, "mm/s"), (model.forces_n, "N")):
+        if axis.size == 1:
+            other = "speeds" if unit == "mm/s" else "forces"
+            lines.append(
+                f"note: {name}: recorded at {axis[0]:g} {unit} alone; nothing is known of "
+                f"other {other}."
+            )
+    if plot:
+        lines.append(f"{name}: pictures in {start}_spectra.png and {start}_layers.png")
+    if missing := missing_conditions(model):
+        names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
+        lines.append(f"{name}: interpolated for want of a recording: {names}")
+    return lines
+
+
+def recording_folders(folder: Path) -> list[Path]:
+    """The folder itself where it is a recording set, else its sub-folders that are, by name."""
+    from modeling.recordings.recording_set import is_recording_set
+
+    if is_recording_set(folder) or not folder.is_dir():
+        return [folder]
+    below = sorted(path for path in folder.iterdir() if path.is_dir() and is_recording_set(path))
+    return below or [folder]
+
+
+def _sources_in(folders: Iterable[Path]) -> tuple[list[Source], list[Outcome]]:
+    """All textures in these folders, and the folders whose list cannot be read."""
+    from modeling.recordings.recording_set import textures_in
+
+    sources: list[Source] = []
+    unreadable: list[Outcome] = []
+    for folder in (found for given in folders for found in recording_folders(given)):
+        try:
+            # A list without lines names no texture: loading it will say so.
+            names = textures_in(folder) or (folder.name,)
+        except (ValueError, OSError) as error:
+            unreadable.append(Outcome(str(folder), error=sentence_of(error)))
+            continue
+        sources += [Source(folder, name) for name in names]
+    return sources, unreadable
+
+
+def _require_own_files(sources: Iterable[Source], out: Path) -> None:
+    """Refuse textures whose files would overwrite each other's or another command's."""
+    from modeling.files.writing import file_stem
+
+    taken: dict[str, Source] = {}
+    for source in sources:
+        stem = file_stem(source.texture)
+        if stem in taken:
+            other = taken[stem]
+            raise ValueError(
+                "expected each texture once, with names that differ in letters or digits, got "
+                f"{other.texture!r} in {other.folder} and {source.texture!r} in {source.folder}; "
+                "rename one, or model them one by one with different --out."
+            )
+        taken[stem] = source
+        check_own_model(out / stem, "model")

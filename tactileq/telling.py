@@ -1,0 +1,79 @@
+"""What is told on the screen: progress, errors, notes and warnings."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from modeling import RecordingSet
+    from modeling.models.loading import AnyModel
+
+
+def sentence_of(error: Exception) -> str:
+    """What a user is told of an error: one sentence, never a traceback."""
+    # A StoreError carries its own sentence, the system's errors only a number and a word.
+    if isinstance(error, OSError) and error.errno is not None and error.filename is not None:
+        return (
+            f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
+            "path, its permissions and the space on the disk."
+        )
+    if isinstance(error, MemoryError):
+        return "expected a task that fits the memory, got a larger one; ask for less at once."
+    return str(error)
+
+
+@contextmanager
+def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
+    """A progress bar over countable steps; in a log it is one line at the end."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[item]}"),
+    )
+    with Progress(*columns) as bar:
+        task = bar.add_task(title, total=total, item="")
+        yield lambda item: bar.update(task, advance=1, item=item)
+        bar.update(task, item="")
+
+
+@contextmanager
+def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
+    """A progress bar for work that tells its share done (0–1)."""
+    from rich.progress import Progress
+
+    with Progress() as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share, what: bar.update(task, completed=share)
+
+
+def clipping_warnings(records: RecordingSet) -> list[str]:
+    """One sentence for every clipped recording."""
+    return [
+        f"warning: {recording.describe()} is clipped in {recording.clipped_share:.2%} of its "
+        "samples; its level is too low."
+        for recording in records.recordings
+        if recording.clipped_share > 0
+    ]
+
+
+def simulated_note(model: AnyModel) -> str:
+    """What a printed line says of a model that nobody recorded."""
+    return " (simulated)" if model.simulated else ""
+
+
+def usable_recordings(folder: Path, texture: str) -> RecordingSet:
+    """The recordings of one texture; what cannot be used is told and left out."""
+    from modeling.recordings.recording_set import load_usable
+
+    records, unusable = load_usable(folder, texture=texture)
+    for sentence in unusable:
+        print(f"warning: {texture}: left out: {sentence}", file=sys.stderr)
+    return records

@@ -1,0 +1,299 @@
+"""Reading answers: what is kept, what is dropped with a word, what is refused."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+from analysis.answers.loading import load_responses
+from modeling import InputError
+
+
+def test_main_trials_and_training_are_kept_apart(study_folder, write_task, absolute_rows):
+    write_task("absolute", absolute_rows)
+    responses = load_responses(study_folder)
+    assert len(responses.absolute) == 14
+    assert set(responses.absolute["phase"]) == {"main"}
+    assert responses.absolute_training["texture"].tolist() == ["canvas"]
+    assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
+    assert responses.absolute["magnitude_similarity"].tolist() == [50.0 + n for n in range(1, 15)]
+    assert responses.relative.empty
+    assert "correct" in responses.relative
+    assert not responses.simulated
+    assert responses.name == "Seven surfaces"
+    assert responses.warnings == ()
+
+
+def test_several_participants_and_both_tasks(
+    study_folder, write_task, absolute_rows, relative_rows
+):
+    for participant in ("sub-02", "sub-01"):
+        write_task("absolute", absolute_rows, participant=participant)
+        write_task("relative", relative_rows, participant=participant)
+    responses = load_responses(str(study_folder))
+    assert len(responses.absolute) == 28
+    assert responses.relative["participant_id"].tolist() == ["sub-01"] * 7 + ["sub-02"] * 7
+    assert responses.relative["correct"].sum() == 8
+
+
+def test_missing_values_become_nan(study_folder, write_task, absolute_rows):
+    absolute_rows[3][6] = "n/a"
+    write_task("absolute", absolute_rows)
+    ratings = load_responses(study_folder).absolute["magnitude_similarity"]
+    assert math.isnan(ratings[2])
+    assert ratings.notna().sum() == 13
+
+
+@pytest.mark.parametrize(
+    "tail",
+    ["15\tmain\tPVC", "15\tmain\tPVC\tfull\tA\treal\t50\t50\t1\t12.2\ttr", "\xe9", "15\tmain\t\t"],
+)
+def test_a_line_cut_short_is_dropped_with_a_warning(study_folder, write_task, absolute_rows, tail):
+    path = write_task("absolute", absolute_rows, tail=tail)
+    path.write_bytes(path.read_bytes()[: -1 if tail == "\xe9" else None])  # within a character
+    responses = load_responses(study_folder)
+    assert len(responses.absolute) == 14
+    assert len(responses.warnings) == 1
+    assert path.name in responses.warnings[0]
+    assert "cut short" in responses.warnings[0]
+
+
+def test_a_whole_last_line_without_its_end_is_kept(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    path.write_bytes(path.read_bytes().removesuffix(b"\n"))
+    responses = load_responses(study_folder)
+    assert len(responses.absolute) == 14
+    assert responses.warnings == ()
+
+
+def test_a_session_killed_within_its_first_line_has_no_answers(
+    study_folder, write_task, absolute_rows
+):
+    write_task("absolute", absolute_rows)
+    path = write_task("absolute", [], participant="sub-02")
+    path.write_text("trial\tpha")
+    responses = load_responses(study_folder)
+    assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
+    assert "no answers" in responses.warnings[0]
+
+
+def test_windows_line_ends_and_byte_order_mark_are_read(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert len(load_responses(study_folder).absolute) == 14
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        (6, "101", "from 0 to 100"),
+        (6, "-0.5", "from 0 to 100"),
+        (7, "high", "from 0 to 100"),
+        (7, "nan", "from 0 to 100"),
+        (9, "inf", "at least 0"),
+        (3, "half", "full or simplified"),
+        (1, "warm-up", "training or main"),
+        (5, "left", "real or virtual"),
+        (2, "n/a", "a value in column texture"),
+        (0, "3", "every trial once"),
+        (10, "true", "simulated = false"),
+    ],
+)
+def test_malformed_ratings_are_refused(
+    study_folder, write_task, absolute_rows, column, value, expected
+):
+    absolute_rows[5][column] = value
+    path = write_task("absolute", absolute_rows)
+    with pytest.raises(InputError, match=expected) as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+    assert "answer 6" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        (6, "velvet", "stands in its trial's layout"),
+        (7, "0", "correct = 1 exactly where"),
+        (7, "0.5", "correct = 1 exactly where"),
+        (7, "2", "from 0 to 1"),
+        (7, "n/a", "correct = 1 exactly where"),
+    ],
+)
+def test_malformed_choices_are_refused(
+    study_folder, write_task, relative_rows, column, value, expected
+):
+    relative_rows[2][column] = value
+    path = write_task("relative", relative_rows)
+    with pytest.raises(InputError, match=expected) as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_a_missing_column_is_named(study_folder, write_task, relative_rows):
+    columns = [name for name in _relative_columns() if name != "layout"]
+    path = write_task("relative", [row[:5] + row[6:] for row in relative_rows], columns=columns)
+    with pytest.raises(InputError, match="the column layout") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_a_line_with_too_many_values_is_refused(study_folder, write_task, absolute_rows):
+    absolute_rows[4].append("surplus")
+    path = write_task("absolute", absolute_rows)
+    with pytest.raises(InputError, match="11 values in line 6") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_a_file_in_the_wrong_folder_is_refused(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    path.rename(path.with_name("sub-07_ses-01_task-absolute_beh.tsv"))
+    with pytest.raises(InputError, match="sub-07_ses-01"):
+        load_responses(study_folder)
+
+
+def test_other_bytes_than_text_are_refused(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    path.write_bytes(path.read_bytes().replace(b"canvas", b"\xff\xfe"))
+    with pytest.raises(InputError, match="UTF-8") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_simulated_and_real_participants_are_never_mixed(study_folder, write_task, absolute_rows):
+    write_task("absolute", absolute_rows)
+    participants = study_folder / "participants.tsv"
+    participants.write_text(participants.read_text() + "sub-02\ttrue\n")
+    with pytest.raises(InputError, match="never a mixture"):
+        load_responses(study_folder)
+
+
+SIMULATED_KEYS = ("Simulated", "SimulatedParticipant", "SimulatedRig")
+
+
+@pytest.mark.parametrize("rig", [False, True])
+@pytest.mark.parametrize("participants", [False, True])
+def test_what_was_simulated_is_carried(study_folder, write_task, absolute_rows, participants, rig):
+    facts = dict(zip(SIMULATED_KEYS, (participants or rig, participants, rig), strict=True))
+    (study_folder / "dataset_description.json").write_text(json.dumps(facts))
+    listed = f"participant_id\tsimulated\nsub-01\t{str(participants).lower()}\n"
+    (study_folder / "participants.tsv").write_text(listed)
+    either = str(participants or rig).lower()
+    path = write_task("absolute", [[*row[:-1], either] for row in absolute_rows])
+    sidecar = path.with_suffix(".json")
+    sidecar.write_text(json.dumps(facts))
+    responses = load_responses(study_folder)
+    assert responses.simulated_participants is participants
+    assert responses.simulated_rig is rig
+    assert responses.simulated is (participants or rig)
+    sidecar.write_text(json.dumps({**facts, "SimulatedParticipant": not participants}))
+    with pytest.raises(InputError, match="SimulatedParticipant .* never a mixture") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, sidecar)
+
+
+@pytest.mark.parametrize(
+    "facts", [(True, False, False), (False, True, False), (True, "yes", False), (True,)]
+)
+def test_a_description_that_does_not_tell_what_was_simulated_is_refused(study_folder, facts):
+    path = study_folder / "dataset_description.json"
+    path.write_text(json.dumps(dict(zip(SIMULATED_KEYS, facts, strict=False))))
+    with pytest.raises(InputError, match="say what was simulated") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def _write_order(data: Path, participant: str, content: object) -> Path:
+    path = data / "sourcedata" / participant / "ses-01"
+    path.mkdir(parents=True)
+    path /= f"{participant}_ses-01_task-relative_order.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_a_session_that_ended_early_is_named(study_folder, write_task, relative_rows):
+    write_task("relative", relative_rows)
+    _write_order(study_folder, "sub-01", {"trials": [{}] * 7})
+    write_task("relative", relative_rows[:4], participant="sub-02")
+    _write_order(study_folder, "sub-02", {"trials": [{}] * 23})
+    write_task("relative", [], participant="sub-03")
+    _write_order(study_folder, "sub-03", {"trials": [{}] * 23})
+    responses = load_responses(study_folder)
+    assert responses.warnings == (
+        "sub-02 relative ses-01 answered 4 of 23 trials (ended early).",
+        "sub-03 relative ses-01 answered 0 of 23 trials (ended early).",
+    )
+    assert len(responses.relative) == 11
+
+
+def test_an_order_without_trials_is_refused(study_folder, write_task, relative_rows):
+    write_task("relative", relative_rows)
+    path = _write_order(study_folder, "sub-01", {"trials": 23})
+    with pytest.raises(InputError, match="a list of trials") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_simulated_answers_in_a_data_set_of_people_are_refused(
+    study_folder, write_task, absolute_rows
+):
+    write_task("absolute", [[*row[:-1], "true"] for row in absolute_rows])
+    with pytest.raises(InputError, match="never a mixture"):
+        load_responses(study_folder)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "expected"),
+    [
+        (lambda folder: folder / "nowhere", "expected a data folder"),
+        (lambda folder: folder / "participants.tsv", "expected a data folder"),
+        (lambda folder: folder, "found none; run a session"),
+    ],
+)
+def test_a_folder_that_is_none_is_refused(study_folder, spoil, expected):
+    with pytest.raises(InputError, match=expected):
+        load_responses(spoil(study_folder))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("{", "expected JSON"),
+        ("[]", '"Simulated": true or false'),
+        (json.dumps({"Name": "x"}), '"Simulated": true or false'),
+        (json.dumps({"Simulated": "no"}), '"Simulated": true or false'),
+        (None, "dataset_description.json, which is not there"),
+    ],
+)
+def test_an_unclear_description_is_refused(study_folder, text, expected):
+    path = study_folder / "dataset_description.json"
+    if text is None:
+        path.unlink()
+    else:
+        path.write_text(text)
+    with pytest.raises(InputError, match=expected):
+        load_responses(study_folder)
+
+
+def test_a_missing_list_of_participants_is_refused(study_folder, write_task, absolute_rows):
+    write_task("absolute", absolute_rows)
+    (study_folder / "participants.tsv").unlink()
+    with pytest.raises(InputError, match="list of participants"):
+        load_responses(study_folder)
+
+
+def _one_sentence(error: InputError, path: Path) -> None:
+    text = str(error)
+    assert path.name in text
+    assert "\n" not in text
+    assert text.endswith(".")
+    assert ". " not in text
+
+
+def _relative_columns() -> tuple[str, ...]:
+    names = "trial phase texture model tray layout answer correct presses response_time_s simulated"
+    return tuple(names.split())

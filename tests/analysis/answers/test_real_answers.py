@@ -1,0 +1,85 @@
+"""Correct rates of ten real people (HaptiComm, see tests/data/hapticomm_3x3) against counting."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy import stats
+
+from analysis.labels import ALL_TEXTURES
+from analysis.statistics.rates import correct_rates, participant_rates, rate_tests
+
+FOLDER = Path(__file__).parents[2] / "data" / "hapticomm_3x3"
+TYPES = {"1": "slide", "2": "tap", "3": "tap and hold"}
+
+
+@pytest.fixture(scope="module")
+def answers() -> pd.DataFrame:
+    """Three kinds of touch as textures; small and large arrays as the two models."""
+    tables = []
+    for path in sorted(FOLDER.glob("P*.csv")):
+        table = pd.read_csv(path, encoding="utf-8-sig", dtype={"TYPE": str})
+        tables.append(table.assign(participant_id=path.stem))
+    table = pd.concat(tables, ignore_index=True)
+    table = table[table["SIZE"] != 2]
+    return pd.DataFrame(
+        {
+            "participant_id": table["participant_id"],
+            "texture": table["TYPE"].map(TYPES),
+            "model": table["SIZE"].map({1: "full", 3: "simplified"}),
+            "correct": table["TYPE_ANS"].astype(float),
+        }
+    )
+
+
+def _counted() -> dict[tuple[str, str, str], list[int]]:
+    """Right and wrong answers by person, touch and size, counted line by line."""
+    counts: dict[tuple[str, str, str], list[int]] = defaultdict(list)
+    for path in sorted(FOLDER.glob("P*.csv")):
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            for row in csv.DictReader(file):
+                counts[path.stem, TYPES[row["TYPE"]], row["SIZE"]].append(int(row["TYPE_ANS"]))
+    return counts
+
+
+def test_rates_per_participant_equal_simple_counts(answers):
+    counted = _counted()
+    rates = participant_rates(answers)
+    assert rates.shape == (10, 6)
+    for person in rates.index:
+        for touch, model in rates.columns:
+            right = counted[person, touch, "1" if model == "full" else "3"]
+            assert len(right) == 6
+            assert rates.loc[person, (touch, model)] == sum(right) / 6
+
+
+def test_rates_against_chance(answers):
+    counted = _counted()
+    rates = correct_rates(answers, rng=np.random.default_rng(0), chance=1 / 3)
+    overall = rates[(rates["texture"] == ALL_TEXTURES) & (rates["model"] == "full")].iloc[0]
+    by_person: dict[str, list[int]] = defaultdict(list)
+    for (person, _, size), right in counted.items():
+        if size == "1":
+            by_person[person] += right
+    shares = [sum(right) / len(right) for right in by_person.values()]
+    expected = stats.ttest_1samp(shares, 1 / 3)
+    assert (overall["participants"], overall["trials"]) == (10, 180)
+    assert_allclose(overall["mean"], np.mean(shares))
+    assert_allclose([overall["t"], overall["p"]], [expected.statistic, expected.pvalue])
+    assert overall["ci_low"] > 1 / 3  # people do recognise how they are touched
+
+
+def test_paired_comparison_of_rates(answers):
+    tests = rate_tests(answers).set_index("texture")
+    rates = participant_rates(answers)
+    for touch in TYPES.values():
+        differences = rates[touch]["simplified"] - rates[touch]["full"]
+        expected = stats.ttest_1samp(differences, 0)
+        assert_allclose(tests.loc[touch, "t"], expected.statistic)
+        assert_allclose(tests.loc[touch, "d_z"], differences.mean() / differences.std(ddof=1))

@@ -1,0 +1,187 @@
+"""Every figure says what it shows: labels with units, legends, and SIMULATED where it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from analysis.figures.answers import (
+    MODEL_COLOURS,
+    figure_confusion,
+    figure_correct_rates,
+    figure_ratings,
+)
+from analysis.figures.drawing import LAYER_COLOURS, VERMILLION
+from analysis.figures.layer_courses import figure_layer_courses
+from analysis.figures.spectra import (
+    figure_spectra,
+    figure_spectra_and_threshold,
+    plot_layers_and_threshold,
+)
+from analysis.spectra.comparison import compare_spectra, spectrum_panels
+from analysis.spectra.layers_over_grid import layer_course
+from analysis.statistics.confusion import confusion_matrices
+from analysis.statistics.paired import rating_tests
+from analysis.statistics.rates import rate_tests
+from modeling import InputError, RecordingSet
+from modeling.fitting.conditions import recording_spectra
+
+pytestmark = pytest.mark.filterwarnings("error")
+OKABE_ITO = {
+    *("#000000", "#e69f00", "#56b4e9", "#009e73", "#f0e442", "#0072b2", "#d55e00", "#cc79a7"),
+}
+
+
+def texts(artist: Figure | Axes) -> str:
+    return "\n".join(text.get_text() for text in artist.findobj(Text))
+
+
+def drawn(figure: Figure) -> list[Axes]:
+    """The figure's axes after drawing it, less the colour bar's."""
+    figure.draw_without_rendering()
+    return [ax for ax in figure.axes if ax.get_label() != "<colorbar>"]
+
+
+def test_spectra_and_threshold(results):
+    figure = figure_spectra_and_threshold(
+        compare_spectra(results[0], speed_mm_s=350.0, force_n=3.0)
+    )
+    axes = drawn(figure)
+    assert len(axes) == 4
+    assert all("SIMULATED" in texts(ax) for ax in axes)
+    assert "leather, 350 mm/s, 3 N" in texts(figure)
+    assert "(g per unit noise)" in axes[0].get_ylabel()
+    assert "(g peak)" in axes[2].get_ylabel()
+    assert [ax.get_xlabel() for ax in axes[2:]] == ["frequency (Hz)"] * 2
+    for ax in axes:
+        assert ax.get_xscale() == ax.get_yscale() == "log"
+    for words in ("(a) full model", "(b) simplified model", "detection threshold (codec)"):
+        assert words in texts(figure)
+    assert "no threshold known" in texts(figure)
+
+
+def test_stems_stand_at_the_layers_and_dropped_ones_are_marked(results):
+    comparison = compare_spectra(results[0], speed_mm_s=350.0, force_n=3.0)
+    dropped = np.zeros(comparison.layer_frequency_hz.size, dtype=bool)
+    dropped[0] = True
+    ax = plot_layers_and_threshold(replace(comparison, dropped=dropped))
+    lines = {str(line.get_label()): line for line in ax.lines}
+    kept, gone = lines["layer, kept"], lines["layer, dropped by simplification"]
+    assert gone.get_marker() != kept.get_marker()
+    assert gone.get_xdata().tolist() == comparison.layer_frequency_hz[:1].tolist()
+    lowest = ax.get_ylim()[0]  # weaker layers stand on the lower edge
+    expected = np.maximum(comparison.layer_amplitude_g[1:], lowest)
+    assert kept.get_ydata() == pytest.approx(expected, rel=1e-12)
+    assert (comparison.layer_amplitude_g[1:] > lowest).any()
+    numbers = {annotation.get_text() for annotation in ax.texts}
+    assert {str(n + 1) for n in range(dropped.size)} <= numbers
+
+
+def test_a_condition_off_the_grid_is_refused(results):
+    with pytest.raises(InputError, match="recorded condition"):
+        compare_spectra(results[0], speed_mm_s=300.0, force_n=3.0)
+    with pytest.raises(InputError, match="condition of the grid"):
+        layer_course(results[0].model, force_n=2.0)
+
+
+def test_ratings(ratings):
+    figure = figure_ratings(rating_tests(ratings), simulated=True)
+    axes = drawn(figure)
+    assert [ax.get_ylabel() for ax in axes] == [
+        "rated similarity of vibration magnitude (0–100)",
+        "rated similarity of frequency pattern (0–100)",
+    ]
+    for ax in axes:
+        assert "SIMULATED" in texts(ax)
+        assert "***" in texts(ax)  # the planted effect on PVC
+        assert len(ax.patches) >= 14
+        assert "wall paper" in [label.get_text() for label in ax.get_xticklabels()]
+    for words in ("full model", "simplified model", "standard error", "Holm"):
+        assert words in texts(figure)
+
+
+def test_correct_rates(choices):
+    figure = figure_correct_rates(rate_tests(choices), simulated=True)
+    (ax,) = drawn(figure)
+    assert "SIMULATED" in texts(ax)
+    assert "14.3%" in texts(ax)
+    assert "0–1" in ax.get_ylabel()
+    assert any(np.allclose(line.get_ydata(), 1 / 7) for line in ax.lines)
+    assert "all textures" not in texts(ax)
+
+
+def test_undefined_and_missing_values_do_not_break_the_bars(choices):
+    always_right = choices.assign(correct=1.0)
+    figure = figure_correct_rates(rate_tests(always_right), simulated=False)
+    figure.draw_without_rendering()
+    heights = {bar.get_height() for bar in figure.axes[0].patches}
+    assert heights == {1.0}
+
+
+def test_confusion_matrices_state_orientation_counts_and_chance(choices):
+    matrices = confusion_matrices(choices)
+    figure = figure_confusion(matrices, simulated=True)
+    axes = drawn(figure)
+    assert [ax.get_xlabel() for ax in axes] == ["virtual surface answered"] * 2
+    assert axes[0].get_ylabel() == "real surface presented"
+    for ax, model in zip(axes, ("full", "simplified"), strict=True):
+        assert "SIMULATED" in texts(ax)
+        matrix = matrices[model]
+        assert f"{100 * matrix.row_shares[0, 0]:.0f}\n({matrix.counts[0, 0]})" in texts(ax)
+    assert "chance 14.3%" in texts(figure)
+    assert "share of the row's answers (%)" in texts(figure)
+
+
+def test_layers_over_speed_beside_the_planted_ones(results):
+    result = results[0]
+    courses = [layer_course(model, force_n=3.0) for model in (result.model, result.truth)]
+    figure = figure_layer_courses(courses)
+    frequency, amplitude = drawn(figure)
+    assert frequency.get_ylabel() == "frequency (Hz)"
+    assert "(g peak)" in amplitude.get_ylabel()
+    for ax in (frequency, amplitude):
+        assert ax.get_xlabel() == "speed (mm/s)"
+        assert "SIMULATED" in texts(ax)
+        assert len(ax.lines) == result.model.n_layers + result.truth.n_layers
+    assert "planted" in texts(figure)
+    assert f"{result.model.estimator}, layer 1" in texts(figure)
+    first = frequency.lines[0]
+    assert first.get_ydata().tolist() == result.model.frequencies_hz[:, 1, 0].tolist()
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_small_multiples_of_spectra_need_no_grid(results, count):
+    recordings = RecordingSet(results[0].recordings.recordings[:count])
+    panels = spectrum_panels(recording_spectra(recordings), estimator="paper")
+    figure = figure_spectra(panels)
+    axes = drawn(figure)
+    assert len(axes) == count
+    for ax, panel in zip(axes, panels, strict=True):
+        assert ax.get_title(loc="left") == panel.title
+        assert "mm/s" in panel.title
+        assert "SIMULATED" in texts(ax)
+        assert ax.lines[1].get_xdata().tolist() == panel.layer_frequency_hz.tolist()
+        assert f"{panel.layer_frequency_hz.size} layer" in texts(ax)
+    assert axes[0].get_ylabel() == "magnitude\n(g per unit noise)"
+    assert axes[-1].get_xlabel() == "frequency (Hz)"
+
+
+def test_real_results_are_not_called_simulated(ratings, choices, results):
+    for figure in (
+        figure_ratings(rating_tests(ratings), simulated=False),
+        figure_correct_rates(rate_tests(choices), simulated=False),
+        figure_confusion(confusion_matrices(choices), simulated=False),
+    ):
+        figure.draw_without_rendering()
+        assert "SIMULATED" not in texts(figure)
+
+
+def test_colours_are_okabe_and_itos():
+    for colour in (*LAYER_COLOURS, *MODEL_COLOURS.values(), VERMILLION):
+        assert to_hex(colour) in OKABE_ITO

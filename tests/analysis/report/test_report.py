@@ -1,0 +1,310 @@
+"""The report: whole in one file, complete, escaped, and honest about what is simulated."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.answers.loading import Responses
+from analysis.report.page import cell, label
+from analysis.report.report import write_report
+from analysis.textures.results import TextureResult
+from modeling import InputError, RecordingSet, Threshold, simplify
+
+pytestmark = pytest.mark.filterwarnings("error")
+WARNING = "sub-01_ses-01_task-absolute_beh.tsv: the last line was cut short & is left out."
+
+
+BANNER = "SIMULATED: {}."
+
+
+class Page(HTMLParser):
+    """What a browser would fetch, show and execute."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.references: list[str] = []
+        self.identifiers: list[str] = []
+        self.text = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        for name, value in attrs:
+            if name in ("src", "href", "srcset", "data", "poster", "action"):
+                self.references.append(value or "")
+            if name == "id":
+                self.identifiers.append(value or "")
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def responses_of(
+    ratings: pd.DataFrame, choices: pd.DataFrame, *, simulated: bool, rig: bool | None = None
+) -> Responses:
+    """Answers whose participants and (unless told otherwise) rig are simulated or not."""
+    return Responses(
+        absolute=ratings,
+        relative=choices,
+        simulated_participants=simulated,
+        simulated_rig=simulated if rig is None else rig,
+        absolute_training=ratings.iloc[:0],
+        relative_training=choices.iloc[:0],
+        warnings=(WARNING,),
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, results, ratings, choices) -> Path:
+    """One report of everything, shared by the tests that only read it."""
+    folder = tmp_path_factory.mktemp("report")
+    told: list[tuple[float, str]] = []
+    path = write_report(
+        folder / "report.html",
+        responses=responses_of(ratings, choices, simulated=True),
+        textures=results,
+        provenance={"configuration": "<i>study.toml</i>"},
+        title="A study <in silico>",
+        seed=5,
+        progress=lambda share, what: told.append((share, what)),
+    )
+    assert path == folder / "report.html"
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def shown(folder) -> Page:
+    return Page((folder / "report.html").read_text(encoding="utf-8"))
+
+
+def test_the_report_needs_nothing_but_itself(folder, shown):
+    for reference in shown.references:
+        assert reference.startswith(("#", "data:image/png;base64,"))
+    assert not {"script", "link", "iframe", "object"} & set(shown.tags)
+    style = re.search(r"<style>(.*?)</style>", (folder / "report.html").read_text(), re.DOTALL)
+    assert style
+    assert "url(" not in style[1]
+    assert "@import" not in style[1]
+
+
+def test_links_lead_somewhere(shown):
+    anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
+    assert len(anchors) == 7
+    assert set(anchors) <= set(shown.identifiers)
+    assert len(shown.identifiers) == len(set(shown.identifiers))
+
+
+def test_every_figure_is_inline_and_beside_the_report(folder, shown):
+    pictures = {path.stem: path.read_bytes() for path in (folder / "figures").iterdir()}
+    assert len(pictures) == 2 * 2 + 1 + 3
+    inline = {
+        base64.b64decode(reference.split(",", 1)[1])
+        for reference in shown.references
+        if reference.startswith("data:")
+    }
+    assert inline == set(pictures.values())
+    for png in inline:
+        assert png.startswith(b"\x89PNG")
+
+
+def test_every_table_is_in_the_report_and_beside_it(folder, shown):
+    names = {path.stem for path in (folder / "tables").iterdir()}
+    assert {"gfc", "rating_tests", "correct_rates", "rate_tests", "planted_truth"} <= names
+    assert {"planted_layers", "confusion_full", "confusion_simplified", "provenance"} <= names
+    assert {"regressions", "regression_support", "regression_coefficients"} <= names
+    assert {"centroid", "centroid_amplitude", "driving"} <= names
+    assert sum(name.startswith("verdicts_") for name in names) == 2
+    assert shown.tags.count("table") == len(names)
+    for name in names:
+        table = pd.read_csv(folder / "tables" / f"{name}.tsv", sep="\t")
+        assert not table.empty
+        assert set(table["simulated"]) == {name != "provenance"}
+
+
+def test_tables_beside_the_report_are_exact(folder, ratings):
+    table = pd.read_csv(folder / "tables" / "rating_tests.tsv", sep="\t", na_values="n/a")
+    pvc = ratings[(ratings["texture"] == "PVC") & (ratings["model"] == "full")]
+    row = table[(table["texture"] == "PVC") & (table["scale"] == "vibration magnitude")].iloc[0]
+    assert row["mean_full"] == pytest.approx(pvc["magnitude_similarity"].mean(), rel=1e-12)
+
+
+def test_simulated_results_are_called_so(shown):
+    assert shown.text.count("SIMULATED") > 15
+    assert (
+        BANNER.format("the recordings come from no real surface; no person took part") in shown.text
+    )
+    assert "16 simulated participants at the simulated rig" in shown.text
+    assert "say nothing about what people feel" in shown.text
+
+
+def test_what_others_wrote_is_escaped(folder, shown):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    assert "<b>bold</b>" not in html
+    assert "<i>study.toml</i>" not in html
+    assert "<in silico>" not in html
+    for text in ("<b>bold</b> & co", "<i>study.toml</i>", "A study <in silico>", WARNING):
+        assert text in shown.text
+    assert not {"i", "in"} & set(shown.tags)
+
+
+def test_outcomes_are_computed_and_bounded(shown, ratings):
+    assert "differ in 1 of 7 textures: PVC −" in shown.text
+    assert "no difference was shown in the other 6" in shown.text
+    assert "does not show that full and simplified models are equal" in shown.text
+    assert "equivalence test" in shown.text
+    assert "chance 14.3%" in shown.text
+    assert "of the planted layers" in shown.text
+    assert "seed of this report" in shown.text
+
+
+def test_a_report_of_real_answers_alone(tmp_path, ratings, choices):
+    no_choices = choices.iloc[:0]
+    path = write_report(
+        tmp_path / "deep" / "report.html",
+        responses=responses_of(ratings, no_choices, simulated=False),
+    )
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert "SIMULATED" not in shown.text
+    assert "simulated" not in shown.text
+    assert "Forced choice" not in shown.text
+    assert "GFC" not in shown.text
+    assert "16participants, absolute evaluation" in shown.text  # a tile: number, then words
+
+
+def test_a_person_at_the_simulated_rig_is_a_person(tmp_path, ratings, choices):
+    people = responses_of(ratings, choices, simulated=False, rig=True)
+    shown = Page(write_report(tmp_path / "report.html", responses=people).read_text("utf-8"))
+    told = "people took part, but at a simulated rig, where nobody felt a real surface"
+    assert BANNER.format(told) in shown.text
+    assert "Absolute evaluation: 16 participants at the simulated rig, 224 trials" in shown.text
+    assert "16participants at the simulated rig, forced choice" in shown.text
+    assert "The participants are people, but the rig was simulated" in shown.text
+    assert "(SIMULATED)" in shown.text
+    assert "simulated participants" not in shown.text.lower()
+    assert "no person" not in shown.text
+
+
+def test_simulated_participants_at_a_real_rig_are_no_people(tmp_path, ratings, choices):
+    answers = responses_of(ratings, choices, simulated=True, rig=False)
+    shown = Page(write_report(tmp_path / "report.html", responses=answers).read_text("utf-8"))
+    assert BANNER.format("no person took part") in shown.text
+    assert "16simulated participants, forced choice" in shown.text
+    assert "Simulated participants follow a model" in shown.text
+    assert "simulated rig" not in shown.text
+
+
+def test_simulated_and_real_recordings_are_told_apart(tmp_path, results):
+    measured = replace(
+        results[1],
+        recordings=RecordingSet(
+            replace(recording, simulated=False) for recording in results[1].recordings.recordings
+        ),
+        model=replace(results[1].model, simulated=False),
+        truth=None,
+    )
+    path = write_report(tmp_path / "report.html", textures=[results[0], measured])
+    shown = Page(path.read_text(encoding="utf-8"))
+    told = "the recordings of 1 of 2 textures come from no real surface"
+    assert BANNER.format(told) in shown.text
+    assert "fitted to 8 recordings, 4 of them simulated (" in shown.text
+
+
+def test_the_flip_probability_says_what_it_covers(shown):
+    assert "in other records; whether the estimator would find the layer again" in shown.text
+
+
+@pytest.mark.parametrize("marked", [0, 3])
+def test_unresolved_layers_are_counted(tmp_path, results, marked):
+    model = results[0].model
+    unresolved = np.zeros(model.unresolved.shape, dtype=bool)
+    unresolved.flat[:marked] = True
+    result = replace(results[0], model=replace(model, unresolved=unresolved))
+    path = write_report(tmp_path / "report.html", textures=[result])
+    told = f"In {marked} of {unresolved.size} layer-conditions"
+    assert (told in Page(path.read_text(encoding="utf-8")).text) == (marked > 0)
+
+
+def test_a_report_of_models_alone(tmp_path, results):
+    path = write_report(tmp_path / "report.html", textures=results[:1])
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert BANNER.format("the recordings come from no real surface") in shown.text
+    assert "t-test" not in shown.text
+
+
+@pytest.mark.parametrize("kept", ["participant_id == 'sub-01'", "model == 'full'"])
+def test_a_study_that_has_just_begun_is_reported(tmp_path, ratings, choices, kept):
+    begun = responses_of(ratings.query(kept), choices.query(kept), simulated=False)
+    path = write_report(tmp_path / "report.html", responses=begun)
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert "the test is undefined for aluminum, canvas" in shown.text
+    assert "t undefined" in shown.text
+    assert not re.search(r"\bnan\b", shown.text)
+
+
+def test_a_texture_without_layers_is_reported(tmp_path, results):
+    bare = results[0].model.with_layers([])
+    result = TextureResult(
+        results[0].recordings, bare, simplify(bare, Threshold.shipped("codec")), results[0].truth
+    )
+    path = write_report(tmp_path / "report.html", textures=[result])
+    shown = Page(path.read_text(encoding="utf-8"))
+    assert "leather: 0 of 0 layers kept" in shown.text
+    assert "found 0% of the planted layers" in shown.text
+    assert not re.search(r"\bnan\b", shown.text)
+
+
+def test_a_second_report_takes_the_place_of_the_first(tmp_path, ratings, choices):
+    answers = responses_of(ratings, choices, simulated=True)
+    first = write_report(tmp_path / "report.html", responses=answers, seed=1).read_bytes()
+    second = write_report(tmp_path / "report.html", responses=answers, seed=1).read_bytes()
+    assert first == second
+
+
+def test_nothing_to_report_is_refused(tmp_path, ratings, choices):
+    with pytest.raises(InputError, match="got neither"):
+        write_report(tmp_path / "report.html")
+    nothing = responses_of(ratings.iloc[:0], choices.iloc[:0], simulated=True)
+    with pytest.raises(InputError, match="got neither"):
+        write_report(tmp_path / "report.html", responses=nothing)
+    assert not (tmp_path / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "text"),
+    [
+        ("p", 0.0004, "< .001"),
+        ("p_holm", 0.04, ".040"),
+        ("p", 1.0, "1.000"),
+        ("t", -3.14159, "−3.14"),
+        ("mean_full", 56.44, "56.4"),
+        ("true_frequency_hz", 1234.5, "1234"),
+        ("true_gain", 0.00012, "1.2e−04"),
+        ("gfc30_mean", 0.98765, "0.9877"),
+        ("worst_speed_mm_s", 350.0, "350"),
+        ("d_z", np.nan, "n/a"),
+        ("df", 19, "19"),
+        ("texture", "wall paper", "wall paper"),
+    ],
+)
+def test_cells_are_readable(column, value, text):
+    assert cell(column, value) == text
+
+
+def test_columns_have_units():
+    assert label("worst_speed_mm_s") == "worst speed (mm/s)"
+    assert label("worst_force_n") == "worst force (N)"
+    assert label("median_frequency_error_hz") == "median frequency error (Hz)"
+    assert label("distance_db") == "distance (dB)"
+    assert label("p_holm") == "p (Holm)"

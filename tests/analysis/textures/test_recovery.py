@@ -1,0 +1,161 @@
+"""Matching estimated layers to planted ones, on models whose offsets are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from analysis.labels import ALL_LAYERS
+from analysis.textures.recovery import (
+    NO_PARTNER,
+    match_layers,
+    planted_layers_table,
+    planted_truth_table,
+)
+from modeling import InputError, TextureModel
+
+
+def shifted(
+    truth: TextureModel,
+    *,
+    hz: float = 0.0,
+    width: float = 1.0,
+    level_db: float = 0.0,
+    noise_db: float = 0.0,
+) -> TextureModel:
+    """An estimate with known errors, of another rate and with all signs positive."""
+    estimate = replace(
+        truth,
+        frequencies_hz=truth.frequencies_hz + hz,
+        bandwidths_hz=truth.bandwidths_hz * width,
+        gains=np.abs(truth.gains) * 10 ** (level_db / 20),
+        noise_gains=truth.noise_gains * 10 ** (noise_db / 20),
+        estimator="shifted",
+    )
+    return estimate.at_rate(8000.0)
+
+
+def with_surplus(model: TextureModel, frequency_hz: float) -> TextureModel:
+    """The model with one more layer that was never planted."""
+    more = model.with_layers([*range(model.n_layers), 0])
+    frequencies = more.frequencies_hz.copy()
+    frequencies[:, :, -1] = frequency_hz
+    return replace(more, frequencies_hz=frequencies)
+
+
+def test_known_offsets_come_back(truth):
+    estimate = shifted(truth, hz=4.0, width=1.5, level_db=-2.0, noise_db=1.0)
+    table = planted_truth_table(truth, [estimate])
+    assert table["layer"].tolist() == ["1", "2", "3", "4", ALL_LAYERS]
+    assert (table["estimator"] == "shifted").all()
+    assert_allclose(table["precision"], 1.0)
+    assert_allclose(table["recall"], 1.0)
+    assert_allclose(table["median_frequency_error_hz"], 4.0)
+    assert_allclose(table["median_bandwidth_ratio"], 1.5)
+    assert_allclose(table["median_level_error_db"], -2.0)
+    assert_allclose(table["median_absolute_level_error_db"], 2.0)
+    assert_allclose(table["median_noise_gain_error_db"].iloc[-1], 1.0)
+    assert table["median_noise_gain_error_db"].iloc[:-1].isna().all()
+
+
+def test_a_missed_layer_lowers_recall_and_a_surplus_one_precision(truth):
+    estimate = with_surplus(shifted(truth).with_layers([0, 1, 3]), 1900.0)
+    table = planted_truth_table(truth, [estimate]).set_index("layer")
+    assert table["recall"].tolist() == [1.0, 1.0, 0.0, 1.0, 0.75]
+    # The surplus layer lies nearest to layer 4 and halves its precision; near layer 3 is nothing.
+    assert_allclose(table["precision"], [1.0, 1.0, np.nan, 0.5, 0.75])
+    assert np.isnan(table.loc["3", "median_frequency_error_hz"])
+
+
+def test_several_estimators_stand_beneath_each_other(truth):
+    table = planted_truth_table(truth, [truth, shifted(truth, level_db=3.0)])
+    overall = table[table["layer"] == ALL_LAYERS]
+    assert overall["estimator"].tolist() == ["planted", "shifted"]
+    assert_allclose(overall["median_level_error_db"], [0.0, 3.0], atol=1e-12)
+
+
+def test_interpolated_conditions_are_left_out(truth):
+    spoilt = truth.frequencies_hz.copy()
+    spoilt[0, 0] += 200.0
+    interpolated = np.zeros((2, 2), dtype=bool)
+    interpolated[0, 0] = True
+    estimate = replace(truth, frequencies_hz=spoilt, interpolated=interpolated)
+    overall = planted_truth_table(truth, [estimate]).iloc[-1]
+    assert (overall["precision"], overall["recall"]) == (1.0, 1.0)
+
+
+def test_layer_by_layer_table_shows_misses_and_surplus(truth):
+    estimate = with_surplus(shifted(truth, hz=2.0, level_db=6.0).with_layers([0, 1, 3]), 1900.0)
+    table = planted_layers_table(truth, estimate, speed_mm_s=350.0, force_n=3.0)
+    assert table["layer"].tolist() == ["1", "2", "3", "4", "surplus"]
+    assert_allclose(table["true_frequency_hz"].iloc[:4], truth.frequencies_hz[1, 1])
+    assert_allclose(table["true_gain"].iloc[:4], np.abs(truth.gains[1, 1]))
+    found = [0, 1, 3]
+    assert_allclose(
+        table["estimated_frequency_hz"].iloc[found], truth.frequencies_hz[1, 1, found] + 2.0
+    )
+    assert_allclose(
+        table["estimated_gain"].iloc[found],
+        np.abs(truth.gains[1, 1, found]) * 10 ** (6 / 20),
+        rtol=1e-9,
+    )
+    assert table.iloc[2][["estimated_frequency_hz", "estimated_gain"]].isna().all()
+    assert table.iloc[4][["true_frequency_hz", "true_gain"]].isna().all()
+
+
+def test_an_estimate_without_layers_finds_nothing(truth):
+    table = planted_truth_table(truth, [truth.with_layers([])])
+    assert (table["recall"] == 0).all()
+    assert table["precision"].isna().all()
+
+
+def test_other_grids_and_empty_truths_are_refused(truth):
+    with pytest.raises(InputError, match="planted grid"):
+        planted_truth_table(truth, [replace(truth, forces_n=np.array([1.0, 2.0]))])
+    with pytest.raises(InputError, match="got none"):
+        planted_truth_table(truth.with_layers([]), [truth])
+
+
+def test_a_pair_may_lie_half_a_bandwidth_or_ten_hertz_apart():
+    true, width = np.array([100.0, 500.0]), np.array([4.0, 60.0])
+    assert match_layers(true, width, estimated_frequency_hz=np.array([110.0, 530.0])).tolist() == [
+        0,
+        1,
+    ]
+    beyond = match_layers(true, width, estimated_frequency_hz=np.array([110.1, 530.1]))
+    assert beyond.tolist() == [NO_PARTNER, NO_PARTNER]
+
+
+def test_more_pairs_go_before_shorter_distances():
+    # Greedy pairing of the nearest (100 with 104) would leave the second layer alone.
+    true, width = np.array([100.0, 112.0]), np.array([20.0, 20.0])
+    partner = match_layers(true, width, estimated_frequency_hz=np.array([104.0, 95.0]))
+    assert partner.tolist() == [1, 0]
+
+
+FREQUENCIES = st.lists(st.floats(10, 150), max_size=4)
+
+
+@given(FREQUENCIES, FREQUENCIES)
+def test_no_assignment_is_better_than_the_chosen_one(true, found):
+    widths = np.full(len(true), 40.0)
+    partner = match_layers(np.array(true), widths, estimated_frequency_hz=np.array(found))
+    used = partner[partner != NO_PARTNER].tolist()
+    assert len(used) == len(set(used))
+
+    def score(chosen: tuple[int, ...]) -> tuple[int, float]:
+        apart = [abs(true[i] - found[j]) for i, j in enumerate(chosen) if j < len(found)]
+        allowed = [d for d in apart if d <= 20.0]
+        return -len(allowed), sum(allowed)
+
+    mine = score(tuple(len(found) if j == NO_PARTNER else int(j) for j in partner))
+    slots = range(len(found) + len(true))
+    best = min(map(score, permutations(slots, len(true))))
+    assert mine[0] == best[0]
+    assert_allclose(mine[1], best[1], atol=1e-9)

@@ -1,0 +1,113 @@
+"""Whole simulated studies through the very same protocols, store and loop."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments import Study, simulate_study
+from experiments.study.models import ModelSets
+from modeling import InputError, TextureModel, Threshold, simplify
+from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
+
+
+def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more: Any) -> Any:
+    return simulate_study(
+        study,
+        real=truths,
+        full=models.full,
+        simplified=models.simplified,
+        rig=SimulatedRig(truths),
+        data_folder=folder,
+        **{"seed": 3, **more},
+    )
+
+
+def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: Any) -> None:
+    study = Study.load()
+    truths = {texture: planted_texture(texture) for texture in study.textures}
+    reduced = {name: simplify(model, threshold).model for name, model in truths.items()}
+    steps: list[tuple[int, int, str]] = []
+    results = simulate(
+        study,
+        tmp_path,
+        truths,
+        ModelSets(full=truths, simplified=reduced),
+        threshold=threshold,
+        progress=lambda done, total, name: steps.append((done, total, name)),
+    )
+    assert len(results) == 20 + 2 * 24
+    assert [(done, total) for done, total, _ in steps] == [(n, 68) for n in range(1, 69)]
+    assert all(result.completed for result in results)
+    participants = rows(tmp_path / "participants.tsv")
+    assert [row["participant_id"] for row in participants] == [f"sub-{n:02d}" for n in range(1, 25)]
+    assert json.loads((tmp_path / "dataset_description.json").read_text())["Simulated"] is True
+
+    absolute = [r for p in tmp_path.rglob("*_task-absolute_beh.tsv") for r in rows(p)]
+    main = [row for row in absolute if row["phase"] == "main"]
+    assert set(Counter((row["texture"], row["model"]) for row in main).values()) == {20}
+    assert len(absolute) - len(main) == 20 * study.training_trials
+    assert all(0 <= float(row["magnitude_similarity"]) <= 100 for row in absolute)
+
+    relative = [r for p in tmp_path.rglob("*_task-relative_beh.tsv") for r in rows(p)]
+    main = [row for row in relative if row["phase"] == "main"]
+    assert set(Counter((row["texture"], row["model"]) for row in main).values()) == {24 * 3}
+    assert {row["simulated"] for row in absolute + relative} == {"true"}
+    share = sum(row["correct"] == "1" for row in main) / len(main)
+    assert 1.5 / 7 < share < 0.95
+
+
+def test_each_participant_meets_either_model_on_one_day(
+    tmp_path: Path,
+    study: Study,
+    truths: dict[str, TextureModel],
+    models: ModelSets,
+    threshold: Threshold,
+    rows: Any,
+) -> None:
+    simulate(study, tmp_path, truths, models, threshold=threshold)
+    days = {
+        (subject, day): {
+            row["model"]
+            for path in tmp_path.glob(f"sub-0{subject}/ses-0{day}/beh/*relative_beh.tsv")
+            for row in rows(path)
+        }
+        for subject in (1, 2, 3, 4)
+        for day in (1, 2)
+    }
+    assert all(len(met) == 1 for met in days.values())
+    first = Counter(next(iter(days[subject, 1])) for subject in (1, 2, 3, 4))
+    assert first == {"full": 2, "simplified": 2}
+    assert all(days[subject, 1] != days[subject, 2] for subject in (1, 2, 3, 4))
+
+
+def test_a_seed_fixes_every_answer(
+    tmp_path: Path,
+    study: Study,
+    truths: dict[str, TextureModel],
+    models: ModelSets,
+    threshold: Threshold,
+) -> None:
+    answers = []
+    for name, seed in (("first", 3), ("again", 3), ("other", 4)):
+        results = simulate(study, tmp_path / name, truths, models, threshold=threshold, seed=seed)
+        answers.append([result.path.read_bytes() for result in results])
+    assert answers[0] == answers[1]
+    assert all(first != other for first, other in zip(answers[0], answers[2], strict=True))
+
+
+def test_a_study_is_not_simulated_twice_into_one_folder(
+    tmp_path: Path,
+    study: Study,
+    truths: dict[str, TextureModel],
+    models: ModelSets,
+    threshold: Threshold,
+) -> None:
+    simulate(study, tmp_path, truths, models, threshold=threshold)
+    with pytest.raises(InputError, match="expected a session that has not been run"):
+        simulate(study, tmp_path, truths, models, threshold=threshold)

@@ -1,0 +1,118 @@
+"""WAV files in recording sets, and what is refused of them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from modeling import InputError, RecordingSet
+from modeling.files.wav import read_wav
+
+NOISE = np.random.default_rng(1).standard_normal(100)
+SIDECAR = {"texture": "felt", "speed_mm_s": 80, "force_n": 1.5}
+
+
+def write_wav(path: Path, samples: np.ndarray, rate_hz: int = 8000) -> None:
+    soundfile.write(path, samples, rate_hz, subtype="FLOAT")
+
+
+def test_wav_listed_in_an_index(tmp_path: Path) -> None:
+    samples = (0.1 * NOISE).astype(np.float32)
+    write_wav(tmp_path / "a.wav", samples)
+    (tmp_path / "recordings.tsv").write_text(
+        "file\ttexture\tspeed_mm_s\tforce_n\tg_per_fullscale\na.wav\tfelt\t80\t1.5\t50\n"
+    )
+    recording = RecordingSet.load(tmp_path).recordings[0]
+    assert (recording.rate_hz, recording.unit) == (8000.0, "g")
+    assert (recording.texture, recording.condition) == ("felt", (80.0, 1.5))
+    assert np.array_equal(recording.samples, samples.astype(float) * 50)
+
+
+def test_wav_with_a_json_sidecar(tmp_path: Path) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    sidecar = {"texture": "felt", "speed_mm_s": 80, "force_n": 1.5, "simulated": True}
+    (tmp_path / "a.json").write_text(json.dumps(sidecar))
+    write_wav(tmp_path / "unlisted.wav", NOISE / 10)
+    (recording,) = RecordingSet.load(tmp_path).recordings
+    assert recording.unit == "arbitrary"
+    assert recording.simulated
+    assert recording.condition == (80.0, 1.5)
+    assert recording.samples == pytest.approx(NOISE / 10, rel=1e-6)
+
+
+@pytest.mark.parametrize("sidecar", ["", "[]", "{", '{"texture": "felt", "speed_mm_s": 80}'])
+def test_damaged_sidecars_are_refused(tmp_path: Path, sidecar: str) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    (tmp_path / "a.json").write_text(sidecar)
+    with pytest.raises(InputError, match="expected"):
+        RecordingSet.load(tmp_path)
+
+
+def test_unusable_wav_files_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.json").write_text('{"texture": "felt", "speed_mm_s": 80, "force_n": 1}')
+    write_wav(tmp_path / "a.wav", np.stack([NOISE, NOISE], axis=1) / 10)
+    with pytest.raises(InputError, match=r"one channel .*, got 2"):
+        RecordingSet.load(tmp_path)
+    (tmp_path / "a.wav").write_bytes(b"RIFF nothing")
+    with pytest.raises(InputError, match="expected a WAV file"):
+        RecordingSet.load(tmp_path)
+    (tmp_path / "a.wav").write_bytes(b"")
+    with pytest.raises(InputError, match="expected a WAV file"):
+        RecordingSet.load(tmp_path)
+
+
+def test_null_in_a_sidecar_is_missing(tmp_path: Path) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    optional = dict.fromkeys(("unit", "repeat", "simulated", "g_per_fullscale", "texture"))
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, **optional}))
+    (recording,) = RecordingSet.load(tmp_path).recordings
+    assert (recording.texture, recording.unit) == (tmp_path.name, "arbitrary")
+    assert (recording.repeat, recording.simulated) == (1, False)
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "speed_mm_s": None}))
+    with pytest.raises(InputError, match=r"speed_mm_s of a\.wav, got nothing"):
+        RecordingSet.load(tmp_path)
+
+
+def test_sidecar_speaks_of_its_own_file(tmp_path: Path) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "file": "../b.wav"}))
+    assert len(RecordingSet.load(tmp_path)) == 1
+
+
+@pytest.mark.parametrize("scale", [0, -16, "nan", "inf"])
+def test_meaningless_full_scale_is_refused(tmp_path: Path, scale: object) -> None:
+    write_wav(tmp_path / "a.wav", NOISE / 10)
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "g_per_fullscale": scale}))
+    with pytest.raises(InputError, match=r"a\.wav: expected g per full scale above 0"):
+        RecordingSet.load(tmp_path)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.9, 0.995])
+@pytest.mark.parametrize("subtype", ["PCM_16", "PCM_24", "FLOAT"])
+def test_cut_wav_is_refused(tmp_path: Path, subtype: str, share: float) -> None:
+    path = tmp_path / "a.wav"
+    soundfile.write(path, np.tile(NOISE / 10, 20), 8000, subtype=subtype)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    with pytest.raises(InputError, match=rf"expected {len(whole)} bytes .* is truncated"):
+        read_wav(path)
+
+
+@pytest.mark.parametrize("size", [0, 0xFFFFFFFF, 0x7FFFF024])
+def test_sizes_of_streaming_recorders_are_no_sizes(tmp_path: Path, size: int) -> None:
+    path = tmp_path / "a.wav"
+    soundfile.write(path, NOISE / 10, 8000, subtype="PCM_16")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:4] + size.to_bytes(4, "little") + whole[8:])
+    assert read_wav(path)[0].size == NOISE.size
+
+
+def test_bytes_after_the_wav_are_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    soundfile.write(path, NOISE / 10, 8000, subtype="PCM_16")
+    path.write_bytes(path.read_bytes() + b"tail")
+    assert read_wav(path)[0].size == NOISE.size
