@@ -89,13 +89,6 @@ def correct_rates(
     return columns_first(pd.concat(rows, ignore_index=True), ["texture", "model"])
 
 
-def participant_rates(relative: pd.DataFrame) -> pd.DataFrame:
-    """Correct rate (0–1) of each participant (rows) per texture and model (columns)."""
-    return relative.pivot_table(
-        index="participant_id", columns=["texture", "model"], values="correct", aggfunc="mean"
-    )
-
-
 def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:
     rates = cell.groupby("participant_id")["correct"].mean().dropna().to_numpy(dtype=float)
     against_chance = without_rounding_noise(rates - chance)

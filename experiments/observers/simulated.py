@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import ndtr, softmax
+from scipy.special import softmax
 
 from experiments.sessions.trial_loop import HIGHEST_RATING, Choice, Rating, Surfaces
 from experiments.study.design import AbsoluteTrial, RelativeTrial
@@ -146,21 +146,6 @@ class Psychometrics:
         rating: Floats = HIGHEST_RATING * np.exp(-np.asarray(distance_db) / self.scale_db)
         return rating
 
-    def expected_rating(self, distance_db: ArrayLike) -> Floats:
-        """Mean rating over subjects and trials: that of a normal variable cut off at 0 and 100.
-
-        With σ² = bias_sd² + noise_sd², μ the true rating, a = −μ/σ and b = (100 − μ)/σ:
-        E = μ·(Φ(b) − Φ(a)) + σ·(φ(a) − φ(b)) + 100·(1 − Φ(b)).
-        """
-        mean = self.true_rating(distance_db)
-        sd = np.hypot(self.bias_sd, self.noise_sd)
-        if sd == 0.0:
-            return mean
-        low, high = -mean / sd, (HIGHEST_RATING - mean) / sd
-        inside = mean * (ndtr(high) - ndtr(low)) + sd * (_density(low) - _density(high))
-        expected: Floats = inside + HIGHEST_RATING * ndtr(-high)
-        return expected
-
     def choice_probabilities(self, distances_db: ArrayLike) -> Floats:
         """Probability of each of n surfaces to be chosen, (n,): Luce's rule with lapses.
 
@@ -170,11 +155,6 @@ class Psychometrics:
         attentive = softmax(-distances / self.temperature_db)
         probabilities: Floats = (1 - self.lapse_rate) * attentive + self.lapse_rate / distances.size
         return probabilities
-
-
-def _density(value: Floats) -> Floats:
-    density: Floats = np.exp(-(value**2) / 2) / np.sqrt(2 * np.pi)
-    return density
 
 
 class Perception:

@@ -65,9 +65,6 @@ class Peaks:
         return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
 
-SILENCE = Peaks(0.0, *(np.zeros(0),) * 3, 1.0, np.zeros(0))
-
-
 def find_peaks_jointly(power: Power) -> Peaks:
     """Noise and peaks of one spectrum: greedy growth, refitted as a whole after every addition.
 

@@ -20,7 +20,7 @@ from analysis.statistics.paired import (
     rating_tests,
     standard_error,
 )
-from analysis.statistics.rates import correct_rates, participant_rates, rate_tests
+from analysis.statistics.rates import correct_rates, rate_tests
 from modeling import InputError
 
 # Student (1908): extra hours of sleep with two drugs, ten patients. The expected values are those
@@ -182,8 +182,8 @@ def test_rate_tests_keep_the_overall_row_out_of_the_family(choices):
     assert tests["texture"].tolist()[-1] == ALL_TEXTURES
     assert np.isnan(tests["p_holm"].iloc[-1])
     assert_allclose(tests["p_holm"].iloc[:-1], holm(tests["p"].iloc[:-1]))
-    rates = participant_rates(choices)
-    means = rates.mean()
+    by = ["participant_id", "texture", "model"]
+    means = choices.groupby(by)["correct"].mean().groupby(["texture", "model"]).mean()
     assert_allclose(
         tests.set_index("texture")["mean_full"].drop(ALL_TEXTURES),
         [means[texture, "full"] for texture in tests["texture"][:-1]],

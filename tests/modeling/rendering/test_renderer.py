@@ -22,6 +22,7 @@ from modeling import (
     Renderer,
     TextureModel,
 )
+from modeling.hand import Hand
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import SWITCH, is_compiled, lib
 from stimuli.planted.textures import CATALOGUE, planted_texture
@@ -609,7 +610,7 @@ def test_ar_output_stays_bounded_under_any_motion(seed: int) -> None:
     """The states hold no more energy than the noise brought: |y| ≤ RMS · √Σw²."""
     speed, force = trajectory(400, seed)
     signal = Renderer(jumping_ar_model(), seed=seed).render(speed, force)
-    settings = Renderer(jumping_ar_model())._engine._filter.settings(speed, force)
+    settings = Renderer(jumping_ar_model())._engine._filter.settings(Hand(speed, force))
     bound = max(gain for gain, *_ in settings) * max(rms for _, rms, _ in settings)
     bound *= np.sqrt(3 * 400)
     assert np.isfinite(signal).all()
