@@ -1,25 +1,39 @@
 """Experiments: designs and orders, protocols, store, console and simulated participants."""
 
-from experiments.observers.simulated import Psychometrics
-from experiments.observers.whole_study import simulate_study
-from experiments.sessions.store import StoreError
-from experiments.sessions.trial_loop import SessionResult
-from experiments.study.design import SessionPlan, fisher_yates, plan_session
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from experiments.tasks.absolute import run_absolute
-from experiments.tasks.relative import run_relative
+from typing import TYPE_CHECKING
 
-__all__ = [
-    "ModelSets",
-    "Psychometrics",
-    "SessionPlan",
-    "SessionResult",
-    "StoreError",
-    "Study",
-    "fisher_yates",
-    "plan_session",
-    "run_absolute",
-    "run_relative",
-    "simulate_study",
-]
+from modeling.face import lazily
+
+HOMES = {
+    "study.study": "Study TaskPlan",
+    "study.models": "ModelSets",
+    "study.design": "SessionPlan fisher_yates",
+    "sessions.store": "StoreError",
+    "sessions.task": "Task",
+    "sessions.trial_loop": "SessionResult run_session",
+    "tasks": "plan_session task_named",
+    "tasks.absolute": "run_absolute",
+    "tasks.relative": "run_relative",
+    "observers.simulated": "Psychometrics",
+    "observers.whole_study": "simulate_study",
+}
+
+if TYPE_CHECKING:
+    from experiments.observers.simulated import Psychometrics as Psychometrics
+    from experiments.observers.whole_study import simulate_study as simulate_study
+    from experiments.sessions.store import StoreError as StoreError
+    from experiments.sessions.task import Task as Task
+    from experiments.sessions.trial_loop import SessionResult as SessionResult
+    from experiments.sessions.trial_loop import run_session as run_session
+    from experiments.study.design import SessionPlan as SessionPlan
+    from experiments.study.design import fisher_yates as fisher_yates
+    from experiments.study.models import ModelSets as ModelSets
+    from experiments.study.study import Study as Study
+    from experiments.study.study import TaskPlan as TaskPlan
+    from experiments.tasks import plan_session as plan_session
+    from experiments.tasks import task_named as task_named
+    from experiments.tasks.absolute import run_absolute as run_absolute
+    from experiments.tasks.relative import run_relative as run_relative
+
+__getattr__ = lazily(__name__, HOMES)
+__all__ = [name for module, names in HOMES.items() for name in names.split() or [module]]

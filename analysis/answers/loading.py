@@ -10,36 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.labels import MODELS
 from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
 
-_NUMBERS: Mapping[str, Mapping[str, tuple[float, float]]] = {
-    "absolute": {
-        "trial": (0, np.inf),
-        "magnitude_similarity": (0, 100),
-        "frequency_similarity": (0, 100),
-        "toggles": (0, np.inf),
-        "response_time_s": (0, np.inf),
-    },
-    "relative": {
-        "trial": (0, np.inf),
-        "correct": (0, 1),
-        "presses": (0, np.inf),
-        "response_time_s": (0, np.inf),
-    },
-}
-_CHOICES = {
-    "phase": ("training", "main"),
-    "model": MODELS,
-    "first_surface": ("real", "virtual"),
-    "simulated": ("true", "false"),
-}
-_TEXTS = {
-    "absolute": ("phase", "texture", "model", "tray", "first_surface", "simulated"),
-    "relative": ("phase", "texture", "model", "tray", "layout", "answer", "simulated"),
-}
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
-_REQUIRED = ("trial", "phase", "texture", "model", "simulated")
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +22,14 @@ class Responses:
 
     Parameters
     ----------
-    absolute : DataFrame
-        Main trials of the absolute evaluation, one row each: participant_id, session, trial,
-        texture, model (full|simplified), tray, first_surface, magnitude_similarity and
-        frequency_similarity (0-100, NaN where not answered), toggles, response_time_s (s).
-    relative : DataFrame
-        Main trials of the seven-alternative forced choice: participant_id, session, trial,
-        texture, model, tray, layout, answer, correct (0, 1 or NaN), presses, response_time_s (s).
+    answers : mapping of task to DataFrame
+        Main trials of each task that `modeling.files.answer_tables` declares, one row each:
+        participant_id, session, and the task's columns (numbers NaN where not answered).
     simulated_participants : bool
         True where no person took part.
     simulated_rig : bool
         True where no real rig was used, so that nobody felt a real surface.
-    absolute_training, relative_training : DataFrame
+    training : mapping of task to DataFrame
         The training trials, same columns; no statistic uses them.
     name : str
         The study's name.
@@ -67,14 +37,28 @@ class Responses:
         What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
 
-    absolute: pd.DataFrame
-    relative: pd.DataFrame
+    answers: Mapping[str, pd.DataFrame]
     simulated_participants: bool
     simulated_rig: bool
-    absolute_training: pd.DataFrame
-    relative_training: pd.DataFrame
+    training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def absolute(self) -> pd.DataFrame:
+        """Main trials of the absolute evaluation."""
+        return self.answers["absolute"]
+
+    @property
+    def relative(self) -> pd.DataFrame:
+        """Main trials of the seven-alternative forced choice."""
+        return self.answers["relative"]
+
+    @property
+    def textures(self) -> tuple[str, ...]:
+        """Textures that were asked about, in the order of the answers."""
+        asked = (texture for table in self.answers.values() for texture in table["texture"])
+        return tuple(dict.fromkeys(asked))
 
     @property
     def simulated(self) -> bool:
@@ -89,7 +73,7 @@ def load_responses(data_folder: str | Path) -> Responses:
     ----------
     data_folder : str or Path
         Folder holding dataset_description.json, participants.tsv and
-        sub-*/ses-*/beh/sub-*_ses-*_task-(absolute|relative)_beh.tsv; beside each its sidecar, and
+        sub-*/ses-*/beh/sub-*_ses-*_task-TASK_beh.tsv; beside each its sidecar, and
         below sourcedata/ the order of its trials, where they are there.
 
     Returns
@@ -111,22 +95,20 @@ def load_responses(data_folder: str | Path) -> Responses:
     participants = simulated["SimulatedParticipant"]
     _check_participants(folder / "participants.tsv", participants, warnings=warnings)
     tables = {
-        task: _load_task(folder, task, simulated=simulated, warnings=warnings) for task in _TEXTS
+        task: _load_task(folder, task, simulated=simulated, warnings=warnings)
+        for task in ANSWER_TABLES
     }
     if all(table is None for table in tables.values()):
         raise InputError(
             f"expected answers such as sub-01/ses-01/beh/sub-01_ses-01_task-absolute_beh.tsv in "
             f"{folder}, found none; run a session first or name the study's data folder."
         )
-    absolute, absolute_training = _split(tables["absolute"], "absolute")
-    relative, relative_training = _split(tables["relative"], "relative")
+    parts = {task: _split(table, task) for task, table in tables.items()}
     return Responses(
-        absolute=absolute,
-        relative=relative,
+        answers={task: main for task, (main, _) in parts.items()},
         simulated_participants=participants,
         simulated_rig=simulated["SimulatedRig"],
-        absolute_training=absolute_training,
-        relative_training=relative_training,
+        training={task: training for task, (_, training) in parts.items()},
         name=str(description.get("Name", "")),
         warnings=tuple(warnings),
     )
@@ -231,24 +213,24 @@ def _planned_trials(order: Path) -> int:
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
-    numbers = _NUMBERS[task]
-    _require_columns(table, (*numbers, *_TEXTS[task]), path=path)
-    for column in _REQUIRED:
-        _refuse(
-            table[column].isna(), table[column], expected=f"a value in column {column}", path=path
-        )
-    for column, allowed in _CHOICES.items():
-        if column in table:
-            known = table[column].isin(allowed) | table[column].isna()
-            expected = f"{' or '.join(allowed)} in column {column}"
-            _refuse(~known, table[column], expected=expected, path=path)
+    columns = ANSWER_TABLES[task]
+    _require_columns(table, tuple(column.name for column in columns), path=path)
+    for column in columns:
+        found = table[column.name]
+        if column.required:
+            expected = f"a value in column {column.name}"
+            _refuse(found.isna(), found, expected=expected, path=path)
+        if column.limits is not None:
+            table[column.name] = _number_column(found, column.limits, path=path)
+        elif column.levels:
+            known = found.isin(list(column.levels)) | found.isna()
+            expected = f"{' or '.join(column.levels)} in column {column.name}"
+            _refuse(~known, found, expected=expected, path=path)
     _check_simulated(table, simulated, path=path)
-    for column, limits in numbers.items():
-        table[column] = _number_column(table[column], limits, path=path)
     twice = table.duplicated(["phase", "trial"])
     _refuse(twice, table["trial"], expected="every trial once", path=path)
-    if task == "relative":
-        _check_answers(table, path)
+    if {"layout", "answer", "correct"} <= set(table):
+        _check_choices(table, path)
 
 
 def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:
@@ -260,7 +242,7 @@ def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path
     return values
 
 
-def _check_answers(table: pd.DataFrame, path: Path) -> None:
+def _check_choices(table: pd.DataFrame, path: Path) -> None:
     answered = table[table["answer"].notna()]
     layouts = [str(layout).split("|") for layout in answered["layout"]]
     absent = [
@@ -348,13 +330,14 @@ def _read_lines(path: Path, warnings: list[str]) -> pd.DataFrame:
 def _is_whole(tail: str, header: list[str]) -> bool:
     """Only a last value known in full (true or false) proves that nothing is missing."""
     values = tail.split("\t")
-    return len(values) == len(header) and values[-1] in _CHOICES["simulated"]
+    return len(values) == len(header) and values[-1] in ("true", "false")
 
 
 def _split(table: pd.DataFrame | None, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Main and training trials; without answers, tables without rows."""
     if table is None:
-        columns = ["participant_id", "session", *dict.fromkeys((*_NUMBERS[task], *_TEXTS[task]))]
-        table = pd.DataFrame({column: pd.Series(dtype=object) for column in columns})
-        table = table.astype(dict.fromkeys(_NUMBERS[task], float))
+        kinds = {c.name: object if c.limits is None else float for c in ANSWER_TABLES[task]}
+        kinds = {"participant_id": object, "session": object} | kinds
+        table = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
     main = table["phase"] == "main"
     return table[main].reset_index(drop=True), table[~main].reset_index(drop=True)

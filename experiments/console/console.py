@@ -27,8 +27,8 @@ from experiments.console.widgets import (
     rounded,
     text,
 )
-from experiments.sessions.trial_loop import Choice, Rating, SessionAborted, Surfaces
-from experiments.study.design import AbsoluteTrial, RelativeTrial
+from experiments.sessions.surfaces import Choice, ChoiceTrial, Rating, SessionAborted, Surfaces
+from experiments.study.design import Trial
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -129,7 +129,7 @@ class Console:
             label="Sample is in place",
         )
 
-    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
         """Two rating scales, and a toggle between the real and the virtual surface.
 
         Raises
@@ -168,7 +168,7 @@ class Console:
             response_time_s=seconds,
         )
 
-    def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
+    def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
         """One numbered button per virtual surface, one for the real surface, one to confirm.
 
         Raises

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import softmax
 
-from experiments.sessions.trial_loop import HIGHEST_RATING, Choice, Rating, Surfaces
-from experiments.study.design import AbsoluteTrial, RelativeTrial
+from experiments.sessions.surfaces import HIGHEST_RATING, Choice, ChoiceTrial, Rating, Surfaces
+from experiments.study.design import Trial
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from modeling import InputError, TextureModel, Threshold
@@ -222,7 +222,7 @@ class SimulatedParticipant:
         Of the whole simulation.
     subject : int
         Fixes, with the seed, the participant's bias on either scale.
-    occasion : int
+    occasion : tuple of int
         Distinguishes the sessions of a participant.
     """
 
@@ -235,13 +235,13 @@ class SimulatedParticipant:
         *,
         seed: int,
         subject: int,
-        occasion: int,
+        occasion: tuple[int, ...],
     ) -> None:
         self._perception = perception
         self._psychometrics = psychometrics
         person = generator(seed, subject)
         self._bias = person.normal(0.0, psychometrics.bias_sd, size=2)
-        self._rng = generator(seed, subject, occasion)
+        self._rng = generator(seed, subject, *occasion)
 
     def announce(self, title: str, text: str) -> None:
         """Simulated participants know the task."""
@@ -249,7 +249,7 @@ class SimulatedParticipant:
     def confirm_mount(self, tray: str) -> None:
         """The simulated experimenter is quick and careful."""
 
-    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
         """Switch a few times, then rate by the distance to the real surface."""
         for _ in range(1 + int(self._rng.poisson(2.0))):
             surfaces.toggle()
@@ -263,7 +263,7 @@ class SimulatedParticipant:
             response_time_s=self._response_time_s(),
         )
 
-    def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
+    def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
         """Feel every surface once, return to the real one, and choose by Luce's rule."""
         for button in range(surfaces.count):
             surfaces.present_virtual(button)

@@ -6,17 +6,15 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from experiments.observers.simulated import Perception, Psychometrics, SimulatedParticipant
-from experiments.sessions.trial_loop import SessionResult
+from experiments.sessions.trial_loop import SessionResult, run_session
 from experiments.study.models import ModelSets
-from experiments.study.study import TASKS, Study, Task
-from experiments.tasks.absolute import run_absolute
-from experiments.tasks.relative import run_relative
+from experiments.study.study import TASKS, Study
+from experiments.tasks import task_named
 from modeling import TextureModel, Threshold
 from modeling.checks import check_whole
 from rig.interface import TextureRig
 
 Progress = Callable[[int, int, str], None]
-PROTOCOLS = {"absolute": run_absolute, "relative": run_relative}
 
 
 def simulate_study(
@@ -32,7 +30,7 @@ def simulate_study(
     psychometrics: Psychometrics | None = None,
     progress: Progress | None = None,
 ) -> tuple[SessionResult, ...]:
-    """Run all sessions of all subjects of both tasks with simulated participants.
+    """Run all sessions of all subjects of all tasks with simulated participants.
 
     Parameters
     ----------
@@ -77,9 +75,10 @@ def simulate_study(
             psychometrics or Psychometrics(),
             seed=seed,
             subject=subject,
-            occasion=2 * session + TASKS.index(task),
+            occasion=_occasion(task, session),
         )
-        result = PROTOCOLS[task](
+        result = run_session(
+            task_named(task),
             study,
             subject=subject,
             session=session,
@@ -94,11 +93,18 @@ def simulate_study(
     return tuple(results)
 
 
-def _agenda(study: Study) -> list[tuple[Task, int, int]]:
+def _occasion(task: str, session: int) -> tuple[int, ...]:
+    """What distinguishes the sessions of a participant in the seeds of the answers."""
+    # Published answers of the paper's two tasks hang on this one number.
+    number = TASKS.index(task)
+    return (2 * session + number,) if number < 2 else (session, number)
+
+
+def _agenda(study: Study) -> list[tuple[str, int, int]]:
     """Task, subject and session of every session, day by day."""
     return [
         (task, subject, session)
-        for task in TASKS
-        for session in range(1, study.plan(task).sessions + 1)
-        for subject in range(1, study.plan(task).participants + 1)
+        for task, plan in study.tasks.items()
+        for session in range(1, plan.sessions + 1)
+        for subject in range(1, plan.participants + 1)
     ]

@@ -1,164 +1,19 @@
-"""The one loop of both protocols: mount the sample, present, ask, store, fall silent."""
+"""The one loop of all tasks: mount the sample, present, ask, store, fall silent."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
 
 from experiments.sessions.store import SessionStore
-from experiments.study.design import AbsoluteTrial, Phase, RelativeTrial, SessionPlan, Trial
-from modeling import InputError, TextureModel
+from experiments.sessions.surfaces import Respondent, SessionAborted, Surfaces
+from experiments.sessions.task import Task
+from experiments.study.design import Trial, draw_session
+from experiments.study.models import ModelSets
+from experiments.study.study import Study
 from rig.interface import TextureRig
-
-HIGHEST_RATING = 100.0
-
-
-class SessionAborted(Exception):
-    """Raised by a respondent to end the session early; the answers given so far are kept."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rating:
-    """The answer to an absolute trial: two similarities, 0 (nothing alike) … 100 (identical).
-
-    Raises
-    ------
-    InputError
-        For a similarity outside 0 … 100.
-    """
-
-    magnitude_similarity: float
-    frequency_similarity: float
-    response_time_s: float
-
-    def __post_init__(self) -> None:
-        for value in (self.magnitude_similarity, self.frequency_similarity):
-            if not 0.0 <= value <= HIGHEST_RATING:
-                raise InputError(
-                    f"expected a similarity from 0 to {HIGHEST_RATING:g}, got {value}; rate again."
-                )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Choice:
-    """The answer to a relative trial: the index (from 0) of the chosen button."""
-
-    button: int
-    response_time_s: float
-
-
-class Surfaces:
-    """What a participant can switch between in one trial; made by the trial loop.
-
-    Parameters
-    ----------
-    rig : TextureRig
-    texture : str
-        The real surface.
-    models : sequence of TextureModel
-        The virtual surfaces, one per button.
-
-    Attributes
-    ----------
-    switches : int
-        Changes between the real and a virtual surface, the first presentation not counted.
-    presses : int
-        Presentations of a virtual surface, repeated ones included.
-    """
-
-    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[TextureModel]) -> None:
-        self._rig = rig
-        self._texture = texture
-        self._models = tuple(models)
-        self._shown: str | None = None
-        self._selected: int | None = None
-        self.switches = 0
-        self.presses = 0
-        rig.read()  # a press of the rig's button before the trial is not one in it
-
-    @property
-    def shows_real(self) -> bool:
-        """Whether the real surface is presented now."""
-        return self._shown == "real"
-
-    @property
-    def selected(self) -> int | None:
-        """Index of the virtual surface presented last, None before the first."""
-        return self._selected
-
-    @property
-    def count(self) -> int:
-        """Number of virtual surfaces."""
-        return len(self._models)
-
-    def present_real(self) -> None:
-        """Present the real surface (the virtual one is switched off)."""
-        self._rig.present_real(self._texture)
-        self._note("real")
-
-    def present_virtual(self, index: int = 0) -> None:
-        """Present the virtual surface of a button (index from 0).
-
-        Raises
-        ------
-        InputError
-            If there is no such button.
-        """
-        if not 0 <= index < len(self._models):
-            raise InputError(
-                f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
-            )
-        self._rig.present_model(self._models[index])
-        self._selected = index
-        self.presses += 1
-        self._note("virtual")
-
-    def toggle(self) -> None:
-        """Change between the real surface and the virtual one presented last, if any."""
-        if not self.shows_real:
-            self.present_real()
-        elif self._selected is not None:
-            self.present_virtual(self._selected)
-        elif len(self._models) == 1:
-            self.present_virtual()
-
-    def follow_rig_button(self) -> None:
-        """Toggle if the rig's button has been pressed since the last call."""
-        if self._rig.read().button:
-            self.toggle()
-
-    def _note(self, shown: str) -> None:
-        if self._shown is not None and self._shown != shown:
-            self.switches += 1
-        self._shown = shown
-
-
-class Respondent(Protocol):
-    """Who answers: a person at the console, or a simulated participant."""
-
-    @property
-    def simulated(self) -> bool:
-        """True unless a person answers."""
-        ...
-
-    def announce(self, title: str, text: str) -> None:
-        """Show a message until the participant goes on."""
-        ...
-
-    def confirm_mount(self, tray: str) -> None:
-        """Return once the sample of this tray is in place."""
-        ...
-
-    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
-        """Compare the real with the virtual surface and rate their likeness."""
-        ...
-
-    def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
-        """Say which virtual surface is the real one."""
-        ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,79 +30,66 @@ class SessionResult:
         return self.answered == self.planned
 
 
-@dataclass(frozen=True, kw_only=True)
-class Script:
-    """What distinguishes the two protocols.
-
-    Parameters
-    ----------
-    announcements : mapping of phase to (title, text)
-        What the participant reads before the phase.
-    closing : (title, text)
-        What the participant reads at the end.
-    virtual : callable
-        The virtual surfaces of a trial, one per button.
-    begin : callable
-        Presents the first surface of a trial.
-    ask : callable
-        Asks the respondent; the columns that are answers.
-    """
-
-    announcements: Mapping[Phase, tuple[str, str]]
-    closing: tuple[str, str]
-    virtual: Callable[[Any], Sequence[TextureModel]]
-    begin: Callable[[Any, Surfaces], None]
-    ask: Callable[[Any, Surfaces], Mapping[str, object]]
-
-
 def run_session(
-    plan: SessionPlan,
-    script: Script,
+    task: Task,
+    study: Study,
     *,
-    columns: Mapping[str, Mapping[str, Any]],
-    description: str,
+    subject: int,
+    session: int,
+    models: ModelSets,
     rig: TextureRig,
     respondent: Respondent,
     data_folder: str | Path,
 ) -> SessionResult:
-    """Store the plan of a session, then run its trials.
+    """Run one session of a task and store it.
 
     Parameters
     ----------
-    plan : SessionPlan
-    script : Script
-        The protocol.
-    columns : mapping of column to its description
-        Of the file of answers.
-    description : str
-        Of the task.
-    rig, respondent
-        What presents, and who answers.
+    task : Task
+    study : Study
+    subject, session : int
+        From 1; with the study's seed they fix the order of the trials.
+    models : ModelSets
+        Full and simplified model of every texture of the study.
+    rig : TextureRig
+        Presents the surfaces; silent afterwards, whatever happens.
+    respondent : Respondent
+        The console, or a simulated participant.
     data_folder : path
         Root of the data set.
+
+    Returns
+    -------
+    SessionResult
+        Not completed if the participant ended it early.
 
     Raises
     ------
     InputError
-        If the session has been run before.
+        If a model is missing or the session has been run before.
     StoreError
         If the disk does not take the answers.
     """
+    models.require(study.textures)
+    plan = draw_session(study, task, subject=subject, session=session)
     with SessionStore.create(
         data_folder,
         plan=plan,
-        columns=columns,
-        description=description,
+        columns={column.name: column.sidecar() for column in task.columns},
+        description=task.description,
         simulated_participant=respondent.simulated,
         simulated_rig=rig.simulated,
     ) as store:
-        return run_trials(plan.trials, script, rig=rig, respondent=respondent, store=store)
+        return run_trials(
+            plan.trials, task, models=models, rig=rig, respondent=respondent, store=store
+        )
 
 
 def run_trials(
     trials: Sequence[Trial],
-    script: Script,
+    task: Task,
     *,
+    models: ModelSets,
     rig: TextureRig,
     respondent: Respondent,
     store: SessionStore,
@@ -258,8 +100,8 @@ def run_trials(
     ----------
     trials : sequence
         In the order of the session's plan.
-    script : Script
-        The protocol.
+    task : Task
+    models : ModelSets
     rig, respondent, store
         What presents, who answers, where the answers go.
 
@@ -272,15 +114,17 @@ def run_trials(
     try:
         rig.silence()
         store.log("session started", f"{len(trials)} trials planned")
-        for trial in _announced(trials, script, respondent=respondent, store=store):
-            row = _run_trial(trial, script, rig=rig, respondent=respondent, store=store)
+        for trial in _announced(trials, task, respondent=respondent, store=store):
+            row = _run_trial(
+                trial, task, models=models, rig=rig, respondent=respondent, store=store
+            )
             store.append(row)
             answered += 1
             rig.silence()
         store.log("session ended", f"{answered} trials answered")
         # Everything is answered: leaving the last page with Escape is not an abort.
         with suppress(SessionAborted):
-            respondent.announce(*script.closing)
+            respondent.announce(*task.texts["closing"])
     except SessionAborted:
         store.log("session aborted", f"{answered} trials answered")
     except BaseException as error:
@@ -295,7 +139,7 @@ def run_trials(
 
 def _announced(
     trials: Sequence[Trial],
-    script: Script,
+    task: Task,
     *,
     respondent: Respondent,
     store: SessionStore,
@@ -305,15 +149,16 @@ def _announced(
     for trial in trials:
         if trial.phase != phase:
             phase = trial.phase
-            respondent.announce(*script.announcements[phase])
+            respondent.announce(*task.texts[phase])
             store.log("phase started", phase)
         yield trial
 
 
 def _run_trial(
     trial: Trial,
-    script: Script,
+    task: Task,
     *,
+    models: ModelSets,
     rig: TextureRig,
     respondent: Respondent,
     store: SessionStore,
@@ -322,9 +167,9 @@ def _run_trial(
     store.log("mount requested", label)
     respondent.confirm_mount(trial.tray)
     store.log("mount confirmed", label)
-    surfaces = Surfaces(rig, texture=trial.texture, models=script.virtual(trial))
-    script.begin(trial, surfaces)
-    answer = script.ask(trial, surfaces)
+    surfaces = Surfaces(rig, texture=trial.texture, models=task.virtual(models, trial))
+    task.begin(trial, surfaces)
+    answer = task.ask(respondent, trial, surfaces)
     return {
         "trial": trial.trial,
         "phase": trial.phase,

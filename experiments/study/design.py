@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
-from experiments.study.study import TASKS, Study, Task
+from experiments.study.study import TASKS, Study
 from modeling.checks import check_whole
 from modeling.seeds import generator
 
 Phase = Literal["training", "main"]
 ModelKind = Literal["full", "simplified"]
-Surface = Literal["real", "virtual"]
 Item = TypeVar("Item")
 
 MODELS: tuple[ModelKind, ...] = ("full", "simplified")
@@ -43,8 +42,8 @@ def fisher_yates(items: Sequence[Item], rng: np.random.Generator) -> list[Item]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AbsoluteTrial:
-    """One trial of the absolute task: a real surface beside one virtual surface.
+class Trial:
+    """What every trial has; each task adds its own.
 
     Parameters
     ----------
@@ -52,11 +51,11 @@ class AbsoluteTrial:
         Running number in the session, from 1, training included.
     phase : {"training", "main"}
     texture : str
+        The real surface.
     model : {"full", "simplified"}
+        Behind the virtual surfaces.
     tray : str
         Where the real sample lies.
-    first_surface : {"real", "virtual"}
-        What is presented when the trial begins.
     """
 
     trial: int
@@ -64,30 +63,29 @@ class AbsoluteTrial:
     texture: str
     model: ModelKind
     tray: str
-    first_surface: Surface
 
 
-@dataclass(frozen=True, kw_only=True)
-class RelativeTrial:
-    """One trial of the relative task: a real surface, and one button per virtual surface.
-
-    Parameters
-    ----------
-    trial, phase, texture, model, tray
-        As in `AbsoluteTrial`; `texture` is the right answer.
-    layout : tuple of str
-        Texture behind each button, from button 1 on.
-    """
-
-    trial: int
-    phase: Phase
-    texture: str
-    model: ModelKind
-    tray: str
-    layout: tuple[str, ...]
+Order = Sequence[tuple[str, ModelKind]]
 
 
-Trial = AbsoluteTrial | RelativeTrial
+class OrderedTask(Protocol):
+    """What of a task decides the order of its trials."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def repeated(self) -> bool:
+        """Whether each texture and model comes as often as the study's `repeats` says."""
+        ...
+
+    @property
+    def trials(self) -> Callable[[Order, Study, np.random.Generator], list[dict[str, Any]]]:
+        """What differs from trial to trial, for textures and models in their random order."""
+        ...
+
+    @property
+    def trial(self) -> type[Trial]: ...
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,17 +93,17 @@ class SessionPlan:
     """The whole order of one session, made before its first trial."""
 
     study: Study
-    task: Task
+    task: str
     subject: int
     session: int
     trials: tuple[Trial, ...]
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, for the order file."""
-        return asdict(self)
+        return asdict(self) | {"study": self.study.to_dict()}
 
 
-def plan_session(study: Study, *, task: Task, subject: int, session: int) -> SessionPlan:
+def draw_session(study: Study, task: OrderedTask, *, subject: int, session: int) -> SessionPlan:
     """The order of one session: training trials, then the main ones (METHOD 11).
 
     The same study, task, subject and session always give the same order.
@@ -113,7 +111,7 @@ def plan_session(study: Study, *, task: Task, subject: int, session: int) -> Ses
     Parameters
     ----------
     study : Study
-    task : {"absolute", "relative"}
+    task : OrderedTask
     subject : int
         1 … participants of the task.
     session : int
@@ -124,24 +122,25 @@ def plan_session(study: Study, *, task: Task, subject: int, session: int) -> Ses
     InputError
         If the study has no such task, subject or session.
     """
-    plan = study.plan(task)
+    plan = study.plan(task.name)
     check_whole("subject", subject, low=1, high=plan.participants)
     check_whole("session", session, low=1, high=plan.sessions)
-    rng = _generator(study, task, subject, session=session)
-    models = models_of_session(study, task=task, subject=subject, session=session)
-    training = _shuffled_trials(study, task, models, rng=rng)[: study.training_trials]
+    rng = _generator(study, task.name, subject, session=session)
+    models = models_of_session(study, task=task.name, subject=subject, session=session)
+    pairs = [(texture, model) for model in models for texture in study.textures]
+    pairs *= study.repeats if task.repeated else 1
+    training = task.trials(fisher_yates(pairs, rng), study, rng)[: study.training_trials]
     drafts: list[tuple[Phase, dict[str, Any]]] = [("training", draft) for draft in training]
-    drafts += [("main", draft) for draft in _shuffled_trials(study, task, models, rng=rng)]
-    kind = AbsoluteTrial if task == "absolute" else RelativeTrial
+    drafts += [("main", draft) for draft in task.trials(fisher_yates(pairs, rng), study, rng)]
     trials = tuple(
-        kind(trial=number, phase=phase, tray=study.trays[draft["texture"]], **draft)
+        task.trial(trial=number, phase=phase, tray=study.trays[draft["texture"]], **draft)
         for number, (phase, draft) in enumerate(drafts, start=1)
     )
-    return SessionPlan(study=study, task=task, subject=subject, session=session, trials=trials)
+    return SessionPlan(study=study, task=task.name, subject=subject, session=session, trials=trials)
 
 
 def models_of_session(
-    study: Study, *, task: Task, subject: int, session: int
+    study: Study, *, task: str, subject: int, session: int
 ) -> tuple[ModelKind, ...]:
     """The models that a session presents: both when interleaved, one when by day.
 
@@ -155,38 +154,6 @@ def models_of_session(
     return (MODELS[(subject + session + coin) % 2],)
 
 
-def _main_trials(
-    study: Study, task: Task, models: Sequence[ModelKind]
-) -> list[tuple[str, ModelKind]]:
-    """Texture and model of each main trial, in the study's own order (nothing shuffled)."""
-    pairs = [(texture, model) for model in models for texture in study.textures]
-    return pairs * (study.repeats if task == "relative" else 1)
-
-
-def _shuffled_trials(
-    study: Study, task: Task, models: Sequence[ModelKind], *, rng: np.random.Generator
-) -> list[dict[str, Any]]:
-    """What differs from trial to trial, in random order."""
-    order = fisher_yates(_main_trials(study, task, models), rng)
-    if task == "absolute":
-        first = _balanced_first_surfaces(len(order), rng)
-        return [
-            {"texture": texture, "model": model, "first_surface": surface}
-            for (texture, model), surface in zip(order, first, strict=True)
-        ]
-    return [
-        {"texture": texture, "model": model, "layout": tuple(fisher_yates(study.textures, rng))}
-        for texture, model in order
-    ]
-
-
-def _balanced_first_surfaces(count: int, rng: np.random.Generator) -> list[Surface]:
-    """Real first and virtual first equally often (one apart if odd), in random order."""
-    surfaces: tuple[Surface, ...] = ("real", "virtual")
-    pair = fisher_yates(surfaces, rng)
-    return fisher_yates([pair[index % 2] for index in range(count)], rng)
-
-
-def _generator(study: Study, task: Task, subject: int, *, session: int) -> np.random.Generator:
+def _generator(study: Study, task: str, subject: int, *, session: int) -> np.random.Generator:
     """Random numbers of one session (session 0: of one counterbalancing pair)."""
     return generator(study.seed, TASKS.index(task), subject, session)

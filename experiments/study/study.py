@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
 from modeling import InputError
 from modeling.checks import check_whole
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_toml
 
-Task = Literal["absolute", "relative"]
 Schedule = Literal["by-day", "interleaved"]
 
-TASKS: tuple[Task, ...] = ("absolute", "relative")
+TASKS = tuple(ANSWER_TABLES)
 SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
 MOST_TEXTURES = 12
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
@@ -75,6 +75,12 @@ class TaskPlan:
         return 2 if self.schedule == "by-day" else 1
 
 
+PAPER_PLANS = {
+    "absolute": TaskPlan(participants=20, schedule="interleaved"),
+    "relative": TaskPlan(participants=24, schedule="by-day"),
+}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Study:
     """Everything that fixes the order of all trials, and what is told about the circumstances.
@@ -92,7 +98,8 @@ class Study:
         Presentations of each texture and model in the relative task, ≥ 1.
     training_trials : int
         Trials before the main ones in each session, from 0 to the number of textures.
-    absolute, relative : TaskPlan
+    tasks : mapping of task to TaskPlan
+        Those of the paper (absolute, relative) are planned as there where they are not named.
     masking : str
         How the sound of the device was masked.
     surface_visible : str
@@ -112,8 +119,7 @@ class Study:
     trays: Mapping[str, str]
     repeats: int = 3
     training_trials: int = 2
-    absolute: TaskPlan = TaskPlan(participants=20, schedule="interleaved")
-    relative: TaskPlan = TaskPlan(participants=24, schedule="by-day")
+    tasks: Mapping[str, TaskPlan] = field(default_factory=dict)
     masking: str = "not stated"
     surface_visible: str = "not stated"
     data_license: str = "not stated"
@@ -121,6 +127,10 @@ class Study:
     def __post_init__(self) -> None:
         object.__setattr__(self, "textures", tuple(self.textures))
         object.__setattr__(self, "trays", dict(self.trays))
+        planned = {**PAPER_PLANS, **self.tasks}
+        _refuse_unknown(planned, TASKS, "the tasks")
+        in_order = {task: planned[task] for task in TASKS if task in planned}
+        object.__setattr__(self, "tasks", in_order)
         check_whole("seed", self.seed, low=0, high=2**63)
         check_whole("repeats", self.repeats, low=1, high=100)
         self._check_texts()
@@ -128,8 +138,8 @@ class Study:
         check_whole("training_trials", self.training_trials, low=0, high=len(self.textures))
 
     def _check_texts(self) -> None:
-        for field in ("name", "masking", "surface_visible", "data_license"):
-            _require_label(field, getattr(self, field), forbidden="")
+        for name in ("name", "masking", "surface_visible", "data_license"):
+            _require_label(name, getattr(self, name), forbidden="")
         for texture in self.textures:
             _require_label("texture", texture, forbidden='|"\\')
         check_whole("number of textures", len(self.textures), low=2, high=MOST_TEXTURES)
@@ -153,21 +163,26 @@ class Study:
                 "put each sample into a tray of its own."
             )
 
-    def plan(self, task: Task) -> TaskPlan:
+    def plan(self, task: str) -> TaskPlan:
         """Participants and schedule of one task.
 
         Raises
         ------
         InputError
-            If there is no such task.
+            If the study has no such task.
         """
-        if task not in TASKS:
-            raise InputError(f"expected the task {' or '.join(TASKS)}, got {task!r}; choose one.")
-        return self.absolute if task == "absolute" else self.relative
+        if task not in self.tasks:
+            raise InputError(
+                f"expected the task {' or '.join(self.tasks)}, got {task!r}; choose one."
+            )
+        return self.tasks[task]
 
     def to_dict(self) -> dict[str, Any]:
         """The study as plain values; `Study.from_dict` makes it again."""
-        return asdict(self)
+        values: dict[str, Any] = {}
+        for name, value in asdict(self).items():
+            values |= value if name == "tasks" else {name: value}
+        return values
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> Study:
@@ -179,10 +194,9 @@ class Study:
             For unknown or missing keys, or values out of range.
         """
         settings = dict(values)
-        _refuse_unknown(settings, Study, "the study")
-        for task in TASKS:
-            if task in settings:
-                settings[task] = _task_plan(task, settings[task])
+        _refuse_unknown(settings, _STUDY_KEYS, "the study")
+        _require(settings, {"name", "seed", "textures", "trays"}, "the study")
+        tasks = {name: _task_plan(name, settings.pop(name)) for name in TASKS if name in settings}
         if not isinstance(settings.get("trays", {}), Mapping):
             raise InputError(
                 f"expected a table [trays] of texture = tray, got {settings['trays']!r}; "
@@ -193,7 +207,7 @@ class Study:
                 f"expected a list of textures, got {settings['textures']!r}; "
                 'write textures = ["…", "…"].'
             )
-        return Study(**settings)
+        return Study(**settings, tasks=tasks)
 
     @staticmethod
     def load(path: str | Path | None = None) -> Study:
@@ -212,25 +226,33 @@ class Study:
             raise InputError(f"{file}: {error}") from None
 
 
-def _task_plan(task: Task, values: object) -> TaskPlan:
+_STUDY_KEYS = tuple(
+    key for f in fields(Study) for key in (TASKS if f.name == "tasks" else (f.name,))
+)
+
+
+def _task_plan(task: str, values: object) -> TaskPlan:
     if not isinstance(values, Mapping):
         raise InputError(
             f"expected a table [{task}] with participants and schedule, got {values!r}; "
             "write both under that heading."
         )
-    _refuse_unknown(values, TaskPlan, f"[{task}]")
+    known = tuple(f.name for f in fields(TaskPlan))
+    _refuse_unknown(values, known, f"[{task}]")
+    _require(values, set(known), f"[{task}]")
     return TaskPlan(**values)
 
 
-def _refuse_unknown(values: Mapping[str, Any], kind: type, where: str) -> None:
-    known = [field.name for field in fields(kind)]
+def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], where: str) -> None:
     unknown = sorted(set(values) - set(known))
     if unknown:
         raise InputError(
             f"expected only {', '.join(known)} in {where}, got {', '.join(unknown)}; "
             "correct the spelling or remove it."
         )
-    needed = {"name", "seed", "textures", "trays"} if kind is Study else set(known)
+
+
+def _require(values: Mapping[str, Any], needed: set[str], where: str) -> None:
     missing = sorted(needed - set(values))
     if missing:
         raise InputError(

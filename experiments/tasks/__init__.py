@@ -1,0 +1,27 @@
+"""The tasks: one module each, of the name under which `ANSWER_TABLES` declares its answers."""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from experiments.sessions.task import Task
+from experiments.study.design import SessionPlan, draw_session
+from experiments.study.study import Study
+
+
+def task_named(name: str) -> Task:
+    """The task that `ANSWER_TABLES` declares under this name."""
+    found: Task = import_module(f"experiments.tasks.{name}").TASK
+    return found
+
+
+def plan_session(study: Study, *, task: str, subject: int, session: int) -> SessionPlan:
+    """The order of one session of a task, as `draw_session` draws it.
+
+    Raises
+    ------
+    InputError
+        If the study has no such task, subject or session.
+    """
+    study.plan(task)
+    return draw_session(study, task_named(task), subject=subject, session=session)

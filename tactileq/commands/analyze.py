@@ -112,7 +112,7 @@ def results_of_study(
     from modeling.files.writing import file_stem
     from modeling.fitting.conditions import recording_spectra
 
-    asked = dict.fromkeys([*responses.absolute["texture"], *responses.relative["texture"]])
+    asked = responses.textures
     missing = [texture for texture in asked if texture not in full]
     if missing:
         raise ValueError(

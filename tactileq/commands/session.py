@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, Simplified, StudyFile
 
 if TYPE_CHECKING:
+    TaskName = str
     from experiments.console.console import Console
+else:
+    TaskName = Literal[tuple(ANSWER_TABLES)]
 
 
 def session(
-    task: Annotated[Literal["absolute", "relative"], typer.Option(help="Which evaluation.")],
+    task: Annotated[TaskName, typer.Option(help="Which evaluation.")],
     subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")],
     models: Models = Path("models"),
     simplified: Simplified = Path("simplified"),
@@ -28,9 +32,10 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --data data
     """
-    from experiments.observers.whole_study import PROTOCOLS
+    from experiments.sessions.trial_loop import run_session
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
+    from experiments.tasks import task_named
     from modeling.files.provenance import write_provenance
     from modeling.models.loading import load_models
     from rig.twin import SimulatedRig
@@ -40,7 +45,8 @@ def session(
     sets.require(plan.textures)
     print("note: the rig is the simulated one; its data are marked simulated.")
     with open_console(fullscreen=fullscreen, screen=screen) as console:
-        result = PROTOCOLS[task](
+        result = run_session(
+            task_named(task),
             plan,
             subject=subject,
             session=number,

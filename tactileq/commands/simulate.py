@@ -71,8 +71,7 @@ def run_study(
     from experiments.observers.whole_study import simulate_study
     from rig.twin import SimulatedRig
 
-    sessions = plan.absolute.participants * plan.absolute.sessions
-    sessions += plan.relative.participants * plan.relative.sessions
+    sessions = sum(task.participants * task.sessions for task in plan.tasks.values())
     with progress("Simulated participants", sessions) as advance:
         simulate_study(
             plan,

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from experiments.sessions.trial_loop import Choice, Rating, Surfaces
-from experiments.study.design import AbsoluteTrial, RelativeTrial
+from experiments.sessions.surfaces import Choice, Rating, Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study, TaskPlan
+from experiments.tasks.absolute import AbsoluteTrial
+from experiments.tasks.relative import RelativeTrial
 from modeling import TextureModel, Threshold, simplify
 from rig.interface import RigReading
 from stimuli.planted.textures import planted_texture
@@ -83,8 +84,10 @@ def study() -> Study:
         trays={"canvas": "C", "MDF": "A", "PVC": "B"},
         repeats=2,
         training_trials=1,
-        absolute=TaskPlan(participants=3, schedule="interleaved"),
-        relative=TaskPlan(participants=4, schedule="by-day"),
+        tasks={
+            "absolute": TaskPlan(participants=3, schedule="interleaved"),
+            "relative": TaskPlan(participants=4, schedule="by-day"),
+        },
     )
 
 

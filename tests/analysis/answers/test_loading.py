@@ -17,7 +17,7 @@ def test_main_trials_and_training_are_kept_apart(study_folder, write_task, absol
     responses = load_responses(study_folder)
     assert len(responses.absolute) == 14
     assert set(responses.absolute["phase"]) == {"main"}
-    assert responses.absolute_training["texture"].tolist() == ["canvas"]
+    assert responses.training["absolute"]["texture"].tolist() == ["canvas"]
     assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
     assert responses.absolute["magnitude_similarity"].tolist() == [50.0 + n for n in range(1, 15)]
     assert responses.relative.empty

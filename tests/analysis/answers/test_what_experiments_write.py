@@ -9,11 +9,10 @@ from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.paired import rating_tests
 from analysis.statistics.rates import rate_tests
 from experiments.observers.whole_study import simulate_study
-from experiments.sessions.trial_loop import Choice, SessionAborted, Surfaces
-from experiments.study.design import RelativeTrial
+from experiments.sessions.surfaces import Choice, SessionAborted, Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study, TaskPlan
-from experiments.tasks.relative import run_relative
+from experiments.tasks.relative import RelativeTrial, run_relative
 from modeling import Threshold, simplify
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
@@ -34,8 +33,10 @@ def responses(tmp_path_factory) -> Responses:
             trays={"leather": "A", "MDF": "B", "PVC": "C"},
             repeats=2,
             training_trials=1,
-            absolute=TaskPlan(participants=3, schedule="interleaved"),
-            relative=TaskPlan(participants=4, schedule="by-day"),
+            tasks={
+                "absolute": TaskPlan(participants=3, schedule="interleaved"),
+                "relative": TaskPlan(participants=4, schedule="by-day"),
+            },
         ),
         real=truths,
         full=truths,
@@ -89,8 +90,8 @@ def test_every_answer_arrives(responses):
     assert responses.warnings == ()
     assert len(responses.absolute) == 3 * 3 * 2
     assert len(responses.relative) == 4 * 3 * 2 * 2
-    assert len(responses.absolute_training) == 3
-    assert len(responses.relative_training) == 4 * 2
+    assert len(responses.training["absolute"]) == 3
+    assert len(responses.training["relative"]) == 4 * 2
     assert set(responses.absolute["texture"]) == set(TEXTURES)
     assert responses.absolute["magnitude_similarity"].between(0, 100).all()
 

@@ -53,12 +53,9 @@ def responses_of(
 ) -> Responses:
     """Answers whose participants and (unless told otherwise) rig are simulated or not."""
     return Responses(
-        absolute=ratings,
-        relative=choices,
+        answers={"absolute": ratings, "relative": choices},
         simulated_participants=simulated,
         simulated_rig=simulated if rig is None else rig,
-        absolute_training=ratings.iloc[:0],
-        relative_training=choices.iloc[:0],
         warnings=(WARNING,),
     )
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 
-from experiments.study.design import plan_session
 from experiments.study.study import Study
+from experiments.tasks import plan_session
 
 ROOT = Path(__file__).parents[3]
 DRIVER = Path(__file__).with_name("console_session.py")

@@ -22,10 +22,10 @@ from experiments.observers.simulated import (
     distance,
     sensation_levels,
 )
-from experiments.sessions.trial_loop import Surfaces
-from experiments.study.design import plan_session
+from experiments.sessions.surfaces import Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
+from experiments.tasks import plan_session
 from modeling import InputError, TextureModel, Threshold
 
 PERCEPTS = arrays(np.float64, (3, 9), elements=st.floats(0.0, 80.0))
@@ -183,7 +183,7 @@ def test_many_ratings_agree_with_the_planted_truth(
     surfaces.present_real()
     ratings = []
     for subject in range(1, 2001):
-        person = SimulatedParticipant(perception, truth, seed=5, subject=subject, occasion=1)
+        person = SimulatedParticipant(perception, truth, seed=5, subject=subject, occasion=(1,))
         given_ = person.rate(trial, surfaces)
         ratings.append((given_.magnitude_similarity, given_.frequency_similarity))
     apart = perception.distance("MDF", "full", "MDF")
@@ -202,7 +202,7 @@ def test_many_choices_agree_with_the_planted_truth(
     truth = Psychometrics(temperature_db=4.0, lapse_rate=0.1)
     trial = plan_session(study, task="relative", subject=1, session=1).trials[0]
     layout = [models.of(texture, trial.model) for texture in trial.layout]
-    person = SimulatedParticipant(perception, truth, seed=6, subject=1, occasion=1)
+    person = SimulatedParticipant(perception, truth, seed=6, subject=1, occasion=(1,))
     surfaces = Surfaces(rig, texture=trial.texture, models=layout)
     counts = np.zeros(3)
     for _ in range(3000):
@@ -223,11 +223,11 @@ def test_a_subject_keeps_the_bias_and_not_the_noise(
         person = SimulatedParticipant(perception, truth, seed=7, **who)
         return person.rate(trial, surfaces).magnitude_similarity
 
-    steady = magnitude(0.0, subject=1, occasion=1)
-    assert steady == magnitude(0.0, subject=1, occasion=2)
-    assert steady != magnitude(0.0, subject=2, occasion=1)
-    assert magnitude(1.0, subject=1, occasion=1) == magnitude(1.0, subject=1, occasion=1)
-    assert magnitude(1.0, subject=1, occasion=1) != magnitude(1.0, subject=1, occasion=2)
+    steady = magnitude(0.0, subject=1, occasion=(1,))
+    assert steady == magnitude(0.0, subject=1, occasion=(2,))
+    assert steady != magnitude(0.0, subject=2, occasion=(1,))
+    assert magnitude(1.0, subject=1, occasion=(1,)) == magnitude(1.0, subject=1, occasion=(1,))
+    assert magnitude(1.0, subject=1, occasion=(1,)) != magnitude(1.0, subject=1, occasion=(2,))
 
 
 def test_a_real_surface_without_truth_is_refused(

@@ -5,7 +5,7 @@ import signal
 import sys
 
 from experiments import ModelSets, Study, run_absolute
-from experiments.sessions.trial_loop import Rating
+from experiments.sessions.surfaces import Rating
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 

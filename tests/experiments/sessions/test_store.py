@@ -20,8 +20,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.sessions.store import SessionStore, StoreError, cell
-from experiments.study.design import SessionPlan, plan_session
+from experiments.study.design import SessionPlan
 from experiments.study.study import Study
+from experiments.tasks import plan_session
 from modeling import InputError
 
 ROOT = Path(__file__).parents[3]

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from experiments.sessions.store import SessionStore, StoreError
-from experiments.sessions.trial_loop import Rating, SessionAborted, Surfaces
-from experiments.study.design import plan_session
+from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
+from experiments.tasks import plan_session
 from experiments.tasks.absolute import run_absolute
 from experiments.tasks.relative import run_relative
 from modeling import InputError

@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from experiments.study.design import fisher_yates, models_of_session, plan_session
+from experiments.study.design import fisher_yates, models_of_session
 from experiments.study.study import Study, TaskPlan
+from experiments.tasks import plan_session
 from modeling import InputError
 
 
@@ -64,14 +65,16 @@ def test_shipped_study_is_the_papers() -> None:
     study = Study.load()
     assert len(study.textures) == 7
     assert study.repeats == 3
-    assert study.absolute == TaskPlan(participants=20, schedule="interleaved")
-    assert study.relative == TaskPlan(participants=24, schedule="by-day")
+    assert study.plan("absolute") == TaskPlan(participants=20, schedule="interleaved")
+    assert study.plan("relative") == TaskPlan(participants=24, schedule="by-day")
 
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**40), pairs=st.integers(1, 15))
 def test_by_day_is_counterbalanced_exactly(seed: int, pairs: int) -> None:
-    study = shipped(seed=seed, relative=TaskPlan(participants=2 * pairs, schedule="by-day"))
+    study = shipped(
+        seed=seed, tasks={"relative": TaskPlan(participants=2 * pairs, schedule="by-day")}
+    )
     first, second = (
         [
             models_of_session(study, task="relative", subject=subject, session=session)
@@ -84,7 +87,7 @@ def test_by_day_is_counterbalanced_exactly(seed: int, pairs: int) -> None:
 
 
 def test_who_begins_with_which_model_cannot_be_told_from_the_number() -> None:
-    study = shipped(relative=TaskPlan(participants=400, schedule="by-day"))
+    study = shipped(tasks={"relative": TaskPlan(participants=400, schedule="by-day")})
     odd = [
         models_of_session(study, task="relative", subject=subject, session=1)
         for subject in range(1, 401, 2)
@@ -112,8 +115,7 @@ def test_every_session_holds_what_the_study_asks_for(
         trays={name: name.upper() for name in textures},
         repeats=repeats,
         training_trials=data.draw(st.integers(0, count)),
-        absolute=plan,
-        relative=plan,
+        tasks={"absolute": plan, "relative": plan},
     )
     task = data.draw(st.sampled_from(["absolute", "relative"]))
     subject, session = data.draw(st.integers(1, 6)), data.draw(st.integers(1, plan.sessions))
@@ -137,7 +139,7 @@ def test_every_session_holds_what_the_study_asks_for(
 
 
 def test_an_order_follows_from_study_seed_subject_session_and_task() -> None:
-    study = shipped(absolute=TaskPlan(participants=20, schedule="by-day"))
+    study = shipped(tasks={"absolute": TaskPlan(participants=20, schedule="by-day")})
     keys = [
         (chosen, task, subject, session)
         for chosen in (study, replace(study, seed=2))

@@ -25,7 +25,7 @@ def test_a_study_is_made_again_from_its_plain_values() -> None:
 
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
     study = Study.load(edited(tmp_path, "participants = 24", "participants = 6"))
-    assert study.relative.participants == 6
+    assert study.plan("relative").participants == 6
 
 
 @pytest.mark.parametrize(
