@@ -12,7 +12,6 @@ from experiments.sessions.store import SessionStore, StoreError
 from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
-from experiments.tasks import plan_session
 from experiments.tasks.absolute import run_absolute
 from experiments.tasks.relative import run_relative
 from modeling import InputError
@@ -39,84 +38,6 @@ def test_a_person_at_the_simulated_rig_is_stored_as_a_person(
     assert {row["simulated"] for row in rows(result.path)} == {"true"}
     (participant,) = rows(tmp_path / "participants.tsv")
     assert participant["simulated"] == "false"
-
-
-def test_an_absolute_session_is_stored_as_it_went(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
-) -> None:
-    result = session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    trials = plan_session(study, task="absolute", subject=1, session=1).trials
-    stored = rows(result.path)
-    assert result.completed
-    assert len(stored) == len(trials) == 7
-    assert list(stored[0]) == [
-        "trial",
-        "phase",
-        "texture",
-        "model",
-        "tray",
-        "first_surface",
-        "magnitude_similarity",
-        "frequency_similarity",
-        "toggles",
-        "response_time_s",
-        "simulated",
-    ]
-    for row, trial in zip(stored, trials, strict=True):
-        assert (row["texture"], row["model"]) == (trial.texture, trial.model)
-        assert (row["tray"], row["first_surface"]) == (trial.tray, trial.first_surface)
-        assert (row["magnitude_similarity"], row["frequency_similarity"]) == ("70", "30.5")
-        assert (row["toggles"], row["simulated"]) == ("2", "true")
-    assert respondent.trays == [trial.tray for trial in trials]
-    assert respondent.heard == ["Training", "The ratings begin", "Thank you"]
-
-
-def test_each_absolute_trial_presents_its_own_surfaces_in_its_own_order(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
-) -> None:
-    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    wanted: list[tuple[str, object]] = [("silence", None)]
-    for trial in plan_session(study, task="absolute", subject=1, session=1).trials:
-        real = ("real", trial.texture)
-        virtual = ("virtual", models.of(trial.texture, trial.model))
-        first, second = (real, virtual) if trial.first_surface == "real" else (virtual, real)
-        wanted += [first, second, first, ("silence", None)]
-    assert rig.notes == [*wanted, ("silence", None)]
-
-
-def test_a_relative_session_is_stored_as_it_went(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
-) -> None:
-    result = session(study, tmp_path, "relative", models=models, rig=rig, respondent=respondent)
-    trials = plan_session(study, task="relative", subject=1, session=1).trials
-    stored = rows(result.path)
-    assert list(stored[0]) == [
-        "trial",
-        "phase",
-        "texture",
-        "model",
-        "tray",
-        "layout",
-        "answer",
-        "correct",
-        "presses",
-        "response_time_s",
-        "simulated",
-    ]
-    for row, trial in zip(stored, trials, strict=True):
-        assert row["layout"].split("|") == list(trial.layout)
-        assert row["answer"] == trial.layout[1]
-        assert row["correct"] == str(int(trial.layout[1] == trial.texture))
-        assert (row["presses"], row["response_time_s"]) == ("3", "3.25")
-    presented = [note for note in rig.notes if note[0] != "silence"][:4]
-    first = trials[0]
-    layout = [models.of(texture, first.model) for texture in first.layout]
-    assert presented == [
-        ("real", first.texture),
-        ("virtual", layout[0]),
-        ("virtual", layout[1]),
-        ("virtual", layout[1]),
-    ]
 
 
 def test_order_is_on_disk_and_mounting_confirmed_before_anything_is_presented(

@@ -1,0 +1,186 @@
+"""Rooms and floors: who imports whom, no circle, contracts that bite, faces that load late."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+import subprocess
+import sys
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+import experiments
+import modeling
+
+ROOT = Path(__file__).parents[1]
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "tactileq")
+
+
+def name_of(path: Path) -> str:
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return name.removesuffix(".__init__")
+
+
+MODULES = {name_of(path): path for room in ROOMS for path in (ROOT / room).rglob("*.py")}
+# A name asked of a face comes from the module that it lives in.
+HOMES = {
+    f"{face.__name__}.{name}": f"{face.__name__}.{module}"
+    for face in (modeling, experiments)
+    for module, names in face.HOMES.items()
+    for name in names.split() or [module]
+}
+
+
+def imported_by(path: Path) -> set[str]:
+    """Modules of the house that one imports, late and for types alone included."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            for full in (f"{node.module}.{alias.name}" for alias in node.names):
+                found.add(HOMES.get(full, full if full in MODULES else node.module))
+    return found & set(MODULES)
+
+
+GRAPH = {name: imported_by(path) - {name} for name, path in MODULES.items()}
+
+
+def test_no_module_imports_itself_by_way_of_others() -> None:
+    # The two faces name what lives below them; nothing below imports a face of its own room.
+    inner = {name: imports for name, imports in GRAPH.items() if name not in ROOMS}
+    order = list(TopologicalSorter(inner).static_order())  # CycleError names a circle
+    assert len(order) > 150
+    for name, imports in inner.items():
+        assert name.split(".")[0] not in imports, name
+
+
+def test_a_circle_would_be_seen(tmp_path: Path) -> None:
+    late = tmp_path / "late.py"
+    late.write_text(
+        "from typing import TYPE_CHECKING\n"
+        "if TYPE_CHECKING:\n    from modeling import TextureModel\n"
+        "def f():\n    from analysis import labels\n    import rig.twin\n"
+    )
+    assert imported_by(late) == {
+        "modeling.models.texture_model",
+        "analysis.labels",
+        "rig.twin",
+    }
+
+
+PLANTED = {
+    "modeling/models/grid.py": ("from stimuli.planted import textures", "Data flows one way"),
+    "stimuli/sets/levels.py": ("import rig.twin", "Data flows one way"),
+    "analysis/labels.py": ("import experiments.study.study", "Data flows one way"),
+    "rig/interface.py": ("import tactileq.app", "Data flows one way"),
+    "modeling/equalizer/bands.py": ("import modeling.models.grid", "Floors of modeling"),
+    "modeling/fitting/field.py": ("import modeling.regression.driving", "Floors of modeling"),
+    "stimuli/planted/textures.py": ("import stimuli.sets.recipe", "Floors of stimuli"),
+    "rig/importing/files.py": ("import rig.twin", "Floors of rig"),
+    "experiments/study/study.py": ("import experiments.sessions.store", "Floors of experiments"),
+    "analysis/statistics/holm.py": ("import analysis.figures.answers", "Floors of analysis"),
+    "tactileq/telling.py": ("import tactileq.commands.demo", "Floors of the command line"),
+    "modeling/perception/clock.py": ("import time", "modeling is pure numerics"),
+    "modeling/hand.py": ("import random", "modeling is pure numerics"),
+    "modeling/newcomer.py": ("", "Floors of modeling"),  # every module has its floor
+}
+
+
+@pytest.fixture(scope="module")
+def house(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of all rooms, to plant imports in."""
+    copy = tmp_path_factory.mktemp("house")
+    for room in ROOMS:
+        kept_out = shutil.ignore_patterns("__pycache__", "*.so", "*.tsv")
+        shutil.copytree(ROOT / room, copy / room, ignore=kept_out)
+    shutil.copy(ROOT / "pyproject.toml", copy)
+    return copy
+
+
+def broken_contracts(house: Path) -> list[str]:
+    run = subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache"],
+        cwd=house,
+        capture_output=True,
+        text=True,
+    )
+    assert "Contracts:" in run.stdout, run.stdout + run.stderr
+    broken = [line for line in run.stdout.splitlines() if " BROKEN" in line]
+    assert (run.returncode == 0) == (not broken)
+    return broken
+
+
+def test_all_contracts_are_kept(house: Path) -> None:
+    assert broken_contracts(house) == []
+
+
+@pytest.mark.parametrize("file", PLANTED)
+def test_a_planted_import_breaks_its_contract(house: Path, file: str) -> None:
+    line, contract = PLANTED[file]
+    path = house / file
+    before = path.read_text(encoding="utf-8") if path.exists() else None
+    late = f"\n\ndef late() -> None:\n    {line or 'pass'}\n"
+    path.write_text((before or '"""New."""\n') + late, encoding="utf-8")
+    try:
+        broken = broken_contracts(house)
+    finally:
+        path.unlink() if before is None else path.write_text(before, encoding="utf-8")
+    assert [line for line in broken if line.startswith(contract)], broken
+
+
+def loaded_after(statements: str) -> list[str]:
+    """All modules that a fresh process holds once it has run the statements."""
+    program = f"import sys\n{statements}\nprint(*sys.modules)"
+    run = subprocess.run(
+        [sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return run.stdout.splitlines()[-1].split()
+
+
+def test_errors_load_neither_numerics_nor_the_rest_of_modeling() -> None:
+    loaded = loaded_after("import modeling.errors")
+    assert "numpy" not in loaded
+    assert {name for name in loaded if name.startswith("modeling")} == {
+        "modeling",
+        "modeling.errors",
+        "modeling.face",
+    }
+
+
+HEAVY = {"scipy", "pandas", "matplotlib", "statsmodels", "psychopy"}
+
+
+@pytest.mark.parametrize("name", modeling.__all__)
+def test_every_name_of_modeling_comes_without_what_only_some_of_it_needs(name: str) -> None:
+    # SciPy as a whole: importing any of its parts takes longer than all of the modeling.
+    assert not HEAVY & set(loaded_after(f"from modeling import {name}"))
+
+
+@pytest.mark.parametrize("face", [modeling, experiments], ids=lambda face: face.__name__)
+def test_a_face_names_what_is_there_to_readers_and_at_run_time(face) -> None:  # type: ignore[no-untyped-def]
+    for_types: set[str] = set()
+    tree = ast.parse(Path(face.__file__).read_text(encoding="utf-8"))
+    for block in (node for node in tree.body if isinstance(node, ast.If)):
+        for node in block.body:
+            assert isinstance(node, ast.ImportFrom)
+            for alias in node.names:
+                home = f"{node.module}.{alias.name}"
+                assert HOMES[f"{face.__name__}.{alias.name}"] in (node.module, home)
+                for_types.add(alias.name)
+    assert for_types == set(face.__all__)
+    for name in face.__all__:
+        assert getattr(face, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = face.nothing
+
+
+def test_tests_mirror_the_rooms() -> None:
+    for room in ROOMS[:-1]:
+        inner = {path.name for path in (ROOT / room).iterdir() if (path / "__init__.py").exists()}
+        tested = {path.name for path in (ROOT / "tests" / room).iterdir() if path.is_dir()}
+        assert tested - {"__pycache__"} <= inner, room
+        for package in inner - tested:
+            assert not any((ROOT / room / package).glob("[a-z]*.py")), f"{room}/{package} untested"
