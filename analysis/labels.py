@@ -12,4 +12,9 @@ ALL_TEXTURES = "all textures"
 
 ALL_LAYERS = "all layers"
 
-LEVELS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+SIGNIFICANCE_MARKS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
+
+
+def significance_mark(p: float) -> str:
+    """*, ** or *** below .05, .01 and .001; nothing else, and nothing for NaN."""
+    return next((mark for level, mark in SIGNIFICANCE_MARKS if p < level), "")

@@ -19,7 +19,7 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import ALL_TEXTURES, LEVELS, MODELS, SCALES
+from analysis.labels import ALL_TEXTURES, MODELS, SCALES, significance_mark
 from analysis.statistics.confusion import ConfusionMatrix
 
 MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
@@ -104,7 +104,7 @@ def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = 
 
 
 def _significance_bracket(ax: Axes, x: float, *, top: float, p: float) -> None:
-    mark = next((mark for level, mark in LEVELS if p < level), "")
+    mark = significance_mark(p)
     if mark:
         ax.annotate(
             "",

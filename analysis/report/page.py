@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -12,76 +11,10 @@ from html import escape
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES
+from analysis.columns import Column, Columns, names
 
 PICTURE_DPI = 150
 PIXELS_PER_INCH = 92
-_P_VALUES = (
-    *("p", "p_holm", "shapiro_p", "wilcoxon_p", "flip_probability"),
-    *("p_speed", "p_force", "p_speed_force", "p_speed_alone", "p_amplitude"),
-)
-_NAMES = (
-    *("scale", "texture", "model", "estimator", "layer", "verdict", "presented", "answered"),
-    *("parameter", "coefficient", "driven_by", "reduced", "foretold_by"),
-    *("worst_level_error_at", "worst_distance_at"),
-)
-_GRID_AXES = ("_mm_s", "force_n")
-_LABELS = {
-    "mean_full": "mean full",
-    "mean_simplified": "mean simplified",
-    "mean_difference": "difference",
-    "ci_low": "CI from",
-    "ci_high": "to",
-    "p_holm": "p (Holm)",
-    "d_z": "d_z",
-    "d_z_low": "CI from",
-    "d_z_high": "to",
-    "wilcoxon_p": "Wilcoxon p",
-    "se": "SE",
-    "rms_error_db": "RMS error (dB)",
-    "log_spectral_distance_db": "log-spectral distance (dB)",
-    "gfc30_mean": "GFC30 mean",
-    "gfc30_min": "GFC30 min",
-    "gfc30_floor": "GFC30 floor",
-    "gfc30_ceiling": "GFC30 ceiling",
-    "gfc5_mean": "GFC5 mean",
-    "gfc5_floor": "GFC5 floor",
-    "gfc5_ceiling": "GFC5 ceiling",
-    "multiple_r": "R",
-    "adjusted_r_squared": "adjusted R²",
-    "published_adjusted_r_squared": "published",
-    "speed_coefficient": "α1 (v)",
-    "force_coefficient": "α2 (F)",
-    "speed_force_coefficient": "α3 (v·F)",
-    "p_speed": "p of α1",
-    "p_force": "p of α2",
-    "p_speed_force": "p of α3",
-    "support_speed": "support α1 (%)",
-    "support_force": "support α2 (%)",
-    "support_speed_force": "support α3 (%)",
-    "published_support_speed": "published α1 (%)",
-    "published_support_force": "published α2 (%)",
-    "published_support_speed_force": "published α3 (%)",
-    "mean_significant": "mean of significant ones",
-    "published_for_n": "published, taken as per N",
-    "slope_speed_alone": "slope on speed alone (Hz per mm/s)",
-    "p_speed_alone": "p",
-    "amplitude_r": "r with amplitude",
-    "p_amplitude": "p",
-    "mean_centroid_hz": "mean (Hz)",
-    "foretold_by": "foretold by",
-    "median_level_error_db": "level error, median (dB)",
-    "worst_level_error_db": "worst (dB)",
-    "worst_level_error_at": "at",
-    "median_distance_db": "distance, median (dB)",
-    "worst_distance_db": "worst (dB)",
-    "worst_distance_at": "at",
-    "distance_at_db": "distance at (dB)",
-    "distance_between_db": "distance between (dB)",
-    "median_level_error_between_db": "level error between, median (dB)",
-    "worst_level_error_between_db": "worst (dB)",
-}
-_UNITS = {"hz": "Hz", "db": "dB", "n": "N", "mm_s": "mm/s", "s": "s"}
 
 STYLE = """
 :root { --ink: #1b1f24; --soft: #59636e; --line: #d8dee4; --paper: #fff; --tint: #f4f7fa;
@@ -133,15 +66,15 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
 class Table:
     """A table of the report: `name` is its file's stem, `title` and `note` its caption.
 
-    The page shows the columns in `shown` (all where there are none); the file holds all.
+    The page shows `columns`, in this order and as they say; the file holds all of `frame`.
     """
 
     name: str
     title: str
     note: str
     frame: pd.DataFrame
+    columns: Columns
     simulated: bool
-    shown: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,63 +148,42 @@ def picture_html(picture: Picture, png: bytes) -> str:
 
 def table_html(table: Table) -> str:
     """The table with its caption; numbers are rounded, the file beside the report is exact."""
-    frame = table.frame[list(table.shown)] if table.shown else table.frame
-    # A column of notes that nobody wrote only takes room.
-    frame = frame[[name for name in frame if frame.empty or (frame[name] != "").any()]]
-    numeric = [pd.api.types.is_numeric_dtype(frame[name]) for name in frame]
-    css = [
-        'class="number"' if number else 'class="name"' if name in _NAMES else ""
-        for number, name in zip(numeric, frame, strict=True)
-    ]
+    columns = _with_content(table)
+    frame = table.frame[names(columns)]
+    css = [_css(column, frame[column.name]) for column in columns]
     head = "".join(
-        f"<th {c}>{escape(label(str(name)))}</th>" for name, c in zip(frame, css, strict=True)
+        f"<th {c}>{escape(column.heading)}</th>" for column, c in zip(columns, css, strict=True)
     )
-    rows = []
-    for values in frame.itertuples(index=False, name=None):
-        cells = "".join(
-            f"<td {c}>{escape(cell(str(name), value))}</td>"
-            for name, value, c in zip(frame, values, css, strict=True)
-        )
-        total = ALL_TEXTURES in values or ALL_LAYERS in values
-        rows.append(f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>")
+    rows = "".join(
+        _row_html(columns, values, css=css) for values in frame.itertuples(index=False, name=None)
+    )
     return (
         f'<div class="scroll" id="table-{escape(table.name)}"><table><caption>{_caption(table)}'
-        f"</caption><thead><tr>{head}</tr></thead><tbody>{''.join(rows)}</tbody></table></div>"
+        f"</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
 
-def label(column: str) -> str:
-    """A column's name for people: `worst_speed_mm_s` becomes `worst speed (mm/s)`."""
-    if column in _LABELS:
-        return _LABELS[column]
-    for ending, unit in _UNITS.items():
-        if column.endswith(f"_{ending}"):
-            return f"{column.removesuffix(f'_{ending}').replace('_', ' ')} ({unit})"
-    return column.replace("_", " ")
+def _with_content(table: Table) -> Columns:
+    """A column of notes that nobody wrote only takes room."""
+    frame = table.frame
+    return tuple(
+        column for column in table.columns if frame.empty or (frame[column.name] != "").any()
+    )
 
 
-def cell(column: str, value: object) -> str:
-    """A value as a table shows it: about three significant digits, `n/a` where there is none."""
-    if not isinstance(value, float):
-        return str(value)
-    if math.isnan(value):
-        return "n/a"
-    if column in _P_VALUES:
-        return p_value(value)
-    if column.startswith(("gfc", "oracle")):
-        return f"{value:.4f}"
-    if column.endswith(_GRID_AXES):
-        return f"{value:g}"
-    size = abs(value)
-    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
-    # Below 1e-12 is what sums of thirds leave of a zero.
-    tiny = 1e-12 < size < 0.0005
-    return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
+def _css(column: Column, values: pd.Series) -> str:
+    if pd.api.types.is_numeric_dtype(values):
+        return 'class="number"'
+    return 'class="name"' if column.is_name else ""
 
 
-def p_value(p: float) -> str:
-    """A probability with three decimals, `< .001` below."""
-    return "< .001" if p < 0.001 else f"{p:.3f}".replace("0.", ".", 1)
+def _row_html(columns: Columns, values: Sequence[object], *, css: Sequence[str]) -> str:
+    cells = "".join(
+        f"<td {c}>{escape(column.text(value))}</td>"
+        for column, value, c in zip(columns, values, css, strict=True)
+    )
+    total = any(column.is_total(value) for column, value in zip(columns, values, strict=True))
+    return f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>"
 
 
 def page(*, title: str, lead: str, banner: str, sections: Sequence[tuple[str, str, str]]) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
+from analysis.columns import Column, names
 from analysis.report.page import (
     Fold,
     Item,
@@ -33,6 +34,7 @@ from modeling.files.writing import write_text
 
 MODELS_SHARE = 0.35  # of the time that a report of a whole study takes
 PARAMETERS_SHARE = 0.3
+PROVENANCE_COLUMNS = (Column("what"), Column("value"))
 
 
 def write_report(
@@ -168,7 +170,8 @@ def _provenance(facts: Mapping[str, str]) -> Table:
         "provenance",
         "Where this report comes from",
         "Exact tables are in tables/*.tsv, pictures in figures/*.png beside this file.",
-        pd.DataFrame([*facts.items()], columns=["what", "value"]),
+        pd.DataFrame([*facts.items()], columns=names(PROVENANCE_COLUMNS)),
+        PROVENANCE_COLUMNS,
         simulated=False,
     )
 

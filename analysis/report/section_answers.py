@@ -6,22 +6,35 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
+from analysis.columns import chosen, without
 from analysis.figures.answers import figure_confusion, figure_correct_rates, figure_ratings
 from analysis.labels import ALL_TEXTURES, MODELS
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes, rating_outcomes
-from analysis.statistics.confusion import ConfusionMatrix, confusion_matrices
-from analysis.statistics.paired import rating_tests
-from analysis.statistics.rates import correct_rates, rate_tests
+from analysis.statistics.confusion import (
+    CONFUSION_COLUMNS,
+    ConfusionMatrix,
+    confusion_matrices,
+    confusion_table,
+)
+from analysis.statistics.paired import RATING_TEST_COLUMNS, rating_tests
+from analysis.statistics.rates import (
+    CORRECT_RATE_COLUMNS,
+    RATE_TEST_COLUMNS,
+    correct_rates,
+    rate_tests,
+)
 
-TEST_COLUMNS = (
+PAIRED_SHOWN = (
     *("texture", "n", "mean_full", "mean_simplified", "mean_difference", "ci_low", "ci_high", "t"),
     *("df", "p", "p_holm", "d_z", "d_z_low", "d_z_high", "wilcoxon_p", "note", "excluded"),
 )
-RATE_COLUMNS = (
-    *("texture", "model", "participants", "trials", "mean", "se", "ci_low", "ci_high", "t", "df"),
-    *("p", "p_holm", "note"),
+RATING_TESTS_SHOWN = chosen(RATING_TEST_COLUMNS, "scale", *PAIRED_SHOWN)
+RATE_TESTS_SHOWN = chosen(RATE_TEST_COLUMNS, *PAIRED_SHOWN)
+CORRECT_RATES_SHOWN = (
+    *without(CORRECT_RATE_COLUMNS, "note"),
+    *chosen(CORRECT_RATE_COLUMNS, "note"),
 )
 
 
@@ -43,8 +56,8 @@ def rating_section(responses: Responses) -> Section:
         "scale. d_z: mean difference over the standard deviation of the differences. Intervals: "
         "95%.",
         tests,
+        RATING_TESTS_SHOWN,
         responses.simulated,
-        ("scale", *TEST_COLUMNS),
     )
     return Section(
         "ratings",
@@ -119,8 +132,8 @@ def _rate_tables(
         "accelerated bootstrap over participants), and a one-sample t-test against chance with "
         "Holm over the textures of one model.",
         rates,
+        CORRECT_RATES_SHOWN,
         simulated,
-        RATE_COLUMNS,
     )
     paired = Table(
         "rate_tests",
@@ -128,8 +141,8 @@ def _rate_tables(
         "Differences are simplified − full, as shares. Holm over the textures; the row over all "
         "textures stands outside the family. Intervals: 95%.",
         tests,
+        RATE_TESTS_SHOWN,
         simulated,
-        TEST_COLUMNS,
     )
     return against_chance, paired
 
@@ -146,17 +159,7 @@ def _participants(
 
 
 def _confusion_table(matrix: ConfusionMatrix, *, simulated: bool) -> Table:
-    shares = matrix.row_shares
-    rows = [
-        {
-            "presented": real,
-            "answered": virtual,
-            "count": int(matrix.counts[i, j]),
-            "row_share": shares[i, j],
-        }
-        for i, real in enumerate(matrix.textures)
-        for j, virtual in enumerate(matrix.textures)
-    ]
     title = f"Confusion matrix, {matrix.model} model"
     note = "Counts and shares of the row (0–1)."
-    return Table(f"confusion_{matrix.model}", title, note, pd.DataFrame(rows), simulated)
+    table = confusion_table(matrix)
+    return Table(f"confusion_{matrix.model}", title, note, table, CONFUSION_COLUMNS, simulated)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.columns import chosen, without
 from analysis.figures.layer_courses import figure_layer_courses
 from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
@@ -15,17 +16,19 @@ from analysis.report.sections import Progress, Section
 from analysis.report.sentences import left_out_outcomes, simplification_outcomes
 from analysis.spectra.comparison import compare_spectra
 from analysis.spectra.layers_over_grid import layer_course
-from analysis.textures.between import left_out_summary
-from analysis.textures.likeness import gfc_table
-from analysis.textures.results import TextureResult, reference_condition, simplification_table
+from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
+from analysis.textures.likeness import GFC_COLUMNS, gfc_table
+from analysis.textures.results import (
+    VERDICT_COLUMNS,
+    TextureResult,
+    reference_condition,
+    simplification_table,
+)
 from modeling.files.writing import file_stem
 
-GFC_COLUMNS = (
-    *("texture", "model", "layers", "parameters", "gfc30_mean", "gfc30_min", "gfc30_floor"),
-    *("gfc30_ceiling", "gfc5_mean", "gfc5_floor", "gfc5_ceiling", "log_spectral_distance_db"),
-    *("rms_error_db", "band_energy_error_db"),
-)
-VERDICT_COLUMNS = (
+GFC_SHOWN = without(GFC_COLUMNS, "conditions", "oracle_gap")
+VERDICTS_SHOWN = chosen(
+    VERDICT_COLUMNS,
     *("layer", "verdict", "reason", "distance_db", "worst_speed_mm_s", "worst_force_n"),
     *("worst_frequency_hz", "flip_probability"),
 )
@@ -60,8 +63,8 @@ def model_section(
         "ceiling: draws of the recording's own smoothed spectrum. "
         "RMS error and band energy error: means of absolute values. Cf. the paper's table 3.",
         gfc,
+        GFC_SHOWN,
         any(result.simulated for result in textures),
-        GFC_COLUMNS,
     )
     left_out = left_out_summary(textures)
     foretold = _left_out_items(left_out, simulated=any(r.simulated for r in textures))
@@ -89,6 +92,7 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
         "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) to the "
         "recording that was left out, whose own scatter is in them.",
         summary,
+        LEFT_OUT_COLUMNS,
         simulated,
     )
     return (table,)
@@ -134,8 +138,8 @@ def _texture_fold(result: TextureResult, *, number: int) -> Fold:
         "length leaves, would turn the verdict in other records; whether the estimator would find "
         f"the layer again, and its bias, are not in it.{_unresolved_note(result)}",
         simplification_table(result.simplification),
+        VERDICTS_SHOWN,
         result.simulated,
-        VERDICT_COLUMNS,
     )
     kept, all_layers = result.simplification.model.n_layers, result.model.n_layers
     return Fold(

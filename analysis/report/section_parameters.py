@@ -7,12 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.columns import chosen
 from analysis.figures.regression import figure_centroid
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import driving_outcomes, regression_outcomes
 from analysis.textures.regressions import (
+    CENTROID_AMPLITUDE_COLUMNS,
+    CENTROID_COLUMNS,
+    COEFFICIENT_COLUMNS,
+    DRIVING_COLUMNS,
     NAMES,
+    REGRESSION_COLUMNS,
+    SUPPORT_COLUMNS,
     centroid_amplitude_table,
     centroid_courses,
     centroid_table,
@@ -24,20 +31,26 @@ from analysis.textures.regressions import (
 from analysis.textures.results import TextureResult
 from modeling import TextureModel
 
-REGRESSION_COLUMNS = (
+REGRESSIONS_SHOWN = chosen(
+    REGRESSION_COLUMNS,
     *("texture", "parameter", "peak", "conditions", "inherited", "multiple_r"),
     *("adjusted_r_squared", "p", "mark", "reduced"),
 )
-CENTROID_COLUMNS = (
+CENTROID_SHOWN = chosen(
+    CENTROID_COLUMNS,
     *("texture", "mean_centroid_hz", "multiple_r", "adjusted_r_squared", "p", "mark"),
     *("speed_coefficient", "p_speed", "force_coefficient", "p_force", "speed_force_coefficient"),
     *("p_speed_force", "slope_speed_alone", "p_speed_alone", "amplitude_r", "p_amplitude"),
 )
-DRIVING_COLUMNS = (
+AMPLITUDES_SHOWN = chosen(
+    CENTROID_AMPLITUDE_COLUMNS,
+    *("texture", "peak", "conditions", "amplitude_r", "p_amplitude", "mark"),
+)
+DRIVING_SHOWN = chosen(
+    DRIVING_COLUMNS,
     *("texture", "driven_by", "numbers", "gfc30_mean", "gfc30_floor", "gfc30_ceiling"),
     *("oracle_gap", "log_spectral_distance_db", "rms_error_db", "band_energy_error_db"),
 )
-AMPLITUDE_COLUMNS = ("texture", "peak", "conditions", "amplitude_r", "p_amplitude", "mark")
 NO_CORRECTION = "The paper corrects for no multiple testing, and neither does this table."
 
 
@@ -90,8 +103,8 @@ def _parameter_tables(
         "without its main effects. n/a: nothing varies, or no residual degree of freedom. "
         f"{NO_CORRECTION} Coefficients are in the file. Cf. the paper's table 1.",
         found.assign(parameter=found["parameter"].map(NAMES)),
+        REGRESSIONS_SHOWN,
         simulated,
-        REGRESSION_COLUMNS,
     )
     ratings = Table(
         "regression_support",
@@ -100,6 +113,7 @@ def _parameter_tables(
         "in the full regression, and mean adjusted R². Published: from other surfaces, by the "
         f"paper's own estimator. {NO_CORRECTION} Cf. the paper's table 2.",
         support,
+        SUPPORT_COLUMNS,
         simulated,
     )
     coefficients = Table(
@@ -110,6 +124,7 @@ def _parameter_tables(
         "mN, so the last column multiplies those of F and v·F by 1000; the unit of the published "
         "amplitudes and noise gains is unknown. Cf. the paper's table 2.",
         coefficient_table(found),
+        COEFFICIENT_COLUMNS,
         simulated,
     )
     return ratings, coefficients, Fold("Regressions of each parameter by peak", (validity,))
@@ -134,16 +149,16 @@ def _centroid_items(models: Sequence[TextureModel], *, simulated: bool) -> tuple
         "SC in Hz on speed, force and their product, and on speed alone; Pearson's r of SC with "
         f"the amplitude √ΣG² over the conditions (published: above 0.6). {NO_CORRECTION}",
         centroid_table(models),
+        CENTROID_SHOWN,
         simulated,
-        CENTROID_COLUMNS,
     )
     by_peak = Table(
         "centroid_amplitude",
         "Correlation of the spectral centroid with the amplitude of each peak",
         f"Pearson's r over the recorded conditions. {NO_CORRECTION}",
         centroid_amplitude_table(models),
+        AMPLITUDES_SHOWN,
         simulated,
-        AMPLITUDE_COLUMNS,
     )
     return picture, table, Fold("Centroid and amplitude by peak", (by_peak,))
 
@@ -159,6 +174,6 @@ def _driving_table(driving: pd.DataFrame, *, simulated: bool) -> Table:
         "recordings that they were fitted to. Measures as in the table of simplification rate and "
         "quality; oracle gap: 1 − GFC30/ceiling.",
         driving,
+        DRIVING_SHOWN,
         simulated,
-        DRIVING_COLUMNS,
     )

@@ -6,12 +6,18 @@ from collections.abc import Sequence
 
 import pandas as pd
 
+from analysis.columns import without
 from analysis.labels import ALL_LAYERS
 from analysis.report.page import Fold, Item, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import planted_outcomes
-from analysis.textures.between import planted_between_table
-from analysis.textures.recovery import planted_layers_table, planted_truth_table
+from analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
+from analysis.textures.recovery import (
+    PLANTED_LAYER_COLUMNS,
+    PLANTED_TRUTH_COLUMNS,
+    planted_layers_table,
+    planted_truth_table,
+)
 from analysis.textures.results import TextureResult, reference_condition
 from stimuli.planted.textures import TEXTURES
 
@@ -50,6 +56,7 @@ def _planted_between(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
         "Nyquist frequency, unsmoothed), at the recorded conditions and half-way between four of "
         "them, where the truth is known by its formula; level errors are those half-way between.",
         planted_between_table(known),
+        PLANTED_BETWEEN_COLUMNS,
         simulated=True,
     )
     return (table,)
@@ -64,6 +71,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "have a partner; recall: share of the conditions in which it was found; median errors over "
         "the pairs. Levels compare |G| at one rate.",
         score,
+        PLANTED_TRUTH_COLUMNS,
         simulated=True,
     )
     overall = Table(
@@ -71,6 +79,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "Planted layers found, by texture",
         "The rows for all layers of the table below; its caption explains the columns.",
         score[score["layer"] == ALL_LAYERS].drop(columns="layer"),
+        without(PLANTED_TRUTH_COLUMNS, "layer"),
         simulated=True,
     )
     detail = Table(
@@ -79,6 +88,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "At the strongest force and highest speed of each texture; gains are |G| at the planted "
         "model's rate; surplus: estimated where nothing was planted.",
         layers,
+        PLANTED_LAYER_COLUMNS,
         simulated=True,
     )
     return (

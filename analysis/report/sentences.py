@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.columns import p_value
 from analysis.labels import ALL_LAYERS, ALL_TEXTURES, MODELS, SCALES
-from analysis.report.page import p_value
 from analysis.statistics.confusion import ConfusionMatrix
 
 ALPHA = 0.05

@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.columns import Column
 from analysis.labels import MODELS
 from modeling.arrays import Floats
 
@@ -62,3 +63,33 @@ def confusion_matrices(relative: pd.DataFrame) -> dict[str, ConfusionMatrix]:
         square = counts.reindex(index=list(textures), columns=list(textures), fill_value=0)
         matrices[model] = ConfusionMatrix(model, textures, square.to_numpy(dtype=np.int64))
     return matrices
+
+
+CONFUSION_COLUMNS = (
+    Column("presented", is_name=True),
+    Column("answered", is_name=True),
+    Column("count"),
+    Column("row_share"),
+)
+
+
+def confusion_table(matrix: ConfusionMatrix) -> pd.DataFrame:
+    """The matrix in long form.
+
+    Returns
+    -------
+    DataFrame
+        One row per cell: presented (the real surface), answered (the virtual one), count,
+        row_share (0–1).
+    """
+    shares = matrix.row_shares
+    return pd.DataFrame(
+        {
+            "presented": real,
+            "answered": virtual,
+            "count": int(matrix.counts[i, j]),
+            "row_share": shares[i, j],
+        }
+        for i, real in enumerate(matrix.textures)
+        for j, virtual in enumerate(matrix.textures)
+    )

@@ -9,6 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
+from analysis.columns import TEXTURE, Column, P, names
 from analysis.labels import MODELS, SCALES
 from modeling import InputError
 from modeling.arrays import Floats
@@ -135,6 +136,32 @@ def holm(p_values: ArrayLike) -> Floats:
     return adjusted
 
 
+CI_LOW, CI_HIGH = Column("ci_low", "CI from"), Column("ci_high", "to")
+T, DF = Column("t"), Column("df")
+P_HOLM = Column("p_holm", "p (Holm)", is_p_value=True)
+NOTE = Column("note")
+PAIRED_COLUMNS = (
+    TEXTURE,
+    Column("n"),
+    Column("excluded"),
+    Column("mean_full"),
+    Column("se_full", "SE full"),
+    Column("mean_simplified"),
+    Column("se_simplified", "SE simplified"),
+    Column("mean_difference", "difference"),
+    *(CI_LOW, CI_HIGH, T, DF, P),
+    Column("d_z", "d_z"),
+    Column("d_z_low", "CI from"),
+    Column("d_z_high", "to"),
+    Column("shapiro_p", "Shapiro p", is_p_value=True),
+    Column("wilcoxon_w", "Wilcoxon W"),
+    Column("wilcoxon_p", "Wilcoxon p", is_p_value=True),
+    NOTE,
+    P_HOLM,
+)
+RATING_TEST_COLUMNS = (Column("scale", is_name=True), *PAIRED_COLUMNS)
+
+
 def rating_tests(absolute: pd.DataFrame) -> pd.DataFrame:
     """Paired tests of both rating scales (PAPER VIII-A), Holm over the textures of a scale.
 
@@ -146,15 +173,13 @@ def rating_tests(absolute: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        One row per scale and texture: scale, texture, the fields of `PairedTest`, p_holm, and
-        excluded (participants without both values, by name).
+        One row per scale and texture: scale, texture, n, excluded (participants without both
+        values, by name), the other fields of `PairedTest`, and p_holm.
     """
     families = [
         paired_family(absolute, column).assign(scale=scale) for column, scale in SCALES.items()
     ]
-    return columns_first(
-        pd.concat(families, ignore_index=True), ["scale", "texture", "n", "excluded"]
-    )
+    return pd.concat(families, ignore_index=True)[names(RATING_TEST_COLUMNS)]
 
 
 def paired_family(table: pd.DataFrame, column: str) -> pd.DataFrame:
@@ -212,10 +237,6 @@ def why_undefined(differences: Floats) -> str:
 
 def mean(values: Floats) -> float:
     return float(values.mean()) if values.size else float("nan")
-
-
-def columns_first(table: pd.DataFrame, names: list[str]) -> pd.DataFrame:
-    return table[names + [name for name in table if name not in names]]
 
 
 def ignoring_case(column: pd.Series) -> pd.Series:

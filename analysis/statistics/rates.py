@@ -8,10 +8,17 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from analysis.columns import MODEL, TEXTURE, Column, P, names
 from analysis.labels import ALL_TEXTURES, MODELS
 from analysis.statistics.paired import (
+    CI_HIGH,
+    CI_LOW,
     CONFIDENCE,
-    columns_first,
+    DF,
+    NOTE,
+    P_HOLM,
+    PAIRED_COLUMNS,
+    T,
     holm,
     ignoring_case,
     mean,
@@ -25,6 +32,7 @@ from modeling import InputError
 from modeling.arrays import Floats
 
 BOOTSTRAP_RESAMPLES = 5000
+RATE_TEST_COLUMNS = PAIRED_COLUMNS
 
 
 def rate_tests(relative: pd.DataFrame) -> pd.DataFrame:
@@ -43,10 +51,19 @@ def rate_tests(relative: pd.DataFrame) -> pd.DataFrame:
     """
     family = paired_family(relative, "correct")
     overall = paired_family(relative.assign(texture=ALL_TEXTURES), "correct")
-    return columns_first(
-        pd.concat([family, overall.assign(p_holm=np.nan)], ignore_index=True),
-        ["texture", "n", "excluded"],
-    )
+    tests = pd.concat([family, overall.assign(p_holm=np.nan)], ignore_index=True)
+    return tests[names(RATE_TEST_COLUMNS)]
+
+
+CORRECT_RATE_COLUMNS = (
+    TEXTURE,
+    MODEL,
+    Column("participants"),
+    Column("trials"),
+    Column("mean"),
+    Column("se", "SE"),
+    *(CI_LOW, CI_HIGH, T, DF, P, NOTE, P_HOLM),
+)
 
 
 def correct_rates(
@@ -68,7 +85,7 @@ def correct_rates(
     DataFrame
         texture, model, participants, trials, mean, se, ci_low, ci_high (95 %, bias-corrected and
         accelerated bootstrap over participants), t, df, p (one-sample t of the participants'
-        rates against chance, two-sided), p_holm (over the textures of one model), note. The rows
+        rates against chance, two-sided), note, p_holm (over the textures of one model). The rows
         `all textures` pool a participant's trials and stand outside the family.
     """
     pooled = relative.assign(texture=ALL_TEXTURES)
@@ -86,7 +103,7 @@ def correct_rates(
             rows.append(family.sort_values("texture", key=ignoring_case))
     if not rows:
         raise InputError("expected answers of the forced choice, got none; run a session first.")
-    return columns_first(pd.concat(rows, ignore_index=True), ["texture", "model"])
+    return pd.concat(rows, ignore_index=True)[names(CORRECT_RATE_COLUMNS)]
 
 
 def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from analysis.columns import CONDITIONS, ESTIMATOR, TEXTURE, Column
 from analysis.textures.results import TextureResult
 from modeling import GridError, Recording, Spectrum, TextureModel, similarity
 from modeling.arrays import Floats
@@ -185,6 +186,17 @@ def _squares(measured: Measured, colour: int) -> set[Condition]:
     }
 
 
+MEDIAN_AND_WORST_COLUMNS = (
+    CONDITIONS,
+    Column("median_level_error_db", "level error, median", "dB"),
+    Column("worst_level_error_db", "worst", "dB"),
+    Column("worst_level_error_at", "at", is_name=True),
+    Column("median_distance_db", "distance, median", "dB"),
+    Column("worst_distance_db", "worst", "dB"),
+    Column("worst_distance_at", "at", is_name=True),
+)
+
+
 def median_and_worst(table: pd.DataFrame) -> dict[str, object]:
     """Median and worst of level error (absolute) and distance, with the conditions' names."""
     if not len(table):
@@ -240,6 +252,9 @@ def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.D
     }
 
 
+LEFT_OUT_COLUMNS = (TEXTURE, Column("foretold_by", is_name=True), *MEDIAN_AND_WORST_COLUMNS)
+
+
 def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:
     """Per texture and model: how well conditions are foretold that it was not shown.
 
@@ -256,6 +271,16 @@ def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:
         if len(table)
     ]
     return pd.DataFrame(rows)
+
+
+PLANTED_BETWEEN_COLUMNS = (
+    TEXTURE,
+    ESTIMATOR,
+    Column("distance_at_db", "distance at", "dB"),
+    Column("distance_between_db", "distance between", "dB"),
+    Column("median_level_error_between_db", "level error between, median", "dB"),
+    Column("worst_level_error_between_db", "worst", "dB"),
+)
 
 
 def planted_between_table(results: Sequence[TextureResult]) -> pd.DataFrame:

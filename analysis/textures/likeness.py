@@ -7,8 +7,31 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
+from analysis.columns import CONDITIONS, MODEL, TEXTURE, Column
 from modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
 from modeling.fitting.conditions import recording_spectra
+
+MEASURE_COLUMNS = (
+    Column("gfc30_mean", "GFC30 mean", format=".4f"),
+    Column("gfc30_min", "GFC30 min", format=".4f"),
+    Column("gfc30_floor", "GFC30 floor", format=".4f"),
+    Column("gfc30_ceiling", "GFC30 ceiling", format=".4f"),
+    Column("gfc5_mean", "GFC5 mean", format=".4f"),
+    Column("gfc5_floor", "GFC5 floor", format=".4f"),
+    Column("gfc5_ceiling", "GFC5 ceiling", format=".4f"),
+    Column("log_spectral_distance_db", "log-spectral distance", "dB"),
+    Column("rms_error_db", "RMS error", "dB"),
+    Column("band_energy_error_db", "band energy error", "dB"),
+    Column("oracle_gap", format=".4f"),
+)
+GFC_COLUMNS = (
+    TEXTURE,
+    MODEL,
+    Column("layers"),
+    Column("parameters"),
+    CONDITIONS,
+    *MEASURE_COLUMNS,
+)
 
 
 def gfc_table(

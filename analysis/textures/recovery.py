@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column
 from analysis.labels import ALL_LAYERS
 from modeling import InputError, TextureModel
 from modeling.arrays import Floats
@@ -65,6 +66,20 @@ class _Pairing:
     nearest: Integers
 
 
+PLANTED_TRUTH_COLUMNS = (
+    TEXTURE,
+    ESTIMATOR,
+    LAYER,
+    Column("precision"),
+    Column("recall"),
+    Column("median_frequency_error_hz", "median frequency error", "Hz"),
+    Column("median_bandwidth_ratio"),
+    Column("median_level_error_db", "level error, median", "dB"),
+    Column("median_absolute_level_error_db", "median absolute level error", "dB"),
+    Column("median_noise_gain_error_db", "median noise gain error", "dB"),
+)
+
+
 def planted_truth_table(truth: TextureModel, estimates: Sequence[TextureModel]) -> pd.DataFrame:
     """Precision, recall and parameter errors of estimated models against the planted one.
 
@@ -107,6 +122,19 @@ def planted_truth_table(truth: TextureModel, estimates: Sequence[TextureModel]) 
             }
             rows.append(labels | scores)
     return pd.DataFrame(rows)
+
+
+PLANTED_LAYER_COLUMNS = (
+    TEXTURE,
+    ESTIMATOR,
+    LAYER,
+    Column("true_frequency_hz", "true frequency", "Hz"),
+    Column("estimated_frequency_hz", "estimated frequency", "Hz"),
+    Column("true_bandwidth_hz", "true bandwidth", "Hz"),
+    Column("estimated_bandwidth_hz", "estimated bandwidth", "Hz"),
+    Column("true_gain"),
+    Column("estimated_gain"),
+)
 
 
 def planted_layers_table(

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.labels import ALL_TEXTURES, LEVELS
-from analysis.textures.likeness import likeness_table
+from analysis.columns import CONDITIONS, SIMULATED, TEXTURE, Column, P
+from analysis.labels import ALL_TEXTURES, significance_mark
+from analysis.textures.likeness import MEASURE_COLUMNS, likeness_table
 from analysis.textures.results import TextureResult
 from modeling import RegressedModel, TextureModel, regressed
 from modeling.arrays import Floats
@@ -36,6 +37,7 @@ NAMES = dict(
     )
 )
 SYMBOLS = {SPEED: "v", FORCE: "F", SPEED_FORCE: "v·F"}
+ALPHAS = {SPEED: "α1", FORCE: "α2", SPEED_FORCE: "α3"}
 PER = {SPEED: "mm/s", FORCE: "N", SPEED_FORCE: "(mm/s·N)"}
 NO_PEAK, ALL_PEAKS = "–", "all peaks"
 # PAPER table 2 (α1, α2, α3 in the order of `TERMS`) and section IV-B.
@@ -63,6 +65,37 @@ MN_PER_N = 1000.0
 GRID = "grid"
 DRIVERS: tuple[DrivenBy, ...] = ("conditions", "centroid")
 
+PARAMETER = Column("parameter", is_name=True)
+PEAK, UNIT, MARK = Column("peak"), Column("unit"), Column("mark")
+ADJUSTED_R_SQUARED = Column("adjusted_r_squared", "adjusted R²")
+FIT_COLUMNS = (
+    Column("multiple_r", "R"),
+    ADJUSTED_R_SQUARED,
+    P,
+    MARK,
+    Column("residual_degrees"),
+    Column("intercept"),
+    Column("p_intercept", "p of intercept", is_p_value=True),
+    *(
+        column
+        for term, alpha in ALPHAS.items()
+        for column in (
+            Column(f"{term}_coefficient", f"{alpha} ({SYMBOLS[term]})"),
+            Column(f"p_{term}", f"p of {alpha}", is_p_value=True),
+            Column(f"mark_{term}", f"mark of {alpha}"),
+        )
+    ),
+)
+REGRESSION_COLUMNS = (
+    *(TEXTURE, PARAMETER, PEAK, UNIT, CONDITIONS),
+    Column("inherited"),
+    Column("own_peak"),
+    *FIT_COLUMNS,
+    Column("reduced", is_name=True),
+    Column("reduced_adjusted_r_squared", "adjusted R², reduced"),
+    SIMULATED,
+)
+
 
 def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
     """Every regression of every parameter (PAPER table 1).
@@ -77,13 +110,13 @@ def regression_table(models: Sequence[TextureModel]) -> pd.DataFrame:
     DataFrame
         Per texture one row for the noise gain and three per peak: texture, parameter, peak
         (1-based), unit, conditions (that the regression rests on), inherited (conditions left
-        out because the frequency there is a copy), multiple_r, adjusted_r_squared, p (F test),
-        mark (* p < .05, ** p < .01, *** p < .001), residual_degrees (of freedom), own_peak (false
-        of a layer without a maximum of the response, which takes no part in support ratings),
-        intercept, p_intercept, and for speed, force
-        and speed_force the coefficient (…_coefficient; per mm/s, N and mm/s·N), p (p_…) and mark
-        (mark_…); reduced: the terms that backward elimination leaves, reduced_adjusted_r_squared;
-        simulated. What cannot be said is NaN (see `modeling.regression.least_squares.Regression`).
+        out because the frequency there is a copy), own_peak (false of a layer without a maximum of
+        the response, which takes no part in support ratings), multiple_r, adjusted_r_squared, p
+        (F test), mark (* p < .05, ** p < .01, *** p < .001), residual_degrees (of freedom),
+        intercept, p_intercept, and for speed, force and speed_force the coefficient
+        (…_coefficient; per mm/s, N and mm/s·N), p (p_…) and mark (mark_…); reduced: the
+        terms that backward elimination leaves, reduced_adjusted_r_squared; simulated. What cannot
+        be said is NaN (see `modeling.regression.least_squares.Regression`).
     """
     rows = []
     for model in models:
@@ -131,9 +164,17 @@ def _reduced(found: ParameterRegression) -> dict[str, object]:
     }
 
 
-def significance_mark(p: float) -> str:
-    """*, ** or *** below .05, .01 and .001; nothing else, and nothing for NaN."""
-    return next((mark for level, mark in LEVELS if p < level), "")
+SUPPORT_COLUMNS = (
+    PARAMETER,
+    Column("of"),
+    *(Column(f"support_{term}", f"support {alpha}", "%") for term, alpha in ALPHAS.items()),
+    *(
+        Column(f"published_support_{term}", f"published {alpha}", "%")
+        for term, alpha in ALPHAS.items()
+    ),
+    ADJUSTED_R_SQUARED,
+    Column("published_adjusted_r_squared", "published"),
+)
 
 
 def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
@@ -170,6 +211,17 @@ def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+COEFFICIENT_COLUMNS = (
+    PARAMETER,
+    Column("coefficient", is_name=True),
+    UNIT,
+    Column("mean"),
+    Column("mean_significant", "mean of significant ones"),
+    Column("published"),
+    Column("published_for_n", "published, taken as per N"),
+)
+
+
 def coefficient_table(regressions: pd.DataFrame) -> pd.DataFrame:
     """Mean coefficients beside the published ones (PAPER table 2, right half).
 
@@ -197,7 +249,7 @@ def coefficient_table(regressions: pd.DataFrame) -> pd.DataFrame:
             rows.append(
                 {
                     "parameter": NAMES[parameter].removesuffix(" (Hz)"),
-                    "coefficient": f"α{number + 1} ({SYMBOLS[term]})",
+                    "coefficient": f"{ALPHAS[term]} ({SYMBOLS[term]})",
                     "unit": f"{' or '.join(units)} per {PER[term]}",
                     "mean": values.mean() if len(units) == 1 else np.nan,
                     "mean_significant": significant.mean() if len(units) == 1 else np.nan,
@@ -208,14 +260,31 @@ def coefficient_table(regressions: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+AMPLITUDE_R = Column("amplitude_r", "r with amplitude")
+P_AMPLITUDE = Column("p_amplitude", "p", is_p_value=True)
+CENTROID_COLUMNS = (
+    TEXTURE,
+    Column("mean_centroid_hz", "mean", "Hz"),
+    CONDITIONS,
+    *FIT_COLUMNS,
+    Column("slope_speed_alone", "slope on speed alone", "Hz per mm/s"),
+    Column("p_speed_alone", "p", is_p_value=True),
+    Column("mark_speed_alone", "mark"),
+    AMPLITUDE_R,
+    P_AMPLITUDE,
+    Column("mark_amplitude", "mark"),
+    SIMULATED,
+)
+
+
 def centroid_table(models: Sequence[TextureModel]) -> pd.DataFrame:
     """The spectral centroid's regressions and its correlation with amplitude (eq. 4, PAPER IV-C).
 
     Returns
     -------
     DataFrame
-        One row per texture with a layer: texture, mean_centroid_hz, the regression on speed, force
-        and their product as in `regression_table`, slope_speed_alone (Hz per mm/s) and
+        One row per texture with a layer: texture, mean_centroid_hz, conditions, the regression on
+        speed, force and their product as in `regression_table`, slope_speed_alone (Hz per mm/s) and
         p_speed_alone with mark_speed_alone, amplitude_r (Pearson, with √ΣG²), p_amplitude,
         mark_amplitude, simulated.
     """
@@ -242,6 +311,9 @@ def centroid_table(models: Sequence[TextureModel]) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+CENTROID_AMPLITUDE_COLUMNS = (TEXTURE, PEAK, AMPLITUDE_R, P_AMPLITUDE, MARK, CONDITIONS, SIMULATED)
 
 
 def centroid_amplitude_table(models: Sequence[TextureModel]) -> pd.DataFrame:
@@ -316,6 +388,15 @@ def centroid_courses(models: Sequence[TextureModel]) -> tuple[CentroidCourse, ..
             )
         )
     return tuple(courses)
+
+
+DRIVING_COLUMNS = (
+    TEXTURE,
+    Column("driven_by", is_name=True),
+    Column("numbers"),
+    CONDITIONS,
+    *MEASURE_COLUMNS,
+)
 
 
 def driving_table(results: Sequence[TextureResult], *, rng: np.random.Generator) -> pd.DataFrame:

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, fields
 import numpy as np
 import pandas as pd
 
+from analysis.columns import LAYER, SIMULATED, TEXTURE, Column
 from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
 from modeling.fitting.conditions import recording_spectra
 
@@ -70,6 +71,22 @@ class TextureResult:
         return spectra[0][1]
 
 
+VERDICT_COLUMNS = (
+    TEXTURE,
+    LAYER,
+    Column("verdict", is_name=True),
+    Column("reason"),
+    Column("worst_speed_mm_s", "worst speed", "mm/s", format="g"),
+    Column("worst_force_n", "worst force", "N", format="g"),
+    Column("worst_frequency_hz", "worst frequency", "Hz"),
+    Column("distance_db", "distance", "dB"),
+    Column("flip_probability", is_p_value=True),
+    Column("assumed"),
+    Column("fills"),
+    SIMULATED,
+)
+
+
 def simplification_table(simplification: Simplification) -> pd.DataFrame:
     """The verdict on every layer and its reason (METHOD 7).
 
@@ -78,7 +95,8 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     DataFrame
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
         worst_frequency_hz (the condition where the layer stands highest against the threshold),
-        distance_db (to the threshold there, + above), flip_probability (0–1), simulated.
+        distance_db (to the threshold there, + above), flip_probability (0–1), assumed and fills
+        (as in `modeling.LayerVerdict`), simulated.
     """
     columns = [each.name for each in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)

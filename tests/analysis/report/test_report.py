@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 
 from analysis.answers.loading import Responses
-from analysis.report.page import cell, label
 from analysis.report.report import write_report
 from analysis.textures.results import TextureResult
 from modeling import InputError, RecordingSet, Threshold, simplify
@@ -276,32 +275,3 @@ def test_nothing_to_report_is_refused(tmp_path, ratings, choices):
     with pytest.raises(InputError, match="got neither"):
         write_report(tmp_path / "report.html", responses=nothing)
     assert not (tmp_path / "report.html").exists()
-
-
-@pytest.mark.parametrize(
-    ("column", "value", "text"),
-    [
-        ("p", 0.0004, "< .001"),
-        ("p_holm", 0.04, ".040"),
-        ("p", 1.0, "1.000"),
-        ("t", -3.14159, "−3.14"),
-        ("mean_full", 56.44, "56.4"),
-        ("true_frequency_hz", 1234.5, "1234"),
-        ("true_gain", 0.00012, "1.2e−04"),
-        ("gfc30_mean", 0.98765, "0.9877"),
-        ("worst_speed_mm_s", 350.0, "350"),
-        ("d_z", np.nan, "n/a"),
-        ("df", 19, "19"),
-        ("texture", "wall paper", "wall paper"),
-    ],
-)
-def test_cells_are_readable(column, value, text):
-    assert cell(column, value) == text
-
-
-def test_columns_have_units():
-    assert label("worst_speed_mm_s") == "worst speed (mm/s)"
-    assert label("worst_force_n") == "worst force (N)"
-    assert label("median_frequency_error_hz") == "median frequency error (Hz)"
-    assert label("distance_db") == "distance (dB)"
-    assert label("p_holm") == "p (Holm)"

@@ -19,7 +19,6 @@ from analysis.textures.regressions import (
     coefficient_table,
     driving_table,
     regression_table,
-    significance_mark,
     support_table,
 )
 from analysis.textures.results import TextureResult
@@ -171,15 +170,6 @@ def test_a_two_by_two_grid_supports_nothing_and_denies_nothing(results) -> None:
     for term in ("speed", "force", "speed_force"):
         assert table[f"support_{term}"].isna().all()
     assert (table["of"] == 0).all()
-
-
-@pytest.mark.parametrize(
-    ("p", "mark"),
-    [(0.0, "***"), (0.00099, "***"), (0.001, "**"), (0.01, "*"), (0.049, "*"), (0.05, "")],
-)
-def test_marks(p: float, mark: str) -> None:
-    assert significance_mark(p) == mark
-    assert significance_mark(np.nan) == ""
 
 
 def test_the_centroid_of_one_layer_is_its_frequency(models) -> None:

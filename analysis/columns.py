@@ -1,0 +1,106 @@
+"""What a column of a table holds, declared beside the function that computes it.
+
+A declaration lists a table's columns in their order. The report shows all or some of them, in the
+words and with the digits that they carry.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column: its name in the file, and how people read it.
+
+    Parameters
+    ----------
+    name : str
+    label : str
+        What stands above it, without the unit; where empty, the name in words.
+    unit : str
+        Empty where the values have none, or different ones.
+    format : str
+        Format specification of its numbers; where empty, about three significant digits.
+    is_p_value : bool
+        Its numbers are written as p values.
+    is_name : bool
+        Its values are names, which stay on one line.
+    total : str
+        The value that marks a row over all others; empty where there is none.
+    """
+
+    name: str
+    label: str = ""
+    unit: str = ""
+    format: str = ""
+    is_p_value: bool = False
+    is_name: bool = False
+    total: str = ""
+
+    @property
+    def heading(self) -> str:
+        """Label with unit: `worst speed (mm/s)`."""
+        label = self.label or self.name.replace("_", " ")
+        return f"{label} ({self.unit})" if self.unit else label
+
+    def text(self, value: object) -> str:
+        """A value as people read it, `n/a` where there is none; the exact one is in the file."""
+        if not isinstance(value, float):
+            return str(value)
+        if math.isnan(value):
+            return "n/a"
+        if self.is_p_value:
+            return p_value(value)
+        return f"{value:{self.format}}" if self.format else _three_digits(value)
+
+    def is_total(self, value: object) -> bool:
+        """Whether this value marks a row over all others."""
+        return bool(self.total) and value == self.total
+
+
+Columns = tuple[Column, ...]
+
+
+def names(columns: Sequence[Column]) -> list[str]:
+    """Their names, in order."""
+    return [column.name for column in columns]
+
+
+def chosen(columns: Sequence[Column], *which: str) -> Columns:
+    """The columns of these names, in the order of the names; each must be declared."""
+    by_name = {column.name: column for column in columns}
+    return tuple(by_name[name] for name in which)
+
+
+def without(columns: Sequence[Column], *which: str) -> Columns:
+    """All but the columns of these names, each of which must be declared."""
+    out = chosen(columns, *which)
+    return tuple(column for column in columns if column not in out)
+
+
+def p_value(p: float) -> str:
+    """A probability with three decimals, `< .001` below."""
+    return "< .001" if p < 0.001 else f"{p:.3f}".replace("0.", ".", 1)
+
+
+def _three_digits(value: float) -> str:
+    size = abs(value)
+    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
+    # Below 1e-12 is what sums of thirds leave of a zero.
+    tiny = 1e-12 < size < 0.0005
+    return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
+
+
+# Columns of more than one table.
+TEXTURE = Column("texture", is_name=True, total=ALL_TEXTURES)
+MODEL = Column("model", is_name=True)
+ESTIMATOR = Column("estimator", is_name=True)
+LAYER = Column("layer", is_name=True, total=ALL_LAYERS)
+CONDITIONS = Column("conditions")
+P = Column("p", is_p_value=True)
+SIMULATED = Column("simulated")

@@ -1,0 +1,197 @@
+"""The report's tables: declared where they are computed, and the page knows none of them."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import analysis.report.page
+from analysis.answers.loading import Responses
+from analysis.columns import TEXTURE, Column, Columns, chosen, names, without
+from analysis.labels import ALL_TEXTURES
+from analysis.report.page import Fold, Item, Table, table_html
+from analysis.report.report import PROVENANCE_COLUMNS
+from analysis.report.section_answers import choice_section, rating_section
+from analysis.report.section_models import model_section
+from analysis.report.section_parameters import parameter_section
+from analysis.report.section_planted import planted_section
+from analysis.statistics.confusion import CONFUSION_COLUMNS
+from analysis.statistics.paired import RATING_TEST_COLUMNS
+from analysis.statistics.rates import CORRECT_RATE_COLUMNS, RATE_TEST_COLUMNS
+from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
+from analysis.textures.likeness import GFC_COLUMNS
+from analysis.textures.recovery import PLANTED_LAYER_COLUMNS, PLANTED_TRUTH_COLUMNS
+from analysis.textures.regressions import (
+    CENTROID_AMPLITUDE_COLUMNS,
+    CENTROID_COLUMNS,
+    COEFFICIENT_COLUMNS,
+    DRIVING_COLUMNS,
+    REGRESSION_COLUMNS,
+    SUPPORT_COLUMNS,
+)
+from analysis.textures.results import VERDICT_COLUMNS
+
+PAGE = Path(analysis.report.page.__file__)
+DECLARED = {
+    "rating_tests": RATING_TEST_COLUMNS,
+    "rate_tests": RATE_TEST_COLUMNS,
+    "correct_rates": CORRECT_RATE_COLUMNS,
+    "confusion": CONFUSION_COLUMNS,
+    "gfc": GFC_COLUMNS,
+    "left_out": LEFT_OUT_COLUMNS,
+    "verdicts": VERDICT_COLUMNS,
+    "regressions": REGRESSION_COLUMNS,
+    "regression_support": SUPPORT_COLUMNS,
+    "regression_coefficients": COEFFICIENT_COLUMNS,
+    "centroid": CENTROID_COLUMNS,
+    "centroid_amplitude": CENTROID_AMPLITUDE_COLUMNS,
+    "driving": DRIVING_COLUMNS,
+    "planted_truth": PLANTED_TRUTH_COLUMNS,
+    "planted_overall": without(PLANTED_TRUTH_COLUMNS, "layer"),
+    "planted_layers": PLANTED_LAYER_COLUMNS,
+    "planted_between": PLANTED_BETWEEN_COLUMNS,
+    "provenance": PROVENANCE_COLUMNS,
+}
+EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
+
+
+def kind(table: Table) -> str:
+    """The declaration that a table's name stands for: there is one per texture or per model."""
+    return re.sub(r"^(verdicts|confusion)_.*", r"\1", table.name)
+
+
+def tables_in(items: Iterable[Item]) -> list[Table]:
+    found = []
+    for item in items:
+        if isinstance(item, Fold):
+            found += tables_in(item.items)
+        elif isinstance(item, Table):
+            found.append(item)
+    return found
+
+
+@pytest.fixture(scope="module")
+def tables(results, ratings, choices) -> list[Table]:
+    """All tables of a report but its provenance."""
+    responses = Responses(
+        {"absolute": ratings, "relative": choices},
+        simulated_participants=True,
+        simulated_rig=True,
+    )
+    foretold = pd.DataFrame(
+        [(200.0, 1.0, -0.5, 1.5)],
+        columns=["speed_mm_s", "force_n", "level_error_db", "log_spectral_distance_db"],
+    )
+    textures = [replace(results[0], left_out={"joint": foretold}), *results[1:]]
+    sections = (
+        model_section(textures, rng=np.random.default_rng(1), progress=lambda share, what: None),
+        parameter_section(
+            textures, rng=np.random.default_rng(1), progress=lambda share, what: None
+        ),
+        rating_section(responses),
+        choice_section(responses, rng=np.random.default_rng(1)),
+        planted_section(textures),
+    )
+    return [table for section in sections for table in tables_in(section.items)]
+
+
+def test_no_table_is_without_a_declaration(tables: list[Table]) -> None:
+    assert {kind(table) for table in tables} | {"provenance"} == set(DECLARED)
+
+
+def test_tables_have_the_columns_that_are_declared(tables: list[Table]) -> None:
+    for table in tables:
+        assert list(table.frame) == names(DECLARED[kind(table)]), table.name
+
+
+def test_what_is_shown_is_declared(tables: list[Table]) -> None:
+    for table in tables:
+        assert set(table.columns) <= set(DECLARED[kind(table)]), table.name
+        assert len(set(table.columns)) == len(table.columns), table.name
+
+
+def test_p_values_are_flagged() -> None:
+    probabilities = {c.name for c in EVERY_COLUMN if re.search(r"^p(_|$)|_p$|probability", c.name)}
+    assert {column.name for column in EVERY_COLUMN if column.is_p_value} == probabilities
+    assert {"p", "p_holm", "wilcoxon_p", "p_speed_alone", "flip_probability"} <= probabilities
+
+
+def test_units_are_those_that_names_end_with() -> None:
+    units = {"_db": "dB", "_hz": "Hz", "_mm_s": "mm/s", "_force_n": "N"}
+    for ending, unit in units.items():
+        columns = [column for column in EVERY_COLUMN if column.name.endswith(ending)]
+        assert columns
+        for column in columns:
+            assert column.unit == unit, column.name
+            assert column.heading.endswith(f" ({unit})"), column.name
+
+
+def shown(frame: pd.DataFrame, columns: Columns) -> str:
+    return table_html(Table("t", "Title", "Note.", frame, columns, simulated=False))
+
+
+def test_a_table_is_shown_as_its_columns_say() -> None:
+    columns = (
+        Column("p", is_p_value=True),
+        TEXTURE,
+        Column("distance_db", "distance", "dB"),
+        Column("note"),
+    )
+    frame = pd.DataFrame(
+        {
+            "texture": ["<canvas>", ALL_TEXTURES],
+            "distance_db": [-12.345, np.nan],
+            "p": [0.0004, 0.04],
+            "unshown": [1, 2],
+            "note": ["", ""],
+        }
+    )
+    html = shown(frame, columns)
+    headings = re.findall(r"<th ([^>]*)>(.*?)</th>", html)
+    assert headings == [
+        ('class="number"', "p"),
+        ('class="name"', "texture"),
+        ('class="number"', "distance (dB)"),
+    ]
+    rows = re.findall(r"<tr( class=\"total\")?>(<td.*?)</tr>", html)
+    cells = [(bool(total), *re.findall(r"<td [^>]*>(.*?)</td>", row)) for total, row in rows]
+    assert cells == [
+        (False, "&lt; .001", "&lt;canvas&gt;", "−12.3"),
+        (True, ".040", ALL_TEXTURES, "n/a"),
+    ]
+
+
+def test_a_note_that_somebody_wrote_is_shown() -> None:
+    frame = pd.DataFrame({"note": ["", "t undefined"]})
+    assert "<td >t undefined</td>" in shown(frame, (Column("note"),))
+    assert "<th >note</th>" in shown(frame.iloc[:0], (Column("note"),))
+
+
+def test_a_column_that_is_not_in_the_table_is_refused() -> None:
+    with pytest.raises(KeyError):
+        shown(pd.DataFrame({"p": [0.5]}), chosen(DECLARED["gfc"], "gfc30_mean"))
+
+
+def test_the_page_names_no_column() -> None:
+    source = PAGE.read_text(encoding="utf-8")
+    nodes = list(ast.walk(ast.parse(source)))
+    texts = {node.value for node in nodes if isinstance(node, ast.Constant)}
+    every = {column.name for column in EVERY_COLUMN}
+    assert not every & texts
+    # Words such as `note` and `value` have their own meaning on the page; these have not.
+    assert not {name for name in every if "_" in name and re.search(rf"\b{name}\b", source)}
+
+
+def test_the_page_knows_of_analysis_only_what_a_column_is() -> None:
+    tree = ast.parse(PAGE.read_text(encoding="utf-8"))
+    modules = {node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)}
+    assert {name for name in modules if name and name.startswith("analysis")} == {
+        "analysis.columns"
+    }
