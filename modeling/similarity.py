@@ -1,4 +1,4 @@
-"""How alike two spectra are (eq. 6, METHOD 8)."""
+"""How alike two spectra are (eq. 6, docs/method/similarity.md)."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def report(
     *,
     rng: np.random.Generator | None = None,
 ) -> SimilarityReport:
-    """All measures of METHOD 8 for one condition, over 10 Hz … 0.98 of the Nyquist frequency.
+    """All measures of docs/method/similarity.md for one condition, 10 Hz … 0.98 of Nyquist.
 
     Parameters
     ----------

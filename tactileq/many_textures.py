@@ -55,7 +55,7 @@ class HowToModel:
     layers : int, optional
         Their number; chosen without it.
     keep_hum, check, alone, plot : bool
-        Leave hum of the mains in; leave conditions out and foretell them; find the layers of each
+        Leave mains hum in; leave conditions out and predict them; find the layers of each
         recording by itself; draw pictures.
     """
 
@@ -166,7 +166,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
 
 
 def _mended(found: Findings) -> list[str]:
-    """One sentence for each thing that was found and mended in recordings, and for silent ones."""
+    """One sentence for each thing that was corrected in recordings, and for silent ones."""
     by_note: dict[str, list[str]] = {}
     for recording, spectrum in found.measured:
         notes = spectrum.notes if spectrum.magnitude.any() else ("silent: left out",)
@@ -207,7 +207,7 @@ def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
     conditions, unknown = model.noise_gains.size, int(model.not_identifiable.any(axis=2).sum())
     lines.append(
         f"{name}{simulated_note(model)}: {model.n_layers} layers{filled * bool(filling)}, "
-        f"{model.n_parameters} numbers per condition; some layer's frequency is told by other "
+        f"{model.n_parameters} numbers per condition; some layer's frequency is given by other "
         f"conditions in {int(model.inherited.any(axis=2).sum())}, its width or level not resolved "
         f"in {int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
         f"{conditions} conditions: {start}.json"
@@ -215,7 +215,7 @@ def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
     lines.append(f"{name}: layers over the grid in {start}_layers.tsv")
     lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
     if found.left_out is not None:
-        lines.append(f"{name}: conditions left out and foretold: {sentence(found.left_out)}")
+        lines.append(f"{name}: conditions left out and predicted: {sentence(found.left_out)}")
     for axis, unit in ((model.speeds_mm_s, "mm/s"), (model.forces_n, "N")):
         if axis.size == 1:
             other = "speeds" if unit == "mm/s" else "forces"

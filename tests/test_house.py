@@ -60,9 +60,40 @@ def test_the_lines_of_the_readme_end_in_a_figure(
     assert (tmp_path / "polyester.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize("name", ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md"])
-def test_pages_have_no_gaps_and_point_at_files_that_exist(name: str) -> None:
+PAGES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"))
+)
+
+
+def anchors_of(page: Path) -> set[str]:
+    """Anchors of a page's headings, by the rule of the sites that show it."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    plain = (re.sub(r"[^\w\- ]", "", heading.lower()) for heading in headings)
+    return {words.replace(" ", "-") for words in plain}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_have_no_gaps_and_point_at_what_exists(name: str) -> None:
     text = (ROOT / name).read_text(encoding="utf-8")
     assert not re.search(r"@[A-Z]+@", text)
-    for target in re.findall(r"\]\(([^)#:]+)\)", text):
-        assert (ROOT / target).exists(), target
+    for target, anchor in re.findall(r"\]\(([^)#: ]*)#?([^): ]*)\)", text):
+        page = (ROOT / name).parent / target if target else ROOT / name
+        assert page.exists(), target
+        assert not anchor or anchor in anchors_of(page), f"{target}#{anchor}"
+
+
+def test_every_cited_page_and_anchor_of_the_method_exists() -> None:
+    cited: set[str] = set()
+    rooms = ("modeling", "stimuli", "rig", "experiments", "analysis", "tactileq", "tests", "docs")
+    for path in (p for room in rooms for p in (ROOT / room).rglob("*.*")):
+        if path.suffix in (".py", ".h", ".c", ".toml"):
+            text = path.read_text(encoding="utf-8")
+            cited |= set(re.findall(r"docs/method[\w./#-]*\w", text))
+            # Sections of a page that no longer exists.
+            assert not re.search(r"\bMETHOD [0-9]", text), path
+    assert len(cited) > 50
+    for citation in cited:
+        page, _, anchor = citation.partition("#")
+        assert (ROOT / page).exists(), citation
+        assert not anchor or anchor in anchors_of(ROOT / page), citation

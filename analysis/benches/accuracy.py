@@ -66,7 +66,9 @@ def reading_rows(model: TextureModel) -> list[dict[str, object]]:
 
 
 def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) -> Parameters:
-    """The parameters that a renderer at the model's rate applies at each sample (METHOD 9).
+    """The parameters that a renderer at the model's rate applies at each sample.
+
+    docs/method/rendering.md#moving-parameters
 
     Frequencies and widths are held from update to update; gains move.
     """

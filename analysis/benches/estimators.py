@@ -1,4 +1,7 @@
-"""A bench: estimators and their rival on random spectra whose layers are known (METHOD 4)."""
+"""A bench: estimators and their rival on random spectra whose layers are known.
+
+What estimators do: docs/method/estimation.md.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +54,8 @@ def estimators_table(*, textures: int, seed: int) -> pd.DataFrame:
     -------
     DataFrame
         One row per kind (and for all together) and estimator: kind, estimator, textures; gfc30,
-        ceiling_gfc30, oracle_gap and log_spectral_distance_db (means of METHOD 8); rms_error_db
+        ceiling_gfc30, oracle_gap and log_spectral_distance_db (means; docs/method/similarity.md);
+        rms_error_db
         (mean) and median_absolute_rms_error_db, both of the record; precision and recall (of all
         layers, matched one to one within max(B/2, 10 Hz)) and layers_per_true_layer;
         level_error_db and median_absolute_level_error_db (medians over matched layers: of the gain

@@ -1,4 +1,7 @@
-"""A bench: what rendering costs, beside what its users would run otherwise (METHOD 3, 4 and 9)."""
+"""A bench: what rendering costs, beside what its users would run otherwise.
+
+What came out: docs/method/rendering.md#cost.
+"""
 
 from __future__ import annotations
 

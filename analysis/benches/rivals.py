@@ -226,7 +226,10 @@ class SosfiltStream:
         return output
 
     def _at(self, speed: float, force: float) -> Floats:
-        """Noise gain, frequencies, bandwidths and gains for this hand (METHOD 9)."""
+        """Noise gain, frequencies, bandwidths and gains for this hand.
+
+        docs/method/rendering.md#grid-edges
+        """
         ramp = min(speed / self._speeds[0], 1.0) * min(max(force / self._forces[0], 0.0), 1.0)
         i, x = _cell(self._speeds, speed)
         j, y = _cell(self._forces, force)

@@ -53,7 +53,7 @@ class Form(Protocol):
 def unit_covariance_form(
     frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float
 ) -> StateEquations:
-    """The kernel's own coefficients (METHOD 3)."""
+    """The kernel's own coefficients (docs/method/equalizer.md#recursion)."""
     c = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=rate_hz)
     return StateEquations(
         _matrix(1 + c.p, -c.q, c.q, 1 + c.r),
@@ -204,13 +204,13 @@ def simulate(at: Parameters, form: Form, noise: Floats, *, rate_hz: float) -> Fl
     return output
 
 
-# --- Motions of METHOD 3
+# --- Motions of docs/method/equalizer.md#stability
 
 
 def motions(
     rng: np.random.Generator, *, rate_hz: float = RATE_HZ, samples: int = SAMPLES
 ) -> dict[str, Parameters]:
-    """The trajectories of METHOD 3 by name: parameters at each of n samples.
+    """The trajectories of docs/method/equalizer.md#stability by name: parameters at each sample.
 
     Strokes are those of a planted texture. All others move three bands of equal level and
     alternating sign over a floor 10 dB below each of them.

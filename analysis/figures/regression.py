@@ -16,10 +16,10 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.textures.regressions import CentroidCourse
+from analysis.textures.regressions import CentroidOverSpeed
 
 
-def figure_centroid(courses: Sequence[CentroidCourse]) -> Figure:
+def figure_centroid(courses: Sequence[CentroidOverSpeed]) -> Figure:
     """Spectral centroid over speed, one line per texture, with its regression (PAPER fig. 5)."""
     figure = Figure(figsize=(8.6, 5), layout="constrained")
     ax = figure.subplots()
@@ -33,7 +33,7 @@ def figure_centroid(courses: Sequence[CentroidCourse]) -> Figure:
     return figure
 
 
-def plot_centroid(courses: Sequence[CentroidCourse], *, ax: Axes | None = None) -> Axes:
+def plot_centroid(courses: Sequence[CentroidOverSpeed], *, ax: Axes | None = None) -> Axes:
     """Mean over the forces with its standard deviation, and the regression on speed."""
     ax = axes_or_new(ax)
     for number, course in enumerate(courses):

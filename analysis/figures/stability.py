@@ -69,7 +69,7 @@ def plot_excess_ranges(table: pd.DataFrame, *, of: str, ax: Axes) -> Axes:
     return ax
 
 
-def plot_excess_course(courses: Mapping[str, Floats], *, rate_hz: float, ax: Axes) -> Axes:
+def plot_excess_over_time(courses: Mapping[str, Floats], *, rate_hz: float, ax: Axes) -> Axes:
     """One band's excess (n,) in dB over time, a line per form, the first one on top."""
     for form, course in reversed(list(courses.items())):
         time_ms = np.arange(course.size) / rate_hz * 1e3
@@ -86,10 +86,10 @@ def figure_stability(
 ) -> Figure:
     """Ranges for bands and for sums over all motions, and one band over time in one of them."""
     figure = Figure(figsize=(10, 7.5), layout="constrained")
-    axes = figure.subplot_mosaic([["band", "sum"], ["course", "course"]])
+    axes = figure.subplot_mosaic([["band", "sum"], ["time", "time"]])
     plot_excess_ranges(table, of="band", ax=axes["band"])
     plot_excess_ranges(table, of="sum", ax=axes["sum"]).tick_params(labelleft=False)
-    plot_excess_course(courses, rate_hz=rate_hz, ax=axes["course"]).set_title(motion, fontsize=10)
+    plot_excess_over_time(courses, rate_hz=rate_hz, ax=axes["time"]).set_title(motion, fontsize=10)
     shared_legend(figure, [axes["band"]], loc="outside lower center", ncols=3)
     figure.suptitle(
         "Simulated: how much louder or softer than they should be filters are while their\n"

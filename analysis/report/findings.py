@@ -43,7 +43,7 @@ class Findings:
         Level error and distance of the model to its recordings (`textures.between`); empty
         without a model.
     left_out : DataFrame, optional
-        The same of conditions that were left out and foretold, where that was asked for.
+        The same of conditions that were left out and predicted, where that was asked for.
     """
 
     texture: str
@@ -76,7 +76,7 @@ def find_in(
     keep_hum : bool
         As in `modeling.fitting.conditions.recording_spectra`.
     check : bool
-        Also leave conditions out and foretell them.
+        Also leave conditions out and predict them.
     alone : bool
         Also find the layers of each recording by itself.
 

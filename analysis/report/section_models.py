@@ -8,14 +8,14 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import chosen, without
-from analysis.figures.layer_courses import figure_layer_courses
+from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import left_out_outcomes, simplification_outcomes
 from analysis.spectra.comparison import compare_spectra
-from analysis.spectra.layers_over_grid import layer_course
+from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
 from analysis.textures.likeness import GFC_COLUMNS, gfc_table
 from analysis.textures.results import (
@@ -67,11 +67,11 @@ def model_section(
         any(result.simulated for result in textures),
     )
     left_out = left_out_summary(textures)
-    foretold = _left_out_items(left_out, simulated=any(r.simulated for r in textures))
+    predicted = _left_out_items(left_out, simulated=any(r.simulated for r in textures))
     return Section(
         "models",
         "Models and their simplification",
-        (table, *foretold, *folds),
+        (table, *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
             *left_out_outcomes(left_out),
@@ -86,9 +86,9 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
         return ()
     table = Table(
         "left_out",
-        "Conditions foretold that the model was not shown",
+        "Conditions predicted that the model was not shown",
         "A hand is hardly ever at a recorded condition. Every second condition was left out and "
-        "foretold from its neighbours, by the model and by an autoregressive one. Level error "
+        "predicted from its neighbours, by the model and by an autoregressive one. Level error "
         "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) to the "
         "recording that was left out, whose own scatter is in them.",
         summary,
@@ -135,7 +135,7 @@ def _texture_fold(result: TextureResult, *, number: int) -> Fold:
         f"{result.texture}: verdict on each layer",
         "Distance to the threshold in the condition where the layer stands highest against it "
         "(+ above); flip probability: chance that the level's sampling error, which the records' "
-        "length leaves, would turn the verdict in other records; whether the estimator would find "
+        "length leaves, would flip the verdict in other records; whether the estimator would find "
         f"the layer again, and its bias, are not in it.{_unresolved_note(result)}",
         simplification_table(result.simplification),
         VERDICTS_SHOWN,
@@ -177,15 +177,15 @@ def _threshold_picture(result: TextureResult, stem: str) -> Picture:
 
 def _course_picture(result: TextureResult, stem: str) -> Picture:
     force_n = reference_condition(result)[1]
-    courses = [layer_course(result.model, force_n=force_n)]
+    courses = [layers_over_speed(result.model, force_n=force_n)]
     note = "Frequency and amplitude of each layer."
     if result.truth is not None and force_n in result.truth.forces_n:
-        courses.append(layer_course(result.truth, force_n=force_n))
+        courses.append(layers_over_speed(result.truth, force_n=force_n))
         note += " Dashed: what was planted."
     return Picture(
         f"layers_{stem}",
         f"{result.texture}: layers over speed at {force_n:g} N",
         note,
-        figure_layer_courses(courses),
+        figure_layers_over_speed(courses),
         result.simulated,
     )

@@ -21,8 +21,8 @@ from analysis.textures.regressions import (
     REGRESSION_COLUMNS,
     SUPPORT_COLUMNS,
     centroid_amplitude_table,
-    centroid_courses,
     centroid_table,
+    centroids_over_speed,
     coefficient_table,
     driving_table,
     regression_table,
@@ -57,7 +57,9 @@ NO_CORRECTION = "The paper corrects for no multiple testing, and neither does th
 def parameter_section(
     textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
 ) -> Section:
-    """Regressions of the full models' parameters, and the models that they drive (METHOD 6).
+    """Regressions of the full models' parameters, and the models that they drive.
+
+    docs/method/regression.md
 
     Parameters
     ----------
@@ -132,7 +134,7 @@ def _parameter_tables(
 
 def _centroid_items(models: Sequence[TextureModel], *, simulated: bool) -> tuple[Item, ...]:
     """Figure 5 and its numbers; nothing where no texture has a layer."""
-    courses = centroid_courses(models)
+    courses = centroids_over_speed(models)
     if not courses:
         return ()
     picture = Picture(
@@ -170,7 +172,7 @@ def _driving_table(driving: pd.DataFrame, *, simulated: bool) -> Table:
         "Numbers: stored in all; of regressions only the coefficients that are not 0. conditions: "
         "reduced regressions on speed, force and their product. centroid: SC as a straight line in "
         "speed and every parameter as one in SC (PAPER IX-B); force then changes nothing, nor does "
-        "speed where SC shows no significant response to it. All three are held against the very "
+        "speed where SC shows no significant response to it. All three are compared with the very "
         "recordings that they were fitted to. Measures as in the table of simplification rate and "
         "quality; oracle gap: 1 − GFC30/ceiling.",
         driving,

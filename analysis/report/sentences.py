@@ -67,12 +67,12 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
 
 
 def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
-    """How well conditions are foretold, from `between.left_out_summary`; none without any."""
+    """How well conditions are predicted, from `between.left_out_summary`; none without any."""
     sentences = []
     for name, rows in summary.groupby("foretold_by", sort=False) if len(summary) else ():
         worst = rows.iloc[int(rows["worst_level_error_db"].abs().to_numpy().argmax())]
         sentences.append(
-            f"Conditions that were left out are foretold by {name} with a level error of "
+            f"Conditions that were left out are predicted by {name} with a level error of "
             f"{rows['median_level_error_db'].median():.2f} dB (median over textures; at worst "
             f"{_signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
             f"{worst['worst_level_error_at']}) and a log-spectral distance of "

@@ -57,11 +57,12 @@ class SpectrumComparison:
     dropped : (m,) ndarray of bool
         Layers that the simplified model does without.
     threshold : Threshold
-        What the layers were held against.
+        What the layers were compared with.
     hold_above : bool
         Whether its last level was assumed to hold above its end, as a lower bound.
     criterion : str
-        Which amplitude was held against it (METHOD 7): energy, paper-fft or paper-gain.
+        Which amplitude was compared with it (docs/method/perception.md#criteria): energy,
+        paper-fft or paper-gain.
     """
 
     texture: str

@@ -25,7 +25,7 @@ def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tu
 
 
 @dataclass(frozen=True, eq=False)
-class LayerCourse:
+class LayersOverSpeed:
     """Frequency and amplitude of each layer over speed, at one force.
 
     Parameters
@@ -39,7 +39,8 @@ class LayerCourse:
         Of the amplitudes: g, or arbitrary.
     speeds_mm_s : (S,) ndarray
     frequency_hz, amplitude : (S, m) ndarray
-        Amplitude of the sinusoid of equal power, √2·G·√(k/(1+k)) (METHOD 7), peak.
+        Amplitude of the sinusoid of equal power, √2·G·√(k/(1+k)), peak
+        (docs/method/perception.md#criteria).
     """
 
     label: str
@@ -52,10 +53,10 @@ class LayerCourse:
     amplitude: Floats
 
 
-def layer_course(model: TextureModel, *, force_n: float) -> LayerCourse:
+def layers_over_speed(model: TextureModel, *, force_n: float) -> LayersOverSpeed:
     """Follow the layers of a model over its speeds, at one force (N) of its grid."""
     force = _grid_index(model, float(model.speeds_mm_s[0]), force_n=force_n)[1]
-    return LayerCourse(
+    return LayersOverSpeed(
         label=model.estimator,
         texture=model.texture,
         force_n=force_n,
@@ -80,11 +81,13 @@ class LayersOverGrid:
     speeds_mm_s : (S,) ndarray
     forces_n : (F,) ndarray
     frequency_hz, amplitude : (S, F, m) ndarray
-        Amplitude of the sinusoid of equal power, √2·G·√(k/(1+k)) (METHOD 7), peak.
+        Amplitude of the sinusoid of equal power, √2·G·√(k/(1+k)), peak
+        (docs/method/perception.md#criteria).
     mean_frequency_hz, mean_amplitude : (S, m) ndarray
         Over the forces.
     inherited, unresolved : (S, F, m) ndarray of bool
-        No peak of its own there; width or level a bound (METHOD 4, 5).
+        No peak of its own there; width or level a bound (docs/method/fitting.md#inherited,
+        #unresolved).
     interpolated : (S, F) ndarray of bool
         Condition without a recording.
     """

@@ -47,7 +47,9 @@ class PairedTest:
 
 
 def paired_test(full: ArrayLike, simplified: ArrayLike) -> PairedTest:
-    """Paired t-test, effect size d_z and Wilcoxon signed-rank test (METHOD 12).
+    """Paired t-test, effect size d_z and Wilcoxon signed-rank test.
+
+    docs/method/statistics.md#paired-tests
 
     Parameters
     ----------

@@ -69,7 +69,9 @@ CORRECT_RATE_COLUMNS = (
 def correct_rates(
     relative: pd.DataFrame, *, rng: np.random.Generator, chance: float = 1 / 7
 ) -> pd.DataFrame:
-    """Correct rates per texture and model against chance, participants as units (METHOD 12).
+    """Correct rates per texture and model against chance, participants as units.
+
+    docs/method/statistics.md#correct-rates
 
     Parameters
     ----------

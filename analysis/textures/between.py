@@ -1,6 +1,6 @@
 """How close models are at recorded conditions, and between them, where a hand really is.
 
-Truths in closed form are known anywhere; of recordings, conditions are left out and foretold from
+Truths in closed form are known anywhere; of recordings, conditions are left out and predicted from
 the others.
 """
 
@@ -137,10 +137,10 @@ def ar_fit(order: int) -> Fit:
 
 
 def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
-    """Conditions foretold by a model that was fitted without them.
+    """Conditions predicted by a model that was fitted without them.
 
     Twice, every second condition is left out like the squares of one colour on a chessboard (but
-    the corners of the grid, beyond which nothing is known), and foretold from the others.
+    the corners of the grid, beyond which nothing is known), and predicted from the others.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def truth_summary(
 
 
 def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.DataFrame]:
-    """Left-out conditions of one texture, foretold as its model was made, and by the rival.
+    """Left-out conditions of one texture, predicted as its model was made, and by the rival.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ LEFT_OUT_COLUMNS = (TEXTURE, Column("foretold_by", is_name=True), *MEDIAN_AND_WO
 
 
 def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:
-    """Per texture and model: how well conditions are foretold that it was not shown.
+    """Per texture and model: how well conditions are predicted that it was not shown.
 
     Returns
     -------

@@ -46,12 +46,13 @@ def gfc_table(
     Parameters
     ----------
     recordings : RecordingSet
-        What both models are held against, condition by condition; those at force 0 are the
+        What both models are compared with, condition by condition; those at force 0 are the
         sensor's floor and are subtracted.
     full, simplified : TextureModel
         Before and after simplification.
     rng : Generator
-        Draws behind the ceiling (METHOD 8), the same for both models.
+        Draws behind the ceiling (docs/method/similarity.md#floor-and-ceiling), the same for
+        both models.
 
     Returns
     -------

@@ -92,7 +92,7 @@ def model_layers_table(model: TextureModel) -> pd.DataFrame:
     -------
     DataFrame
         The columns of `layers_table` without repeat, and besides: own_peak (false of a layer
-        without a maximum of the response), inherited (its frequency is told by other conditions),
+        without a maximum of the response), inherited (its frequency is given by other conditions),
         not_identifiable (its level is not told), interpolated (there is no recording).
     """
     peaks = own_peaks(model).is_peak

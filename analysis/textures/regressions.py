@@ -344,7 +344,7 @@ def centroid_amplitude_table(models: Sequence[TextureModel]) -> pd.DataFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class CentroidCourse:
+class CentroidOverSpeed:
     """One texture's spectral centroid over speed (PAPER fig. 5).
 
     Parameters
@@ -367,7 +367,7 @@ class CentroidCourse:
     regression_hz: Floats
 
 
-def centroid_courses(models: Sequence[TextureModel]) -> tuple[CentroidCourse, ...]:
+def centroids_over_speed(models: Sequence[TextureModel]) -> tuple[CentroidOverSpeed, ...]:
     """What figure 5 shows: one course per texture with a layer."""
     courses = []
     for model in models:
@@ -378,7 +378,7 @@ def centroid_courses(models: Sequence[TextureModel]) -> tuple[CentroidCourse, ..
         centroid = pd.DataFrame(np.where(chosen, spectral_centroid_hz(model), np.nan))
         alone = centroid_regression(model).speed_only
         courses.append(
-            CentroidCourse(
+            CentroidOverSpeed(
                 texture=model.texture,
                 simulated=model.simulated,
                 speeds_mm_s=model.speeds_mm_s,

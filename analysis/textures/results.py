@@ -28,9 +28,9 @@ class TextureResult:
     truth : TextureModel, optional
         What was planted, where the recordings are simulated from a known model.
     other_estimates : tuple of TextureModel
-        Models of other estimators, to be held against the truth beside `model`.
+        Models of other estimators, to be compared with the truth beside `model`.
     left_out : mapping of str to DataFrame
-        By model (joint, AR(20)): conditions foretold by one that was fitted without them
+        By model (joint, AR(20)): conditions predicted by one that was fitted without them
         (`analysis.textures.between.left_out_table`); empty where that was not tried.
     """
 
@@ -88,7 +88,7 @@ VERDICT_COLUMNS = (
 
 
 def simplification_table(simplification: Simplification) -> pd.DataFrame:
-    """The verdict on every layer and its reason (METHOD 7).
+    """The verdict on every layer and its reason (docs/method/perception.md#simplification).
 
     Returns
     -------

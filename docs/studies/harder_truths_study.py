@@ -1,7 +1,7 @@
 """What `joint` makes of textures that are harder than sums of layers on white noise.
 
 Simulated: random layers whose places are known (`stimuli.planted.spectra`), over 2 × 2 conditions
-of one level each, with what laboratories meet: coloured floors, hum of the mains, a pure tone, many
+of one level each, with what laboratories meet: coloured floors, mains hum, a pure tone, many
 layers, short and long records, a turntable that slows down, a level that changes.
 
 Example: python docs/studies/harder_truths_study.py writes harder_truths_study.tsv beside this file
@@ -200,7 +200,8 @@ def fine_power(peq: PEQ) -> float:
 def study(textures: int) -> pd.DataFrame:
     """Per case: precision, recall, and level errors over all conditions of all textures.
 
-    Once of all layers, and once of those that are peaks of their own (METHOD 5).
+    Once of all layers, and once of those that are peaks of their own
+    (docs/method/fitting.md#own-peaks).
     """
     rows = []
     for name, case in CASES.items():

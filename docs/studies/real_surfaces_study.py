@@ -44,7 +44,7 @@ MODELS = (
     "paper",
     "paper-consistent",
 )
-# Few speeds: three are recorded at two forces, two others are foretold.
+# Few speeds: three are recorded at two forces, two others are predicted.
 FEW_SPEEDS, FEW_FORCES, HIDDEN_SPEEDS = (50.0, 150.0, 350.0), (1.0, 2.5), (90.0, 230.0)
 Conditions = Sequence[Condition]
 

@@ -1,7 +1,8 @@
 """How far a verdict on a layer can be trusted, by record length and distance to threshold.
 
 Simulated: textures whose layers are known are recorded twice and fitted by the default estimator;
-one layer of each is followed through the rules of METHOD 7. The threshold is flat and laid so that
+one layer of each is followed through the rules of docs/method/perception.md#simplification. The
+threshold is flat and laid so that
 the layer's true level has the wanted distance, in the amplitude of each criterion.
 
 Example: python docs/studies/simplification_study.py writes simplification_study.tsv and .png

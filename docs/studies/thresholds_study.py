@@ -47,7 +47,7 @@ def planted(seed: int) -> TextureModel:
     gains = amplitude / np.sqrt(2 * k / (1 + k)) * rng.choice([-1.0, 1.0], frequency.size)
     growth = (SPEEDS_MM_S[:, None] / SPEEDS_MM_S[-1]) ** 0.5 * (FORCES_N / FORCES_N[-1]) ** 0.2
     shape = (*growth.shape, frequency.size)
-    # The Cramér–Rao bound of a lone layer's level (METHOD 4).
+    # The Cramér–Rao bound of a lone layer's level (docs/method/estimation.md#level-deviations).
     level_sd_db = 10 / np.log(10) / np.sqrt(np.pi * width * DURATION_S)
     return TextureModel(
         texture="planted",

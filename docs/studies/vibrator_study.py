@@ -1,7 +1,7 @@
 """What compensating a vibrator gains, and how well its test must be recorded.
 
 Simulated: second-order vibrators (mass, spring, damper; `stimuli.planted.vibrators`) are tested
-with white noise, identified and compensated (METHOD 9).
+with white noise, identified and compensated (docs/method/vibrators.md).
 
 Example: python docs/studies/vibrator_study.py writes vibrator_study.png and two tables,
 vibrator_study.tsv and vibrator_study_coherence.tsv, beside this file.

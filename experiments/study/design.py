@@ -1,4 +1,4 @@
-"""The order of the trials: who does what, when (METHOD 11, paper section VII)."""
+"""The order of the trials: who does what, when (docs/method/protocols.md#order, PAPER VII)."""
 
 from __future__ import annotations
 
@@ -104,7 +104,9 @@ class SessionPlan:
 
 
 def draw_session(study: Study, task: OrderedTask, *, subject: int, session: int) -> SessionPlan:
-    """The order of one session: training trials, then the main ones (METHOD 11).
+    """The order of one session: training trials, then the main ones.
+
+    docs/method/protocols.md#order
 
     The same study, task, subject and session always give the same order.
 

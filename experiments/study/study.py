@@ -1,4 +1,7 @@
-"""The study file: textures, trays, participants, schedules and circumstances (METHOD 11)."""
+"""The study file: textures, trays, participants, schedules and circumstances.
+
+docs/method/protocols.md
+"""
 
 from __future__ import annotations
 

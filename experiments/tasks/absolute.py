@@ -1,4 +1,4 @@
-"""The absolute evaluation (METHOD 11, paper VII-B1).
+"""The absolute evaluation (docs/method/protocols.md#absolute-task, PAPER VII-B1).
 
 The participant knows that the virtual surface stands for the real one, feels both as often as
 wanted, and rates on two scales from 0 to 100 how alike they are.

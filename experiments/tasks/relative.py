@@ -1,4 +1,4 @@
-"""The relative evaluation (METHOD 11, paper VII-B2).
+"""The relative evaluation (docs/method/protocols.md#relative-task, PAPER VII-B2).
 
 The participant feels a real surface and, behind one button each, the virtual surfaces of all
 textures, switches freely, and says once which virtual surface is the real one.

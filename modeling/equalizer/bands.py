@@ -1,4 +1,7 @@
-"""Bands of the equalizer: legal range, coefficients, response and level (METHOD 3)."""
+"""Bands of the equalizer: legal range, coefficients, response and level.
+
+docs/method/equalizer.md
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,10 @@ def rational_tan(angle: ArrayLike) -> Floats:
 
 
 class BandCoefficients(NamedTuple):
-    """Coefficients of the unit-covariance state-variable filter (METHOD 3), one per band."""
+    """Coefficients of the unit-covariance state-variable filter, one per band.
+
+    docs/method/equalizer.md#recursion
+    """
 
     p: Floats
     q: Floats
@@ -71,7 +77,7 @@ def band_coefficients(
 
     Notes
     -----
-    METHOD's recursion with v1 and v2 eliminated: s1 ← s1 + p·s1 − q·s2 + b1·w,
+    The recursion of docs/method/equalizer.md: s1 ← s1 + p·s1 − q·s2 + b1·w,
     s2 ← s2 + q·s1 + r·s2 + b2·w, band = tap·(s1 before + s1 after). With θ = πf/fs and
     k = tan(πB/fs): p = −2(sin²θ + k)/(1+k), r = −2 sin²θ/(1+k), q = sin 2θ/(1+k),
     (b1, b2) = 2√k/(1+k)·(cos θ, sin θ) and tap = √k/(2 cos θ). Operation by operation as
@@ -140,7 +146,7 @@ def band_response(
 
 
 def check_bands(frequencies_hz: Floats, bandwidths_hz: Floats, rate_hz: float) -> None:
-    """Refuse frequencies and widths outside the legal range (METHOD 3).
+    """Refuse frequencies and widths out of range (docs/method/equalizer.md#legal-ranges).
 
     Raises
     ------
@@ -161,7 +167,9 @@ def check_bands(frequencies_hz: Floats, bandwidths_hz: Floats, rate_hz: float) -
 
 
 def band_rms(gains: ArrayLike, bandwidths_hz: ArrayLike, *, rate_hz: float) -> Floats:
-    """RMS (g) of unit white noise through bands of peak gain G and width B (METHOD 3).
+    """RMS (g) of unit white noise through bands of peak gain G and width B.
+
+    docs/method/equalizer.md#band-variance
 
     Any shape; `gains` may be signed. Variance is G²·k/(1+k) with k = tan(πB/rate).
     """

@@ -1,4 +1,4 @@
-"""The parametric equalizer of one condition (METHOD 3)."""
+"""The parametric equalizer of one condition (docs/method/equalizer.md#response)."""
 
 from __future__ import annotations
 

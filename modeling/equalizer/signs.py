@@ -1,4 +1,7 @@
-"""Signs of layers worth trying: which patterns a coherent sum can have (METHOD 3)."""
+"""Signs of layers worth trying: which patterns a coherent sum can have.
+
+docs/method/equalizer.md#signs
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from modeling.arrays import Floats
 
 
 def sign_patterns(frequencies_hz: Floats) -> Floats:
-    """Signs worth trying (METHOD 3): all equal, and the two that alternate along frequency.
+    """Signs worth trying (docs/method/equalizer.md#signs): all equal, and the two that alternate.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """Layers as they are rendered: the coherent response |G_w + Σ G_i H_i(f)| of many spectra at once.
 
-All spectra of a texture, or several starts for one, are climbed side by side (METHOD 3 and 4):
+All spectra of a texture, or several starts for one, are climbed side by side
+(docs/method/equalizer.md#response, docs/method/estimation.md#likelihood):
 arrays have one row per spectrum, bins that a row does not need have no weight.
 """
 
@@ -33,7 +34,7 @@ NARROWEST_LINES = 1.5
 # Half the corner of the high-pass of the preparation: of layers below it only a skirt is seen.
 LOWEST_LAYER_HZ = 5.0
 # A layer higher than this many times the response at its own frequency is mostly cancelled by
-# others: two such layers describe what one would, and nothing foretells what is left of them
+# others: two such layers describe what one would, and nothing predicts what is left of them
 # elsewhere. Being twice as high costs nothing, four times as high five units of log likelihood.
 LARGEST_SHARE = 2.0
 CANCELLING = 20.0
@@ -172,7 +173,7 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     noise, frequency, bandwidth, gain = split(theta, m)
     centre, width = np.exp(frequency), np.exp(bandwidth)
     seen = np.hypot(width, observed.line_hz[:, None])
-    told = ((width / seen) ** 2)[..., None]  # d ln seen by d ln B
+    width_share = ((width / seen) ** 2)[..., None]  # d ln seen by d ln B
     g, k = np.tan(per_hz * centre), np.tan(per_hz * seen)
     scale = 1 / (k * (1 + g * g))
     cotangent, tangent = observed.cotangent[:, None, :], observed.tangent[:, None, :]
@@ -189,7 +190,9 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     derivative = np.empty((theta.shape[0], 1 + 3 * m, power.shape[1]))
     derivative[:, 0] = by_noise
     derivative[:, 1 : 1 + m] = by_u * by_frequency
-    derivative[:, 1 + m : 1 + 2 * m] = told * (by_u * by_width) + 0.5 * (1 - told) * by_gain
+    derivative[:, 1 + m : 1 + 2 * m] = (
+        width_share * (by_u * by_width) + 0.5 * (1 - width_share) * by_gain
+    )
     derivative[:, 1 + 2 * m :] = by_gain
     return Response(power, derivative)
 
@@ -235,8 +238,8 @@ def misfits(power: Floats, observed: Observed) -> Floats:
 class Slopes(NamedTuple):
     """Misfit and objective (K,), Fisher information (K, p, p) and score (K, p) of each row.
 
-    `told` is the information of the records alone, by their full number of lines: what `weight`
-    forgives and what keeps layers from cancelling is not in it.
+    `record_information` is the information of the records alone, by their full number of lines:
+    what `weight` forgives and what keeps layers from cancelling is not in it.
     """
 
     misfit: Floats
@@ -287,7 +290,7 @@ def _with_centres(theta: Floats, m: int, observed: Observed) -> Observed:
 
 
 def limits_of(m: int, *, rate_hz: float, step_hz: float) -> tuple[Floats, Floats]:
-    """Lowest and highest parameters of m layers: what a model may hold and a record can tell."""
+    """Lowest and highest parameters of m layers: what a model may hold and a record can resolve."""
     narrowest_hz = max(NARROWEST_LINES * step_hz, LOWEST_BANDWIDTH_HZ)
     low = np.full(1 + 3 * m, -WIDEST_LOG_GAIN)
     high = np.full(1 + 3 * m, WIDEST_LOG_GAIN)
@@ -366,7 +369,7 @@ def without_layer(theta: Floats, layer: int) -> Floats:
     return fewer
 
 
-def told(theta: Floats, signs: Floats, observed: Observed) -> Floats:
+def record_information(theta: Floats, signs: Floats, observed: Observed) -> Floats:
     """Fisher information (K, p, p) of the records, by their full number of lines."""
     _, derivative = response(theta, signs, observed)
     information: Floats = (derivative * observed.count[:, None, :]) @ derivative.transpose(0, 2, 1)

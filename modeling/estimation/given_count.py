@@ -1,4 +1,7 @@
-"""A spectrum by a given number of layers: what a prescribed size can do (METHOD 3 and 4)."""
+"""A spectrum by a given number of layers: what a prescribed size can do.
+
+docs/method/estimation.md#given-number
+"""
 
 from __future__ import annotations
 

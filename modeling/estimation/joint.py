@@ -1,7 +1,7 @@
 """The `joint` estimator for one spectrum: all layers at once, coherent as they are rendered.
 
 Peaks are found as a sum of powers (`estimation.peaks`), then fitted as the coherent response that
-gets rendered (`estimation.coherent`); METHOD 4.
+gets rendered (`estimation.coherent`); docs/method/estimation.md#single-spectra.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from modeling.estimation.coherent import (
     limits_of,
     misfits,
     one_spectrum,
+    record_information,
     response,
-    told,
     without_layer,
 )
 from modeling.estimation.layers import Layers, no_layers
@@ -133,7 +133,7 @@ def as_layers(fitted: Climbed, power: Power, observed: Observed) -> Layers:
     """
     m = fitted.signs.size
     noise, frequency, bandwidth, gain = split(fitted.theta, m)
-    information = told(fitted.theta[None], fitted.signs[None], observed)
+    information = record_information(fitted.theta[None], fitted.signs[None], observed)
     deviation = level_deviations(
         fitted.theta[None], covariance_alone(information), rate_hz=power.rate_hz
     )[0]

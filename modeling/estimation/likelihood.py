@@ -146,9 +146,9 @@ def bins_near(power: Power, centres_hz: Floats, widths_hz: Floats) -> Bins:
     lines = np.diff(np.append(starts, frequency.size))
     heard = np.add.reduceat(power.weight, starts)
     tangent = np.tan(np.pi / power.rate_hz * (frequency[starts] + (lines - 1) * step / 2))
-    told = heard > 0  # lines that the sensor's floor took whole say nothing
-    heard, tangent = heard[told], tangent[told]
-    average = np.add.reduceat(power.power * power.weight, starts)[told] / heard
+    kept = heard > 0  # lines that the sensor's floor took whole say nothing
+    heard, tangent = heard[kept], tangent[kept]
+    average = np.add.reduceat(power.power * power.weight, starts)[kept] / heard
     count = heard * power.records
     weight = count / (1 + count * FORGIVEN_MISFIT**2)
     return Bins(average, weight, count, tangent, 1 / tangent, power.rate_hz)
@@ -276,7 +276,7 @@ def _step(information: Floats, score: Floats, damping: float) -> Floats:
 
 
 def limits_of_sum(m: int, power: Power) -> tuple[Floats, Floats]:
-    """Lowest and highest parameters of a power sum of m peaks: what a record can tell."""
+    """Lowest and highest parameters of a power sum of m peaks: what a record can resolve."""
     narrowest_hz = max(NARROWEST_LINES * power.step_hz, LOWEST_BANDWIDTH_HZ)
 
     def limit(gain: float, frequency_hz: float, bandwidth_hz: float, shape: float) -> Floats:

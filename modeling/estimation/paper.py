@@ -3,7 +3,8 @@
 `paper` reads the recipe plainly: B is the full width at half
 maximum of the smoothed peak and G its height. That counts the noise floor twice and the smoothing
 as width. `paper-consistent` fits the peak above the floor, takes the smoothing out of its width,
-and chooses gains such that the model, smoothed alike, has the measured heights (METHOD 4).
+and chooses gains such that the model, smoothed alike, has the measured heights
+(docs/method/estimation.md).
 """
 
 from __future__ import annotations
@@ -151,7 +152,10 @@ def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> floa
 
 
 def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, NDArray[np.bool_]]:
-    """−3 dB widths from fitted s, and which of them the smoothing hides (METHOD 4)."""
+    """−3 dB widths from fitted s, and which of them the smoothing hides.
+
+    docs/method/estimation.md#paper-consistent
+    """
     if not consistent:
         return FWHM_PER_S * fitted_s_hz, np.zeros(fitted_s_hz.shape, dtype=bool)
     excess = fitted_s_hz**2 - SMOOTHING_HZ**2

@@ -1,4 +1,6 @@
-"""How far sampling error moves a level that is read from the smoothed spectrum (METHOD 4).
+"""How far sampling error moves a level that is read from the smoothed spectrum.
+
+docs/method/estimation.md#level-deviations
 
 A record of T seconds fixes the level of a band of width B to 10/ln 10/√(πBT) dB at best. Heights
 and widths read from a smoothed spectrum do not reach that: the smoothing and the floor take part of

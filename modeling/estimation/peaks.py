@@ -1,4 +1,6 @@
-"""Peaks of one spectrum as a sum of powers: how many there are, and where (METHOD 4).
+"""Peaks of one spectrum as a sum of powers: how many there are, and where.
+
+docs/method/estimation.md#single-spectra, docs/method/estimation.md#growth
 
 A sum of powers needs no signs. It grows by the largest residual; its peaks share one shape between
 Lorentzian and Gaussian, so that no layers are spent on skirts of another form.
@@ -120,10 +122,12 @@ def _candidates(power: Power, expected: Floats) -> Floats:
     width = NARROWEST_BOX
     while width * power.step_hz <= WIDEST_BOX_HZ and width < expected.size:
         hop = max(1, width // 6)
-        told = np.maximum(lines[width::hop] - lines[:-width:hop], 1e-9)
-        raised = np.maximum((total[width::hop] - total[:-width:hop]) / told, 1.0)
-        told *= power.records
-        gain = told / (1 + told * FORGIVEN_MISFIT**2) * (raised - 1 - np.log(raised))
+        lines_within = np.maximum(lines[width::hop] - lines[:-width:hop], 1e-9)
+        raised = np.maximum((total[width::hop] - total[:-width:hop]) / lines_within, 1.0)
+        lines_within *= power.records
+        gain = (
+            lines_within / (1 + lines_within * FORGIVEN_MISFIT**2) * (raised - 1 - np.log(raised))
+        )
         for _ in range(4):
             best = int(np.argmax(gain))
             if gain[best] < penalty(power):
@@ -138,7 +142,7 @@ def _candidates(power: Power, expected: Floats) -> Floats:
             break
         if all(abs(candidate[1] - c[1]) > 1.5 * (candidate[2] + c[2]) for c in chosen):
             chosen.append(candidate)
-    # A Lorentzian of width B is told best by a box of about 1.4 B.
+    # A Lorentzian of width B is detected best by a box of about 1.4 B.
     rows = [
         (power.frequency_hz[0] + c[1] * power.step_hz, 0.7 * c[2] * power.step_hz, c[3])
         for c in chosen

@@ -29,7 +29,7 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     sensor's floor has been subtracted (Burg's method needs the waveform, in which it cannot be),
     averaged over the repeats of a condition. Records are tapered at their ends, which makes it as
     good as Burg's: the gain is the geometric mean of the spectrum, so that what a rectangular
-    window spills into quiet bands would count in full. Holes of the grid are interpolated linearly.
+    window leaks into quiet bands would count in full. Holes of the grid are interpolated linearly.
 
     Parameters
     ----------

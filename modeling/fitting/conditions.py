@@ -18,7 +18,7 @@ from modeling.recordings.spectrum import (
     prepared_spectrum,
     subtract_floor,
 )
-from modeling.recordings.stationarity import Drift, drift_of, straightened
+from modeling.recordings.stationarity import Drift, drift_of, without_drift
 
 
 def spectra_by_condition(
@@ -36,7 +36,7 @@ def recording_spectra(
 ) -> list[tuple[Recording, Spectrum]]:
     """Each recording with contact and its spectrum, at one rate, the sensor's floor subtracted.
 
-    This is what models are fitted to and held against (METHOD 2). Hum of the mains is taken out,
+    This is what models are fitted to and compared with (docs/method/recordings.md). Hum is removed,
     and frequencies that drift within a record are held at those of its middle; the spectra's
     `notes` say so.
 
@@ -47,7 +47,7 @@ def recording_spectra(
     rate_hz : float
         Of the spectra, unless a recording with contact has a lower rate: then that one.
     keep_hum : bool
-        Leave hum of the mains where it is.
+        Leave mains hum where it is.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def recording_spectra(
 def _hum_in(
     records: Sequence[Recording], prepared: Sequence[Floats], rate_hz: float
 ) -> list[tuple[float, ...]]:
-    """Lines of the mains in each; hum is told by data of one rate, so slower ones have none."""
+    """Lines of the mains in each; hum is sought in data of one rate only."""
     quick = [n for n, record in enumerate(records) if record.rate_hz >= rate_hz]
     speeds = [records[n].speed_mm_s if records[n].force_n > 0 else 0.0 for n in quick]
     found = common_hum([prepared[n] for n in quick], rate_hz, speeds_mm_s=speeds)
@@ -93,7 +93,7 @@ def _hum_in(
 def _spectrum_of(
     record: Recording, samples: Floats, rate_hz: float, *, hum_hz: Sequence[float]
 ) -> Spectrum:
-    """The spectrum of one prepared record, mended and told of."""
+    """The spectrum of one prepared record, corrected, with notes."""
     notes = []
     if hum_hz:
         samples = without_hum(samples, rate_hz, hum_hz)
@@ -102,7 +102,7 @@ def _spectrum_of(
     # Without contact there is nothing that could drift.
     drift = drift_of(samples, rate_hz) if record.force_n > 0 else Drift(0.0, 0.0)
     if drift.frequency:
-        samples = straightened(samples, drift.frequency)
+        samples = without_drift(samples, drift.frequency)
         notes.append(
             f"its frequencies drift by {drift.frequency:+.0%}, so its speed does; they are held at "
             "those of its middle"

@@ -4,9 +4,9 @@ Every parameter of every layer (log frequency, log bandwidth, log amplitude, log
 little from a condition to its neighbours: a Gaussian Markov random field of first order over the
 grid (Rue and Held 2005, "Gaussian Markov random fields"). How much is little, and which parameters
 change together, is read off the texture itself: the covariance of the differences between
-neighbours is estimated with the field (expectation–maximisation on Laplace's approximation). What a
-record tells overrules its neighbours; where it tells nothing they do. Conditions without a record
-are part of the field, too.
+neighbours is estimated with the field (expectation–maximisation on Laplace's approximation). Where
+a record is informative it outweighs its neighbours; where it is not they decide. Conditions without
+a record are part of the field, too.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from modeling.estimation.coherent import (
 # much as one difference more than there are parameters. Chosen where fits of planted and of drawn
 # surfaces are nearest to their truths; three times looser or stiffer changes the distances by up to
 # a tenth (docs/studies/real_surfaces.md).
-USUAL_CHANGE = 0.175
-USUAL_LEVEL_CHANGE = 0.38
-# Precision of a parameter that no record tells anything of: a deviation of 30 in its logarithm.
+PRIOR_CHANGE = 0.175
+PRIOR_LEVEL_CHANGE = 0.38
+# Precision of a parameter that no record determines: a deviation of 30 in its logarithm.
 FAINTEST = 1e-3
-MENDING_ROUNDS = 3
+RESTART_ROUNDS = 3
 # Weight of a trend's square in the penalty: a power of speed or force of 1 is as usual as a change
-# of USUAL_CHANGE between neighbours. Matters where two speeds alone tell the trend, or none.
-TREND_SHARE = USUAL_CHANGE**2
+# of PRIOR_CHANGE between neighbours. Matters where two speeds alone determine the trend, or none.
+TREND_SHARE = PRIOR_CHANGE**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,12 +100,12 @@ class Field:
         trend = TREND_SHARE * float(np.sum(self.trend * (self.trend @ self.precision)))
         return 0.5 * (trend + float(np.sum(rest * (self.laplacian(rest) @ self.precision))))
 
-    def foretold(self, theta: Floats) -> Floats:
+    def predicted(self, theta: Floats) -> Floats:
         """What the neighbours of each condition and the trend make of its parameters, (C, p)."""
         rest = theta - self.places @ self.trend
         neighbours = np.maximum(self.neighbours(), 1.0)[:, None]
-        foretold: Floats = theta - self.laplacian(rest) / neighbours
-        return foretold
+        predicted: Floats = theta - self.laplacian(rest) / neighbours
+        return predicted
 
     @property
     def degrees(self) -> int:
@@ -113,12 +113,12 @@ class Field:
         return self.rows * self.columns - 1
 
 
-def usual_changes(m: int) -> Floats:
+def prior_covariance(m: int) -> Floats:
     """Covariance (p, p) that is expected of differences between neighbours of m layers."""
     p = 1 + 3 * m
-    covariance = np.eye(p) * USUAL_CHANGE**2
+    covariance = np.eye(p) * PRIOR_CHANGE**2
     gains = np.r_[0, 1 + 2 * m : p]
-    covariance[np.ix_(gains, gains)] += USUAL_LEVEL_CHANGE**2
+    covariance[np.ix_(gains, gains)] += PRIOR_LEVEL_CHANGE**2
     return covariance
 
 
@@ -155,8 +155,8 @@ def fit_field(
 ) -> FieldFit:
     """All conditions at once to the greatest penalised likelihood near a start.
 
-    No condition stays worse than its neighbours foretell it: such a one has gone astray and is
-    begun anew from there.
+    No condition stays worse than its neighbours predict it: such a one converged to a poor maximum,
+    and is started again from their prediction.
 
     Parameters
     ----------
@@ -172,12 +172,12 @@ def fit_field(
         As in `coherent.climb`.
     """
     fit = _climb_field(theta, signs, observed, field, limits=limits, steps=steps, enough=enough)
-    for _ in range(MENDING_ROUNDS):
-        foretold = np.clip(fit.field.foretold(fit.theta), *limits)
-        astray = slopes(foretold, signs, observed).objective < fit.slopes.objective - enough
-        if not astray.any():
+    for _ in range(RESTART_ROUNDS):
+        predicted = np.clip(fit.field.predicted(fit.theta), *limits)
+        poor = slopes(predicted, signs, observed).objective < fit.slopes.objective - enough
+        if not poor.any():
             break
-        start = np.where(astray[:, None], foretold, fit.theta)
+        start = np.where(poor[:, None], predicted, fit.theta)
         again = _climb_field(
             start, signs, observed, fit.field, limits=limits, steps=steps, enough=enough
         )
@@ -351,16 +351,16 @@ def _of_blocks(matrix: Floats, p: int) -> Floats:
     return np.asarray(np.einsum("ipiq->ipq", blocks), dtype=np.float64)
 
 
-def learnt_precision(fit: FieldFit) -> Floats:
+def updated_precision(fit: FieldFit) -> Floats:
     """Precision of the differences between neighbours that this texture suggests, (p, p).
 
     One step of expectation–maximisation: the expected sum of squares of all differences, with
-    `usual_changes` for as many more as there are parameters and one.
+    `prior_covariance` for as many more as there are parameters and one.
     """
     p, field = fit.theta.shape[1], fit.field
     rest = fit.theta - field.places @ field.trend
     scatter = rest.T @ field.laplacian(rest)
     scatter += covariances(field, fit.slopes.information).differences
     count = p + 1
-    expected = (count * usual_changes((p - 1) // 3) + scatter) / (count + field.degrees)
+    expected = (count * prior_covariance((p - 1) // 3) + scatter) / (count + field.degrees)
     return np.asarray(np.linalg.inv((expected + expected.T) / 2))

@@ -84,7 +84,7 @@ def _distinct(
         frequency = LOWEST_HZ * np.exp((place + 0.5) * CELL)
         frequency = np.clip(frequency, LOWEST_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz)
         height = np.where(place == inside, raised[np.arange(len(place)), inside], 1.0)
-        # A Lorentzian of width B is told best by a box of about 1.4 B.
+        # A Lorentzian of width B is detected best by a box of about 1.4 B.
         bandwidth = 0.7 * width * CELL * frequency
         chosen.append(Candidate(frequency, bandwidth, np.clip(height, *RAISED), evidence))
         if len(chosen) == CANDIDATES:
@@ -125,10 +125,10 @@ def _boxes(ratio: Floats, lines: Floats, width: int) -> tuple[Floats, Floats]:
     cells = ratio.shape[1] - 1
     low = np.clip(np.arange(cells) - (width - 1) // 2, 0, cells)
     high = np.clip(low + width, 0, cells)
-    told = lines[:, high] - lines[:, low]
-    raised = (ratio[:, high] - ratio[:, low]) / np.maximum(told, 1e-9)
-    raised = np.where(told > 1e-6, np.maximum(raised, 1.0), 1.0)
-    weight = told / (1 + told * FORGIVEN_MISFIT**2)
+    lines_within = lines[:, high] - lines[:, low]
+    raised = (ratio[:, high] - ratio[:, low]) / np.maximum(lines_within, 1e-9)
+    raised = np.where(lines_within > 1e-6, np.maximum(raised, 1.0), 1.0)
+    weight = lines_within / (1 + lines_within * FORGIVEN_MISFIT**2)
     gain = np.minimum(weight * (raised - 1 - np.log(raised)), CLEAR_EVIDENCE)
     return gain, raised
 

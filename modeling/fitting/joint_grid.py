@@ -1,9 +1,9 @@
 """The `joint` estimator over a whole grid: the layers of a texture as one smooth field.
 
 Of the solutions that the search has found the likeliest is taken: by its evidence, so that a layer
-must say more than the freedom to say it costs, and by how well it foretells conditions that are
+must say more than the freedom to say it costs, and by how well it predicts conditions that are
 hidden from it. Then the field learns its own smoothness from the texture
-(METHOD 3–5).
+docs/method/fitting.md#smooth-field, docs/method/fitting.md#model-choice.
 """
 
 from __future__ import annotations
@@ -15,16 +15,22 @@ from itertools import combinations
 import numpy as np
 
 from modeling.arrays import Bools, Floats
-from modeling.estimation.coherent import level_deviations, misfits, response, told, without_layer
+from modeling.estimation.coherent import (
+    level_deviations,
+    misfits,
+    record_information,
+    response,
+    without_layer,
+)
 from modeling.estimation.joint import NEPER_DB
 from modeling.estimation.layers import Layers
 from modeling.estimation.likelihood import split
 from modeling.fitting.field import (
     Covariances,
     covariances,
-    learnt_precision,
+    prior_covariance,
     solve,
-    usual_changes,
+    updated_precision,
 )
 from modeling.fitting.growth import expected_on_lines
 from modeling.fitting.layer_search import (
@@ -33,23 +39,23 @@ from modeling.fitting.layer_search import (
     completed,
     fitted,
     hidden,
+    in_frequency_order,
     search,
-    uncrossed,
 )
 from modeling.fitting.texture_grid import TextureGrid, texture_grid
 from modeling.models.grid import Condition
 from modeling.recordings.spectrum import Spectrum
 
-LEARNING_ROUNDS = 4
-FORETELLING_REACH = 20.0  # of log likelihood: no hidden condition counts for more
+EM_ROUNDS = 4
+LARGEST_PREDICTION_LOSS = 20.0  # of log likelihood: no hidden condition counts for more
 LARGEST_LEVEL_SD_DB = 12.0
-# A record that leaves more than this of the variance with which its neighbours foretell a
-# frequency has not told it.
+# A record that leaves more than this of the variance with which its neighbours predict a
+# frequency has not determined it.
 INHERITED_SHARE = 0.5
 # In log likelihood: what a record must lose without a layer, to show a peak of it.
 LEAST_EVIDENCE = 3.0
 # Layers within this share of their widths, of opposite signs, are tried as one.
-TWINS_SHARE = 0.25
+CANCELLING_SHARE = 0.25
 LEAST_LEFT = 0.05
 FADED = 8.0  # of log amplitude: 70 dB
 HELD = 1e8
@@ -63,9 +69,9 @@ class GridFit:
     Parameters
     ----------
     layers : dict of (speed, force) to Layers
-        Also of conditions without a record, as their neighbours foretell them.
+        Also of conditions without a record, as their neighbours predict them.
     inherited : dict of (speed, force) to (m,) ndarray of bool
-        Layers whose frequency the neighbours tell rather than the record.
+        Layers whose frequency the neighbours determine rather than the record.
     recorded : dict of (speed, force) to bool
         Whether there is a record that is not silent.
     """
@@ -89,45 +95,45 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     if not grid.recorded.any():
         return _silent(grid)
     best = _chosen(grid, search(grid, count=count))
-    best = uncrossed(grid, completed(grid, best, count=count))
-    solution = _learnt(grid, best)
+    best = in_frequency_order(grid, completed(grid, best, count=count))
+    solution = _with_estimated_precision(grid, best)
     if count is None:
         solution = _merged(grid, solution)
     return _grid_fit(grid, solution)
 
 
 def _chosen(grid: TextureGrid, solutions: Sequence[Solution]) -> Solution:
-    """The likeliest, whatever its freedom, that foretells hidden conditions, too."""
+    """The likeliest, whatever its freedom, that predicts hidden conditions, too."""
     if len(solutions) == 1:
         return solutions[0]
-    losses = np.array([foretelling_losses(grid, s) for s in solutions])
-    worse = np.minimum(losses - losses.min(axis=0), FORETELLING_REACH).sum(axis=1)
+    losses = np.array([prediction_losses(grid, s) for s in solutions])
+    worse = np.minimum(losses - losses.min(axis=0), LARGEST_PREDICTION_LOSS).sum(axis=1)
     return solutions[int(np.argmax([s.evidence for s in solutions] - worse))]
 
 
-def foretelling_losses(grid: TextureGrid, solution: Solution) -> Floats:
-    """Minus the log likelihood of every second condition, hidden and foretold by the others.
+def prediction_losses(grid: TextureGrid, solution: Solution) -> Floats:
+    """Minus the log likelihood of every second condition, hidden and predicted by the others.
 
     Whatever its level: that scatters from condition to condition, and would hide how well the
-    shape of the spectrum is foretold.
+    shape of the spectrum is predicted.
     """
-    foretold = hidden(grid, solution).theta
+    predicted = hidden(grid, solution).theta
     losses = []
     for row in np.flatnonzero(grid.every_second() & grid.recorded):
         power = grid.powers[row]
         assert power is not None, "recorded conditions have a power"
-        expected = expected_on_lines(power, foretold[row], solution.signs)
+        expected = expected_on_lines(power, predicted[row], solution.signs)
         level = float(np.average(power.power / expected, weights=power.weight))
         loss = power.weight.sum() * np.log(level) + power.weight @ np.log(expected)
         losses.append(power.records * float(loss))
     return np.array(losses)
 
 
-def _learnt(grid: TextureGrid, solution: Solution) -> Solution:
+def _with_estimated_precision(grid: TextureGrid, solution: Solution) -> Solution:
     """The solution in a field that has learnt its smoothness from it."""
     theta, observed = solution.theta, solution.observed
-    precision = np.asarray(np.linalg.inv(usual_changes(solution.count)))
-    for _ in range(LEARNING_ROUNDS):
+    precision = np.asarray(np.linalg.inv(prior_covariance(solution.count)))
+    for _ in range(EM_ROUNDS):
         solution = fitted(
             grid,
             theta,
@@ -137,7 +143,7 @@ def _learnt(grid: TextureGrid, solution: Solution) -> Solution:
             steps=8,
             enough=0.5,
         )
-        theta, precision = solution.theta, learnt_precision(solution.fit)
+        theta, precision = solution.theta, updated_precision(solution.fit)
     return fitted(grid, theta, solution.signs, precision=precision, steps=8, enough=0.3)
 
 
@@ -145,9 +151,9 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
     """The solution without layers that another, of the opposite sign, mostly cancels.
 
     Two of them at one place can say what one would, and vanish where it would have to change more
-    than a field may; but what is left of them is told by their difference alone.
+    than a field may; but what is left of them is determined by their difference alone.
     """
-    while (pair := _twins(grid, solution)) is not None:
+    while (pair := _cancelling_pair(grid, solution)) is not None:
         stays, goes = pair
         m, theta = solution.count, solution.theta.copy()
         gain = 1 + 2 * m
@@ -155,7 +161,7 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
         least = LEAST_LEFT * np.exp(theta[:, gain + stays])
         theta[:, gain + stays] = np.log(np.maximum(amplitude, least))
         start = without_layer(theta, goes), np.delete(solution.signs, goes)
-        one = _learnt(grid, fitted(grid, *start))
+        one = _with_estimated_precision(grid, fitted(grid, *start))
         power = response(one.theta, one.signs, solution.observed).power
         lost = misfits(power, solution.observed) - solution.fit.slopes.misfit
         if lost.sum() > LEAST_GAIN * grid.recorded.sum():
@@ -164,11 +170,11 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
     return solution
 
 
-def _twins(grid: TextureGrid, solution: Solution) -> tuple[int, int] | None:
+def _cancelling_pair(grid: TextureGrid, solution: Solution) -> tuple[int, int] | None:
     """Two layers (the louder one first) of opposite signs at one place in most conditions."""
     _, frequency, bandwidth, gain = (np.exp(part) for part in split(solution.theta, solution.count))
     for a, b in combinations(range(solution.count), 2):
-        near = TWINS_SHARE * np.minimum(bandwidth[:, a], bandwidth[:, b])
+        near = CANCELLING_SHARE * np.minimum(bandwidth[:, a], bandwidth[:, b])
         together = np.abs(frequency[:, a] - frequency[:, b]) < near
         if solution.signs[a] != solution.signs[b] and together[grid.recorded].mean() > 0.5:
             louder = (gain[:, a] > gain[:, b])[grid.recorded].mean() >= 0.5
@@ -184,10 +190,10 @@ def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     noise, frequency, bandwidth, gain = split(theta, m)
     top = max(range(len(theta)), key=lambda row: grid.conditions[row])
     order = np.argsort(frequency[top], kind="stable")
-    records = told(theta, solution.signs, solution.observed)
+    records = record_information(theta, solution.signs, solution.observed)
     after = covariances(solution.fit.field, records)
     level_sd = level_deviations(theta, after.conditions, rate_hz=grid.rate_hz)
-    inherited = absent | _told_by_neighbours(after, records, m)
+    inherited = absent | _determined_by_neighbours(after, records, m)
     width = np.exp(bandwidth)
     unresolved = grid.recorded[:, None] & (absent | (width < 2 * grid.steps_hz[:, None]))
     gains = grid.scale * solution.signs * np.exp(gain)
@@ -223,7 +229,7 @@ def _absent(grid: TextureGrid, solution: Solution) -> Bools:
 
 
 def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:
-    """Parameters (C, p) with absent layers where their neighbours foretell them.
+    """Parameters (C, p) with absent layers where their neighbours predict them.
 
     Frequencies and widths that a record has read into its own scatter would mislead between the
     conditions.
@@ -231,24 +237,24 @@ def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:
     m, field = solution.count, solution.fit.field
     if not absent.any():
         return solution.theta
-    untold = np.zeros(solution.theta.shape, dtype=bool)
-    # Of a layer that no record shows nothing is foretold.
-    untold[:, 1 : 1 + m] = untold[:, 1 + m : 1 + 2 * m] = absent & ~absent.all(axis=0)
+    undetermined = np.zeros(solution.theta.shape, dtype=bool)
+    # Of a layer that no record shows nothing is predicted.
+    undetermined[:, 1 : 1 + m] = undetermined[:, 1 + m : 1 + 2 * m] = absent & ~absent.all(axis=0)
     # Each parameter by itself: a layer that vanishes must not pull its frequency along.
     alone = replace(field, precision=np.diag(np.diag(field.precision)))
-    held = np.where(untold, 0.0, HELD)
+    held = np.where(undetermined, 0.0, HELD)
     blocks = held[:, :, None] * np.eye(held.shape[1])
     theta = solution.theta
     for _ in range(TREND_ROUNDS):  # the trend is that of the layers that are shown
         trend = alone.places @ alone.trend
         rest = solve(alone, blocks, held * (solution.theta - trend))
-        theta = np.where(untold, rest + trend, solution.theta)
+        theta = np.where(undetermined, rest + trend, solution.theta)
         alone = alone.following(theta)
     return theta
 
 
-def _told_by_neighbours(after: Covariances, records: Floats, m: int) -> Bools:
-    """Where the neighbours tell a layer's frequency rather than the record, (C, m)."""
+def _determined_by_neighbours(after: Covariances, records: Floats, m: int) -> Bools:
+    """Where the neighbours determine a layer's frequency rather than the record, (C, m)."""
     own = np.eye(records.shape[1]) - after.conditions @ records
     before = np.linalg.solve(own + 1e-12 * np.eye(records.shape[1]), after.conditions)
     f = np.arange(1, 1 + m)

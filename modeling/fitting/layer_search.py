@@ -1,7 +1,9 @@
-"""Which layers a texture may have: how many, where, with which signs (METHOD 3 and 5).
+"""Which layers a texture may have: how many, where, with which signs.
 
-The search runs on a coarse part of the grid, with a stiff field. Layers grow one by one as
-independent ones, whose powers add and which need no signs; then signs are tried; layers that the
+docs/method/fitting.md#layer-search, docs/method/fitting.md#sign-search
+
+The search runs on a coarse part of the grid, with a strong smoothing prior. Layers grow one by one
+as independent ones, whose powers add and which need no signs; then signs are tried; layers that the
 coherent response does not need are taken away, and such as it lacks are added. Spectra without
 clear peaks are also begun from layers spread over them, with every sign.
 """
@@ -20,7 +22,7 @@ from modeling.equalizer.signs import neighbouring_patterns
 from modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
 from modeling.estimation.given_count import starts_of
 from modeling.estimation.likelihood import split
-from modeling.fitting.field import FieldFit, fit_field, log_evidence, usual_changes
+from modeling.fitting.field import FieldFit, fit_field, log_evidence, prior_covariance
 from modeling.fitting.growth import (
     CLEAR_EVIDENCE,
     candidates,
@@ -78,9 +80,9 @@ def fitted(
     steps: int = 12,
     enough: float = 1.0,
 ) -> Solution:
-    """The field near a start (C, p); by default with the stiff one of the search."""
+    """The field near a start (C, p); by default with the strong prior of the search."""
     if precision is None:
-        precision = stiff(signs.size)
+        precision = search_precision(signs.size)
     observed = grid.observed(theta) if observed is None else observed
     fit = fit_field(
         theta,
@@ -95,9 +97,9 @@ def fitted(
     return Solution(fit.theta, signs, value, observed, fit)
 
 
-def stiff(m: int) -> Floats:
+def search_precision(m: int) -> Floats:
     """Precision of the field of m layers while they are searched."""
-    return np.asarray(np.linalg.inv(usual_changes(m)) * STIFFNESS)
+    return np.asarray(np.linalg.inv(prior_covariance(m)) * STIFFNESS)
 
 
 def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
@@ -173,7 +175,7 @@ class _Pool:
 def _grow(pool: _Pool) -> None:
     """Independent layers, one by one, along laws over the grid; each number of them with signs.
 
-    Where coherent layers dig holes or add up, independent ones go on growing for ever; it ends
+    Where coherent layers cancel or add up, independent ones go on growing for ever; it ends
     when two more have not made the coherent solution any better.
     """
     grid = pool.grid
@@ -184,7 +186,7 @@ def _grow(pool: _Pool) -> None:
             return
         start = inserted_independently(theta, found[0], rate_hz=grid.rate_hz)
         observed = grid.observed(start)
-        field, limits = grid.field(stiff(m)), grid.limits(m)
+        field, limits = grid.field(search_precision(m)), grid.limits(m)
         fit = fit_field(start, None, observed, field, limits=limits, steps=12, enough=1.0)
         value = fit.value - float(observed.scatter.sum())
         if now - value < LEAST_GAIN * pool.records:
@@ -261,10 +263,10 @@ def completed(grid: TextureGrid, solution: Solution, *, count: int | None = None
     return pool.best()
 
 
-def uncrossed(grid: TextureGrid, solution: Solution) -> Solution:
+def in_frequency_order(grid: TextureGrid, solution: Solution) -> Solution:
     """The solution with layers in the order of their frequencies, where two speeds allow for it.
 
-    They do not tell which layers have crossed; that none has is likelier if it is as near.
+    They do not determine which layers have crossed; that none has is likelier if it is as near.
     """
     _, frequency, _, _ = split(solution.theta, solution.count)
     order = np.argsort(frequency, axis=1, kind="stable")
@@ -378,7 +380,7 @@ def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Soluti
 
 
 def hidden(grid: TextureGrid, solution: Solution) -> Solution:
-    """The same field without every second condition, which it then foretells."""
+    """The same field without every second condition, which it then predicts."""
     seen = solution.observed.without(grid.every_second())
     refit = fitted(grid, solution.theta, solution.signs, observed=seen, enough=0.5)
     return replace(refit, observed=solution.observed)

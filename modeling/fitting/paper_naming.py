@@ -1,4 +1,4 @@
-"""One layer, one name, over the whole grid (METHOD 5; PAPER III)."""
+"""One layer, one name, over the whole grid (docs/method/fitting.md#tracking; PAPER III)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Tracked:
 def _track(
     spectra: dict[Condition, Spectrum], estimator: EstimatorName
 ) -> dict[Condition, _Tracked]:
-    """Layers of all conditions under common names, in the order of METHOD 5."""
+    """Layers of all conditions under common names, in order (docs/method/fitting.md#tracking)."""
     peaks = {condition: find_peak_frequencies(s) for condition, s in spectra.items()}
     order = visiting_order(list(spectra))
     lead = next((c for c in order if peaks[c].size), order[0])

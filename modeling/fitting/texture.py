@@ -1,4 +1,4 @@
-"""From the recordings of one texture to its model over the grid (METHOD 2, 4 and 5)."""
+"""From the recordings of one texture to its model over the grid (docs/method/fitting.md)."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def _check_layers(layers: object, estimator: EstimatorName) -> None:
 
 
 def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> dict[str, Any]:
-    """The model's arrays by `joint`; holes are what their neighbours foretell."""
+    """The model's arrays by `joint`; holes are what their neighbours predict."""
     found = fit_grid_jointly(spectra, count=count)
     speeds, forces = grid_axes(spectra)
     grid = [(speed, force) for speed in speeds for force in forces]

@@ -168,7 +168,7 @@ class ARModel(SavedModel):
         return self.order + 1
 
     def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> ARParameters:
-        """Bilinear interpolation over the grid, with the edges of METHOD 9.
+        """Bilinear interpolation over the grid; edges: docs/method/rendering.md#grid-edges.
 
         Line spectral frequencies are blended, not coefficients: any mean of rising frequencies
         rises, so every blend is stable. The gain is blended linearly, as a `TextureModel`'s gains

@@ -1,4 +1,7 @@
-"""Grids of speeds and forces: their axes and holes (METHOD 5), between and beyond (METHOD 9)."""
+"""Grids of speeds and forces: axes, holes, interpolation, edges.
+
+docs/method/fitting.md#missing-conditions, docs/method/rendering.md#grid-edges
+"""
 
 from __future__ import annotations
 
@@ -33,7 +36,9 @@ def check_axes(speeds_mm_s: Floats, forces_n: Floats) -> None:
 def within_grid(
     speeds_mm_s: Floats, forces_n: Floats, *, speed_mm_s: ArrayLike, force_n: ArrayLike
 ) -> tuple[Hand, Floats]:
-    """A hand on the grid, and the share (n,) of level that is left there (METHOD 9).
+    """A hand on the grid, and the share (n,) of level that is left there.
+
+    docs/method/rendering.md#grid-edges
 
     Above the grid: clamped. Below the lowest speed or force: clamped too, and the share falls
     linearly to 0 at rest or lift-off (in the corner by the product of both ramps). NaN and infinite

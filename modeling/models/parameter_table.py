@@ -83,7 +83,7 @@ class ParameterTable:
         return np.where(self.signs * gains < 0, 0.0, gains)
 
     def at(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
-        """Bilinear interpolation over the grid, with the edges of METHOD 9 (`within_grid`).
+        """Bilinear interpolation over the grid; edges: docs/method/rendering.md#grid-edges.
 
         Parameters
         ----------

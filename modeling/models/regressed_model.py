@@ -1,4 +1,7 @@
-"""A texture driven by regressions instead of a grid (METHOD 6 and 9, PAPER IX-B)."""
+"""A texture driven by regressions instead of a grid (PAPER IX-B).
+
+docs/method/regression.md#driven-models
+"""
 
 from __future__ import annotations
 
@@ -126,7 +129,7 @@ class RegressedModel(SavedModel):
         return sum(int(np.count_nonzero(getattr(self, name))) for name in _COEFFICIENTS)
 
     def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
-        """The PEQ's parameters at n points, with the edges of METHOD 9 (`modeling.models.grid`).
+        """The PEQ's parameters at n points; edges: docs/method/rendering.md#grid-edges.
 
         A noise gain or an amplitude that its regression would make negative is 0; a layer never
         changes its sign. Frequencies and widths may leave the legal range, as those of a

@@ -25,8 +25,8 @@ from modeling.models.parameter_table import (
 
 Blending = Literal["linear", "logarithmic"]
 BLENDINGS: tuple[Blending, ...] = ("linear", "logarithmic")
-# Above this a layer's level is not identifiable from the records (METHOD 4).
-LARGEST_TOLD_SD_DB = 6.0
+# Above this a layer's level is not identifiable (docs/method/fitting.md#not-identifiable).
+LARGEST_IDENTIFIABLE_SD_DB = 6.0
 
 
 def _no_marks() -> Bools:
@@ -65,7 +65,8 @@ class TextureModel(SavedModel):
         Condition without a recording, filled from its neighbours.
     blending : {"linear", "logarithmic"}
         How parameters are read between conditions: linearly over speed and force, or as powers of
-        both (METHOD 9), for which no layer may change its sign. A file without it means linear.
+        both (docs/method/rendering.md#blending), for which no layer may change its sign. A file
+        without it means linear.
 
     Raises
     ------
@@ -159,17 +160,17 @@ class TextureModel(SavedModel):
 
     @property
     def n_parameters(self) -> int:
-        """Numbers per condition: 1 + 3m (METHOD 9)."""
+        """Numbers per condition: 1 + 3m."""
         return 1 + 3 * self.n_layers
 
     @property
     def not_identifiable(self) -> Bools:
-        """Where the records do not tell a layer's level, (S, F, m): deviations above 6 dB."""
-        unknown: Bools = self.level_sd_db > LARGEST_TOLD_SD_DB
+        """Where the records do not determine a layer's level, (S, F, m): deviations above 6 dB."""
+        unknown: Bools = self.level_sd_db > LARGEST_IDENTIFIABLE_SD_DB
         return unknown
 
     def parameters(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Parameters:
-        """Interpolation over the grid as `blending` says, with the edges of METHOD 9.
+        """Interpolation over the grid as `blending` says; docs/method/rendering.md#grid-edges.
 
         Above the grid: clamped. Below the lowest speed or force all gains fall linearly to 0 at
         rest or lift-off (in the corner by the product of both ramps). NaN and infinite values

@@ -1,4 +1,7 @@
-"""How far above the detection threshold a vibration is: its sensation level (METHOD 7)."""
+"""How far above the detection threshold a vibration is: its sensation level.
+
+docs/method/perception.md#sensation-level
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,8 @@ def sensation_level(
     """Threshold-weighted RMS of a vibration.
 
     The power sum over frequency of (√2·RMS/threshold)²: every line of the spectrum counts as the
-    sinusoid of equal power (criterion `energy` of METHOD 7) against the threshold at its frequency,
+    sinusoid of equal power (criterion `energy`, docs/method/perception.md#criteria) against the
+    threshold at its frequency,
     so a sinusoid at threshold has 0 dB. Frequencies where no threshold is known are left out.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Dropping the layers that nobody can feel (PAPER V, METHOD 7)."""
+"""Dropping the layers that nobody can feel (PAPER V, docs/method/perception.md#simplification)."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ HIGHEST_FLIP_PROBABILITY = 0.05
 PAPER_RECORD_S = 1.0
 SIGN_POINTS = 120
 TINY = 1e-100
-# `level_sd_db` is that of the energy. A gain is told less well, since an error of it is mostly made
-# up for by one of the width. Cramér–Rao bound of a lone layer without floor: exactly twice.
+# `level_sd_db` is that of the energy. A gain is known less well: an error of it is mostly made up
+# for by one of the width. Cramér–Rao bound of a lone layer without floor: exactly twice.
 DEVIATIONS_PER_LEVEL_SD: dict[CriterionName, float] = {
     "energy": 1.0,
     "paper-fft": 2.0,
@@ -91,7 +91,8 @@ def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -
     (S, F, m) for a model, (m,) for the PEQ of one condition.
 
     `energy`: the sinusoid of equal power, √2·G·√(k/(1+k)). `paper-fft`: the single-sided FFT
-    amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself (METHOD 7).
+    amplitude of the peak in a record of 1 s, G·√(π/N). `paper-gain`: G itself
+    (docs/method/perception.md#criteria).
     """
     gains = np.abs(model.gains)
     if criterion == "paper-gain":
@@ -128,7 +129,7 @@ def simplify(
     kept. Where no threshold is known the layer is kept; but above the table's end its last level is
     held as a lower bound, below which a layer may go. A layer that only fills another's shape
     (`modeling.models.own_peaks`) goes with that one or not at all. The noise and at least one layer
-    always stay (PAPER V, METHOD 7).
+    always stay (PAPER V, docs/method/perception.md#simplification).
 
     Parameters
     ----------
@@ -197,7 +198,8 @@ def _distances(
 def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureModel:
     """The model with only these layers, their signs such that its response stays nearest.
 
-    Two neighbours left with equal signs would dig a hole between them (METHOD 3). Held against the
+    Two neighbours left with equal signs would cut a notch between them
+    (docs/method/equalizer.md#signs). Compared with the
     full response in all conditions, over 10 Hz … 0.98 of the Nyquist frequency on a logarithmic
     scale, by Whittle's likelihood; amplitudes stay. Models by the paper's recipe keep their signs,
     which are all positive.

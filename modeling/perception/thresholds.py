@@ -1,4 +1,7 @@
-"""Detection thresholds: the weakest sinusoid that is felt, by frequency (eq. 5, METHOD 7)."""
+"""Detection thresholds: the weakest sinusoid that is felt, by frequency (eq. 5).
+
+docs/method/perception.md#thresholds
+"""
 
 from __future__ import annotations
 
@@ -81,7 +84,8 @@ class Threshold:
     def held(self, frequency_hz: ArrayLike) -> Floats:
         """As `at`, but above the range its last level (g): a lower bound, which is assumed.
 
-        Thresholds rise there: the P channel is the most sensitive at 250 to 300 Hz (METHOD 7).
+        Thresholds rise there: the P channel is the most sensitive at 250 to 300 Hz
+        (docs/method/perception.md#above-the-table).
         """
         above = np.asarray(frequency_hz, dtype=np.float64) > self.frequency_hz[-1]
         finite = above & np.isfinite(frequency_hz)
@@ -131,7 +135,7 @@ class Threshold:
 
     @staticmethod
     def shipped(name: str) -> Threshold:
-        """One of the thresholds that come along: one of `SHIPPED` (METHOD 7)."""
+        """One of `SHIPPED`, which come along (docs/method/perception.md#shipped-thresholds)."""
         if name not in SHIPPED:
             raise InputError(
                 f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got {name!r}; "

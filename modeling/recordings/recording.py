@@ -26,7 +26,7 @@ class Recording:
         Sampling rate, > 0.
     speed_mm_s, force_n : float
         Tangential speed (mm/s) and normal force (N), ≥ 0. A force of 0 marks a no-contact
-        recording, which gives the sensor's floor (METHOD 2).
+        recording, which gives the sensor's floor (docs/method/recordings.md#sensor-floor).
     texture : str
         Name of the surface.
     unit : {"g", "arbitrary"}
@@ -149,7 +149,7 @@ def _checked_samples(samples: ArrayLike, where: str) -> NDArray[np.float64]:
 
 
 def clipped_samples(samples: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which samples of one sensor axis are stuck at the highest or lowest value.
+    """Which samples of one sensor axis are saturated at the highest or lowest value.
 
     An end counts, then with all its samples, where they pile up: more than twice as many as at
     the next three levels inwards together. A quantised sinusoid's highest level holds as many as

@@ -1,6 +1,6 @@
-"""Sinusoids in a record: the hum of the mains, and pure tones.
+"""Sinusoids in a record: the mains hum, and pure tones.
 
-A sinusoid is told from a narrow band of noise by Thomson's F-test: the spectra of one record
+Thomson's F-test distinguishes a sinusoid from a narrow band of noise: the spectra of one record
 through several tapers, which are independent for noise, agree in amplitude and phase for a sinusoid
 (Thomson 1982, "Spectrum estimation and harmonic analysis").
 """

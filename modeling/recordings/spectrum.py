@@ -1,4 +1,4 @@
-"""From a recording to a spectrum (METHOD 2)."""
+"""From a recording to a spectrum (docs/method/recordings.md)."""
 
 from __future__ import annotations
 
@@ -43,10 +43,10 @@ class Spectrum:
         Of each line's power, what subtracting the sensor's floor has left, 0…1.
     tapered_magnitude : (n,) ndarray, optional
         The same of the record faded in and out: what is fitted to, since a rectangular window
-        spills loud bands into quiet ones. Pure tones are in it as bands of noise two lines wide,
+        leaks loud bands into quiet ones. Pure tones are in it as bands of noise two lines wide,
         of the same power: what a layer can describe.
     notes : tuple of str
-        What was found and mended in the record, one phrase each.
+        What was found and corrected in the record, one phrase each.
     """
 
     frequency_hz: Floats
@@ -136,7 +136,7 @@ def spectrum(
         Model rate; data of a lower rate keep their own.
     hum_hz : sequence of float
         Sinusoids that are no vibration of the texture: each is subtracted, and the lines around
-        it tell nothing.
+        it have no weight.
     """
     samples = prepare(recording, rate_hz=rate_hz)
     rate_hz = min(rate_hz, recording.rate_hz)
@@ -166,14 +166,14 @@ def prepared_spectrum(
     rest = samples - tones.samples(samples.size, rate_hz)
     faded = spectrum_of_samples(_taper(rest.size) * rest, rate_hz).magnitude
     levels = zip(tones.frequency_hz.tolist(), tones.amplitude.tolist(), strict=True)
-    told = [
+    reported = [
         f"pure tone of {a / np.sqrt(2):.3g} {recording.unit} RMS at {f:.1f} Hz" for f, a in levels
     ]
     return replace(
         plain,
         share=share,
         tapered_magnitude=np.sqrt(faded**2 + _as_bands(tones, plain.frequency_hz, samples.size)),
-        notes=(*notes, *told),
+        notes=(*notes, *reported),
     )
 
 
@@ -181,7 +181,7 @@ def prepared_spectrum(
 def _taper(count: int) -> Floats:
     """Window (n,) that fades a record in and out over a twentieth each (Tukey), of unit power.
 
-    It removes what a rectangular window spills into quiet bands, at 6 % of the data.
+    It removes what a rectangular window leaks into quiet bands, at 6 % of the data.
     """
     from scipy.signal.windows import tukey
 
@@ -213,7 +213,9 @@ def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectru
 
 
 def dft321(axes: NDArray[np.float64]) -> Floats:
-    """Three axes as one signal of the same spectral energy (METHOD 2).
+    """Three axes as one signal of the same spectral energy.
+
+    docs/method/recordings.md#three-axes
 
     Parameters
     ----------

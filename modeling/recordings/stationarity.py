@@ -1,8 +1,8 @@
-"""Whether a record is of one speed and one level: drift within it, found, told and mended.
+"""Whether a record is of one speed and one level: drift within it, found, reported and corrected.
 
 A turntable that slows down moves all spatial frequencies together. The record is then played at a
 changing rate, so that they stand still (order tracking), and belongs to its middle. A level that
-changes cannot be mended; it is told.
+changes cannot be corrected; it is reported.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def drift_of(samples: Floats, rate_hz: float) -> Drift:
     return Drift(_frequency_drift(power, frequency), _level_change_db(power))
 
 
-def straightened(samples: Floats, drift: float) -> Floats:
+def without_drift(samples: Floats, drift: float) -> Floats:
     """The record with its frequencies held at those of its middle, (n,).
 
     Parameters
@@ -96,7 +96,7 @@ def _frequency_drift(power: Floats, frequency_hz: Floats) -> float:
     level = logs.mean(axis=2, keepdims=True)
     # Independent lines in a cell, of which a Hann window leaves two in three.
     lines = np.diff(places[reach : reach + count : PARTS]) / step / 1.5
-    lines = lines * _telling(logs[DRIFT_STEPS].mean(axis=0))
+    lines = lines * _information_share(logs[DRIFT_STEPS].mean(axis=0))
     together = np.log(np.exp(logs - level).mean(axis=1))
     losses = (SEGMENTS * together - (logs - level).sum(axis=1)) @ lines
     best = int(np.argmin(losses))
@@ -105,8 +105,8 @@ def _frequency_drift(power: Floats, frequency_hz: Floats) -> float:
     return drift if gained > LEAST_GAIN and abs(drift) >= LEAST_DRIFT else 0.0
 
 
-def _telling(log_power: Floats) -> Floats:
-    """How much a cell (n,) can tell of a drift, 0…1: where the spectrum is flat, nothing moves."""
+def _information_share(log_power: Floats) -> Floats:
+    """Information of a cell (n,) about a drift, 0…1: none where the spectrum is flat."""
     from scipy.ndimage import uniform_filter1d
 
     slope = np.gradient(uniform_filter1d(log_power, SMOOTHED_CELLS, mode="nearest"))

@@ -21,7 +21,9 @@ from modeling.regression.parameters import (
 
 
 def regressed(model: TextureModel, *, by: DrivenBy = "conditions") -> RegressedModel:
-    """The texture driven by reduced regressions instead of the grid (METHOD 6 and 9).
+    """The texture driven by reduced regressions instead of the grid.
+
+    docs/method/regression.md#driven-models
 
     By the centroid, SC(v) is fitted first and every parameter then to SC(v), each reduced to what
     is significant. SC(v) being a straight line, each parameter is one in speed, too: what the

@@ -28,8 +28,8 @@ class Regression:
     coefficients, p_values : (1 + terms,) ndarray
         The intercept first, then one per term, and the two-sided p of its t-test.
     n_conditions : int
-        0 where no condition tells the parameter: then the intercept is a mean of what neighbours
-        foretell, and nothing can be tested.
+        0 where no condition yields the parameter: then the intercept is a mean of what neighbours
+        predict, and nothing can be tested.
     multiple_r, adjusted_r_squared, p : float
         Multiple correlation R (0–1), 1 − (1 − R²)(n − 1)/(n − k − 1) with k terms, and p of the
         F test of all terms at once.
@@ -67,7 +67,7 @@ class Regression:
 def regress(values: ArrayLike, predictors: Mapping[str, ArrayLike]) -> Regression:
     """Ordinary least squares with an intercept (eq. 3).
 
-    Predictors that the conditions cannot tell apart from a constant and the ones before them are
+    Predictors that are linear combinations of a constant and the ones before them are
     left out: three corners of a 2 × 2 grid say nothing about the interaction.
 
     Parameters
@@ -83,7 +83,7 @@ def regress(values: ArrayLike, predictors: Mapping[str, ArrayLike]) -> Regressio
         For no conditions, different lengths or values that are not finite.
     """
     observed, columns = _checked(values, predictors)
-    terms = _told_apart(columns)
+    terms = _independent_terms(columns)
     if np.ptp(observed) <= ROUNDING * np.abs(observed).max():
         unknown = np.full(1 + len(terms), np.nan)
         mean_only = np.array([observed.mean(), *np.zeros(len(terms))])
@@ -115,7 +115,9 @@ def _least_squares(observed: Floats, columns: Mapping[str, Floats]) -> Regressio
 
 
 def reduced_regression(values: ArrayLike, predictors: Mapping[str, ArrayLike]) -> Regression:
-    """The reduced model: backward elimination of terms that are not significant (METHOD 6).
+    """The reduced model: backward elimination of terms that are not significant.
+
+    docs/method/regression.md#reduced-models
 
     The term with the largest p is dropped and the rest fitted again, until each one left has
     p < .05; a term without any response (to rounding) counts as p = 1. The intercept stays. The
@@ -164,7 +166,7 @@ def _checked(
     return observed, columns
 
 
-def _told_apart(columns: Mapping[str, Floats]) -> tuple[str, ...]:
+def _independent_terms(columns: Mapping[str, Floats]) -> tuple[str, ...]:
     """The terms that are no combination of a constant and of those before them."""
     kept: dict[str, Floats] = {}
     for term, column in columns.items():

@@ -26,9 +26,9 @@ class Observations(NamedTuple):
     """One parameter of one layer in the n conditions that say something about it.
 
     `layer` counts from 1; 0 is the noise gain, which belongs to no layer. `inherited` is the number
-    of recorded conditions left out, because the layer's frequency there was told by other
-    conditions, or because its level is not identifiable. Where that leaves none, `told` is false
-    and the values are those of all recorded conditions.
+    of recorded conditions left out, because the layer's frequency there was given by other
+    conditions, or because its level is not identifiable. Where that leaves none, `determined` is
+    false and the values are those of all recorded conditions.
     """
 
     parameter: str
@@ -37,11 +37,11 @@ class Observations(NamedTuple):
     speed_mm_s: Floats
     force_n: Floats
     inherited: int
-    told: bool = True
+    determined: bool = True
 
     def regressions(self, predictors: Mapping[str, ArrayLike]) -> tuple[Regression, Regression]:
-        """Full and reduced; of what is not told anywhere the mean, which rests on 0 conditions."""
-        if not self.told:
+        """Full and reduced; where no condition determines it, the mean (of 0 conditions)."""
+        if not self.determined:
             constant = replace(regress(self.values, {}), n_conditions=0)
             return constant, constant
         return regress(self.values, predictors), reduced_regression(self.values, predictors)
@@ -58,18 +58,18 @@ def parameter_observations(model: TextureModel) -> tuple[Observations, ...]:
     recorded = ~model.interpolated
 
     def observed(parameter: str, layer: int, *, of: Floats, at: NDArray[np.bool_]) -> Observations:
-        left_out, told = int(np.count_nonzero(recorded & ~at)), bool(at.any())
-        at = at if told else recorded
-        return Observations(parameter, layer, of[at], speed[at], force[at], left_out, told)
+        left_out, determined = int(np.count_nonzero(recorded & ~at)), bool(at.any())
+        at = at if determined else recorded
+        return Observations(parameter, layer, of[at], speed[at], force[at], left_out, determined)
 
     found = [observed(NOISE_GAIN, 0, of=model.noise_gains, at=recorded)]
     for i in range(model.n_layers):
-        told = recorded & ~model.not_identifiable[:, :, i]
-        own = told & ~model.inherited[:, :, i]
+        determined = recorded & ~model.not_identifiable[:, :, i]
+        own = determined & ~model.inherited[:, :, i]
         found += [
             observed(FREQUENCY, i + 1, of=model.frequencies_hz[:, :, i], at=own),
-            observed(AMPLITUDE, i + 1, of=np.abs(model.gains[:, :, i]), at=told),
-            observed(BANDWIDTH, i + 1, of=model.bandwidths_hz[:, :, i], at=told),
+            observed(AMPLITUDE, i + 1, of=np.abs(model.gains[:, :, i]), at=determined),
+            observed(BANDWIDTH, i + 1, of=model.bandwidths_hz[:, :, i], at=determined),
         ]
     return tuple(found)
 

@@ -1,4 +1,5 @@
-/* The rendering kernel: a texture under a moving hand, sample by sample (METHOD 3 and 9).
+/* The rendering kernel: a texture under a moving hand, sample by sample.
+   docs/method/rendering.md, docs/method/equalizer.md#recursion
 
    C99, no allocation, no globals, no call of the mathematical library but one square root per layer
    and parameter update (and one per sample that the RMS limit touches). Define TQ_REAL as float
@@ -75,7 +76,7 @@ typedef struct {
 
 /* Coefficients of one unit-covariance band: s1' = s1 + p s1 - q s2 + b1 w, s2' = s2 + q s1 + r s2 +
    b2 w, and the unit-gain band-pass is tap (s1 + s1'). At high rates p and r are small: 1 + p in single
-   precision would lose what tells a narrow band from none. */
+   precision would lose what distinguishes a narrow band from none. */
 typedef struct {
     tq_real p, q, r, b1, b2, tap;
 } tq_band;
@@ -267,9 +268,9 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
         to[i] = tq_blend(hand, first + i);
 }
 
-/* How far a reading will have changed by the next one, if it goes on as it did lately; smoothed, since
-   the noise of readings goes on no more than a step does: a change beyond what a hand can do, or what
-   has come to rest. */
+/* The exponentially smoothed change of a reading from update to update, by which the hand is
+   extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0 reset
+   it. */
 TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real furthest, tq_real share)
 {
     tq_real change = now - last;
@@ -293,7 +294,7 @@ TQ_INLINE int tq_moved(tq_real value, tq_real legal)
     return (by < 0 ? -by : by) > (tq_real)1e-6 * legal;
 }
 
-/* Of `width` layers from `from` on: coefficients, and the way that gains go until the next update. */
+/* Of `width` layers from `from` on: coefficients, and the ramps of gains until the next update. */
 TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand *amid,
                                 const tq_hand *end, int from, int width)
 {
@@ -328,8 +329,8 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
     }
 }
 
-/* Parameters for the hand as it will be: those for the hand as it is read would be late. Frequencies
-   and bandwidths are set for the middle of the time to the next update; gains move in a straight line
+/* Parameters for the linearly extrapolated hand: those for the hand as it is read would be late.
+   Frequencies and bandwidths are set for the middle of the time to the next update; gains ramp linearly
    to those for its last sample, so that nothing clicks. The first update sets all at once. */
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
@@ -469,8 +470,8 @@ static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int co
 
 /* --- Limits ------------------------------------------------------------------------------------ */
 
-/* One sample that is no louder than the limits allow. After `longest` samples of vibration without
-   `pause` samples of silence: silence until such a pause. Then the peak; then the running mean square
+/* One sample within the limits. After `longest` samples of vibration without `pause` samples of
+   silence the output is muted until such a pause. Then the peak; then the running mean square
    of what leaves, which never exceeds its limit. */
 TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 {

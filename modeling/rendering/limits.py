@@ -1,4 +1,4 @@
-"""What a signal may be at most before it leaves: peak, RMS and duration (METHOD 9)."""
+"""What a signal may be at most: peak, RMS and duration (docs/method/rendering.md#limits)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Limits:
     rms_window_s : float
         Above 0 and finite.
     duration_s : float
-        Longest vibration without a pause; what follows is silence until a pause. Above 0, infinite
+        Longest vibration without a pause; what follows is muted until a pause. Above 0, infinite
         for none.
     pause_s : float
         Shortest silence that counts as a pause; above 0 and finite.

@@ -15,7 +15,7 @@ from modeling.rendering.limits import Limits
 
 UPDATE_S = 1e-3
 FADE_S = 5e-3
-# Over which the slope of a reading is smoothed before the hand is foreseen by it.
+# Over which the slope of a reading is smoothed before the hand is extrapolated by it.
 SLOPE_S = 4e-3
 # A reading that changes faster is a step of the device, not a hand's motion (2 g; a sharp tap).
 FASTEST_SPEED_CHANGE_MM_S2 = 2e4

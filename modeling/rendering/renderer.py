@@ -29,15 +29,15 @@ class Engine(Protocol):
 
 
 class Renderer:
-    """Vibration of a texture model under a moving hand (eq. 1–2, METHOD 3, 4 and 9).
+    """Vibration of a texture model under a moving hand (eq. 1–2, docs/method/rendering.md).
 
     The state carries on from call to call: rendering in blocks of any size gives the same bits.
     Layered models run through the compiled kernel (`kernel.h`), or, where there is none, through
     Python with the same bits; an ARModel always runs in Python.
 
-    At each update the hand is taken to go on as it did over the last 4 ms (but a change beyond any
+    At each update the hand is extrapolated by its slope over the last 4 ms (but a change beyond any
     hand's, 20 m/s² or 200 N/s, is a step): frequencies and bandwidths are those for the middle of
-    the time to the next update, and gains move in a straight line to those for its end. The largest
+    the time to the next update, and gains ramp linearly to those for its end. The largest
     of the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
 
     Parameters
@@ -55,7 +55,8 @@ class Renderer:
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
         Samples from one reading of speed and force to the next, 1 … 1 000 000; by default one
-        millisecond (5 at 5 kHz, METHOD 9). Where a device reads less often, its period.
+        millisecond (5 at 5 kHz, docs/method/rendering.md#moving-parameters). Where a device reads
+        less often, its period.
     limits : Limits, optional
         Peak, RMS and duration that the output does not exceed; none by default.
     compensation : Compensation, optional

@@ -3,7 +3,8 @@
 A vibrator that answers a drive w by G_w·w + G·H(w), H a band-pass, is R = 1 + G/G_w times as strong
 at its resonance as elsewhere. Eq. 7, ã = G_o·â + G_BEF·H_BEF(â), undoes that exactly where the
 notch H_BEF = 1 − H_BP belongs to the band-pass whose tan(πB/fs) is R times that of H, with
-G_o = 1/R and G_BEF = 1 − 1/R (METHOD 9). A notch of H's own width leaves a resonance nearly as high
+G_o = 1/R and G_BEF = 1 − 1/R (docs/method/vibrators.md#compensation). A notch of H's own width
+leaves a resonance nearly as high
 as the one it was to take away.
 """
 
@@ -94,7 +95,8 @@ class Compensation:
         """Numerator and denominator in z⁻¹.
 
         With t = (1 − z⁻¹)/(1 + z⁻¹), g = tan(πf/fs) and k = tan(πB/fs) the band is
-        H_BP = k(1+g²)t/(g² + k(1+g²)t + t²), the transfer function of METHOD 3's filter.
+        H_BP = k(1+g²)t/(g² + k(1+g²)t + t²), the transfer function of
+        docs/method/equalizer.md#recursion.
         """
         g = float(rational_tan(np.pi / self.rate_hz * self.frequency_hz))
         damping = float(rational_tan(np.pi / self.rate_hz * self.bandwidth_hz)) * (1 + g * g)
@@ -104,7 +106,9 @@ class Compensation:
 
 
 def compensation_for(vibrator: Vibrator, *, rate_hz: float | None = None) -> Compensation:
-    """The exact inverse, up to 1/G_w, of a vibrator's one layer (METHOD 9).
+    """The exact inverse, up to 1/G_w, of a vibrator's one layer.
+
+    docs/method/vibrators.md#compensation
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""A vibrator's resonance from a test with white noise (METHOD 9).
+"""A vibrator's resonance from a test with white noise (docs/method/vibrators.md#identification).
 
 The transfer from drive to acceleration is fitted by one layer, with the likelihood of the layers
-estimator (METHOD 4).
+estimator (docs/method/estimation.md#likelihood).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from modeling.vibrators.compensation import FLAT_WITHIN_DB
 from modeling.vibrators.vibrator import Vibrator
 
 SEGMENTS = 32
-# Hann windows that overlap by half share 1/6 of what they tell (Welch 1967).
+# Hann windows that overlap by half share 1/6 of their information (Welch 1967).
 INDEPENDENT_SEGMENTS = SEGMENTS / (1 + 2 / 36)
-# A line's magnitude is told to √((1 − γ²)/2nγ²) (Bendat and Piersol 2010): 0.5 dB with n = 30 at a
+# A line's magnitude is known to √((1 − γ²)/2nγ²) (Bendat and Piersol 2010): 0.5 dB with n = 30 at a
 # coherence γ² of 0.8. Further down most of what is heard is something else than the vibrator.
 LEAST_COHERENCE = 0.8
 SHORTEST_SEGMENT_S = 0.5
@@ -266,7 +266,7 @@ def _check_record(name: str, record: Floats) -> None:
 
 
 def _resampled(record: Floats, rate_hz: float) -> Floats:
-    """A record at 5 kHz (by FFT, METHOD 2), or as it is at a lower rate."""
+    """A record at 5 kHz (by FFT, docs/method/recordings.md#preparation), else at its lower rate."""
     if rate_hz <= MODEL_RATE_HZ:
         return record
     from scipy.signal import resample  # late: takes longer to load than all of modeling

@@ -1,4 +1,6 @@
-"""Random spectra with known layers, of three kinds: what estimators are held against (METHOD 4).
+"""Random spectra with known layers, of three kinds: what estimators are tested on.
+
+docs/method/stimuli.md#random-spectra
 
 Nothing here was measured. Layers are drawn 6–30 dB above the noise, anywhere between 20 and
 1500 Hz, so they overlap, and some lie hidden under others.

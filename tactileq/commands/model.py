@@ -26,13 +26,13 @@ def model(
         int | None, typer.Option(min=1, help="Number of layers; chosen without it (joint).")
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Leave conditions out and foretell them.")
+        bool, typer.Option("--check", help="Leave conditions out and predict them.")
     ] = False,
     alone: Annotated[
         bool, typer.Option("--alone", help="Find the layers of each recording by itself, too.")
     ] = False,
     keep_hum: Annotated[
-        bool, typer.Option("--keep-hum", help="Leave hum of the mains in the recordings.")
+        bool, typer.Option("--keep-hum", help="Leave mains hum in the recordings.")
     ] = False,
     plot: Annotated[
         bool, typer.Option("--plot", help="Draw some spectra, and the layers over the grid.")

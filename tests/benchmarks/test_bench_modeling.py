@@ -99,7 +99,7 @@ def test_autoregressive_fit_of_a_texture(
 
 
 def resampling_and_one_paper_fit(study: tuple[RecordingSet, ...]) -> int:
-    """What a study's modelling is held against: both for each record, one after the other."""
+    """What a study's modelling is compared with: both for each record, one after the other."""
     return sum(
         find_layers(spectrum(record), estimator="paper").gains.size > 0
         for recordings in study

@@ -193,7 +193,7 @@ def test_simplify_draws_the_condition_that_was_asked_for(main, three: Path) -> N
 
 
 def test_layers_check_and_alone(main, tmp_path: Path) -> None:
-    """A prescribed number of layers; conditions foretold; each recording by itself."""
+    """A prescribed number of layers; conditions predicted; each recording by itself."""
     axes = {"speeds_mm_s": np.array([100.0, 200.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     truth = planted_texture("canvas", **axes)
     record_texture(truth, rate_hz=5000.0, duration_s=0.5).save(tmp_path / "set")
@@ -201,11 +201,11 @@ def test_layers_check_and_alone(main, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert TextureModel.load(tmp_path / "models/canvas.json").n_layers == 2
     assert "log-spectral distance" in done.stdout
-    foretold = pd.read_csv(tmp_path / "models/canvas_check.tsv", sep="\t")
+    predicted = pd.read_csv(tmp_path / "models/canvas_check.tsv", sep="\t")
     # Six conditions, four of them corners.
-    assert list(zip(foretold.speed_mm_s, foretold.force_n, strict=True)) == [(200, 1), (200, 3)]
-    assert foretold.simulated.all()
-    assert np.isfinite(foretold.level_error_db).all()
+    assert list(zip(predicted.speed_mm_s, predicted.force_n, strict=True)) == [(200, 1), (200, 3)]
+    assert predicted.simulated.all()
+    assert np.isfinite(predicted.level_error_db).all()
     alone = pd.read_csv(tmp_path / "models/canvas_alone.tsv", sep="\t")
     assert len(alone.groupby(["speed_mm_s", "force_n"])) == 6
     provenance = json.loads((tmp_path / "models/canvas_provenance.json").read_text())

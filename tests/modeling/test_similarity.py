@@ -1,4 +1,4 @@
-"""Measures of likeness against closed forms and planted ratios (METHOD 8)."""
+"""Measures of likeness against closed forms and planted ratios (docs/method/similarity.md)."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def test_log_spectral_distance_refuses_zeros() -> None:
 
 
 def test_band_energies_of_planted_ratios() -> None:
-    """Each band of METHOD 8 (the measured table's edges, then 800, 1300, 2500) gets its error."""
+    """Each band of docs/method/similarity.md#band-energies gets its error."""
     edges = [10, 20, 35, 60, 90, 130, 180, 250, 350, 480, 800, 1300, 2500]
     frequency = np.arange(10.0, 2451.0)
     rng = np.random.default_rng(1)

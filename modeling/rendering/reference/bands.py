@@ -14,11 +14,11 @@ from modeling.rendering.reference.hand import Extrapolator, GainRamps
 
 
 class BandFilter:
-    """A PEQ of m bands (METHOD 3) at the model's rate or above.
+    """A PEQ of m bands (docs/method/equalizer.md#recursion) at the model's rate or above.
 
-    Parameters are those for the hand as it will be: those for the hand as it is read would be
+    Parameters are those for the extrapolated hand: those for the hand as it is read would be
     late. Frequencies and bandwidths are set for the middle of the time to the next update; gains
-    move in a straight line to those for its last sample, and at most by the plan's slews. The first
+    ramp linearly to those for its last sample, and at most by the plan's slews. The first
     update sets all at once.
     """
 
@@ -47,7 +47,7 @@ class BandFilter:
         return list(zip(gains.tolist(), taps.tolist(), bands, strict=True))
 
     def update(self, setting: Any) -> None:
-        """Put coefficients into force, and start every gain on its way to what is wanted."""
+        """Put coefficients into force, and start the ramp of every gain to its target."""
         wanted, taps, self._bands = setting
         self._gains.update(wanted, taps)
 
@@ -65,7 +65,7 @@ class BandFilter:
         return wide[half : half + count].tolist(), floor_noise.tolist()
 
     def filter(self, *inputs: list[float]) -> list[float]:
-        """The recursion of METHOD 3 with the parameters in force."""
+        """The recursion of docs/method/equalizer.md#recursion with the parameters in force."""
         noise, floor_noise = inputs
         floor_gains = self._gains.course(0, len(noise))
         output = [gain * w for gain, w in zip(floor_gains, floor_noise, strict=True)]

@@ -1,4 +1,7 @@
-"""How parameters follow the hand: linear extrapolation, and ramps of gains (METHOD 9)."""
+"""How parameters follow the hand: linear extrapolation, and ramps of gains.
+
+docs/method/rendering.md#extrapolation, docs/method/rendering.md#slew
+"""
 
 from __future__ import annotations
 
@@ -47,7 +50,7 @@ class Extrapolator:
 
 
 class GainRamps:
-    """Gains that move in straight lines from update to update, no faster than the plan lets them.
+    """Gains on linear ramps from update to update, no faster than the plan's slews.
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ class GainRamps:
         self._courses = [(0.0, 0.0)] * len(self._slews)
 
     def update(self, wanted: list[float], factors: Sequence[float]) -> None:
-        """Start (k,) gains on their way to what is wanted, each heard times a factor.
+        """Start ramps of (k,) gains to their targets, each multiplied by a factor.
 
         The first update sets all at once.
         """

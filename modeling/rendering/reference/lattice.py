@@ -22,7 +22,7 @@ class LatticeFilter:
     """An all-pole filter as a normalised lattice (Gray and Markel 1975), at the model's rate.
 
     Every stage turns (its input, its state) by an angle, so with white noise of unit variance all
-    states and the unscaled output have unit variance too; the gain is applied behind it. A direct
+    states and the unscaled output have unit variance too; the gain is applied after it. A direct
     form, stable as each of its filters is, can grow without bound when they change.
     """
 
@@ -52,7 +52,7 @@ class LatticeFilter:
         return list(zip(end.gain.tolist(), rms.tolist(), stages, strict=True))
 
     def update(self, setting: Any) -> None:
-        """Put angles into force, and start the gain on its way."""
+        """Put angles into force, and start the ramp of the gain."""
         gain, rms, self._stages = setting
         self._gain.update([gain], [rms])
 

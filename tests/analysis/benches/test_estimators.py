@@ -1,4 +1,7 @@
-"""What `joint` promises on 200 random planted textures (METHOD 4), and how it is scored."""
+"""What `joint` promises on 200 random planted textures, and how it is scored.
+
+docs/method/estimation.md
+"""
 
 from __future__ import annotations
 

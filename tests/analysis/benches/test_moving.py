@@ -56,7 +56,8 @@ def jerky_hand(count: int) -> Hand:
 
 @pytest.mark.parametrize("update_samples", [1, 4, 5, 32])
 def test_rendered_parameters_are_those_of_the_renderer(update_samples: int) -> None:
-    """Put through METHOD 3's recursion with the same noise, they give the renderer's output."""
+    """Put through the recursion (docs/method/equalizer.md#recursion) with the same noise, they give
+    the renderer's output."""
     model, hand = planted_texture("canvas"), jerky_hand(2000)
     at = rendered_parameters(model, hand, update_samples)
     noise = white_noise(stream_key(3), 0, 2000)
@@ -71,7 +72,7 @@ def test_updates_each_millisecond_are_40_db_below_the_signal(
 ) -> None:
     every_5, every_32 = accuracy.loc[texture, ["error_db_every_5", "error_db_every_32"]]
     assert every_5 <= -40
-    assert every_5 + 10 < every_32 < -25  # METHOD 9 measured −26 dB
+    assert every_5 + 10 < every_32 < -25  # −26 dB in docs/method/rendering.md#accuracy
 
 
 @pytest.mark.parametrize("texture", TEXTURES)

@@ -88,7 +88,7 @@ def test_moving_variances_are_the_sums_of_all_squared_impulse_responses(form: st
 
 
 def test_each_band_is_exactly_as_loud_as_it_should_be(table: pd.DataFrame) -> None:
-    """≤ 0.1 dB is asked for; it is exact on every motion of METHOD 3."""
+    """≤ 0.1 dB is asked for; it is exact on all motions of docs/method/equalizer.md#stability."""
     ours = table[table["form"] == OURS]
     assert len(ours) == 5
     assert (ours["band_highest_db"] < 1e-6).all()
@@ -96,7 +96,7 @@ def test_each_band_is_exactly_as_loud_as_it_should_be(table: pd.DataFrame) -> No
 
 
 def test_the_sum_of_bands_is_nearly_right_on_smooth_strokes(table: pd.DataFrame) -> None:
-    """METHOD 3 measured ±0.15 dB."""
+    """±0.15 dB is the preliminary figure of docs/method/equalizer.md#stability."""
     ours = table[table["form"] == OURS].set_index("motion").loc["smooth strokes"]
     assert ours["sum_highest_db"] < 0.15
     assert ours["sum_lowest_db"] > -0.15
@@ -111,7 +111,10 @@ def test_the_sum_is_never_louder_than_bands_in_step_would_be() -> None:
 
 
 def test_other_forms_are_not(table: pd.DataFrame) -> None:
-    """METHOD 3 measured that a direct form blows up on jumps, and that jitter costs both dear."""
+    """A direct form grows without bound on jumps, and jitter is costly for both.
+
+    Preliminary figures: docs/method/equalizer.md#stability.
+    """
     highest = table.pivot(index="motion", columns="form", values="band_highest_db")
     for motion in ("jumping 20 ↔ 1500 Hz", "random jumps"):
         assert highest.loc[motion, DIRECT] == np.inf
@@ -122,7 +125,7 @@ def test_other_forms_are_not(table: pd.DataFrame) -> None:
 
 
 def test_the_state_variable_filter_costs_33_db_on_jumps() -> None:
-    """METHOD 3's figure for one band jumping 20 ↔ 1500 Hz each sample."""
+    """One band jumping 20 ↔ 1500 Hz each sample (docs/method/equalizer.md#stability)."""
     count = 3000
     jumping = np.where(np.arange(count) % 2, 1500.0, 20.0)[:, None]
     at = Parameters(np.zeros(count), jumping, np.full((count, 1), 50.0), np.ones((count, 1)))

@@ -18,14 +18,14 @@ from analysis.figures.answers import (
     figure_ratings,
 )
 from analysis.figures.drawing import LAYER_COLOURS, VERMILLION
-from analysis.figures.layer_courses import figure_layer_courses
+from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import (
     figure_spectra,
     figure_spectra_and_threshold,
     plot_layers_and_threshold,
 )
 from analysis.spectra.comparison import compare_spectra, spectrum_panels
-from analysis.spectra.layers_over_grid import layer_course
+from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.paired import rating_tests
 from analysis.statistics.rates import rate_tests
@@ -87,7 +87,7 @@ def test_a_condition_off_the_grid_is_refused(results):
     with pytest.raises(InputError, match="recorded condition"):
         compare_spectra(results[0], speed_mm_s=300.0, force_n=3.0)
     with pytest.raises(InputError, match="condition of the grid"):
-        layer_course(results[0].model, force_n=2.0)
+        layers_over_speed(results[0].model, force_n=2.0)
 
 
 def test_ratings(ratings):
@@ -140,8 +140,8 @@ def test_confusion_matrices_state_orientation_counts_and_chance(choices):
 
 def test_layers_over_speed_beside_the_planted_ones(results):
     result = results[0]
-    courses = [layer_course(model, force_n=3.0) for model in (result.model, result.truth)]
-    figure = figure_layer_courses(courses)
+    courses = [layers_over_speed(model, force_n=3.0) for model in (result.model, result.truth)]
+    figure = figure_layers_over_speed(courses)
     frequency, amplitude = drawn(figure)
     assert frequency.get_ylabel() == "frequency (Hz)"
     assert "(g peak)" in amplitude.get_ylabel()

@@ -85,11 +85,11 @@ def tables(results, ratings, choices) -> list[Table]:
         simulated_participants=True,
         simulated_rig=True,
     )
-    foretold = pd.DataFrame(
+    predicted = pd.DataFrame(
         [(200.0, 1.0, -0.5, 1.5)],
         columns=["speed_mm_s", "force_n", "level_error_db", "log_spectral_distance_db"],
     )
-    textures = [replace(results[0], left_out={"joint": foretold}), *results[1:]]
+    textures = [replace(results[0], left_out={"joint": predicted}), *results[1:]]
     sections = (
         model_section(textures, rng=np.random.default_rng(1), progress=lambda share, what: None),
         parameter_section(

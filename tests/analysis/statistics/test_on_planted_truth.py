@@ -1,4 +1,7 @@
-"""Every procedure on planted truth: errors of the first kind, coverage, recovery (METHOD 12)."""
+"""Every procedure on planted truth: type I errors, coverage, recovery.
+
+docs/method/statistics.md
+"""
 
 from __future__ import annotations
 

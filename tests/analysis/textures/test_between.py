@@ -99,7 +99,7 @@ def test_every_condition_but_the_corners_is_left_out_once() -> None:
 
 
 def test_what_is_left_out_is_foretold_without_it() -> None:
-    """A condition that differs from its neighbours is foretold by them, not by itself."""
+    """A condition that differs from its neighbours is predicted by them, not by itself."""
     records = [
         replace(r, samples=10 * r.samples) if r.condition == (200.0, 2.0) else r
         for r in planted_records()

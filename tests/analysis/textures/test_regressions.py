@@ -14,8 +14,8 @@ from analysis.report.section_parameters import parameter_section
 from analysis.textures.regressions import (
     NAMES,
     centroid_amplitude_table,
-    centroid_courses,
     centroid_table,
+    centroids_over_speed,
     coefficient_table,
     driving_table,
     regression_table,
@@ -197,7 +197,7 @@ def test_courses_hold_mean_and_deviation_over_the_forces() -> None:
     holes = np.zeros((4, 4), dtype=bool)
     holes[0, 1:], holes[1] = True, True
     model = known("rough", frequency=100 + V + 10 * F, interpolated=holes)
-    (course,) = centroid_courses([model])
+    (course,) = centroids_over_speed([model])
     assert course.mean_hz == pytest.approx([155, np.nan, 370, 470], nan_ok=True)
     deviation = np.std(10 * FORCES, ddof=1)
     assert course.sd_hz == pytest.approx([np.nan, np.nan, deviation, deviation], nan_ok=True)
@@ -207,7 +207,7 @@ def test_courses_hold_mean_and_deviation_over_the_forces() -> None:
 
 
 def test_figure_five_shows_every_texture_with_units(models, tmp_path) -> None:
-    courses = centroid_courses([*models[:2], replace(models[2], simulated=True)])
+    courses = centroids_over_speed([*models[:2], replace(models[2], simulated=True)])
     figure = figure_centroid(courses)
     ax = figure.axes[0]
     assert ax.get_xlabel() == "probing speed (mm/s)"
@@ -262,11 +262,11 @@ def test_a_texture_without_layers_is_driven_by_its_noise_alone(results) -> None:
 
 
 def test_the_section_says_what_came_out(results) -> None:
-    told: list[float] = []
+    determined: list[float] = []
     section = parameter_section(
-        results, rng=np.random.default_rng(1), progress=lambda share, what: told.append(share)
+        results, rng=np.random.default_rng(1), progress=lambda share, what: determined.append(share)
     )
-    assert told == sorted(told)
+    assert determined == sorted(determined)
     (driven,) = section.outcomes  # nothing could be tested on 2 × 2 conditions
     assert "the grid" in driven
     assert "regressions" in driven

@@ -63,7 +63,7 @@ def test_white_noise_is_felt_by_the_power_in_each_band() -> None:
 
 
 def test_a_narrow_layer_is_felt_as_the_sinusoid_of_equal_power() -> None:
-    """METHOD 7, `energy`: √2·G·√(k/(1+k)) with k = tan(πB/rate)."""
+    """`energy` (docs/method/perception.md#criteria): √2·G·√(k/(1+k)) with k = tan(πB/rate)."""
     gain, bandwidth_hz, limit_g = 0.5, 2.0, 0.001
     k = np.tan(np.pi * bandwidth_hz / 5000.0)
     amplitude_g = np.sqrt(2) * gain * np.sqrt(k / (1 + k))

@@ -1,4 +1,4 @@
-"""The parametric equalizer against METHOD 3, written out here a second time."""
+"""The parametric equalizer against docs/method/equalizer.md, written out here a second time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def one_band(frequency_hz: float, bandwidth_hz: float, *, gain: float = 1.0) -> 
 
 
 def state_space(frequency_hz: float, bandwidth_hz: float) -> tuple[np.ndarray, ...]:
-    """(A, b, c, d) of one band of unit gain, from the formulas of METHOD 3 and numpy's tangent."""
+    """(A, b, c, d) of one band, from docs/method/equalizer.md#recursion and numpy's tangent."""
     g = np.tan(np.pi * frequency_hz / RATE_HZ)
     K = 2 * np.tan(np.pi * bandwidth_hz / RATE_HZ) / np.sin(2 * np.pi * frequency_hz / RATE_HZ)
     a1 = 1 / (1 + g * (g + K))

@@ -21,9 +21,9 @@ from modeling.estimation.coherent import (
     limits_of,
     misfits,
     observe,
+    record_information,
     response,
     slopes,
-    told,
     without_layer,
 )
 from modeling.estimation.likelihood import centres_and_widths, signal_power
@@ -223,10 +223,10 @@ def test_the_climb_reaches_the_truth_where_nothing_scatters() -> None:
 
 
 def test_a_lone_bands_level_is_told_as_well_as_theory_allows() -> None:
-    """10/ln 10/√(πBT) dB, from above; METHOD 4's 4.34/√(πBT)."""
+    """10/ln 10/√(πBT) dB, from above (docs/method/estimation.md#level-deviations)."""
     width, seconds = 50.0, 1.0
     theta = np.log([1e-4, 500.0, width, 1.0])[None]
-    information = told(theta, np.ones(1), at(np.arange(15.0, 2450.0, 1 / seconds)))
+    information = record_information(theta, np.ones(1), at(np.arange(15.0, 2450.0, 1 / seconds)))
     covariance = np.linalg.inv(information)
     deviation_db = 20 / np.log(10) * level_deviations(theta, covariance, rate_hz=RATE_HZ)[0, 0]
     bound_db = 10 / np.log(10) / np.sqrt(np.pi * width * seconds)

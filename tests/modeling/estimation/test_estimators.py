@@ -1,4 +1,4 @@
-"""Estimators on spectra without noise, where METHOD 4 has closed answers."""
+"""Estimators on spectra without noise, where docs/method/estimation.md has closed answers."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_smoothed_consistent_model_has_the_measured_heights(
 
 
 def test_paper_overestimates_what_consistent_gets_right() -> None:
-    """Level of one band over its true level; METHOD 4 reports +4.6 dB for the plain reading."""
+    """Level of one band over its true level; +4.6 dB in docs/method/estimation.md#paper."""
     spectrum = truth(0.05, [(600.0, 50.0, 0.5)])
 
     def level_error_db(estimator: str) -> float:
@@ -136,7 +136,10 @@ def test_paper_overestimates_what_consistent_gets_right() -> None:
 
 @pytest.mark.parametrize("estimator", ["paper", "paper-consistent"])
 def test_level_deviation_is_no_less_than_a_record_allows(estimator: str) -> None:
-    """10·log10(e)/√(πBT) is the bound: 0.35 dB at 50 Hz and 1 s. METHOD 4."""
+    """10·log10(e)/√(πBT) is the bound: 0.35 dB at 50 Hz and 1 s.
+
+    docs/method/estimation.md#level-deviations
+    """
     layers = find_layers(truth(0.05, [(600.0, 50.0, 0.5)]), estimator=estimator)
     assert 4.342945 / np.sqrt(np.pi * 50) == pytest.approx(0.35, abs=0.01)
     assert 0.3 < layers.level_sd_db[0] < 0.7

@@ -96,7 +96,10 @@ def test_derivatives_of_the_power_sum(drawn: tuple[Floats, int], shape: float) -
 def test_a_peak_is_3_db_down_at_its_edges_whatever_its_shape(
     centre: float, width: float, shape: float
 ) -> None:
-    """At u = ±1, which lie tan(πB/fs) apart on the filter's warped scale (METHOD 3)."""
+    """At u = ±1, which lie tan(πB/fs) apart on the filter's warped scale.
+
+    docs/method/equalizer.md#recursion
+    """
     g, k = np.tan(np.pi * centre / RATE_HZ), np.tan(np.pi * width / RATE_HZ)
     half = k * (1 + g * g) / 2
     root = np.sqrt(half**2 + g * g)

@@ -257,7 +257,10 @@ def test_parameters_at_the_grid_and_between() -> None:
 
 
 def test_edges_of_the_grid() -> None:
-    """METHOD 9: clamped above, a linear ramp to 0 below, NaN and inf as lift-off."""
+    """Clamped above, a linear ramp to 0 below, NaN and inf as lift-off.
+
+    docs/method/rendering.md#grid-edges
+    """
     model = fit_ar(grid_of_recordings(), order=3)
     speed = [50.0, 50.0, 900.0, 0.0, 100.0, np.nan, 100.0, -100.0]
     force = [1.0, 0.25, 9.0, 1.0, -1.0, 1.0, np.inf, 1.0]
@@ -277,7 +280,8 @@ def test_every_blend_is_stable(speed: float, force: float, seed: int) -> None:
 
 
 def test_blending_coefficients_goes_unstable_where_frequencies_never_do() -> None:
-    """METHOD 4's 95 of 540, on harsher pairs: narrow resonances anywhere, order 6 and 8."""
+    """95 of 540 in docs/method/fitting.md#ar-models; here on harsher pairs: narrow resonances
+    anywhere, order 6 and 8."""
     rng = np.random.default_rng(0)
     unstable = 0
     for _ in range(300):

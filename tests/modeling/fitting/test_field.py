@@ -18,10 +18,10 @@ from modeling.fitting.field import (
     Field,
     covariances,
     fit_field,
-    learnt_precision,
     log_evidence,
+    prior_covariance,
     solve,
-    usual_changes,
+    updated_precision,
 )
 from modeling.recordings.spectrum import spectrum_of_samples
 
@@ -117,13 +117,13 @@ def test_a_power_law_costs_little(rows: int, columns: int) -> None:
     cost = 0.5 * TREND_SHARE * np.sum(trend * (trend @ field.precision))
     assert given.penalty(theta) == pytest.approx(cost, rel=1e-9)
     if min(rows, columns) > 2:
-        assert following.foretold(theta) == pytest.approx(theta, abs=0.05)
+        assert following.predicted(theta) == pytest.approx(theta, abs=0.05)
 
 
 def test_foretold_is_the_mean_of_the_neighbours() -> None:
     field = replace(random_field(3, 3, 1), trend=np.zeros((2, 1)))
     theta = np.arange(9.0)[:, None] ** 2
-    told = field.foretold(theta)[:, 0]
+    told = field.predicted(theta)[:, 0]
     assert told[4] == pytest.approx(np.mean([1, 9, 25, 49]))
     assert told[0] == pytest.approx(np.mean([1, 9]))
 
@@ -160,7 +160,7 @@ def textured(
 
 def field_of(rows: int, columns: int, m: int) -> Field:
     places = np.log([(1.3**i, 1.5**j) for i in range(rows) for j in range(columns)])
-    precision = np.linalg.inv(usual_changes(m))
+    precision = np.linalg.inv(prior_covariance(m))
     p = 1 + 3 * m
     return Field(rows, columns, places - places.mean(axis=0), precision, np.zeros((2, p)))
 
@@ -197,7 +197,7 @@ def test_a_condition_without_a_record_is_told_by_its_neighbours() -> None:
     limits = limits_of(1, rate_hz=RATE_HZ, step_hz=1.0)
     fit = fit_field(start, np.ones(1), observed, field_of(4, 3, 1), limits=limits, steps=30)
     assert np.abs(fit.theta[4] - truth[4]).max() < 0.25
-    assert fit.theta[4] == pytest.approx(fit.field.foretold(fit.theta)[4], abs=1e-3)
+    assert fit.theta[4] == pytest.approx(fit.field.predicted(fit.theta)[4], abs=1e-3)
 
 
 def test_no_condition_stays_worse_than_its_neighbours_foretell() -> None:
@@ -211,8 +211,8 @@ def test_no_condition_stays_worse_than_its_neighbours_foretell() -> None:
     assert np.exp(fit.theta[7, 1]) == pytest.approx(300.0, abs=15)
     from modeling.estimation.coherent import slopes
 
-    foretold = slopes(fit.field.foretold(fit.theta), np.ones(1), observed)
-    assert (fit.slopes.objective <= foretold.objective + 0.3).all()
+    predicted = slopes(fit.field.predicted(fit.theta), np.ones(1), observed)
+    assert (fit.slopes.objective <= predicted.objective + 0.3).all()
 
 
 def test_the_field_learns_how_smooth_a_texture_is() -> None:
@@ -229,7 +229,7 @@ def test_the_field_learns_how_smooth_a_texture_is() -> None:
         observed, field = observed_near(powers, truth), field_of(4, 3, 1)
         for _ in range(4):
             fit = fit_field(truth, np.ones(1), observed, field, limits=limits, steps=30)
-            field = replace(field, precision=learnt_precision(fit))
+            field = replace(field, precision=updated_precision(fit))
         learnt[jump] = np.sqrt(np.diag(np.linalg.inv(field.precision)))
     assert learnt[0.7][3] > 2 * learnt[0.0][3]
     assert learnt[0.7][3] == pytest.approx(0.7 * np.sqrt(2), rel=0.4)

@@ -10,7 +10,7 @@ from modeling.arrays import Floats
 from modeling.estimation.coherent import response
 from modeling.estimation.likelihood import split
 from modeling.fitting.growth import candidates, inserted, inserted_independently
-from modeling.fitting.layer_search import fitted, search, uncrossed
+from modeling.fitting.layer_search import fitted, in_frequency_order, search
 from modeling.fitting.texture_grid import TextureGrid, texture_grid
 from modeling.recordings.spectrum import spectrum
 
@@ -144,7 +144,7 @@ def test_layers_of_two_speeds_are_named_in_the_order_of_their_frequencies() -> N
     frequency = np.exp(theta[:, 1:3])
     crossed = theta if abs(frequency[0, 0] - frequency[-1, 0]) > 300 else best.theta
     solution = fitted(grid, crossed, best.signs)
-    named = uncrossed(grid, solution)
+    named = in_frequency_order(grid, solution)
     low, high = np.exp(np.sort(named.theta[:, 1:3], axis=1)).T
     assert low == pytest.approx(600, abs=30)
     assert high == pytest.approx(1300, abs=40)
@@ -165,4 +165,4 @@ def test_three_speeds_may_cross() -> None:
     speed = np.array(grid.conditions)[:, 0]
     assert frequency[:, moving] == pytest.approx(6 * speed, rel=0.1)
     assert frequency[:, 1 - moving] == pytest.approx(900, rel=0.1)
-    assert uncrossed(grid, best) is best
+    assert in_frequency_order(grid, best) is best

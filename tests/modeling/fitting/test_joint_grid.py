@@ -178,7 +178,7 @@ def test_names_are_kept(judged: Mapping[tuple[str, bool], list[Names]]) -> None:
 def test_naming_the_grid_as_a_whole_beats_tracking_step_by_step(
     judged: Mapping[tuple[str, bool], list[Names]], independent: bool
 ) -> None:
-    """METHOD 5 lets `joint` do so if it is better on the same measures."""
+    """`joint` names layers at least as well as tracking (docs/method/fitting.md#identities)."""
     joint, tracked = (judged[e, independent] for e in ("joint", "paper-consistent"))
     # Of what was planted: a recipe that names only the clearest layers names these well.
     for part in ("kept", "planted_found"):
@@ -253,7 +253,7 @@ def test_layers_that_vanish_inherit_their_law_and_stay_faint() -> None:
 
 @pytest.mark.parametrize("steep", [5.0, 8.0, 20.0])
 def test_a_layer_that_leaves_the_band_above(steep: float) -> None:
-    """At v/λ beyond the Nyquist frequency; what is foretold there stays legal."""
+    """At v/λ beyond the Nyquist frequency; what is predicted there stays legal."""
     grid = axes(7, 4)
 
     def truth(v: float, f: float) -> PEQ:

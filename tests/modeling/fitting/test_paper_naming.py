@@ -1,4 +1,4 @@
-"""One layer, one name: the rules of METHOD 5 as a table and as properties."""
+"""One layer, one name: docs/method/fitting.md#tracking as a table and as properties."""
 
 from __future__ import annotations
 

@@ -64,10 +64,10 @@ def test_foretold_conditions_do_not_decide(make_model: ModelMaker) -> None:
     model = make_model(0.0, [PEAK, (700.0, 40.0, -0.5)])
     frequencies = model.frequencies_hz.copy()
     frequencies[0, 0, 1] = frequencies[0, 1, 1] = frequencies[1, 0, 1] = 300.0
-    foretold = np.array([[True, True], [True, False]])
+    predicted = np.array([[True, True], [True, False]])
     mixed = replace(model, frequencies_hz=frequencies)
     assert own_peaks(mixed).is_peak.tolist() == [True, False]
-    assert own_peaks(replace(mixed, interpolated=foretold)).is_peak.all()
+    assert own_peaks(replace(mixed, interpolated=predicted)).is_peak.all()
 
 
 def test_some_layer_is_always_a_peak(make_model: ModelMaker) -> None:

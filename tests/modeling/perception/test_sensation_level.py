@@ -36,7 +36,10 @@ def test_gain_adds_in_db(gain_db: float) -> None:
 
 
 def test_powers_add() -> None:
-    """Three sinusoids 1 dB below threshold are 3.8 dB above it (METHOD 7)."""
+    """Three sinusoids 1 dB below threshold are 3.8 dB above it.
+
+    docs/method/perception.md#simplification
+    """
     three = sum(sine(f, 0.01 * 10 ** (-1 / 20)) for f in (40.0, 120.0, 350.0))
     found = sensation_level(np.asarray(three), RATE_HZ, threshold=FLAT)
     assert found.level_db == pytest.approx(10 * np.log10(3) - 1, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Which layers go: the criteria and rules of METHOD 7."""
+"""Which layers go: docs/method/perception.md#criteria and #simplification."""
 
 from __future__ import annotations
 
@@ -278,7 +278,7 @@ def test_threshold_unknown_in_some_conditions_keeps_the_layer(
 
 
 def test_below_the_last_level_of_the_table_a_layer_may_go(make_model: ModelMaker) -> None:
-    """That is a lower bound of the threshold above its end (METHOD 7)."""
+    """A lower bound of the threshold above its end: docs/method/perception.md#above-the-table."""
     quiet = (1500.0, 50.0, 0.1 * 10 ** (-14 / 20))
     result = run(make_model(0.0, [*at_db(10, -20), quiet]))
     layer = result.layers[2]
@@ -446,7 +446,7 @@ def test_unknown_criteria_are_refused(make_model: ModelMaker) -> None:
         run(make_model(0.0, at_db(1)), criterion="loudness")
 
 
-# --- signs of those that stay (METHOD 3)
+# --- signs of those that stay (docs/method/perception.md#signs-of-the-rest)
 
 ALTERNATING = [(300.0, 40.0, 0.5), (400.0, 60.0, -0.35), (500.0, 40.0, 0.5)]
 

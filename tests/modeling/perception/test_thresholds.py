@@ -1,4 +1,4 @@
-"""Thresholds against the numbers of METHOD 7 and the codec's formula, computed here."""
+"""Thresholds against the numbers of docs/method/perception.md, and the codec's formula."""
 
 from __future__ import annotations
 

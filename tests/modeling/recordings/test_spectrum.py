@@ -28,7 +28,10 @@ def flat(level: float, *, samples: int = 5000, rate_hz: float = 5000.0) -> Spect
 
 @pytest.mark.parametrize(("n", "rate_hz"), [(1000, 1000.0), (5000, 5000.0), (20001, 5000.0)])
 def test_white_noise_has_the_magnitude_of_its_rms(n: int, rate_hz: float) -> None:
-    """METHOD 3: the mean |FFT| of unit noise is √(πN)/2, whatever N and the rate."""
+    """The mean |FFT| of unit noise is √(πN)/2, whatever N and the rate.
+
+    docs/method/recordings.md#magnitude
+    """
     rng = np.random.default_rng(0)
     means = [
         spectrum_of_samples(0.25 * rng.standard_normal(n), rate_hz).magnitude[5:-1].mean()

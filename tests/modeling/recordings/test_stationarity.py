@@ -1,4 +1,4 @@
-"""Drift that was put in is found and mended; steady records are left alone."""
+"""Drift that was put in is found and corrected; steady records are left alone."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import PEQ
-from modeling.recordings.stationarity import drift_of, straightened
+from modeling.recordings.stationarity import drift_of, without_drift
 
 RATE_HZ = 5000.0
 FINE = 8
@@ -72,7 +72,7 @@ def test_drift_is_found(drift: float, share: float) -> None:
 @given(st.floats(-0.25, 0.25), st.integers(0, 100))
 def test_straightened_frequencies_stand_still(drift: float, seed: int) -> None:
     """The peaks of a drifting record are as narrow as those of the steady one it was made of."""
-    mended = straightened(drifting(seed, drift), drift)
+    mended = without_drift(drifting(seed, drift), drift)
     middle = steady(seed, 10_000)[1250 : 1250 + 5000]  # what the drifting record was read from
     mended, middle = mended[250:-250], middle[250:-250]
     assert np.corrcoef(mended, middle)[0, 1] > 0.98
@@ -80,7 +80,7 @@ def test_straightened_frequencies_stand_still(drift: float, seed: int) -> None:
 
 def test_no_drift_leaves_the_record() -> None:
     x = steady(0)
-    assert straightened(x, 0.0) == pytest.approx(x, abs=1e-9)
+    assert without_drift(x, 0.0) == pytest.approx(x, abs=1e-9)
 
 
 def test_a_level_that_doubles_is_told() -> None:

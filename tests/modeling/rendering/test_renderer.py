@@ -132,7 +132,7 @@ def test_seed_and_stream_choose_the_noise() -> None:
 
 
 def test_rendering_follows_the_written_recursion() -> None:
-    """METHOD 3 step by step with numpy's tangent, constant parameters."""
+    """docs/method/equalizer.md#recursion step by step with numpy's tangent, constant parameters."""
     from modeling.rendering.noise import stream_key, white_noise
 
     model, count = moving_model(), 600
@@ -199,7 +199,8 @@ def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: fl
     # Standard error 4.34/√(bins · pieces): 0.3 dB in the narrowest band, 0.1 dB in the widest.
     for low, high in ((60, 100), (250, 350), (400, 700), (800, 1000), (1200, 1800), (1900, 2300)):
         assert abs(level_db(low, high, here)) < 0.8
-    # Against the model's own rate the peaks agree too; only far skirts are less warped (METHOD 3
+    # Against the model's own rate the peaks agree too; only far skirts are less warped
+    # (docs/method/rendering.md#other-rates: the filter
     # keeps f, B and the peak, not the distance to the Nyquist zero).
     for low, high in ((60, 100), (280, 320), (840, 960)):
         assert abs(level_db(low, high, at_model_rate)) < 0.8

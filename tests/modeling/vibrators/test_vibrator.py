@@ -67,7 +67,7 @@ def one_resonance(
 
 
 def moved(vibrator: Vibrator, drive: np.ndarray) -> np.ndarray:
-    """What the vibrator makes of a drive, by the recursion of METHOD 3, sample by sample."""
+    """What the vibrator makes of a drive: docs/method/equalizer.md#recursion, step by step."""
     g, k = (
         math.tan(math.pi / vibrator.rate_hz * f)
         for f in (vibrator.frequency_hz, vibrator.bandwidth_hz)
@@ -107,7 +107,7 @@ def test_compensation_inverts_a_layer_exactly(frequency_hz, bandwidth_hz, height
         at, centres_hz=[frequency_hz], bandwidths_hz=[bandwidth_hz], rate_hz=RATE_HZ
     )[0]
     product = legal_compensation(vibrator).response(at) * 0.3 * (1 + (height - 1) * band)
-    # Up to 1/G_w, in magnitude and in phase: far below METHOD 9's 0.01 dB.
+    # Up to 1/G_w, in magnitude and in phase (docs/method/vibrators.md#compensation).
     assert np.abs(product / 0.3 - 1).max() < 1e-9
 
 

@@ -374,7 +374,8 @@ def test_json_of_one_condition_is_interpolated(tmp_path: Path) -> None:
     low, high = CANVAS.frequencies_hz[:2, 0]
     expected = (1 - share) * low + share * high
     assert [layer["frequency_hz"] for layer in linear["layers"]] == pytest.approx(expected)
-    # In logarithms the geometric mean, to what the finer table leaves of it (METHOD 9).
+    # In logarithms the geometric mean, to what the finer table leaves of it
+    # (docs/method/rendering.md#parameter-table).
     near = {"rel": 10 ** (0.13 / 20) - 1}
     logarithmic = exported(CANVAS)
     expected = np.sign(CANVAS.gains[0, 0]) * np.sqrt(np.prod(CANVAS.gains[:2, 0], axis=0)) / 2

@@ -204,7 +204,10 @@ def test_the_drive_gives_the_vibration_meant(rate_hz: int) -> None:
 
 
 def notch(frequency_hz: float, bandwidth_hz: float, height: float, *, rate_hz: int) -> Compensation:
-    """METHOD 9: the notch whose tan(πB/fs) is that of the resonance times its height."""
+    """The notch whose tan(πB/fs) is that of the resonance times its height.
+
+    docs/method/vibrators.md#compensation
+    """
     widened = height * np.tan(np.pi * bandwidth_hz / rate_hz)
     return Compensation(
         frequency_hz=frequency_hz,

@@ -18,28 +18,28 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.spectra.layers_over_grid import LayerCourse
+from analysis.spectra.layers_over_grid import LayersOverSpeed
 
 
-def figure_layer_courses(courses: Sequence[LayerCourse]) -> Figure:
+def figure_layers_over_speed(courses: Sequence[LayersOverSpeed]) -> Figure:
     """Frequency and amplitude of each layer over speed at one force.
 
     Parameters
     ----------
-    courses : sequence of LayerCourse
+    courses : sequence of LayersOverSpeed
         The first is drawn with markers, a second one (such as the planted truth) as thin lines.
     """
     figure = Figure(figsize=(10.5, 4.2), layout="constrained")
     axes = figure.subplots(1, 2)
-    plot_layer_course(courses, quantity="frequency_hz", ax=axes[0])
-    plot_layer_course(courses, quantity="amplitude", ax=axes[1])
+    plot_layers_over_speed(courses, quantity="frequency_hz", ax=axes[0])
+    plot_layers_over_speed(courses, quantity="amplitude", ax=axes[1])
     shared_legend(figure, axes[:1], loc="outside right center", ncols=1)
     figure.suptitle(f"{courses[0].texture}, {courses[0].force_n:g} N")
     return figure
 
 
-def plot_layer_course(
-    courses: Sequence[LayerCourse], *, quantity: str, ax: Axes | None = None
+def plot_layers_over_speed(
+    courses: Sequence[LayersOverSpeed], *, quantity: str, ax: Axes | None = None
 ) -> Axes:
     """One quantity (frequency_hz or amplitude) of each layer over speed."""
     ax = axes_or_new(ax)
