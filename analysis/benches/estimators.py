@@ -83,26 +83,33 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
         truth = random_truth(kind, rng=rng)
         record = Recording(truth.record(rng=rng), RATE_HZ, 100.0, 1.0, "random", simulated=True)
         measured = spectrum(record)
-        for name in ESTIMATORS:
-            layers, seconds = _timed(partial(find_layers, measured, estimator=name))
-            score = {**_score(measured, truth, layers), "seconds": seconds}
+        for name, score in _scores_of_one(measured, truth).items():
             scores.setdefault(name, []).append(score)
-        if kind == "coherent":
-            score = _score(measured, truth, _from_the_truth(measured, truth.layers))
-            scores.setdefault(FROM_THE_TRUTH, []).append(score)
-        for order in ORDERS:
-            found, seconds = _timed(partial(fit_filter, [measured], order=order))
-            score = {**_likeness(measured, found), "seconds": seconds}
-            scores.setdefault(f"AR({order})", []).append(score)
     return scores
 
 
-def _score(measured: Spectrum, truth: RandomTruth, layers: Layers) -> dict[str, Any]:
-    return {
-        **_likeness(measured, layers.peq(rate_hz=RATE_HZ)),
-        **_recovery(truth, layers),
-        "seconds": np.nan,
+def _scores_of_one(measured: Spectrum, truth: RandomTruth) -> dict[str, dict[str, Any]]:
+    """Every estimator and filter on one spectrum, compared with the same draws for its ceiling."""
+    layers: dict[str, tuple[Layers, float]] = {
+        name: _timed(partial(find_layers, measured, estimator=name)) for name in ESTIMATORS
     }
+    if truth.kind == "coherent":
+        layers[FROM_THE_TRUTH] = _from_the_truth(measured, truth.layers), np.nan
+    filters = {
+        f"AR({order})": _timed(partial(fit_filter, [measured], order=order)) for order in ORDERS
+    }
+    models: dict[str, similarity.SpectralFilter] = {
+        name: found.peq(rate_hz=RATE_HZ) for name, (found, _) in layers.items()
+    }
+    models |= {name: found for name, (found, _) in filters.items()}
+    seconds = {name: taken for name, (_, taken) in (layers | filters).items()}
+    scores = {
+        name: {**_likeness(report), "seconds": seconds[name]}
+        for name, report in zip(models, similarity.reports(measured, models.values()), strict=True)
+    }
+    for name, (found, _) in layers.items():
+        scores[name] |= _recovery(truth, found)
+    return scores
 
 
 def _from_the_truth(measured: Spectrum, planted: PEQ) -> Layers:
@@ -129,8 +136,7 @@ def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
     return result, perf_counter() - start
 
 
-def _likeness(measured: Spectrum, model: similarity.SpectralFilter) -> dict[str, Any]:
-    report = similarity.report(measured, model)
+def _likeness(report: similarity.SimilarityReport) -> dict[str, Any]:
     names = ("gfc30", "ceiling_gfc30", "oracle_gap", "log_spectral_distance_db", "rms_error_db")
     return {name: getattr(report, name) for name in names}
 
