@@ -8,9 +8,9 @@ from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
 from modeling.models.ar_model import ARModel
@@ -162,7 +162,7 @@ def reports(
     return [_report(measured, fitted, truths, ceilings) for fitted in filters]
 
 
-def _compared(measured: Spectrum) -> NDArray[np.bool_]:
+def _compared(measured: Spectrum) -> Bools:
     """10 Hz … 0.98 of the Nyquist frequency."""
     frequency = measured.frequency_hz
     return (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)

@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
 
 from analysis.figures.drawing import (
     BLACK,
@@ -19,6 +18,7 @@ from analysis.figures.drawing import (
     stamp_if_simulated,
 )
 from analysis.spectra.layers_over_grid import LayersOverGrid
+from modeling.arrays import Bools
 
 QUANTITIES = ("frequency_hz", "amplitude")
 # Marker, filling, size and meaning of the marks on points that are no measurements.
@@ -89,7 +89,7 @@ def _plot_layer(layers: LayersOverGrid, *, quantity: str, layer: int, ax: Axes) 
         )
 
 
-def _marked(layers: LayersOverGrid) -> tuple[NDArray[np.bool_], ...]:
+def _marked(layers: LayersOverGrid) -> tuple[Bools, ...]:
     """What `MARKS` stand for, in their order."""
     return layers.inherited, layers.unresolved, layers.interpolated[:, :, None]
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from analysis.figures.drawing import (
     BLACK,
@@ -19,6 +17,7 @@ from analysis.figures.drawing import (
     stamp_if_simulated,
 )
 from analysis.spectra.layers_over_grid import LayersOverSpeed
+from modeling.arrays import Floats
 
 
 def figure_layers_over_speed(courses: Sequence[LayersOverSpeed]) -> Figure:
@@ -44,7 +43,7 @@ def plot_layers_over_speed(
     """One quantity (frequency_hz or amplitude) of each layer over speed."""
     ax = axes_or_new(ax)
     for course, solid in zip(courses, (True, False), strict=False):
-        values: NDArray[np.float64] = getattr(course, quantity)
+        values: Floats = getattr(course, quantity)
         for layer in range(values.shape[1]):
             ax.plot(
                 course.speeds_mm_s,

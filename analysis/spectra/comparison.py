@@ -19,7 +19,7 @@ from modeling import (
     Threshold,
     find_layers,
 )
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import band_response
 from modeling.perception.simplification import CriterionName, layer_amplitudes_g
 from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
@@ -77,7 +77,7 @@ class SpectrumComparison:
     layer_amplitude_g: Floats
     layer_response: Floats
     layer_threshold: Floats
-    dropped: NDArray[np.bool_]
+    dropped: Bools
     threshold: Threshold
     hold_above: bool
     criterion: CriterionName

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from stimuli.sets.manifest import COMPENSATED, MANIFEST
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.rendering import steady_part
@@ -50,7 +49,7 @@ class ContactSheet:
     density_db: Floats
     level_db: Floats
     unit: str
-    simulated: NDArray[np.bool_]
+    simulated: Bools
     compensated: bool
 
 

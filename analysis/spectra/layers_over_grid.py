@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modeling import InputError, TextureModel
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.perception.simplification import layer_amplitudes_g
 
 
@@ -102,9 +101,9 @@ class LayersOverGrid:
     amplitude: Floats
     mean_frequency_hz: Floats
     mean_amplitude: Floats
-    inherited: NDArray[np.bool_]
-    unresolved: NDArray[np.bool_]
-    interpolated: NDArray[np.bool_]
+    inherited: Bools
+    unresolved: Bools
+    interpolated: Bools
 
 
 def layers_over_grid(model: TextureModel) -> LayersOverGrid:

@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column
 from analysis.labels import ALL_LAYERS
 from modeling import InputError, TextureModel
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 
 Integers = NDArray[np.int64]
 
@@ -61,7 +61,7 @@ class _Pairing:
 
     truth: TextureModel
     estimated: TextureModel
-    conditions: NDArray[np.bool_]
+    conditions: Bools
     partner: Integers
     nearest: Integers
 

@@ -13,9 +13,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Bools, Floats
+from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
 from modeling.estimation.likelihood import (
     LEAST_POWER,
@@ -73,7 +72,7 @@ class Observed:
         each = self.weight * (np.log(count) - digamma(count))
         return np.asarray(np.where(self.weight > 0, each, 0.0).sum(axis=1))
 
-    def rows(self, chosen: Sequence[int] | NDArray[np.intp]) -> Observed:
+    def rows(self, chosen: Sequence[int] | Integers) -> Observed:
         """Some of the spectra, any of them several times."""
         return Observed(
             self.power[chosen],

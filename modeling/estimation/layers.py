@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
 
@@ -36,7 +35,7 @@ class Layers:
     bandwidths_hz: Floats
     gains: Floats
     level_sd_db: Floats
-    unresolved: NDArray[np.bool_]
+    unresolved: Bools
 
     def peq(self, *, rate_hz: float) -> PEQ:
         """The equalizer of these layers at the rate of the spectrum they were found in."""

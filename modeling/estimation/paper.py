@@ -10,9 +10,8 @@ and chooses gains such that the model, smoothed alike, has the measured heights
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import (
     HIGHEST_BANDWIDTH_SHARE,
     LOWEST_BANDWIDTH_HZ,
@@ -151,7 +150,7 @@ def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> floa
     return s
 
 
-def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, NDArray[np.bool_]]:
+def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, Bools]:
     """−3 dB widths from fitted s, and which of them the smoothing hides.
 
     docs/method/estimation.md#paper-consistent
@@ -166,7 +165,7 @@ def _bandwidths(fitted_s_hz: Floats, consistent: bool) -> tuple[Floats, NDArray[
 
 def _consistent_gains(
     spectrum: Spectrum, frequencies_hz: Floats, bandwidths_hz: Floats, targets: Floats, floor: float
-) -> tuple[Floats, NDArray[np.bool_]]:
+) -> tuple[Floats, Bools]:
     """Gains ≥ 0 that give the smoothed coherent model its measured heights above the floor.
 
     A multiplicative fixed point, each step held to a factor of 2. Where the skirts of neighbours

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from modeling.arrays import Floats
 from modeling.errors import InputError
 
 
@@ -17,7 +17,7 @@ def full_scale(value_g: float, file: str) -> float:
     return value_g
 
 
-def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
+def read_wav(path: Path) -> tuple[Floats, float]:
     """Samples (n,), 1 = full scale, and rate (Hz) of a mono WAV file.
 
     Raises
@@ -33,7 +33,7 @@ def read_wav(path: Path) -> tuple[NDArray[np.float64], float]:
     return samples[:, 0], rate_hz
 
 
-def read_wav_channels(path: Path) -> tuple[NDArray[np.float64], float]:
+def read_wav_channels(path: Path) -> tuple[Floats, float]:
     """Samples (n, channels), 1 = full scale, and rate (Hz) of a WAV file.
 
     Raises

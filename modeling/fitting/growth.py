@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Floats, Integers
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE
 from modeling.estimation.coherent import Observed, response
 from modeling.estimation.likelihood import FORGIVEN_MISFIT, LOWEST_HZ, Power, split
@@ -72,10 +71,10 @@ def candidates(grid: TextureGrid, theta: Floats, signs: Floats | None) -> list[C
 
 
 def _distinct(
-    found: list[tuple[float, int, NDArray[np.intp], Floats]], *, rate_hz: float
+    found: list[tuple[float, int, Integers, Floats]], *, rate_hz: float
 ) -> list[Candidate]:
     chosen: list[Candidate] = []
-    taken: list[tuple[NDArray[np.intp], int]] = []
+    taken: list[tuple[Integers, int]] = []
     for evidence, width, place, raised in sorted(found, key=lambda f: -f[0]):
         if any(np.median(np.abs(place - p)) < 0.75 * max(width, w) for p, w in taken):
             continue

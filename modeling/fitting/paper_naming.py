@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.layers import EstimatorName, Layers
 from modeling.estimation.paper import find_peak_frequencies, fit_layers
 from modeling.models.grid import Condition, fill_grid
@@ -37,7 +36,7 @@ class _Tracked:
     """Layers of one condition under their names, and which of them had no peak of their own."""
 
     layers: Layers
-    inherited: NDArray[np.bool_]
+    inherited: Bools
 
 
 def _track(
@@ -73,13 +72,13 @@ def _track(
 def _grids(tracked: Mapping[Condition, _Tracked], texture: str) -> dict[str, Any]:
     """The model's arrays; holes of the grid are filled from their neighbours and marked."""
 
-    def grid(name: str) -> NDArray[np.float64]:
+    def grid(name: str) -> Floats:
         return fill_grid({c: getattr(t.layers, name) for c, t in tracked.items()}, texture)[0]
 
-    def marks(rows: Mapping[Condition, NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    def marks(rows: Mapping[Condition, Bools]) -> Bools:
         known = {c: row.astype(np.float64) for c, row in rows.items()}
         # A condition that was filled in has no marks of its own.
-        marked: NDArray[np.bool_] = fill_grid(known, texture)[0] == 1
+        marked: Bools = fill_grid(known, texture)[0] == 1
         return marked & ~interpolated[:, :, None]
 
     noise = {c: np.array([t.layers.noise_gain]) for c, t in tracked.items()}
@@ -116,7 +115,7 @@ def reference_of(condition: Condition, visited: Sequence[Condition]) -> Conditio
     return min(visited, key=lambda c: (abs(c[1] - force), abs(c[0] - speed)))
 
 
-def assign_peaks(peaks_hz: Floats, layers_hz: Floats) -> NDArray[np.intp]:
+def assign_peaks(peaks_hz: Floats, layers_hz: Floats) -> Integers:
     """Which peak belongs to which layer.
 
     A peak takes the name of the nearest layer, within half the gap to that layer's neighbours

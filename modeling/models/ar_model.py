@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.checks import UNITS, check_rate, check_texture_name
 from modeling.errors import InputError
 from modeling.files.saved_model import SavedModel
@@ -123,7 +123,7 @@ class ARModel(SavedModel):
     level_sd_db: Floats
     unit: str = "g"
     simulated: bool = False
-    interpolated: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    interpolated: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __post_init__(self) -> None:
         check_texture_name(self.texture)

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats, Integers
 from modeling.errors import GridError, InputError
 from modeling.hand import Hand
 
@@ -85,7 +85,7 @@ class Cells:
         return blended
 
 
-def _cell(axis: Floats, inside: Floats) -> tuple[NDArray[np.intp], Floats]:
+def _cell(axis: Floats, inside: Floats) -> tuple[Integers, Floats]:
     """Index of the grid cell that holds each value, and the position within it (0 … 1)."""
     if axis.size == 1:
         return np.zeros(inside.shape, dtype=np.intp), np.zeros(inside.shape)
@@ -121,9 +121,7 @@ def check_spanned(conditions: Collection[Condition], texture: str) -> None:
         )
 
 
-def fill_grid(
-    rows: Mapping[Condition, ArrayLike], texture: str
-) -> tuple[Floats, NDArray[np.bool_]]:
+def fill_grid(rows: Mapping[Condition, ArrayLike], texture: str) -> tuple[Floats, Bools]:
     """Values over the whole grid from those of its known conditions.
 
     Holes are interpolated linearly over speed and force; beyond the outermost neighbours the

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response
 from modeling.equalizer.peq import PEQ
 from modeling.models.texture_model import TextureModel
@@ -35,8 +34,8 @@ class OwnPeaks(NamedTuple):
         response there in most conditions: such a layer is hidden, but shapes nothing.
     """
 
-    is_peak: NDArray[np.bool_]
-    fills: NDArray[np.intp]
+    is_peak: Bools
+    fills: Integers
 
 
 def own_peaks(model: TextureModel) -> OwnPeaks:
@@ -59,8 +58,8 @@ class _Condition(NamedTuple):
     """Of m layers: who has a maximum, who makes up half of the response at its own place, how loud
     the others are there (m, m), and each one's RMS."""
 
-    own: NDArray[np.bool_]
-    shaping: NDArray[np.bool_]
+    own: Bools
+    shaping: Bools
     share: Floats
     rms: Floats
 

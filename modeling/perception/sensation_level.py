@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.perception.thresholds import Threshold
 
@@ -24,9 +24,7 @@ class SensationLevel(NamedTuple):
     share_without_threshold: float
 
 
-def sensation_level(
-    vibration_g: NDArray[np.float64], rate_hz: float, *, threshold: Threshold
-) -> SensationLevel:
+def sensation_level(vibration_g: Floats, rate_hz: float, *, threshold: Threshold) -> SensationLevel:
     """Threshold-weighted RMS of a vibration.
 
     The power sum over frequency of (√2·RMS/threshold)²: every line of the spectrum counts as the

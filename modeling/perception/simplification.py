@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.arrays import Bools, Floats
+from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response, band_rms
 from modeling.equalizer.peq import PEQ
 from modeling.equalizer.signs import neighbouring_patterns
@@ -266,7 +266,7 @@ def _check_input(model: TextureModel, criterion: str, margin_db: float) -> None:
 
 
 def _decide(
-    distances: Floats, flips: Floats, threshold: Threshold, *, fills: NDArray[np.intp]
+    distances: Floats, flips: Floats, threshold: Threshold, *, fills: Integers
 ) -> list[tuple[bool, str]]:
     """(kept?, reason) per layer, from (conditions, m) distances that include the margin."""
     decided = [
@@ -298,7 +298,7 @@ def _decide_alone(level: Floats, flip: float, threshold: Threshold) -> tuple[boo
     return False, "below threshold in every condition"
 
 
-def _keep_together(decided: list[tuple[bool, str]], fills: NDArray[np.intp]) -> None:
+def _keep_together(decided: list[tuple[bool, str]], fills: Integers) -> None:
     """A layer that fills another's shape stays as long as that one, and holds it."""
     for layer, peak in enumerate(fills.tolist()):
         if peak < 0:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from modeling.arrays import Bools, Floats
 from modeling.checks import UNITS, check_texture_name
 from modeling.errors import InputError
 
@@ -46,7 +47,7 @@ class Recording:
         For anything outside these ranges.
     """
 
-    samples: NDArray[np.float64]
+    samples: Floats
     rate_hz: float
     speed_mm_s: float
     force_n: float
@@ -122,7 +123,7 @@ class Recording:
         return f"{self.texture} at {self.speed_mm_s:g} mm/s, {self.force_n:g} N{repeat}"
 
 
-def _checked_samples(samples: ArrayLike, where: str) -> NDArray[np.float64]:
+def _checked_samples(samples: ArrayLike, where: str) -> Floats:
     array = np.array(samples, dtype=np.float64)
     if array.ndim != 1:
         raise InputError(
@@ -148,7 +149,7 @@ def _checked_samples(samples: ArrayLike, where: str) -> NDArray[np.float64]:
     return array
 
 
-def clipped_samples(samples: NDArray[np.float64]) -> NDArray[np.bool_]:
+def clipped_samples(samples: Floats) -> Bools:
     """Which samples of one sensor axis are saturated at the highest or lowest value.
 
     An end counts, then with all its samples, where they pile up: more than twice as many as at

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, replace_folder
@@ -260,7 +260,7 @@ def _flag(text: str, name: str) -> bool:
     return text.lower() == "true"
 
 
-def _read_samples(path: Path) -> NDArray[np.float64]:
+def _read_samples(path: Path) -> Floats:
     """One column of numbers below a header; a last line without its end counts as truncated."""
     try:
         text = path.read_text(encoding="utf-8")

@@ -8,7 +8,6 @@ from functools import lru_cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
@@ -201,7 +200,7 @@ def _as_bands(tones: Sinusoids, frequency_hz: Floats, count: int) -> Floats:
     return squares
 
 
-def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectrum:
+def spectrum_of_samples(samples: Floats, rate_hz: float) -> Spectrum:
     """Spectrum of (n,) samples as they are, in their unit per unit noise."""
     scale = np.sqrt(np.pi * samples.size) / 2
     return Spectrum(
@@ -212,7 +211,7 @@ def spectrum_of_samples(samples: NDArray[np.float64], rate_hz: float) -> Spectru
     )
 
 
-def dft321(axes: NDArray[np.float64]) -> Floats:
+def dft321(axes: Floats) -> Floats:
     """Three axes as one signal of the same spectral energy.
 
     docs/method/recordings.md#three-axes

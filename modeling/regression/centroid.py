@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.errors import InputError
 from modeling.models.terms import SPEED
 from modeling.models.texture_model import TextureModel
@@ -30,9 +29,9 @@ def spectral_centroid_hz(model: TextureModel) -> Floats:
     return centroid
 
 
-def with_centroid(model: TextureModel) -> NDArray[np.bool_]:
+def with_centroid(model: TextureModel) -> Bools:
     """The recorded conditions that have a centroid, (S, F)."""
-    chosen: NDArray[np.bool_] = ~model.interpolated & np.isfinite(spectral_centroid_hz(model))
+    chosen: Bools = ~model.interpolated & np.isfinite(spectral_centroid_hz(model))
     return chosen
 
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.errors import InputError
 from modeling.models.terms import FORCE, SPEED, SPEED_FORCE
 
@@ -177,10 +177,8 @@ def _independent_terms(columns: Mapping[str, Floats]) -> tuple[str, ...]:
     return tuple(kept)
 
 
-def _silent(
-    coefficients: Floats, columns: Mapping[str, Floats], *, observed: Floats
-) -> NDArray[np.bool_]:
+def _silent(coefficients: Floats, columns: Mapping[str, Floats], *, observed: Floats) -> Bools:
     """Coefficients, the intercept first, whose share in the values is nothing but rounding."""
     reach = np.array([1.0, *(np.ptp(column) for column in columns.values())])
-    silent: NDArray[np.bool_] = np.abs(coefficients) * reach <= ROUNDING * np.abs(observed).max()
+    silent: Bools = np.abs(coefficients) * reach <= ROUNDING * np.abs(observed).max()
     return silent

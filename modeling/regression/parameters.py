@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.models.texture_model import TextureModel
 from modeling.regression.least_squares import (
     Regression,
@@ -57,7 +57,7 @@ def parameter_observations(model: TextureModel) -> tuple[Observations, ...]:
     speed, force = np.meshgrid(model.speeds_mm_s, model.forces_n, indexing="ij")
     recorded = ~model.interpolated
 
-    def observed(parameter: str, layer: int, *, of: Floats, at: NDArray[np.bool_]) -> Observations:
+    def observed(parameter: str, layer: int, *, of: Floats, at: Bools) -> Observations:
         left_out, determined = int(np.count_nonzero(recorded & ~at)), bool(at.any())
         at = at if determined else recorded
         return Observations(parameter, layer, of[at], speed[at], force[at], left_out, determined)

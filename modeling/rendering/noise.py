@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from modeling.arrays import Floats
 from modeling.checks import is_whole
 from modeling.errors import InputError
 
@@ -36,7 +37,7 @@ def stream_key(seed: int, stream: int = 0) -> np.uint64:
     return np.uint64(_mix((first ^ pair[1:]) + _GOLDEN)[0])
 
 
-def white_noise(key: np.uint64, start: int, count: int) -> NDArray[np.float64]:
+def white_noise(key: np.uint64, start: int, count: int) -> Floats:
     """Samples start … start+count−1 of a stream: uniform on ±√3, mean 0, variance 1.
 
     Parameters

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from modeling import InputError, Recording, RecordingSet
+from modeling.arrays import Floats
 from modeling.files.tables import is_number, number, read_table, whole_number
 from modeling.files.wav import full_scale, read_wav
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
@@ -192,7 +192,7 @@ def labels_from_table(table: Path, paths: Sequence[Path], *, texture: str | None
 
 def _recording(
     path: Path,
-    samples: NDArray[np.float64],
+    samples: Floats,
     rate_hz: float,
     label: Label,
     *,
@@ -254,7 +254,7 @@ def _decoded(path: Path) -> str:
     raise InputError(f"expected a text file, got other bytes in {path}; export CSV.")
 
 
-def _read_columns(path: Path) -> dict[str, NDArray[np.float64]]:
+def _read_columns(path: Path) -> dict[str, Floats]:
     """Columns of numbers by their header."""
     lines = _read_lines(path)
     delimiter = max(",;\t", key=lines[0].count)
@@ -298,11 +298,11 @@ def _name_and_unit(header: str) -> tuple[str, str]:
     return re.sub(r"[\s_]+", "_", text.strip()).strip("_"), unit.replace("m_s2", "m/s2")
 
 
-def _time_column(columns: dict[str, NDArray[np.float64]]) -> str | None:
+def _time_column(columns: dict[str, Floats]) -> str | None:
     return next((name for name in columns if _name_and_unit(name)[0] in _TIME_NAMES), None)
 
 
-def _rate_from_time(path: Path, columns: dict[str, NDArray[np.float64]]) -> float:
+def _rate_from_time(path: Path, columns: dict[str, Floats]) -> float:
     name = _time_column(columns)
     if name is None:
         raise InputError(
@@ -325,7 +325,7 @@ def _rate_from_time(path: Path, columns: dict[str, NDArray[np.float64]]) -> floa
     return 1 / mean_step
 
 
-def _mean_step_s(path: Path, time_s: NDArray[np.float64]) -> float:
+def _mean_step_s(path: Path, time_s: Floats) -> float:
     """Mean distance of the samples (s), which must rise evenly."""
     steps = np.diff(time_s)
     span = float(time_s[-1] - time_s[0])
@@ -345,9 +345,7 @@ def _mean_step_s(path: Path, time_s: NDArray[np.float64]) -> float:
     return mean_step
 
 
-def _chosen_axes(
-    path: Path, columns: dict[str, NDArray[np.float64]], axis: Axis | None
-) -> tuple[NDArray[np.float64], str]:
+def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> tuple[Floats, str]:
     """The chosen axis (1, n), or all three (3, n), as recorded, and the unit in their header."""
     time = _time_column(columns)
     others = [name for name in columns if name != time]

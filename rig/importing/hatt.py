@@ -14,11 +14,11 @@ from typing import NoReturn
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import freqz, lfilter, resample
 
 from modeling import InputError, Recording, RecordingSet
-from modeling.arrays import Floats
+from modeling.arrays import Floats, Integers
 from modeling.models.line_spectral import check_line_spectral, prediction_coefficients
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.seeds import generator, number_of
@@ -71,7 +71,7 @@ class HattTexture:
     material: str
     rate_hz: float
     conditions: Floats
-    triangles: NDArray[np.intp]
+    triangles: Integers
     ar_frequencies: Floats
     ma_frequencies: Floats
     variances: Floats
@@ -386,7 +386,7 @@ def _checked_frequencies(file: _Reader, element: ElementTree.Element, part: str)
     return frequencies
 
 
-def _triangles(file: _Reader, root: ElementTree.Element, conditions: Floats) -> NDArray[np.intp]:
+def _triangles(file: _Reader, root: ElementTree.Element, conditions: Floats) -> Integers:
     rows = [file.values_of(triangle, "tri") for triangle in root.findall("tri")]
     count = len(conditions)
     for row in rows:

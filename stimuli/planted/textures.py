@@ -11,9 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from modeling import InputError, Recording, RecordingSet, Renderer, TextureModel
+from modeling.arrays import Floats
 from modeling.equalizer.bands import band_rms
 from modeling.seeds import noise_seed
 
@@ -133,8 +134,8 @@ NOISE_GROWTH_SPEED = -0.1
 def planted_texture(
     name: str,
     *,
-    speeds_mm_s: NDArray[np.float64] = SPEEDS_MM_S,
-    forces_n: NDArray[np.float64] = FORCES_N,
+    speeds_mm_s: Floats = SPEEDS_MM_S,
+    forces_n: Floats = FORCES_N,
 ) -> TextureModel:
     """The truth of one planted texture as a model (estimator "planted", simulated, 5 kHz).
 
@@ -199,9 +200,7 @@ class PlantedSurface:
     texture: str
     recorder_rate_hz: float = RECORDER_RATE_HZ
 
-    def magnitude(
-        self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float
-    ) -> NDArray[np.float64]:
+    def magnitude(self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float) -> Floats:
         """True magnitude (n,) in g per unit noise at 5 kHz; speed and force above 0."""
         here = planted_texture(
             self.texture, speeds_mm_s=np.array([speed_mm_s]), forces_n=np.array([force_n])
@@ -253,8 +252,8 @@ def record_texture(
     return RecordingSet(records)
 
 
-def sensed(acceleration_g: NDArray[np.float64]) -> NDArray[np.float64]:
+def sensed(acceleration_g: Floats) -> Floats:
     """What the accelerometer reports of (n,) g: whole steps, limited to its range."""
     steps = np.rint(np.clip(acceleration_g, -SENSOR_LIMIT_G, SENSOR_LIMIT_G) / SENSOR_STEP_G)
-    reported: NDArray[np.float64] = np.round(steps * SENSOR_STEP_G, 9)
+    reported: Floats = np.round(steps * SENSOR_STEP_G, 9)
     return reported
