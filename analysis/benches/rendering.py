@@ -278,7 +278,7 @@ def _in_python(effort: Effort) -> dict[str, Any]:
     plan = RenderPlan(rate_hz=texture.rate_hz, update_samples=SWEEP_UPDATE)
     engine = PythonEngine(BandFilter(texture, plan), plan, key=stream_key(0))
     hand = stroke(_PYTHON_SAMPLES, rate_hz=RATE_HZ)
-    best = _best_seconds({PYTHON: partial(engine.render, hand)}, min(effort.turns, 5))
+    best = _best_seconds({PYTHON: partial(engine.render, *hand)}, min(effort.turns, 5))
     ns = 1e9 * best[PYTHON] / _PYTHON_SAMPLES
     return _row(PYTHON, 3, update=SWEEP_UPDATE, ns=ns)
 

@@ -8,7 +8,6 @@ import warnings
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.hand import Hand
 from modeling.rendering.plan import LayeredModel, RenderCounters, RenderPlan
 
 try:
@@ -70,14 +69,14 @@ class CompiledEngine:
         rows = memory[: 2 * self._row].reshape(2, -1)
         return rows[:, : self._texture.layers].T.copy()
 
-    def render(self, hand: Hand) -> Floats:
-        """The next samples, (n,), for n samples of the hand."""
-        output = np.empty(hand.speed_mm_s.size)
+    def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
+        """The next samples for (n,) speeds and forces."""
+        output = np.empty(speed_mm_s.size)
         lib.tq_render(
             self._texture,
             self._state,
-            ffi.from_buffer("double[]", hand.speed_mm_s),
-            ffi.from_buffer("double[]", hand.force_n),
+            ffi.from_buffer("double[]", speed_mm_s),
+            ffi.from_buffer("double[]", force_n),
             ffi.from_buffer("double[]", output),
             output.size,
         )

@@ -54,9 +54,8 @@ class PythonEngine:
         """What had to be corrected so far."""
         return RenderCounters(self._lift_offs, self._filter.clamped, *self._limiter.touched)
 
-    def render(self, hand: Hand) -> Floats:
-        """The next samples, (n,), for n samples of the hand."""
-        speed_mm_s, force_n = hand
+    def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
+        """The next samples for (n,) speeds and forces."""
         count, period = speed_mm_s.size, self._plan.update_samples
         finite = np.isfinite(speed_mm_s) & np.isfinite(force_n)
         self._lift_offs += count - int(np.count_nonzero(finite))
