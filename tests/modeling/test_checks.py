@@ -1,0 +1,70 @@
+"""Checks of single values: what passes, what does not, and the sentence."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import numpy as np
+import pytest
+
+from modeling import InputError
+from modeling.checks import (
+    check_choice,
+    check_name,
+    check_number,
+    check_rate,
+    check_whole,
+    is_number,
+    is_rate,
+    is_whole,
+)
+
+NUMBERS = (0, -3, 2.5, float("nan"), np.float64(1.5), np.float32(1.5), np.int64(4), np.uint8(4))
+NEITHER = (True, False, np.bool_(True), "5", None, [5], 5j, b"5", Decimal(5), np.ones(2))
+
+
+@pytest.mark.parametrize("value", NUMBERS)
+def test_numbers(value: object) -> None:
+    assert is_number(value)
+    assert is_whole(value) == (not isinstance(value, float | np.floating))
+
+
+@pytest.mark.parametrize("value", NEITHER)
+def test_what_is_no_number(value: object) -> None:
+    assert not is_number(value)
+    assert not is_whole(value)
+    for check in (
+        lambda: check_number("gain", value, high=10),
+        lambda: check_whole("seed", value, low=0, high=10),
+        lambda: check_rate(value),
+    ):
+        with pytest.raises(InputError, match="expected .*, got .*; "):
+            check()
+
+
+@pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), 10**400])
+def test_rates_are_finite_and_above_zero(value: float) -> None:
+    assert not is_rate(value)
+    with pytest.raises(InputError, match="expected a rate above 0 Hz"):
+        check_rate(value)
+    assert is_rate(5e-324)
+
+
+def test_ends_of_a_range_are_in_it() -> None:
+    check_number("gain", 0, high=10)
+    check_number("gain", 10.0, high=10)
+    check_whole("seed", np.int64(10), low=0, high=10)
+    with pytest.raises(InputError, match="from 0 to 10 for gain, got 10.1; correct it"):
+        check_number("gain", 10.1, high=10)
+    with pytest.raises(InputError, match="from 0 to 10 for seed, got 11; correct it"):
+        check_whole("seed", 11, low=0, high=10)
+
+
+def test_words() -> None:
+    check_choice("mode", "rms", ("rms", "peak"))
+    check_name("a label", "full · 1")
+    with pytest.raises(InputError, match='expected mode to be "rms" or "peak", got .loud.'):
+        check_choice("mode", "loud", ("rms", "peak"))
+    for name in ("", "  ", "two\nlines", 5):
+        with pytest.raises(InputError, match="expected printable text in one line as a label"):
+            check_name("a label", name)
