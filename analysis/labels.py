@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-MODELS = ("full", "simplified")
+from modeling.files.answer_tables import MODEL_LEVELS
+
+MODELS = tuple(MODEL_LEVELS)
 SCALES = {
     "magnitude_similarity": "vibration magnitude",
     "frequency_similarity": "frequency pattern",

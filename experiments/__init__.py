@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from modeling.face import lazily
+from modeling.face import lazily, public_names
 
 HOMES = {
     "study.study": "Study TaskPlan",
@@ -36,4 +36,8 @@ if TYPE_CHECKING:
     from experiments.tasks.relative import run_relative as run_relative
 
 __getattr__ = lazily(__name__, HOMES)
-__all__ = [name for module, names in HOMES.items() for name in names.split() or [module]]
+__all__ = public_names(HOMES)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -5,7 +5,7 @@ Each name is loaded when it is first asked for, so that `import modeling.errors`
 
 from typing import TYPE_CHECKING
 
-from modeling.face import lazily
+from modeling.face import lazily, public_names
 
 HOMES = {
     "errors": "GridError InputError",
@@ -65,4 +65,8 @@ if TYPE_CHECKING:
     from modeling.vibrators.vibrator import Vibrator as Vibrator
 
 __getattr__ = lazily(__name__, HOMES)
-__all__ = [name for module, names in HOMES.items() for name in names.split() or [module]]
+__all__ = public_names(HOMES)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from math import inf
 from numbers import Integral, Real
-from sys import float_info
 from typing import TypeGuard
 
 from modeling.errors import InputError
@@ -31,7 +32,10 @@ def check_texture_name(name: object) -> None:
 
 def is_rate(value: object) -> TypeGuard[float]:
     """Whether this can be a sampling rate: a finite number above 0."""
-    return is_number(value) and 0 < value <= float_info.max
+    try:
+        return is_number(value) and 0 < float(value) < inf
+    except OverflowError:  # a whole number larger than any floating-point one
+        return False
 
 
 def check_rate(rate_hz: object) -> None:
@@ -67,4 +71,14 @@ def check_whole(what: str, value: object, *, low: int, high: int) -> None:
     if not (is_whole(value) and low <= value <= high):
         raise InputError(
             f"expected a whole number from {low} to {high} for {what}, got {value!r}; correct it."
+        )
+
+
+def check_keys(values: Iterable[str], known: Sequence[str], *, where: str) -> None:
+    """Refuse keys that are not among the known ones."""
+    unknown = sorted(set(values) - set(known))
+    if unknown:
+        raise InputError(
+            f"expected only {', '.join(known)} in {where}, got {', '.join(unknown)}; correct the "
+            "spelling or remove it."
         )

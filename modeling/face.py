@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
+
+
+def public_names(homes: Mapping[str, str]) -> list[str]:
+    """The names that live in these modules, as `lazily` takes them."""
+    return [name for module, names in homes.items() for name in names.split() or [module]]
 
 
 def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
@@ -23,6 +29,8 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
         if name not in places:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module = import_module(f"{package}.{places[name]}")
-        return module if name == places[name] else getattr(module, name)
+        found = module if name == places[name] else getattr(module, name)
+        setattr(sys.modules[package], name, found)  # so that it is looked for once
+        return found
 
     return find

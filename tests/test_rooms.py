@@ -85,6 +85,7 @@ PLANTED = {
     "tactileq/telling.py": ("import tactileq.commands.demo", "Floors of the command line"),
     "modeling/perception/clock.py": ("import time", "modeling is pure numerics"),
     "modeling/hand.py": ("import random", "modeling is pure numerics"),
+    "rig/twin.py": ("import tests.conftest", "Nobody imports tests"),
     "modeling/newcomer.py": ("", "Floors of modeling"),  # every module has its floor
 }
 
@@ -173,6 +174,7 @@ def test_a_face_names_what_is_there_to_readers_and_at_run_time(face) -> None:  #
     assert for_types == set(face.__all__)
     for name in face.__all__:
         assert getattr(face, name) is not None
+    assert set(face.__all__) <= set(dir(face))
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         _ = face.nothing
 

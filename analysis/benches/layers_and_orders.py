@@ -39,11 +39,10 @@ def layers_and_orders(
     DataFrame
         One row per model: model, size (layers or order), numbers (per condition); means of gfc30
         with its floor and ceiling, oracle_gap and log_spectral_distance_db
-        (docs/method/similarity.md, to the
-        record), distance_to_truth_db (of the two responses, unsmoothed, 10 Hz to 0.96 of the
-        Nyquist frequency: the measure of docs/method/equalizer.md#signs on real textures);
-        lowest_gfc30,
-        level_error_db (root mean square); records, simulated.
+        (docs/method/similarity.md, to the record), distance_to_truth_db (of the two responses,
+        unsmoothed, 10 Hz to 0.96 of the Nyquist frequency: the measure of
+        docs/method/equalizer.md#signs on real textures); lowest_gfc30, level_error_db (root mean
+        square); records, simulated.
     """
     scores: dict[tuple[str, int], list[tuple[SimilarityReport, float]]] = {}
     simulated = False

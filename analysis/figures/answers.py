@@ -34,7 +34,7 @@ def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
     Parameters
     ----------
     tests : DataFrame
-        From `statistics.rating_tests`.
+        From `paired.rating_tests`.
     simulated : bool
         Written into the figure.
     """
@@ -57,7 +57,7 @@ def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float 
     Parameters
     ----------
     tests : DataFrame
-        From `statistics.rate_tests`; the row over all textures is left out.
+        From `rates.rate_tests`; the row over all textures is left out.
     simulated : bool
         Written into the figure.
     chance : float

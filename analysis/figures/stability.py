@@ -114,7 +114,7 @@ def plot_levels(
     Parameters
     ----------
     levels : dict of (n,) ndarray
-        From `moving.level_above_click_hz`.
+        From `clicks.level_above_click_hz`.
     """
     _plot_around_the_step({name: levels[name] for name in shown}, time_s=time_s, ax=ax)
     ax.set_ylim(-15, 22)
@@ -140,7 +140,7 @@ def figure_clicks(
 
     Parameters
     ----------
-    steps : sequence of (StepSignals, levels from `moving.level_above_click_hz`)
+    steps : sequence of (StepSignals, levels from `clicks.level_above_click_hz`)
     shown : dict of str to sequence of str
         By step: the methods to draw. Where several make the same signal, one will do.
     """

@@ -132,7 +132,7 @@ def _sections(
 
 
 def _overview(sections: Sequence[Section], responses: Responses | None, *, models: bool) -> str:
-    careful = cautions(
+    warned = cautions(
         [section.tests for section in sections if section.tests is not None],
         simulated_participants=responses is not None and responses.simulated_participants,
         simulated_rig=responses is not None and responses.simulated_rig,
@@ -146,7 +146,7 @@ def _overview(sections: Sequence[Section], responses: Responses | None, *, model
         + "<h3>What came out</h3>"
         + bullets([sentence for section in sections for sentence in section.outcomes])
         + '<div class="caution"><h3>What may not be concluded</h3>'
-        + bullets(careful)
+        + bullets(warned)
         + "</div><h3>What was done</h3>"
         + bullets(done)
     )

@@ -15,7 +15,7 @@ ALPHA = 0.05
 
 
 def rating_outcomes(tests: pd.DataFrame) -> list[str]:
-    """One sentence per rating scale, from `statistics.rating_tests`."""
+    """One sentence per rating scale, from `paired.rating_tests`."""
     return [
         f"Rated similarity of {scale}: "
         + _differences(tests[tests["scale"] == scale], unit="points", factor=1.0)
@@ -42,7 +42,7 @@ def rate_outcomes(
 
 
 def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
-    """Sentences on what was dropped and what it cost, from `tables.gfc_table` rows."""
+    """Sentences on what was dropped and what it cost, from `likeness.gfc_table` rows."""
     full = gfc[gfc["model"] == "full"].set_index("texture")
     simple = gfc[gfc["model"] == "simplified"].set_index("texture")
     dropped = full["layers"] - simple["layers"]
@@ -110,7 +110,7 @@ def driving_outcomes(driving: pd.DataFrame) -> list[str]:
 
 
 def planted_outcomes(planted: pd.DataFrame) -> list[str]:
-    """One sentence per estimator, from `planted.planted_truth_table` rows; means over textures."""
+    """One sentence per estimator, from rows of `recovery.planted_truth_table`: means."""
     overall = planted[planted["layer"] == ALL_LAYERS]
     return [
         _planted_outcome(str(estimator), rows)

@@ -252,7 +252,11 @@ def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.D
     }
 
 
-LEFT_OUT_COLUMNS = (TEXTURE, Column("foretold_by", is_name=True), *MEDIAN_AND_WORST_COLUMNS)
+LEFT_OUT_COLUMNS = (
+    TEXTURE,
+    Column("foretold_by", "predicted by", is_name=True),
+    *MEDIAN_AND_WORST_COLUMNS,
+)
 
 
 def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:

@@ -86,14 +86,14 @@ def layers_table(found: Sequence[RecordingLayers]) -> pd.DataFrame:
 
 
 def model_layers_table(model: TextureModel) -> pd.DataFrame:
-    """The layers of a model in every condition of its grid, as `layers_table` tells them.
+    """The layers of a model in every condition of its grid, as `layers_table` gives them.
 
     Returns
     -------
     DataFrame
         The columns of `layers_table` without repeat, and besides: own_peak (false of a layer
         without a maximum of the response), inherited (its frequency is given by other conditions),
-        not_identifiable (its level is not told), interpolated (there is no recording).
+        not_identifiable (its level), interpolated (there is no recording).
     """
     peaks = own_peaks(model).is_peak
     rows: list[dict[str, Any]] = []

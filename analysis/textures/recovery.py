@@ -7,15 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column
 from analysis.labels import ALL_LAYERS
 from modeling import InputError, TextureModel
-from modeling.arrays import Bools, Floats
-
-Integers = NDArray[np.int64]
+from modeling.arrays import Bools, Floats, Integers
 
 LEAST_TOLERANCE_HZ = 10.0
 NO_PARTNER = -1

@@ -2,8 +2,8 @@
 
 Simulated: textures whose layers are known are recorded twice and fitted by the default estimator;
 one layer of each is followed through the rules of docs/method/perception.md#simplification. The
-threshold is flat and laid so that
-the layer's true level has the wanted distance, in the amplitude of each criterion.
+threshold is flat and laid so that the layer's true level has the wanted distance, in the amplitude
+of each criterion.
 
 Example: python docs/studies/simplification_study.py writes simplification_study.tsv and .png
 beside this file.

@@ -37,11 +37,10 @@ def sensation_levels(
 ) -> Floats:
     """How far above threshold a surface is felt, by stroke and frequency band.
 
-    The power in a band, ∫ response² · 2/rate df, is that of a sinusoid of peak amplitude
-    √2·RMS (criterion `energy`, docs/method/perception.md#criteria); each frequency counts relative
-    to its own threshold.
-    Frequencies without a known threshold, and those beyond the model's Nyquist frequency,
-    contribute nothing.
+    The power in a band, ∫ response² · 2/rate df, is that of a sinusoid of peak amplitude √2·RMS
+    (criterion `energy`, docs/method/perception.md#criteria); each frequency counts relative to its
+    own threshold. Frequencies without a known threshold, and those beyond the model's Nyquist
+    frequency, contribute nothing.
 
     Parameters
     ----------

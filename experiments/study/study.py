@@ -5,13 +5,13 @@ docs/method/protocols.md
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal
 
 from modeling import InputError
-from modeling.checks import check_whole
+from modeling.checks import check_keys, check_whole
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_toml
 
@@ -131,7 +131,12 @@ class Study:
         object.__setattr__(self, "textures", tuple(self.textures))
         object.__setattr__(self, "trays", dict(self.trays))
         planned = {**PAPER_PLANS, **self.tasks}
-        _refuse_unknown(planned, TASKS, "the tasks")
+        check_keys(planned, TASKS, where="the tasks")
+        for task, plan in planned.items():
+            if not isinstance(plan, TaskPlan):
+                raise InputError(
+                    f"expected a TaskPlan for {task}, got {plan!r}; give participants and schedule."
+                )
         in_order = {task: planned[task] for task in TASKS if task in planned}
         object.__setattr__(self, "tasks", in_order)
         check_whole("seed", self.seed, low=0, high=2**63)
@@ -180,6 +185,16 @@ class Study:
             )
         return self.tasks[task]
 
+    @property
+    def absolute(self) -> TaskPlan:
+        """The plan of the absolute task."""
+        return self.tasks["absolute"]
+
+    @property
+    def relative(self) -> TaskPlan:
+        """The plan of the relative task."""
+        return self.tasks["relative"]
+
     def to_dict(self) -> dict[str, Any]:
         """The study as plain values; `Study.from_dict` makes it again."""
         values: dict[str, Any] = {}
@@ -197,7 +212,7 @@ class Study:
             For unknown or missing keys, or values out of range.
         """
         settings = dict(values)
-        _refuse_unknown(settings, _STUDY_KEYS, "the study")
+        check_keys(settings, _STUDY_KEYS, where="the study")
         _require(settings, {"name", "seed", "textures", "trays"}, "the study")
         tasks = {name: _task_plan(name, settings.pop(name)) for name in TASKS if name in settings}
         if not isinstance(settings.get("trays", {}), Mapping):
@@ -241,18 +256,9 @@ def _task_plan(task: str, values: object) -> TaskPlan:
             "write both under that heading."
         )
     known = tuple(f.name for f in fields(TaskPlan))
-    _refuse_unknown(values, known, f"[{task}]")
+    check_keys(values, known, where=f"[{task}]")
     _require(values, set(known), f"[{task}]")
     return TaskPlan(**values)
-
-
-def _refuse_unknown(values: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    unknown = sorted(set(values) - set(known))
-    if unknown:
-        raise InputError(
-            f"expected only {', '.join(known)} in {where}, got {', '.join(unknown)}; "
-            "correct the spelling or remove it."
-        )
 
 
 def _require(values: Mapping[str, Any], needed: set[str], where: str) -> None:

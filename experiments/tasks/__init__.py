@@ -6,11 +6,14 @@ from importlib import import_module
 
 from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan, draw_session
-from experiments.study.study import Study
+from experiments.study.study import TASKS, Study
+from modeling import InputError
 
 
 def task_named(name: str) -> Task:
-    """The task that `ANSWER_TABLES` declares under this name."""
+    """The task that `ANSWER_TABLES` declares under this name; InputError for another name."""
+    if name not in TASKS:
+        raise InputError(f"expected the task {' or '.join(TASKS)}, got {name!r}; choose one.")
     found: Task = import_module(f"experiments.tasks.{name}").TASK
     return found
 

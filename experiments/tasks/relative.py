@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
+from functools import partial, update_wrapper
 from typing import Any
 
 import numpy as np
@@ -101,3 +101,4 @@ TASK = Task(
     ask=_ask,
 )
 run_relative = partial(run_session, TASK)
+update_wrapper(run_relative, run_session, assigned=("__doc__",), updated=())

@@ -1,8 +1,8 @@
 """Layers as they are rendered: the coherent response |G_w + Σ G_i H_i(f)| of many spectra at once.
 
 All spectra of a texture, or several starts for one, are climbed side by side
-(docs/method/equalizer.md#response, docs/method/estimation.md#likelihood):
-arrays have one row per spectrum, bins that a row does not need have no weight.
+(docs/method/equalizer.md#response, docs/method/estimation.md#likelihood): arrays have one row per
+spectrum, bins that a row does not need have no weight.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from modeling.estimation.likelihood import (
     split,
 )
 
-# Width at −3 dB of a spectral line seen through the taper of `spectra.tapered`, in lines; a band
+# Width at −3 dB of a spectral line seen through the taper of `Spectrum.tapered`, in lines; a band
 # that is as narrow looks wider by it, and lower, at the same level.
 LINE_WIDTH = 0.9
 NARROWEST_LINES = 1.5
@@ -165,8 +165,8 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     Notes
     -----
     A band is H = 1/(1 − ju) with u = (g²·cot(πF/fs) − tan(πF/fs))/(k(1+g²)) at the frequency F,
-    g = tan(πf/fs), k = tan(πB/fs): `peq.band_response`, rearranged. Seen through a line of width δ,
-    the band has the width √(B² + δ²) and the power of its peak is lower by B over it.
+    g = tan(πf/fs), k = tan(πB/fs): `bands.band_response`, rearranged. Seen through a line of width
+    δ, the band has the width √(B² + δ²) and the power of its peak is lower by B over it.
     """
     m, per_hz = (theta.shape[1] - 1) // 3, np.pi / observed.rate_hz
     noise, frequency, bandwidth, gain = split(theta, m)

@@ -158,7 +158,7 @@ def offsets(theta: Floats, m: int, bins: Bins) -> tuple[Floats, Floats, Floats]:
     """u (m, n), where a band is 1/(1 − ju), and its derivatives by log f and log B.
 
     H = 1/(1 − ju) with u = (g²·cot(πF/fs) − tan(πF/fs))/(k(1+g²)) at the frequency F, where
-    g = tan(πf/fs) and k = tan(πB/fs): `peq.band_response`, rearranged.
+    g = tan(πf/fs) and k = tan(πB/fs): `bands.band_response`, rearranged.
     """
     per_hz = np.pi / bins.rate_hz
     centre, width = centres_and_widths(theta, m)

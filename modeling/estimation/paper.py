@@ -1,10 +1,9 @@
 """From a spectrum to noise gain and layers by the paper's recipe, in two readings.
 
-`paper` reads the recipe plainly: B is the full width at half
-maximum of the smoothed peak and G its height. That counts the noise floor twice and the smoothing
-as width. `paper-consistent` fits the peak above the floor, takes the smoothing out of its width,
-and chooses gains such that the model, smoothed alike, has the measured heights
-(docs/method/estimation.md).
+`paper` reads the recipe plainly: B is the full width at half maximum of the smoothed peak and G its
+height. That counts the noise floor twice and the smoothing as width. `paper-consistent` fits the
+peak above the floor, takes the smoothing out of its width, and chooses gains such that the model,
+smoothed alike, has the measured heights (docs/method/estimation.md).
 """
 
 from __future__ import annotations

@@ -45,6 +45,9 @@ class AnswerColumn:
         return described
 
 
+MODEL_LEVELS = {"full": "all layers", "simplified": "without imperceptible layers"}
+
+
 def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[AnswerColumn, ...]:
     """The columns of a task's table: those of every task, with its own among them.
 
@@ -72,7 +75,7 @@ def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[Answer
         AnswerColumn(
             name="model",
             description=model,
-            levels={"full": "all layers", "simplified": "without imperceptible layers"},
+            levels=MODEL_LEVELS,
             required=True,
         ),
         AnswerColumn(name="tray", description="Tray that held the sample"),

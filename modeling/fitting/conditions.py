@@ -1,4 +1,4 @@
-"""The spectra of one texture: one per recording, hum and drift taken out."""
+"""The spectra of one texture: one per recording, hum removed and drift corrected."""
 
 from __future__ import annotations
 

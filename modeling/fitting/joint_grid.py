@@ -130,7 +130,7 @@ def prediction_losses(grid: TextureGrid, solution: Solution) -> Floats:
 
 
 def _with_estimated_precision(grid: TextureGrid, solution: Solution) -> Solution:
-    """The solution in a field that has learnt its smoothness from it."""
+    """The solution in a field whose smoothness is estimated from it."""
     theta, observed = solution.theta, solution.observed
     precision = np.asarray(np.linalg.inv(prior_covariance(solution.count)))
     for _ in range(EM_ROUNDS):

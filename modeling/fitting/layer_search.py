@@ -284,8 +284,8 @@ def in_frequency_order(grid: TextureGrid, solution: Solution) -> Solution:
 def _carry(pool: _Pool) -> None:
     """The layers of single conditions that are fitted well, carried to all others.
 
-    Frequencies and gains follow their trend, widths stay. A few conditions that have gone astray
-    together, mostly in their widths, hold each other there.
+    Frequencies and gains follow their trend, widths stay. A few conditions that converged to a
+    poor maximum together, mostly in their widths, hold each other there.
     """
     grid, count = pool.grid, pool.best().count
     for solution in map(pool.of, (count - 1, count)):
@@ -356,7 +356,7 @@ def _likeliest(
     observed = observe(powers, np.exp(frequency), np.exp(bandwidth), scale=grid.scale)
     fits = climb(theta, signs, observed, limits=grid.limits(m), steps=10, enough=1.0)
     loss = np.sort((fits.objective - observed.scatter).reshape(len(starts), -1), axis=1)
-    # In a few conditions a start may go astray.
+    # In a few conditions a start may lead to a poor maximum.
     held = loss[:, : max(1, round(0.67 * some.size))].sum(axis=1)
     return [starts[i] for i in np.argsort(held, kind="stable")[:count]]
 

@@ -90,9 +90,7 @@ class RegressedModel(SavedModel):
     def _check_kinds(self) -> None:
         check_texture_name(self.texture)
         rate = self.rate_hz
-        kinds = (
-            is_rate(rate) and isinstance(self.simulated, bool) and isinstance(self.estimator, str)
-        )
+        kinds = isinstance(self.simulated, bool) and isinstance(self.estimator, str)
         if not (kinds and is_rate(rate) and self.unit in UNITS):
             raise InputError(
                 f"{self.texture}: expected a rate above 0 Hz, a unit among {', '.join(UNITS)}, "

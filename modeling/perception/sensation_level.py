@@ -29,8 +29,8 @@ def sensation_level(vibration_g: Floats, rate_hz: float, *, threshold: Threshold
 
     The power sum over frequency of (√2·RMS/threshold)²: every line of the spectrum counts as the
     sinusoid of equal power (criterion `energy`, docs/method/perception.md#criteria) against the
-    threshold at its frequency,
-    so a sinusoid at threshold has 0 dB. Frequencies where no threshold is known are left out.
+    threshold at its frequency, so a sinusoid at threshold has 0 dB. Frequencies where no threshold
+    is known are left out.
 
     Parameters
     ----------

@@ -199,10 +199,9 @@ def with_signs_chosen_again(model: TextureModel, keep: list[int]) -> TextureMode
     """The model with only these layers, their signs such that its response stays nearest.
 
     Two neighbours left with equal signs would cut a notch between them
-    (docs/method/equalizer.md#signs). Compared with the
-    full response in all conditions, over 10 Hz … 0.98 of the Nyquist frequency on a logarithmic
-    scale, by Whittle's likelihood; amplitudes stay. Models by the paper's recipe keep their signs,
-    which are all positive.
+    (docs/method/equalizer.md#signs). Compared with the full response in all conditions, over 10 Hz
+    … 0.98 of the Nyquist frequency on a logarithmic scale, by Whittle's likelihood; amplitudes
+    stay. Models by the paper's recipe keep their signs, which are all positive.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 A vibrator that answers a drive w by G_w·w + G·H(w), H a band-pass, is R = 1 + G/G_w times as strong
 at its resonance as elsewhere. Eq. 7, ã = G_o·â + G_BEF·H_BEF(â), undoes that exactly where the
-notch H_BEF = 1 − H_BP belongs to the band-pass whose tan(πB/fs) is R times that of H, with
-G_o = 1/R and G_BEF = 1 − 1/R (docs/method/vibrators.md#compensation). A notch of H's own width
-leaves a resonance nearly as high
-as the one it was to take away.
+notch H_BEF = 1 − H_BP belongs to the band-pass whose tan(πB/fs) is R times that of H, with G_o =
+1/R and G_BEF = 1 − 1/R (docs/method/vibrators.md#compensation). A notch of H's own width leaves a
+resonance nearly as high as the one it was to take away.
 """
 
 from __future__ import annotations
@@ -94,9 +93,8 @@ class Compensation:
     def _coefficients(self) -> tuple[Floats, Floats]:
         """Numerator and denominator in z⁻¹.
 
-        With t = (1 − z⁻¹)/(1 + z⁻¹), g = tan(πf/fs) and k = tan(πB/fs) the band is
-        H_BP = k(1+g²)t/(g² + k(1+g²)t + t²), the transfer function of
-        docs/method/equalizer.md#recursion.
+        With t = (1 − z⁻¹)/(1 + z⁻¹), g = tan(πf/fs) and k = tan(πB/fs) the band is H_BP =
+        k(1+g²)t/(g² + k(1+g²)t + t²), the transfer function of docs/method/equalizer.md#recursion.
         """
         g = float(rational_tan(np.pi / self.rate_hz * self.frequency_hz))
         damping = float(rational_tan(np.pi / self.rate_hz * self.bandwidth_hz)) * (1 + g * g)

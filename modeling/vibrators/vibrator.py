@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.checks import is_number
+from modeling.checks import is_rate
 from modeling.equalizer.bands import check_bands
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
@@ -64,7 +64,9 @@ class Vibrator(SavedModel):
 
     def __post_init__(self) -> None:
         for name in (*_NUMBERS, "lowest_hz", "highest_hz"):
-            _check_positive(name, getattr(self, name))
+            value = getattr(self, name)
+            _check_positive(name, value)
+            object.__setattr__(self, name, float(value))
         check_height(self.height)
         self._freeze(_CURVES)
         curves = np.array([getattr(self, name).size for name in _CURVES])
@@ -93,7 +95,7 @@ class Vibrator(SavedModel):
 
 
 def _check_positive(name: str, value: float) -> None:
-    if not (is_number(value) and np.isfinite(value) and value > 0):
+    if not is_rate(value):  # what a rate must be: finite and above 0
         raise InputError(
             f"expected a finite {name} above 0, got {value!r}; identify the vibrator again."
         )

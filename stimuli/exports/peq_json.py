@@ -38,8 +38,7 @@ def write_peq_json(
     `force_n`, `noise_gain` (G_w, unit per unit noise) and `layers`. A layer has `frequency_hz`,
     `bandwidth_hz` (−3 dB), `gain` (G_i, signed) and the coefficients `b` (b0, b1, b2) and `a` (a0,
     a1, a2) of its unit-gain band-pass as a biquad at `rate_hz`. The filter is that of
-    docs/method/equalizer.md, but
-    a biquad does not share its safety while parameters move.
+    docs/method/equalizer.md, but a biquad does not share its safety while parameters move.
 
     Parameters
     ----------

@@ -47,7 +47,15 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from modeling import InputError
-from modeling.checks import check_choice, check_name, check_number, check_whole, is_number, is_whole
+from modeling.checks import (
+    check_choice,
+    check_keys,
+    check_name,
+    check_number,
+    check_whole,
+    is_number,
+    is_whole,
+)
 from modeling.files.documents import read_toml
 
 SampleFormat = Literal["float32", "pcm24"]
@@ -270,7 +278,8 @@ class Recipe:
         ------
         InputError
             If the file is missing, no TOML or of another version, has unknown or missing keys, or
-            values out of range. The files that it names are read later, by `sources.load`.
+            values out of range. The files that it names are read later, by
+            `sources.load_sources`.
         """
         file = Path(path)
         values = read_toml(file, "a recipe")
@@ -306,7 +315,7 @@ class Recipe:
 
 
 def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
-    _only(values, ("version", *_SECTIONS), where="a recipe")
+    check_keys(values, ("version", *_SECTIONS), where="a recipe")
     version = values.get("version")
     if type(version) is not int or version != VERSION:
         raise InputError(
@@ -365,7 +374,7 @@ def _table(values: Mapping[str, Any], name: str) -> dict[str, Any]:
         raise InputError(
             f"expected a table [{name}], got {table!r}; write [{name}] above its keys."
         )
-    _only(table, _SECTIONS[name], where=f"[{name}]")
+    check_keys(table, _SECTIONS[name], where=f"[{name}]")
     return dict(table)
 
 
@@ -376,17 +385,8 @@ def _tables(values: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
             f"expected tables [[{name}]], got {tables!r}; write [[{name}]] above the keys of each."
         )
     for table in tables:
-        _only(table, _SECTIONS[name], where=f"[[{name}]]")
+        check_keys(table, _SECTIONS[name], where=f"[[{name}]]")
     return [dict(table) for table in tables]
-
-
-def _only(values: Iterable[str], known: Iterable[str], *, where: str) -> None:
-    unknown = sorted(set(values) - set(known))
-    if unknown:
-        raise InputError(
-            f"expected only {', '.join(known)} in {where}, got {', '.join(unknown)}; correct the "
-            "spelling or remove it."
-        )
 
 
 def _listed(name: str, value: object) -> tuple[int, ...]:

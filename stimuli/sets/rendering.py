@@ -67,9 +67,9 @@ def at_rate(
     """A stroke with its margins, resampled to a file's rate, cut to its duration and faded.
 
     By FFT over a length that the ratio of the rates divides: exact up to the model's Nyquist
-    frequency, and nothing above it (docs/method/recordings.md#preparation: a usual polyphase
-    filter bends the top band by
-    −1.05 dB). Faded in and out over 10 ms, in files shorter than 40 ms over a quarter of them.
+    frequency, and nothing above it (docs/method/recordings.md#preparation: a usual polyphase filter
+    bends the top band by −1.05 dB). Faded in and out over 10 ms, in files shorter than 40 ms over a
+    quarter of them.
 
     Parameters
     ----------

@@ -42,12 +42,13 @@ def test_what_is_no_number(value: object) -> None:
             check()
 
 
-@pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), 10**400])
+@pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), np.float32("inf"), 10**400])
 def test_rates_are_finite_and_above_zero(value: float) -> None:
     assert not is_rate(value)
     with pytest.raises(InputError, match="expected a rate above 0 Hz"):
         check_rate(value)
     assert is_rate(5e-324)
+    assert is_rate(np.float32(5000))
 
 
 def test_ends_of_a_range_are_in_it() -> None:

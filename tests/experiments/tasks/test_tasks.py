@@ -5,11 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
-from experiments.tasks import plan_session
+from experiments.tasks import plan_session, task_named
 from experiments.tasks.absolute import run_absolute
 from experiments.tasks.relative import run_relative
+from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
 
 
 def session(study: Study, folder: Path, task: str = "absolute", **parts: Any) -> Any:
@@ -93,3 +97,11 @@ def test_a_relative_session_is_stored_as_it_went(
         ("virtual", layout[1]),
         ("virtual", layout[1]),
     ]
+
+
+def test_every_declared_table_has_its_task_and_another_name_is_refused() -> None:
+    for name in ANSWER_TABLES:
+        assert task_named(name).name == name
+        assert {"training", "main", "closing"} <= set(task_named(name).texts)
+    with pytest.raises(InputError, match="expected the task absolute or relative, got 'os'"):
+        task_named("os")

@@ -138,8 +138,7 @@ def test_result_is_described(make_model: ModelMaker, estimator: str) -> None:
     if estimator != "joint":  # both readings of the paper keep all signs positive
         assert (model.gains > 0).all()
     # A third of a dB at a width of 50 Hz and 1 s, less for wider bands
-    # (docs/method/estimation.md#level-deviations), more where a
-    # width has to be told as well.
+    # (docs/method/estimation.md#level-deviations), more where a width has to be estimated as well.
     assert (model.level_sd_db > 0.1).all()
     assert (model.level_sd_db < 1.5).all()
 

@@ -200,8 +200,8 @@ def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: fl
     for low, high in ((60, 100), (250, 350), (400, 700), (800, 1000), (1200, 1800), (1900, 2300)):
         assert abs(level_db(low, high, here)) < 0.8
     # Against the model's own rate the peaks agree too; only far skirts are less warped
-    # (docs/method/rendering.md#other-rates: the filter
-    # keeps f, B and the peak, not the distance to the Nyquist zero).
+    # (docs/method/rendering.md#other-rates: the filter keeps f, B and the peak, not the distance to
+    # the Nyquist zero).
     for low, high in ((60, 100), (280, 320), (840, 960)):
         assert abs(level_db(low, high, at_model_rate)) < 0.8
     assert abs(level_db(10, 2400, at_model_rate)) < 0.3

@@ -25,6 +25,7 @@ from modeling import (
     identify_vibrator,
 )
 from modeling.equalizer.bands import band_response
+from stimuli.planted.vibrators import planted_vibrator
 
 RATE_HZ = 5000.0
 FREQUENCY_HZ = np.geomspace(1.0, 0.999 * RATE_HZ / 2, 3000)
@@ -428,3 +429,9 @@ def test_files_that_hold_no_vibrator_are_refused(tmp_path: Path, changed, senten
     path.write_text(json.dumps({**json.loads(path.read_text()), **changed}))
     with pytest.raises(InputError, match=sentence):
         Vibrator.load(path)
+
+
+def test_numbers_of_numpy_are_saved_as_numbers(tmp_path: Path) -> None:
+    found = planted_vibrator(np.float32(80.5), np.int64(25))  # type: ignore[arg-type]
+    found.save(tmp_path / "pen.json")
+    assert Vibrator.load(tmp_path / "pen.json") == found == planted_vibrator(80.5, 25.0)
