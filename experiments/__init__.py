@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from modeling.face import lazily, public_names
+from modeling.face import lazily
 
 HOMES = {
     "study.study": "Study TaskPlan",
@@ -34,10 +34,5 @@ if TYPE_CHECKING:
     from experiments.tasks import task_named as task_named
     from experiments.tasks.absolute import run_absolute as run_absolute
     from experiments.tasks.relative import run_relative as run_relative
-
-__getattr__ = lazily(__name__, HOMES)
-__all__ = public_names(HOMES)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+else:  # a type checker that saw __getattr__ would take every name for public
+    __getattr__, __dir__, __all__ = lazily(__name__, HOMES)

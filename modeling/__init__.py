@@ -5,7 +5,7 @@ Each name is loaded when it is first asked for, so that `import modeling.errors`
 
 from typing import TYPE_CHECKING
 
-from modeling.face import lazily, public_names
+from modeling.face import lazily
 
 HOMES = {
     "errors": "GridError InputError",
@@ -63,10 +63,5 @@ if TYPE_CHECKING:
     from modeling.vibrators.compensation import flat_band as flat_band
     from modeling.vibrators.identification import identify_vibrator as identify_vibrator
     from modeling.vibrators.vibrator import Vibrator as Vibrator
-
-__getattr__ = lazily(__name__, HOMES)
-__all__ = public_names(HOMES)
-
-
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+else:  # a type checker that saw __getattr__ would take every name for public
+    __getattr__, __dir__, __all__ = lazily(__name__, HOMES)

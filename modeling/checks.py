@@ -30,8 +30,8 @@ def check_texture_name(name: object) -> None:
         )
 
 
-def is_rate(value: object) -> TypeGuard[float]:
-    """Whether this can be a sampling rate: a finite number above 0."""
+def is_positive(value: object) -> TypeGuard[float]:
+    """Whether this is a finite number above 0."""
     try:
         return is_number(value) and 0 < float(value) < inf
     except OverflowError:  # a whole number larger than any floating-point one
@@ -40,7 +40,7 @@ def is_rate(value: object) -> TypeGuard[float]:
 
 def check_rate(rate_hz: object) -> None:
     """Refuse what cannot be a sampling rate: anything but a finite number above 0."""
-    if not is_rate(rate_hz):
+    if not is_positive(rate_hz):
         got = str(rate_hz) if is_number(rate_hz) else repr(rate_hz)
         raise InputError(f"expected a rate above 0 Hz, got {got}; give the rate.")
 

@@ -8,13 +8,10 @@ from importlib import import_module
 from typing import Any
 
 
-def public_names(homes: Mapping[str, str]) -> list[str]:
-    """The names that live in these modules, as `lazily` takes them."""
-    return [name for module, names in homes.items() for name in names.split() or [module]]
-
-
-def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package whose names live in modules below it.
+def lazily(
+    package: str, homes: Mapping[str, str]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]], list[str]]:
+    """`__getattr__`, `__dir__` and `__all__` of a package whose names live in modules below it.
 
     Parameters
     ----------
@@ -26,6 +23,7 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     places = {name: module for module, names in homes.items() for name in names.split() or [module]}
 
     def find(name: str) -> Any:
+        """The public object of this name; AttributeError where there is none."""
         if name not in places:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         module = import_module(f"{package}.{places[name]}")
@@ -33,4 +31,4 @@ def lazily(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
         setattr(sys.modules[package], name, found)  # so that it is looked for once
         return found
 
-    return find
+    return find, lambda: sorted({*vars(sys.modules[package]), *places}), list(places)

@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactileq.keeping import check_own_model
-from tactileq.telling import clipping_warnings, progress, sentence_of, simulated_note
+from tactileq.telling import (
+    clipping_warnings,
+    left_out_warnings,
+    progress,
+    sentence_of,
+    simulated_note,
+)
 
 if TYPE_CHECKING:
     from analysis.report.findings import Findings
@@ -160,8 +166,11 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
     except (ValueError, OSError, MemoryError) as error:
         return Outcome(what, error=sentence_of(error))
     notes = (*_rate_notes(records), *_told(found, start, plot=how.plot))
-    left_out = [f"warning: {source.texture}: left out: {sentence}" for sentence in unusable]
-    warnings = (*left_out, *clipping_warnings(records), *_mended(found))
+    warnings = (
+        *left_out_warnings(source.texture, unusable),
+        *clipping_warnings(records),
+        *_mended(found),
+    )
     return Outcome(what, notes=notes, warnings=warnings)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -54,6 +54,11 @@ def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
         yield lambda share, what: bar.update(task, completed=share)
 
 
+def left_out_warnings(texture: str, refusals: Iterable[str]) -> list[str]:
+    """One sentence for every recording of a texture that cannot be used."""
+    return [f"warning: {texture}: left out: {refusal}" for refusal in refusals]
+
+
 def clipping_warnings(records: RecordingSet) -> list[str]:
     """One sentence for every clipped recording."""
     return [
@@ -74,6 +79,6 @@ def usable_recordings(folder: Path, texture: str) -> RecordingSet:
     from modeling.recordings.recording_set import load_usable
 
     records, unusable = load_usable(folder, texture=texture)
-    for sentence in unusable:
-        print(f"warning: {texture}: left out: {sentence}", file=sys.stderr)
+    for warning in left_out_warnings(texture, unusable):
+        print(warning, file=sys.stderr)
     return records

@@ -4,29 +4,12 @@ from __future__ import annotations
 
 import pkgutil
 import re
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
-
-
-def loaded_after(statements: str, packages: tuple[str, ...]) -> str:
-    """Which of these packages a fresh process holds once it has run the statements, as a list."""
-    program = f"import sys\n{statements}\nprint([p for p in {packages} if p in sys.modules])"
-    result = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
-    return result.stdout.splitlines()[-1]
-
-
-def test_help_loads_no_numerics() -> None:
-    statements = "from tactileq.app import app\ntry: app(['--help'])\nexcept SystemExit: pass"
-    heavy = ("numpy", "scipy", "pandas", "matplotlib", "psychopy")
-    assert loaded_after(statements, heavy) == "[]"
 
 
 def test_every_command_has_an_example() -> None:

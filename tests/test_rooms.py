@@ -154,6 +154,14 @@ def test_errors_load_neither_numerics_nor_the_rest_of_modeling() -> None:
 HEAVY = {"scipy", "pandas", "matplotlib", "statsmodels", "psychopy"}
 
 
+def test_help_loads_no_numerics() -> None:
+    loaded = loaded_after(
+        "from tactileq.app import app\ntry: app(['--help'])\nexcept SystemExit: pass"
+    )
+    assert "tactileq.commands.demo" in loaded
+    assert not (HEAVY | {"numpy"}) & set(loaded)
+
+
 def test_no_public_name_of_modeling_loads_what_only_some_of_it_needs() -> None:
     # SciPy as a whole: importing any of its parts takes longer than all of the modeling.
     loaded = loaded_after(f"from modeling import {', '.join(modeling.__all__)}")
@@ -165,13 +173,17 @@ def test_no_public_name_of_modeling_loads_what_only_some_of_it_needs() -> None:
 def test_a_face_names_what_is_there_to_readers_and_at_run_time(face) -> None:  # type: ignore[no-untyped-def]
     for_types: set[str] = set()
     tree = ast.parse(Path(face.__file__).read_text(encoding="utf-8"))
-    for block in (node for node in tree.body if isinstance(node, ast.If)):
-        for node in block.body:
-            assert isinstance(node, ast.ImportFrom)
-            for alias in node.names:
-                home = f"{node.module}.{alias.name}"
-                assert HOMES[f"{face.__name__}.{alias.name}"] in (node.module, home)
-                for_types.add(alias.name)
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    # At the top `__getattr__` would let type checkers take every name for public.
+    assert len(block.orelse) == 1
+    assert "__getattr__" in ast.unparse(block.orelse[0])
+    assert not any("__getattr__" in ast.unparse(n) for n in tree.body if n is not block)
+    for node in block.body:
+        assert isinstance(node, ast.ImportFrom)
+        for alias in node.names:
+            home = f"{node.module}.{alias.name}"
+            assert HOMES[f"{face.__name__}.{alias.name}"] in (node.module, home)
+            for_types.add(alias.name)
     assert for_types == set(face.__all__)
     for name in face.__all__:
         assert getattr(face, name) is not None

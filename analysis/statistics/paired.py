@@ -230,6 +230,7 @@ def without_rounding_noise(differences: Floats) -> Floats:
 
 
 def why_undefined(differences: Floats) -> str:
+    """Why no t-test can be made of these differences; empty where one can."""
     if differences.size < 2:
         return f"t undefined: {differences.size} participant(s)"
     if np.ptp(differences) == 0:
@@ -238,8 +239,10 @@ def why_undefined(differences: Floats) -> str:
 
 
 def mean(values: Floats) -> float:
+    """Arithmetic mean; NaN of no value."""
     return float(values.mean()) if values.size else float("nan")
 
 
 def ignoring_case(column: pd.Series) -> pd.Series:
+    """Sort key of names: capital letters count as small ones."""
     return column.str.casefold()

@@ -7,10 +7,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from experiments.sessions.order import draw_session
 from experiments.sessions.store import SessionStore
 from experiments.sessions.surfaces import Respondent, SessionAborted, Surfaces
 from experiments.sessions.task import Task
-from experiments.study.design import Trial, draw_session
+from experiments.study.design import Trial
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from rig.interface import TextureRig

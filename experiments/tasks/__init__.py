@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from experiments.sessions.order import draw_session
 from experiments.sessions.task import Task
-from experiments.study.design import SessionPlan, draw_session
+from experiments.study.design import SessionPlan
 from experiments.study.study import TASKS, Study
 from modeling import InputError
 
@@ -26,5 +27,4 @@ def plan_session(study: Study, *, task: str, subject: int, session: int) -> Sess
     InputError
         If the study has no such task, subject or session.
     """
-    study.plan(task)
     return draw_session(study, task_named(task), subject=subject, session=session)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 from modeling.errors import InputError
@@ -22,27 +23,32 @@ def load_model(path: Path) -> AnyModel:
     return _KINDS.get(_stated_format(path) or "", TextureModel).load(path)
 
 
-def is_something_else(path: Path) -> bool:
-    """Whether a JSON file states that it holds no model but, say, a vibrator.
+def models_among(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
+    """Which of these JSON files may be models, and which state that they are something else.
 
-    False of a file that states nothing: that may be a damaged model.
+    A file that states nothing may be a damaged model. Provenance is neither.
     """
-    stated = _stated_format(path)
-    return stated is not None and stated not in _KINDS
+    models: list[Path] = []
+    others: list[Path] = []
+    for path in paths:
+        if not path.name.endswith("provenance.json"):
+            stated = _stated_format(path)
+            (models if stated is None or stated in _KINDS else others).append(path)
+    return models, others
 
 
-def model_files(folder: Path) -> list[Path]:
-    """JSON files of a folder that may be models, in order of name; provenance is none.
+def models_in(folder: Path) -> tuple[list[Path], list[Path]]:
+    """`models_among` the JSON files of a folder, in order of name.
 
     Raises
     ------
     InputError
-        Where all of them state that they are something else.
+        Where none may be a model.
     """
-    found = sorted(p for p in folder.glob("*.json") if not p.name.endswith("provenance.json"))
-    if all(map(is_something_else, found)):
+    models, others = models_among(sorted(folder.glob("*.json")))
+    if not models:
         raise InputError(f"expected model files in {folder}, got none; fit or simplify some first.")
-    return found
+    return models, others
 
 
 def load_models(folder: Path) -> dict[str, TextureModel]:
@@ -54,9 +60,7 @@ def load_models(folder: Path) -> dict[str, TextureModel]:
         For a folder without models, a file that is none, and two models of one texture.
     """
     models: dict[str, TextureModel] = {}
-    for path in model_files(folder):
-        if is_something_else(path):
-            continue
+    for path in models_in(folder)[0]:
         fitted = TextureModel.load(path)
         if fitted.texture in models:
             raise InputError(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.checks import UNITS, check_texture_name, is_rate
+from modeling.checks import UNITS, check_texture_name, is_positive
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
 from modeling.files.saved_model import SavedModel
@@ -91,7 +91,7 @@ class RegressedModel(SavedModel):
         check_texture_name(self.texture)
         rate = self.rate_hz
         kinds = isinstance(self.simulated, bool) and isinstance(self.estimator, str)
-        if not (kinds and is_rate(rate) and self.unit in UNITS):
+        if not (kinds and is_positive(rate) and self.unit in UNITS):
             raise InputError(
                 f"{self.texture}: expected a rate above 0 Hz, a unit among {', '.join(UNITS)}, "
                 f"true or false for simulated and text for estimator, got {rate!r}, "

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.checks import is_rate
+from modeling.checks import is_positive
 from modeling.equalizer.bands import check_bands
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError
@@ -95,17 +95,19 @@ class Vibrator(SavedModel):
 
 
 def _check_positive(name: str, value: float) -> None:
-    if not is_rate(value):  # what a rate must be: finite and above 0
+    if not is_positive(value):
         raise InputError(
             f"expected a finite {name} above 0, got {value!r}; identify the vibrator again."
         )
 
 
 def check_band(frequency_hz: float, bandwidth_hz: float, *, rate_hz: float) -> None:
+    """Refuse a frequency or width (Hz) outside the legal range of a band."""
     check_bands(np.array([frequency_hz]), np.array([bandwidth_hz]), rate_hz)
 
 
 def check_height(height: float) -> None:
+    """Refuse a height R over the flat part that is not finite and above 1."""
     if not (np.isfinite(height) and height > 1):
         raise InputError(
             f"expected a resonance higher than the flat part (R > 1), got R = {height:g}; only a "

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from modeling import InputError, Threshold, Vibrator, compensation_for
 from modeling.files.writing import file_stem, write_text
-from modeling.models.loading import AnyModel, is_something_else, load_model, model_files
+from modeling.models.loading import AnyModel, load_model, models_in
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.trajectories import Trajectory
 
@@ -56,11 +56,7 @@ def load_sources(recipe: Recipe) -> Sources:
         in arbitrary units in a set that is to be matched in loudness, or a vibrator that cannot be
         compensated at a rate, or not within the time to settle.
     """
-    found = [(path, entry.label) for entry in recipe.models for path in _files(entry)]
-    # A model that the recipe names itself is to be one.
-    named = {entry.path for entry in recipe.models}
-    passed_over = [path for path, _ in found if path not in named and is_something_else(path)]
-    models = tuple(_labelled(path, label) for path, label in found if path not in passed_over)
+    models, passed_over = _models_of(recipe)
     _check_models(models, recipe)
     trajectories = tuple(
         Trajectory.of(entry, duration_s=recipe.duration_s) for entry in recipe.trajectories
@@ -77,20 +73,24 @@ def load_sources(recipe: Recipe) -> Sources:
         threshold=None if named_threshold is None else Threshold.named(named_threshold),
         vibrator=vibrator,
         vibrator_sha256=None if recipe.vibrator is None else _sha256(recipe.vibrator),
-        passed_over=tuple(passed_over),
+        passed_over=passed_over,
     )
 
 
-def _labelled(path: Path, label: str) -> LabelledModel:
-    return LabelledModel(label, load_model(path), path, _sha256(path))
+def _models_of(recipe: Recipe) -> tuple[tuple[LabelledModel, ...], tuple[Path, ...]]:
+    """The models of the recipe, and what its folders hold besides; a file that it names is one."""
+    found: list[tuple[str, Path]] = []
+    passed_over: list[Path] = []
+    for entry in recipe.models:
+        paths, others = models_in(entry.path) if entry.path.is_dir() else ([entry.path], [])
+        found += [(entry.label, path) for path in paths]
+        passed_over += others
+    models = (LabelledModel(label, load_model(path), path, _sha256(path)) for label, path in found)
+    return tuple(models), tuple(passed_over)
 
 
 def _sha256(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _files(entry: ModelEntry) -> list[Path]:
-    return model_files(entry.path) if entry.path.is_dir() else [entry.path]
 
 
 def _check_models(models: Sequence[LabelledModel], recipe: Recipe) -> None:

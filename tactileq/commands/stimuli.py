@@ -78,6 +78,7 @@ def recipe_from(
     vibrator: Path | None,
 ) -> Recipe:
     """The recipe of this file, or the one that model files and options make."""
+    from modeling.models.loading import models_among
     from stimuli.sets.recipe import Recipe, TrajectoryEntry, model_entry, whole_or_as_it_is
 
     recipes = [path for path in named if path.suffix.lower() == ".toml"]
@@ -89,9 +90,11 @@ def recipe_from(
                 f"that {recipes[0]} lacks into it."
             )
         return Recipe.load(recipes[0])
+    models, others = models_among(named)
+    tell_passed_over(others)
     return Recipe(
         name=out.resolve().name,
-        models=tuple(map(model_entry, _models_among(named))),
+        models=tuple(map(model_entry, models)),
         trajectories=tuple(
             TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]
         ),
@@ -100,16 +103,6 @@ def recipe_from(
         duration_s=1.0 if duration_s is None else duration_s,
         vibrator=vibrator,
     )
-
-
-def _models_among(named: Sequence[Path]) -> list[Path]:
-    """Without what else models/*.json names: provenance, vibrators, exported equalizers."""
-    from modeling.models.loading import is_something_else
-
-    files = [path for path in named if not path.name.endswith("provenance.json")]
-    others = [path for path in files if is_something_else(path)]
-    tell_passed_over(others)
-    return [path for path in files if path not in others]
 
 
 def tell_passed_over(others: Sequence[Path]) -> None:

@@ -15,7 +15,7 @@ from modeling.checks import (
     check_rate,
     check_whole,
     is_number,
-    is_rate,
+    is_positive,
     is_whole,
 )
 
@@ -44,11 +44,11 @@ def test_what_is_no_number(value: object) -> None:
 
 @pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), np.float32("inf"), 10**400])
 def test_rates_are_finite_and_above_zero(value: float) -> None:
-    assert not is_rate(value)
+    assert not is_positive(value)
     with pytest.raises(InputError, match="expected a rate above 0 Hz"):
         check_rate(value)
-    assert is_rate(5e-324)
-    assert is_rate(np.float32(5000))
+    assert is_positive(5e-324)
+    assert is_positive(np.float32(5000))
 
 
 def test_ends_of_a_range_are_in_it() -> None:

@@ -16,15 +16,18 @@ from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
 
 
-def session(study: Study, folder: Path, task: str = "absolute", **parts: Any) -> Any:
-    run = run_absolute if task == "absolute" else run_relative
-    return run(study, subject=1, session=1, data_folder=folder, **parts)
-
-
 def test_an_absolute_session_is_stored_as_it_went(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
 ) -> None:
-    result = session(study, tmp_path, models=models, rig=rig, respondent=respondent)
+    result = run_absolute(
+        study,
+        subject=1,
+        session=1,
+        data_folder=tmp_path,
+        models=models,
+        rig=rig,
+        respondent=respondent,
+    )
     trials = plan_session(study, task="absolute", subject=1, session=1).trials
     stored = rows(result.path)
     assert result.completed
@@ -54,7 +57,15 @@ def test_an_absolute_session_is_stored_as_it_went(
 def test_each_absolute_trial_presents_its_own_surfaces_in_its_own_order(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
-    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
+    run_absolute(
+        study,
+        subject=1,
+        session=1,
+        data_folder=tmp_path,
+        models=models,
+        rig=rig,
+        respondent=respondent,
+    )
     wanted: list[tuple[str, object]] = [("silence", None)]
     for trial in plan_session(study, task="absolute", subject=1, session=1).trials:
         real = ("real", trial.texture)
@@ -67,7 +78,15 @@ def test_each_absolute_trial_presents_its_own_surfaces_in_its_own_order(
 def test_a_relative_session_is_stored_as_it_went(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
 ) -> None:
-    result = session(study, tmp_path, "relative", models=models, rig=rig, respondent=respondent)
+    result = run_relative(
+        study,
+        subject=1,
+        session=1,
+        data_folder=tmp_path,
+        models=models,
+        rig=rig,
+        respondent=respondent,
+    )
     trials = plan_session(study, task="relative", subject=1, session=1).trials
     stored = rows(result.path)
     assert list(stored[0]) == [
