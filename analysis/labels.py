@@ -14,6 +14,8 @@ ALL_TEXTURES = "all textures"
 
 ALL_LAYERS = "all layers"
 
+IDENTICAL = "identical models, nothing to compare"
+
 SIGNIFICANCE_MARKS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 
 

@@ -22,7 +22,8 @@ HOMES = {
     "fitting.autoregressive": "fit_ar",
     "regression.driving": "regressed",
     "perception.thresholds": "Threshold",
-    "perception.simplification": "CRITERIA LayerVerdict Simplification simplify",
+    "perception.simplification": "simplify",
+    "perception.verdicts": "CRITERIA LayerVerdict Simplification",
     "vibrators.vibrator": "Vibrator",
     "vibrators.compensation": "Compensation compensation_for flat_band",
     "vibrators.identification": "identify_vibrator",
@@ -46,11 +47,11 @@ if TYPE_CHECKING:
     from modeling.models.ar_model import ARModel as ARModel
     from modeling.models.regressed_model import RegressedModel as RegressedModel
     from modeling.models.texture_model import TextureModel as TextureModel
-    from modeling.perception.simplification import CRITERIA as CRITERIA
-    from modeling.perception.simplification import LayerVerdict as LayerVerdict
-    from modeling.perception.simplification import Simplification as Simplification
     from modeling.perception.simplification import simplify as simplify
     from modeling.perception.thresholds import Threshold as Threshold
+    from modeling.perception.verdicts import CRITERIA as CRITERIA
+    from modeling.perception.verdicts import LayerVerdict as LayerVerdict
+    from modeling.perception.verdicts import Simplification as Simplification
     from modeling.recordings.recording import Recording as Recording
     from modeling.recordings.recording_set import RecordingSet as RecordingSet
     from modeling.recordings.spectrum import Spectrum as Spectrum

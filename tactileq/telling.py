@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from experiments.study.models import ModelSets
     from modeling import RecordingSet
     from modeling.models.loading import AnyModel
 
@@ -72,6 +73,15 @@ def clipping_warnings(records: RecordingSet) -> list[str]:
 def simulated_note(model: AnyModel) -> str:
     """What a printed line says of a model that nobody recorded."""
     return " (simulated)" if model.simulated else ""
+
+
+def tell_controls(sets: ModelSets, textures: Sequence[str]) -> None:
+    """Name the textures of a study whose simplified model is the full one."""
+    if controls := sets.identical(textures):
+        print(
+            f"note: the simplified model is identical to the full one for {', '.join(controls)}: "
+            "presented as a control, nothing to compare."
+        )
 
 
 def usable_recordings(folder: Path, texture: str) -> RecordingSet:

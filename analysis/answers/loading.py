@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from analysis.answers.order import check_order, planned_trials, told_of_unordered
+from analysis.labels import MODELS
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
+_RESTS_ON = ("StudySHA256", "ModelsSHA256")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,8 @@ class Responses:
         The training trials, same columns; no statistic uses them.
     name : str
         The study's name.
+    models : mapping of texture to mapping of kind to SHA-256
+        The full and the simplified model that were presented; empty where the data do not say.
     warnings : tuple of str
         What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
@@ -42,7 +47,15 @@ class Responses:
     simulated_rig: bool
     training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
+    models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
+
+    @property
+    def identical(self) -> frozenset[str]:
+        """Textures whose full and simplified model are the same: nothing to compare."""
+        return frozenset(
+            texture for texture, kinds in self.models.items() if len(set(kinds.values())) == 1
+        )
 
     @property
     def absolute(self) -> pd.DataFrame:
@@ -74,29 +87,31 @@ def load_responses(data_folder: str | Path) -> Responses:
     data_folder : str or Path
         Folder holding dataset_description.json, participants.tsv and
         sub-*/ses-*/beh/sub-*_ses-*_task-TASK_beh.tsv; beside each its sidecar, and
-        below sourcedata/ the order of its trials, where they are there.
+        below sourcedata/ the order of its trials, where they are there. Answers must follow that
+        order, trial by trial.
 
     Returns
     -------
     Responses
         A last line cut short by a killed process is dropped and named in `warnings`; so is a
-        session with fewer answers than planned trials.
+        session with fewer answers than planned trials, and one without a stored order.
 
     Raises
     ------
     InputError
-        Where the folder is none, a file is malformed, a value is out of range, or answers are
-        mixed that differ in whether participants or rig were simulated.
+        Where the folder is none, a file is malformed, a value is out of range, answers are not
+        those to the trials that were planned, or answers are mixed that differ in whether
+        participants or rig were simulated, in their study or in their models.
     """
     folder = Path(data_folder)
     description = _description(folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
+    origin = {**simulated, **{key: description[key] for key in _RESTS_ON if key in description}}
     warnings: list[str] = []
     participants = simulated["SimulatedParticipant"]
     _check_participants(folder / "participants.tsv", participants, warnings=warnings)
     tables = {
-        task: _load_task(folder, task, simulated=simulated, warnings=warnings)
-        for task in ANSWER_TABLES
+        task: _load_task(folder, task, origin=origin, warnings=warnings) for task in ANSWER_TABLES
     }
     if all(table is None for table in tables.values()):
         raise InputError(
@@ -110,6 +125,7 @@ def load_responses(data_folder: str | Path) -> Responses:
         simulated_rig=simulated["SimulatedRig"],
         training={task: training for task, (_, training) in parts.items()},
         name=str(description.get("Name", "")),
+        models=_models(description, folder),
         warnings=tuple(warnings),
     )
 
@@ -159,11 +175,24 @@ def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> 
     _check_simulated(table, simulated, path=path)
 
 
+def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[str, str]]:
+    """SHA-256 of the models that were presented, by texture and kind; empty where not stated."""
+    stated = description.get("ModelsSHA256", {})
+    textures = stated.values() if isinstance(stated, Mapping) else [None]
+    if not all(isinstance(kinds, Mapping) and set(kinds) == set(MODELS) for kinds in textures):
+        raise InputError(
+            'expected "ModelsSHA256" with a full and a simplified model of each texture in '
+            f"{folder / 'dataset_description.json'}, got something else; restore the file."
+        )
+    assert isinstance(stated, Mapping)
+    return {str(t): {str(k): str(v) for k, v in kinds.items()} for t, kinds in stated.items()}
+
+
 def _load_task(
-    folder: Path, task: str, *, simulated: Mapping[str, bool], warnings: list[str]
+    folder: Path, task: str, *, origin: Mapping[str, object], warnings: list[str]
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
-    sessions = []
+    sessions, unordered = [], []
     for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
         participant, session = path.parts[-4], path.parts[-3]
         if path.name != f"{participant}_{session}_task-{task}_beh.tsv":
@@ -171,44 +200,42 @@ def _load_task(
                 f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
                 f"move the file back to its own participant's folder."
             )
-        _check_sidecar(path.with_suffix(".json"), simulated)
+        _check_sidecar(path.with_suffix(".json"), origin)
         table = _read_lines(path, warnings)
         order = folder / "sourcedata" / participant / session
         order /= path.name.removesuffix("beh.tsv") + "order.json"
-        if len(table) < (planned := _planned_trials(order)):
-            warnings.append(
-                f"{participant} {task} {session} answered {len(table)} of {planned} trials "
-                "(ended early)."
-            )
+        what = f"{participant} {task} {session}"
+        planned = None
+        if order.is_file():
+            planned = planned_trials(_json_object(order), (participant, session, task), path=order)
+            if len(table) < len(planned):
+                ended = f"answered {len(table)} of {len(planned)} trials (ended early)."
+                warnings.append(f"{what} {ended}")
+        else:
+            unordered.append(what)
         if table.columns.empty:
             continue
-        _check_session(table, task, path=path, simulated=simulated["Simulated"])
+        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+        check_order(table, planned, path=path)
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)
+    warnings += told_of_unordered(unordered)
     return pd.concat(sessions, ignore_index=True) if sessions else None
 
 
-def _check_sidecar(path: Path, simulated: Mapping[str, bool]) -> None:
-    """Refuse a session that says otherwise than the data set what was simulated."""
+def _check_sidecar(path: Path, origin: Mapping[str, object]) -> None:
+    """Refuse a session that says otherwise than the data set what was simulated or presented."""
     sidecar = _json_object(path) if path.is_file() else {}
-    for key, value in simulated.items():
-        if sidecar.get(key, value) is not value:
+    for key, value in origin.items():
+        if sidecar.get(key, value) != value:
+            found = json.dumps(sidecar[key]) if key in _SIMULATED else "another"
+            wanted = f"{key} {json.dumps(value)}" if key in _SIMULATED else f"one {key}"
             raise InputError(
-                f"expected {key} {json.dumps(value)} in {path}, as dataset_description.json says, "
-                f"never a mixture, but found {json.dumps(sidecar[key])}; correct the file or leave "
+                f"expected {wanted} in {path}, as dataset_description.json says, "
+                f"never a mixture, but found {found}; correct the file or leave "
                 "its session out."
             )
-
-
-def _planned_trials(order: Path) -> int:
-    """Number of trials in a session's stored order; 0 where there is none."""
-    if not order.is_file():
-        return 0
-    trials = _json_object(order).get("trials")
-    if not isinstance(trials, list):
-        raise InputError(f"expected a list of trials in {order}, found none; restore the file.")
-    return len(trials)
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:

@@ -40,7 +40,7 @@ CORRECT_RATES_SHOWN = (
 
 def rating_section(responses: Responses) -> Section:
     """Absolute evaluation (PAPER VIII-A)."""
-    tests = rating_tests(responses.absolute)
+    tests = rating_tests(responses.absolute, identical=responses.identical)
     done, tile = _participants(responses, responses.absolute, where="absolute evaluation")
     picture = Picture(
         "ratings",
@@ -76,7 +76,7 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
     matrices = confusion_matrices(relative)
     chance = 1 / len(matrices["full"].textures)
     rates = correct_rates(relative, rng=rng, chance=chance)
-    tests = rate_tests(relative)
+    tests = rate_tests(relative, identical=responses.identical)
     done, tile = _participants(responses, relative, where="forced choice")
     overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import p_value
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES, MODELS, SCALES
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, MODELS, SCALES
 from analysis.statistics.confusion import ConfusionMatrix
 
 ALPHA = 0.05
@@ -185,11 +185,15 @@ def cautions(
 
 def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
     """Which textures differ between the models, after Holm."""
+    same = tests[tests["note"] == IDENTICAL]
+    tests = tests.drop(same.index)
     count = len(tests)
     different = tests[tests["p_holm"] < ALPHA]
     undefined = tests[tests["p_holm"].isna()]
     rest = count - len(different) - len(undefined)
-    if different.empty:
+    if not count:
+        text = "nothing was compared"
+    elif different.empty:
         text = f"no difference between the models was shown in any of {count} textures"
     else:
         shown = "; ".join(
@@ -204,6 +208,8 @@ def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
             text += f"; no difference was shown in the other {rest}"
     if not undefined.empty:
         text += f"; the test is undefined for {_names(undefined['texture'])} (see the notes)"
+    if not same.empty:
+        text += f"; {IDENTICAL}: {_names(same['texture'])}"
     return text + "."
 
 

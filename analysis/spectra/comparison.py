@@ -21,7 +21,8 @@ from modeling import (
 )
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import band_response
-from modeling.perception.simplification import CriterionName, layer_amplitudes_g
+from modeling.perception.simplification import layer_amplitudes_g
+from modeling.perception.verdicts import CriterionName
 from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
 
 PANELS_PER_AXIS = 3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from scipy import special, stats
 
 from analysis.columns import TEXTURE, Column, P, names
-from analysis.labels import MODELS, SCALES
+from analysis.labels import IDENTICAL, MODELS, SCALES
 from modeling import InputError
 from modeling.arrays import Floats
 
@@ -138,6 +139,7 @@ def holm(p_values: ArrayLike) -> Floats:
     return adjusted
 
 
+INFERENCE = ("t", "p", "d_z", "d_z_low", "d_z_high", "shapiro_p", "wilcoxon_w", "wilcoxon_p")
 CI_LOW, CI_HIGH = Column("ci_low", "CI from"), Column("ci_high", "to")
 T, DF = Column("t"), Column("df")
 P_HOLM = Column("p_holm", "p (Holm)", is_p_value=True)
@@ -164,13 +166,18 @@ PAIRED_COLUMNS = (
 RATING_TEST_COLUMNS = (Column("scale", is_name=True), *PAIRED_COLUMNS)
 
 
-def rating_tests(absolute: pd.DataFrame) -> pd.DataFrame:
+def rating_tests(
+    absolute: pd.DataFrame, *, identical: Collection[str] = frozenset()
+) -> pd.DataFrame:
     """Paired tests of both rating scales (PAPER VIII-A), Holm over the textures of a scale.
 
     Parameters
     ----------
     absolute : DataFrame
         `Responses.absolute`; ratings 0–100.
+    identical : collection of str
+        Textures whose simplified model is the full one: described, but not tested
+        (docs/method/statistics.md#identical-models).
 
     Returns
     -------
@@ -179,13 +186,16 @@ def rating_tests(absolute: pd.DataFrame) -> pd.DataFrame:
         values, by name), the other fields of `PairedTest`, and p_holm.
     """
     families = [
-        paired_family(absolute, column).assign(scale=scale) for column, scale in SCALES.items()
+        paired_family(absolute, column, identical=identical).assign(scale=scale)
+        for column, scale in SCALES.items()
     ]
     return pd.concat(families, ignore_index=True)[names(RATING_TEST_COLUMNS)]
 
 
-def paired_family(table: pd.DataFrame, column: str) -> pd.DataFrame:
-    """Test every texture of a table; the Holm family is these textures."""
+def paired_family(
+    table: pd.DataFrame, column: str, *, identical: Collection[str] = frozenset()
+) -> pd.DataFrame:
+    """Test every texture of a table but the identical ones; the Holm family is these textures."""
     rows = []
     for texture, cells in table.groupby("texture", sort=False):
         means = cells.pivot_table(
@@ -195,6 +205,8 @@ def paired_family(table: pd.DataFrame, column: str) -> pd.DataFrame:
         means = means.reindex(sorted(table["participant_id"].unique()))
         both = means.dropna()
         result = asdict(paired_test(both["full"], both["simplified"]))
+        if texture in identical:
+            result |= dict.fromkeys(INFERENCE, np.nan) | {"note": IDENTICAL}
         excluded = ", ".join(means.index.difference(both.index))
         rows.append({"texture": texture, **result, "excluded": excluded})
     if not rows:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
@@ -35,13 +36,16 @@ BOOTSTRAP_RESAMPLES = 5000
 RATE_TEST_COLUMNS = PAIRED_COLUMNS
 
 
-def rate_tests(relative: pd.DataFrame) -> pd.DataFrame:
+def rate_tests(relative: pd.DataFrame, *, identical: Collection[str] = frozenset()) -> pd.DataFrame:
     """Paired tests of the correct rates (PAPER VIII-B), Holm over the textures.
 
     Parameters
     ----------
     relative : DataFrame
         `Responses.relative`; rates are shares 0–1 per participant.
+    identical : collection of str
+        As in `rating_tests`. They stay in the row over all textures, where the choice was among
+        all models of one kind.
 
     Returns
     -------
@@ -49,7 +53,7 @@ def rate_tests(relative: pd.DataFrame) -> pd.DataFrame:
         One row per texture as in `rating_tests`, then one over all textures, which is not part
         of the family (its p_holm is NaN).
     """
-    family = paired_family(relative, "correct")
+    family = paired_family(relative, "correct", identical=identical)
     overall = paired_family(relative.assign(texture=ALL_TEXTURES), "correct")
     tests = pd.concat([family, overall.assign(p_holm=np.nan)], ignore_index=True)
     return tests[names(RATE_TEST_COLUMNS)]

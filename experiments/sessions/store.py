@@ -54,6 +54,7 @@ class SessionStore:
         plan: SessionPlan,
         columns: Mapping[str, Mapping[str, Any]],
         description: str,
+        models: Mapping[str, Mapping[str, str]],
         simulated_participant: bool,
         simulated_rig: bool,
     ) -> SessionStore:
@@ -69,6 +70,8 @@ class SessionStore:
             The columns of the responses in order, each with its BIDS description.
         description : str
             What the participant does, for the sidecar.
+        models : mapping of texture to mapping of kind to SHA-256
+            The models that are presented; one data set holds answers about one set of them.
         simulated_participant, simulated_rig : bool
             Whether they are simulated; one data set holds one kind.
 
@@ -88,8 +91,13 @@ class SessionStore:
         }
         try:
             root.mkdir(parents=True, exist_ok=True)
-            _describe_data_set(root, plan.study, simulated=simulated)
-            sidecar = _sidecar_text(plan, columns, description=description, simulated=simulated)
+            origin = {
+                **simulated,
+                "StudySHA256": plan.study.sha256,
+                "ModelsSHA256": {texture: dict(kinds) for texture, kinds in models.items()},
+            }
+            _describe_data_set(root, plan.study, origin=origin)
+            sidecar = _sidecar_text(plan, columns, description=description, origin=origin)
             store = cls._make_files(root, plan, columns=tuple(columns), sidecar=sidecar, made=made)
             _add_participant(root, plan.subject, simulated=simulated_participant)
             _sync_folder(root)
@@ -299,7 +307,8 @@ def _json(values: Mapping[str, Any]) -> str:
 
 
 def _order_text(plan: SessionPlan) -> str:
-    return _json({"format": ORDER_FORMAT, "version": ORDER_VERSION, **plan.to_dict()})
+    stated = {"format": ORDER_FORMAT, "version": ORDER_VERSION, "study_sha256": plan.study.sha256}
+    return _json({**stated, **plan.to_dict()})
 
 
 def _sidecar_text(
@@ -307,7 +316,7 @@ def _sidecar_text(
     columns: Mapping[str, Mapping[str, Any]],
     *,
     description: str,
-    simulated: Mapping[str, bool],
+    origin: Mapping[str, Any],
 ) -> str:
     study = plan.study
     return _json(
@@ -318,22 +327,22 @@ def _sidecar_text(
             "Masking": study.masking,
             "SurfaceVisible": study.surface_visible,
             "Schedule": study.plan(plan.task).schedule,
-            **simulated,
+            **origin,
             **columns,
         }
     )
 
 
-def _describe_data_set(root: Path, study: Study, *, simulated: Mapping[str, bool]) -> None:
-    """Write the description of the data set, or check that the one there is of this study."""
+def _describe_data_set(root: Path, study: Study, *, origin: Mapping[str, Any]) -> None:
+    """Write the description of the data set, or check that the one there is of this origin."""
     design = study.to_dict()
-    wanted = {"Name": study.name, **simulated, "StudyDesign": design}
+    wanted = {"Name": study.name, "StudyDesign": design, **origin}
     values = {
         "Name": study.name,
         "BIDSVersion": BIDS_VERSION,
         "DatasetType": "raw",
         "License": study.data_license,
-        **simulated,
+        **origin,
         "StudyDesign": design,
         "GeneratedBy": [{"Name": "tactileq", "Version": _own_version()}],
     }

@@ -78,6 +78,7 @@ def run_session(
         plan=plan,
         columns={column.name: column.sidecar() for column in task.columns},
         description=task.description,
+        models=models.sha256(study.textures),
         simulated_participant=respondent.simulated,
         simulated_rig=rig.simulated,
     ) as store:

@@ -14,6 +14,7 @@ from modeling import InputError
 from modeling.checks import check_keys, check_whole
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_toml
+from modeling.files.hashes import sha256_of_values
 
 Schedule = Literal["by-day", "interleaved"]
 
@@ -201,6 +202,11 @@ class Study:
         for name, value in asdict(self).items():
             values |= value if name == "tasks" else {name: value}
         return values
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of its values, by which files name the study that they rest on."""
+        return sha256_of_values(self.to_dict())
 
     @staticmethod
     def from_dict(values: Mapping[str, Any]) -> Study:

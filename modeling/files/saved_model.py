@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Container, Iterable
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from modeling.errors import InputError
 from modeling.files.documents import dump_json
+from modeling.files.hashes import sha256_of
 from modeling.files.writing import write_text
 
 if TYPE_CHECKING:
@@ -30,8 +31,17 @@ class SavedModel(_Base):
 
     def save(self, path: str | Path) -> None:
         """Write the model as versioned JSON; the file is there whole or not at all."""
+        write_text(path, dump_json(self.to_dict()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The model as plain values, those of its file; `from_dict` makes it again."""
         values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
-        write_text(path, dump_json({"format": self.FORMAT, "version": self.VERSION, **values}))
+        return {"format": self.FORMAT, "version": self.VERSION, **values}
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the file that `save` writes: equal exactly where models are equal."""
+        return sha256_of(dump_json(self.to_dict()))
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -42,18 +52,36 @@ class SavedModel(_Base):
         InputError
             If the file is missing, is no such model, or has another version.
         """
-        values = _load_json(Path(path), cls.FORMAT, version=cls.VERSION)
+        return cls.from_dict(_load_json(Path(path)), source=Path(path))
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], *, source: Path) -> Self:
+        """A model from the plain values of its file.
+
+        Parameters
+        ----------
+        values : mapping
+            As `to_dict` gives them.
+        source : Path
+            Where they stand, for what is said of them.
+
+        Raises
+        ------
+        InputError
+            If they are of no such model, or of another version.
+        """
+        given = _fields(values, cls.FORMAT, version=cls.VERSION, source=source)
         names = {f.name for f in fields(cls)}
-        wrong = ", ".join(sorted((names - cls.OPTIONAL - set(values)) | (set(values) - names)))
+        wrong = ", ".join(sorted((names - cls.OPTIONAL - set(given)) | (set(given) - names)))
         if wrong:
             raise InputError(
-                f"expected the fields of a {cls.FORMAT} in {path}, got too few or too many "
+                f"expected the fields of a {cls.FORMAT} in {source}, got too few or too many "
                 f"({wrong}); make the file again."
             )
         try:
-            return cls(**values)
+            return cls(**given)
         except (TypeError, ValueError) as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(f"{source}: {error}") from None
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -77,23 +105,25 @@ def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
 
 
-def _load_json(source: Path, file_format: str, *, version: int) -> dict[str, Any]:
-    """The fields of a model file of this format and version."""
+def _load_json(source: Path) -> Any:
     if not source.is_file():
         raise InputError(f"expected a model file at {source}, got no file there; give its path.")
     try:
-        values = json.loads(source.read_text(encoding="utf-8"))
+        return json.loads(source.read_text(encoding="utf-8"))
     except ValueError:
         raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
-    if not isinstance(values, dict) or values.pop("format", None) != file_format:
+
+
+def _fields(values: Any, file_format: str, *, version: int, source: Path) -> dict[str, Any]:
+    """The fields of a model file of this format and version."""
+    if not isinstance(values, Mapping) or values.get("format") != file_format:
         raise InputError(
             f"expected the format {file_format} in {source}, got another; give a model of "
             "that kind."
         )
-    found = values.pop("version", None)
-    if found != version:
+    if values.get("version") != version:
         raise InputError(
-            f"expected a model of version {version} in {source}, got version {found!r}; "
-            "update tactileq or fit the model again."
+            f"expected a model of version {version} in {source}, got version "
+            f"{values.get('version')!r}; update tactileq or fit the model again."
         )
-    return values
+    return {name: value for name, value in values.items() if name not in ("format", "version")}

@@ -15,6 +15,8 @@ AnyModel = TextureModel | RegressedModel | ARModel
 _KINDS: dict[str, type[AnyModel]] = {
     kind.FORMAT: kind for kind in (TextureModel, RegressedModel, ARModel)
 }
+# What stands beside models and tells of them.
+_ABOUT_MODELS = "tactileq.simplification"
 
 
 def load_model(path: Path) -> AnyModel:
@@ -26,13 +28,13 @@ def load_model(path: Path) -> AnyModel:
 def models_among(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     """Which of these JSON files may be models, and which state that they are something else.
 
-    A file that states nothing may be a damaged model. Provenance is neither.
+    A file that states nothing may be a damaged model. Provenance and simplifications are neither.
     """
     models: list[Path] = []
     others: list[Path] = []
     for path in paths:
-        if not path.name.endswith("provenance.json"):
-            stated = _stated_format(path)
+        stated = _stated_format(path)
+        if stated != _ABOUT_MODELS and not path.name.endswith("provenance.json"):
             (models if stated is None or stated in _KINDS else others).append(path)
     return models, others
 

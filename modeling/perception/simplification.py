@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +15,9 @@ from modeling.errors import InputError
 from modeling.models.own_peaks import own_peaks
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold
+from modeling.perception.verdicts import CRITERIA, CriterionName, LayerVerdict, Simplification
 from modeling.similarity import HIGHEST_SHARE, LOWEST_HZ
 
-CriterionName = Literal["energy", "paper-fft", "paper-gain"]
-CRITERIA: tuple[CriterionName, ...] = ("energy", "paper-fft", "paper-gain")
 HIGHEST_FLIP_PROBABILITY = 0.05
 PAPER_RECORD_S = 1.0
 SIGN_POINTS = 120
@@ -31,58 +29,6 @@ DEVIATIONS_PER_LEVEL_SD: dict[CriterionName, float] = {
     "paper-fft": 2.0,
     "paper-gain": 2.0,
 }
-
-
-@dataclass(frozen=True)
-class LayerVerdict:
-    """What became of one layer, and why.
-
-    Parameters
-    ----------
-    layer : int
-        1-based, in the order of the full model.
-    verdict : {"kept", "dropped"}
-    reason : str
-        One phrase.
-    worst_speed_mm_s, worst_force_n, worst_frequency_hz : float
-        The condition in which the layer stands highest against the threshold.
-    distance_db : float
-        Its level there, in dB relative to the threshold; NaN where no threshold is known.
-    flip_probability : float
-        P(flip): how often the layer would be on the other side of the all-conditions rule if the
-        levels scattered once more by their standard deviations, as in a block bootstrap of the
-        records (normal, independent between conditions); NaN where a threshold is not known. Not
-        in it: whether the estimator would find the layer again, its bias, the other rules.
-    assumed : int
-        In how many conditions the threshold was not known at the layer's frequency, but its last
-        level was held as a lower bound.
-    fills : int
-        The layer (1-based) whose shape this one only fills, with which alone it goes; 0 for a peak
-        of its own.
-    """
-
-    layer: int
-    verdict: Literal["kept", "dropped"]
-    reason: str
-    worst_speed_mm_s: float
-    worst_force_n: float
-    worst_frequency_hz: float
-    distance_db: float
-    flip_probability: float
-    assumed: int
-    fills: int
-
-
-@dataclass(frozen=True, eq=False)
-class Simplification:
-    """A simplified model and the verdict on every layer of the full one."""
-
-    model: TextureModel
-    layers: tuple[LayerVerdict, ...]
-    criterion: CriterionName
-    threshold: Threshold
-    margin_db: float
-    hold_above: bool
 
 
 def layer_amplitudes_g(model: TextureModel | PEQ, *, criterion: CriterionName) -> Floats:
@@ -167,7 +113,9 @@ def simplify(
     )
     keep = [layer for layer, (kept, _) in enumerate(decided) if kept]
     simplified = with_signs_chosen_again(model, keep)
-    return Simplification(simplified, verdicts, criterion, threshold, margin_db, hold_above)
+    return Simplification(
+        simplified, verdicts, criterion, threshold, margin_db, hold_above, model.sha256
+    )
 
 
 def _distances(

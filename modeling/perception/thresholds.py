@@ -8,12 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
+from modeling.files.hashes import sha256_of_values
 from modeling.files.tables import number, read_table
 
 STANDARD_GRAVITY_M_S2 = 9.80665
@@ -90,6 +92,21 @@ class Threshold:
         above = np.asarray(frequency_hz, dtype=np.float64) > self.frequency_hz[-1]
         finite = above & np.isfinite(frequency_hz)
         return np.where(finite, self.acceleration_g[-1], self.at(frequency_hz))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The threshold as plain values; `Threshold(**values)` makes it again."""
+        return {
+            "name": self.name,
+            "frequency_hz": self.frequency_hz.tolist(),
+            "acceleration_g": self.acceleration_g.tolist(),
+            "source": self.source,
+            "caveat": self.caveat,
+        }
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of its values, by which files name the threshold that they rest on."""
+        return sha256_of_values(self.to_dict())
 
     @staticmethod
     def load(path: str | Path) -> Threshold:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tactileq.keeping import check_own_results
-from tactileq.options import Criterion, HoldAbove, Margin, Out, Seed, ThresholdName
+from tactileq.options import Out, Seed
 from tactileq.telling import share_of, usable_recordings
 
 if TYPE_CHECKING:
     from analysis.answers.loading import Responses
     from analysis.textures.results import TextureResult
-    from modeling import Simplification, TextureModel, Threshold
-    from modeling.perception.simplification import CriterionName
+    from modeling import Simplification, TextureModel
 
 REPORT_CONTENTS = {"report.html", "tables", "figures", "provenance.json"}
 
@@ -31,25 +29,21 @@ def analyze(
     ] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
     simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
-    threshold: ThresholdName = "codec",
-    criterion: Criterion = "energy",
-    margin_db: Margin = 0.0,
-    hold_above: HoldAbove = True,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
     With --recordings, --models and --simplified the report also tells how good and how small the
-    models are; the threshold's options must be those of tactileq simplify.
+    models are; why layers went stands in the folder that tactileq simplify wrote.
 
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
-    from modeling import Threshold
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import write_provenance
     from modeling.models.loading import load_models
+    from modeling.perception.verdicts import load_simplifications
 
     check_own_results(out, "analyze", contents=REPORT_CONTENTS)
     responses = load_responses(data)
@@ -61,29 +55,17 @@ def analyze(
             recordings=recordings,
             full=load_models(models),
             shown=load_models(simplified),
-            verdict=partial(
-                simplification_shown,
-                threshold=Threshold.named(threshold),
-                criterion=criterion,
-                margin_db=margin_db,
-                hold_above=hold_above,
-            ),
+            simplifications=load_simplifications(simplified),
         )
     elif folders != (None, None, None):
         raise ValueError(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    settings = {
-        "threshold": threshold,
-        "criterion": criterion,
-        "margin_db": margin_db,
-        "hold_above": hold_above,
-    }
     inputs = [path for path in (data, *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         provenance = write_provenance(
-            fresh / "provenance.json", "analyze", settings, seed=seed, inputs=inputs
+            fresh / "provenance.json", "analyze", settings_of(results), seed=seed, inputs=inputs
         )
         write_report(
             fresh / "report.html",
@@ -98,13 +80,29 @@ def analyze(
     print((out / "report.html").resolve())
 
 
+def settings_of(results: Sequence[TextureResult]) -> dict[str, object]:
+    """What the models rest on: of each texture its models, and how layers were dropped."""
+    return {
+        result.texture: {
+            "full_sha256": result.simplification.full_sha256,
+            "simplified_sha256": result.simplification.model.sha256,
+            "threshold": result.simplification.threshold.name,
+            "threshold_sha256": result.simplification.threshold.sha256,
+            "criterion": result.simplification.criterion,
+            "margin_db": result.simplification.margin_db,
+            "hold_above": result.simplification.hold_above,
+        }
+        for result in results
+    }
+
+
 def results_of_study(
     responses: Responses,
     *,
     recordings: Path,
     full: Mapping[str, TextureModel],
     shown: Mapping[str, TextureModel],
-    verdict: Callable[[TextureModel, TextureModel | None], Simplification],
+    simplifications: Mapping[str, Simplification],
 ) -> list[TextureResult]:
     """Recordings, models and verdicts of every texture that was asked about."""
     from analysis.textures.between import left_out_by_model
@@ -112,43 +110,48 @@ def results_of_study(
     from modeling.files.writing import file_stem
     from modeling.fitting.conditions import recording_spectra
 
-    asked = responses.textures
-    missing = [texture for texture in asked if texture not in full]
-    if missing:
-        raise ValueError(
-            f"expected a model of each texture in the answers, got none of {', '.join(missing)}; "
-            "give the folder of the models that were presented."
-        )
     results = []
-    for texture in asked:
+    for texture in responses.textures:
+        _require_models(texture, responses, full=full, shown=shown, why=simplifications)
         records = usable_recordings(recordings / file_stem(texture), texture)
-        model = full[texture]
-        left_out = left_out_by_model(recording_spectra(records), model)
-        simplified = verdict(model, shown.get(texture))
-        results.append(TextureResult(records, model, simplified, left_out=left_out))
+        left_out = left_out_by_model(recording_spectra(records), full[texture])
+        results.append(
+            TextureResult(records, full[texture], simplifications[texture], left_out=left_out)
+        )
     return results
 
 
-def simplification_shown(
-    full: TextureModel,
-    shown: TextureModel | None,
+def _require_models(
+    texture: str,
+    responses: Responses,
     *,
-    threshold: Threshold,
-    criterion: CriterionName,
-    margin_db: float,
-    hold_above: bool,
-) -> Simplification:
-    """The verdicts behind the simplified model that people felt; refused where they differ."""
-    from modeling import simplify
-
-    verdicts = simplify(
-        full, threshold, criterion=criterion, margin_db=margin_db, hold_above=hold_above
-    )
-    if verdicts.model != shown:
+    full: Mapping[str, TextureModel],
+    shown: Mapping[str, TextureModel],
+    why: Mapping[str, Simplification],
+) -> None:
+    """Refuse models that are not there, do not belong together, or were not the ones presented."""
+    for kind, models in (("full", full), ("simplified", shown)):
+        if texture not in models:
+            raise ValueError(
+                f"expected a {kind} model of each texture in the answers, got none of {texture}; "
+                "give the folders of the models that were presented."
+            )
+    if texture not in why:
         raise ValueError(
-            f"expected the simplified model of {full.texture} to be the one that {threshold.name}, "
-            f"{criterion} and {margin_db:g} dB give, got "
-            f"{'another' if shown else 'none'}; give the --threshold, --criterion, "
-            "--margin-db and --known-only that it was made with."
+            f"expected the file that tells why layers of {texture} were dropped beside its "
+            "simplified model, got none; simplify it again with tactileq simplify."
         )
-    return verdicts
+    simplification = why[texture]
+    if simplification.full_sha256 != full[texture].sha256 or simplification.model != shown[texture]:
+        raise ValueError(
+            f"expected the simplified model of {texture} to come from the full one in --models, "
+            "got one of another model or a changed file; simplify it again."
+        )
+    given = {"full": full[texture].sha256, "simplified": shown[texture].sha256}
+    for kind, presented in responses.models.get(texture, {}).items():
+        if given[kind] != presented:
+            raise ValueError(
+                f"expected the {kind} model of {texture} that was presented (SHA-256 "
+                f"{presented[:12]}…), got another one ({given[kind][:12]}…); give the folders of "
+                "the models that were presented."
+            )

@@ -30,6 +30,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
 
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
+    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
     from modeling.files.folders import replace_folder
@@ -50,14 +51,15 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
                 results.append(result)
                 advance(result.texture)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
-        full = {r.texture: r.model for r in results}
-        fewer = {r.texture: r.simplification.model for r in results}
+        models = ModelSets(
+            full={r.texture: r.model for r in results},
+            simplified={r.texture: r.simplification.model for r in results},
+        )
         real = {r.texture: r.truth for r in results if r.truth is not None}
         run_study(
             plan,
             real=real,
-            full=full,
-            simplified=fewer,
+            models=models,
             data=fresh / "data",
             threshold=threshold,
             seed=seed,
@@ -65,6 +67,9 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
+            "threshold_sha256": threshold.sha256,
+            "study_sha256": plan.sha256,
+            "models_sha256": models.sha256(plan.textures),
             "criterion": results[0].simplification.criterion,
             "margin_db": results[0].simplification.margin_db,
             "study": plan.to_dict(),
@@ -104,6 +109,7 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     from modeling.files.writing import file_stem
     from modeling.fitting.conditions import recording_spectra
     from modeling.fitting.texture import fit_spectra
+    from modeling.perception.verdicts import ENDING
     from stimuli.planted.textures import planted_texture, record_texture
 
     truth = planted_texture(name)
@@ -115,6 +121,7 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     simplification = drop_layers(full, threshold)
     full.save(folder / "models" / f"{file_stem(name)}.json")
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
+    simplification.save(folder / "simplified" / f"{file_stem(name)}{ENDING}")
     others = (fit_spectra(measured, estimator="paper"),)
     left_out = left_out_by_model(measured, full)
     return TextureResult(records, full, simplification, truth, others, left_out)

@@ -9,6 +9,7 @@ import typer
 
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, Simplified, StudyFile
+from tactileq.telling import tell_controls
 
 if TYPE_CHECKING:
     TaskName = str
@@ -43,6 +44,7 @@ def session(
     plan = Study.load(study)
     sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
     sets.require(plan.textures)
+    tell_controls(sets, plan.textures)
     print("note: the rig is the simulated one; its data are marked simulated.")
     with open_console(fullscreen=fullscreen, screen=screen) as console:
         result = run_session(
@@ -56,7 +58,12 @@ def session(
             data_folder=data,
         )
     note = data / "sourcedata" / f"{result.path.stem.removesuffix('_beh')}_provenance.json"
-    write_provenance(note, "session", {"task": task}, inputs=[models, simplified])
+    settings = {
+        "task": task,
+        "study_sha256": plan.sha256,
+        "models_sha256": sets.sha256(plan.textures),
+    }
+    write_provenance(note, "session", settings, inputs=[models, simplified])
     print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
 
 

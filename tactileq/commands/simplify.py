@@ -36,7 +36,9 @@ def simplify(
 ) -> None:
     """Drop the layers that nobody can feel, with a reason for each.
 
-    Writes TEXTURE.json and TEXTURE_layers.tsv, with --plot also TEXTURE_threshold.png.
+    Writes TEXTURE.json (the model), TEXTURE_simplification.json (threshold, criterion, margin and
+    the verdict on each layer, for tactileq analyze) and TEXTURE_layers.tsv, with --plot also
+    TEXTURE_threshold.png.
 
     Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
     """
@@ -45,6 +47,7 @@ def simplify(
     from modeling import simplify as drop_layers
     from modeling.files.provenance import write_provenance
     from modeling.files.writing import file_stem, write_text
+    from modeling.perception.verdicts import ENDING
 
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
@@ -63,17 +66,24 @@ def simplify(
             "expected --plot with --recordings, --speed or --force, got none; add --plot."
         )
     result.model.save(f"{start}.json")
+    result.save(f"{start}{ENDING}")
     table = simplification_table(result)
     write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
     tell_verdicts(result)
-    settings = {
+    settings: dict[str, object] = {
         "threshold": threshold,
         "criterion": criterion,
         "margin_db": margin_db,
         "hold_above": hold_above,
     }
+    settings |= {"full_sha256": full.sha256, "threshold_sha256": result.threshold.sha256}
     provenance = Path(f"{start}_provenance.json")
     write_provenance(provenance, "simplify", settings, inputs=[model_file])
+    if result.identical:
+        print(
+            f"note: {full.texture}: the simplified model is identical to the full one: nothing to "
+            "compare, and in a session a control."
+        )
     print(f"{full.n_layers} layers to {result.model.n_layers}{simulated_note(full)}: {start}.json")
 
 

@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactileq.options import Data, Models, Seed, Simplified, StudyFile, ThresholdName
-from tactileq.telling import progress
+from tactileq.telling import progress, tell_controls
 
 if TYPE_CHECKING:
+    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import TextureModel, Threshold
 
@@ -28,6 +29,7 @@ def simulate(
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
+    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
     from modeling.files.provenance import write_provenance
@@ -41,18 +43,18 @@ def simulate(
             f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
         )
     real = {name: planted_texture(name) for name in plan.textures}
-    full, fewer = load_models(models), load_models(simplified)
-    run_study(
-        plan,
-        real=real,
-        full=full,
-        simplified=fewer,
-        data=data,
-        threshold=Threshold.named(threshold),
-        seed=seed,
-    )
+    sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
+    sets.require(plan.textures)
+    felt_above = Threshold.named(threshold)
+    run_study(plan, real=real, models=sets, data=data, threshold=felt_above, seed=seed)
     note = data / "sourcedata" / "simulate_provenance.json"
-    settings = {"study": plan.to_dict(), "threshold": threshold}
+    settings = {
+        "study": plan.to_dict(),
+        "study_sha256": plan.sha256,
+        "models_sha256": sets.sha256(plan.textures),
+        "threshold": threshold,
+        "threshold_sha256": felt_above.sha256,
+    }
     write_provenance(note, "simulate", settings, seed=seed, inputs=[models, simplified])
     print(f"simulated answers: {data}")
 
@@ -61,8 +63,7 @@ def run_study(
     plan: Study,
     *,
     real: Mapping[str, TextureModel],
-    full: Mapping[str, TextureModel],
-    simplified: Mapping[str, TextureModel],
+    models: ModelSets,
     data: Path,
     threshold: Threshold,
     seed: int,
@@ -71,13 +72,14 @@ def run_study(
     from experiments.observers.whole_study import simulate_study
     from rig.twin import SimulatedRig
 
+    tell_controls(models, plan.textures)
     sessions = sum(task.participants * task.sessions for task in plan.tasks.values())
     with progress("Simulated participants", sessions) as advance:
         simulate_study(
             plan,
             real=real,
-            full=full,
-            simplified=simplified,
+            full=models.full,
+            simplified=models.simplified,
             rig=SimulatedRig(real, seed=seed),
             data_folder=data,
             seed=seed,

@@ -65,8 +65,32 @@ def relative_rows() -> Rows:
 
 
 @pytest.fixture
-def write_task(study_folder: Path) -> WriteTask:
-    """Write one session's file; `tail` stands after its last whole line."""
+def write_order(study_folder: Path) -> WriteTask:
+    """Store the order of a session in which these rows are the answers to all trials."""
+
+    def write(task: str, rows: Rows, *, participant: str = "sub-01") -> Path:
+        trials = []
+        for row in rows:
+            cells = dict(zip(ABSOLUTE if task == "absolute" else RELATIVE, row, strict=False))
+            shared = ("phase", "texture", "model", "tray", "first_surface")
+            trial: dict[str, object] = {name: cells[name] for name in shared if name in cells}
+            if "layout" in cells:
+                trial["layout"] = cells["layout"].split("|")
+            trials.append({"trial": int(cells["trial"]), **trial})
+        path = study_folder / "sourcedata" / participant / "ses-01"
+        path.mkdir(parents=True, exist_ok=True)
+        path /= f"{participant}_ses-01_task-{task}_order.json"
+        number = int(participant.removeprefix("sub-"))
+        order = {"task": task, "subject": number, "session": 1, "trials": trials}
+        path.write_text(json.dumps(order))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def write_task(study_folder: Path, write_order: WriteTask) -> WriteTask:
+    """Write one session's file and its order; `tail` stands after its last whole line."""
 
     def write(
         task: str,
@@ -82,6 +106,7 @@ def write_task(study_folder: Path) -> WriteTask:
         path /= f"{participant}_ses-01_task-{task}_beh.tsv"
         lines = ["\t".join(header), *("\t".join(row) for row in rows)]
         path.write_bytes(("\n".join(lines) + "\n" + tail).encode())
+        write_order(task, rows, participant=participant)
         return path
 
     return write

@@ -207,32 +207,155 @@ def test_a_description_that_does_not_tell_what_was_simulated_is_refused(study_fo
     _one_sentence(caught.value, path)
 
 
-def _write_order(data: Path, participant: str, content: object) -> Path:
-    path = data / "sourcedata" / participant / "ses-01"
-    path.mkdir(parents=True)
-    path /= f"{participant}_ses-01_task-relative_order.json"
-    path.write_text(json.dumps(content))
-    return path
-
-
-def test_a_session_that_ended_early_is_named(study_folder, write_task, relative_rows):
+def test_a_session_that_ended_early_is_named(study_folder, write_task, write_order, relative_rows):
     write_task("relative", relative_rows)
-    _write_order(study_folder, "sub-01", {"trials": [{}] * 7})
     write_task("relative", relative_rows[:4], participant="sub-02")
-    _write_order(study_folder, "sub-02", {"trials": [{}] * 23})
+    write_order("relative", relative_rows, participant="sub-02")
     write_task("relative", [], participant="sub-03")
-    _write_order(study_folder, "sub-03", {"trials": [{}] * 23})
+    write_order("relative", relative_rows, participant="sub-03")
     responses = load_responses(study_folder)
     assert responses.warnings == (
-        "sub-02 relative ses-01 answered 4 of 23 trials (ended early).",
-        "sub-03 relative ses-01 answered 0 of 23 trials (ended early).",
+        "sub-02 relative ses-01 answered 4 of 7 trials (ended early).",
+        "sub-03 relative ses-01 answered 0 of 7 trials (ended early).",
     )
     assert len(responses.relative) == 11
 
 
-def test_an_order_without_trials_is_refused(study_folder, write_task, relative_rows):
+def test_answers_without_a_stored_order_are_told(study_folder, write_task, absolute_rows):
+    for participant in ("sub-01", "sub-02", "sub-03"):
+        write_task("absolute", absolute_rows, participant=participant)
+    for participant in ("sub-01", "sub-03"):
+        order = study_folder / "sourcedata" / participant / "ses-01"
+        (order / f"{participant}_ses-01_task-absolute_order.json").unlink()
+    (told,) = load_responses(study_folder).warnings
+    assert told == (
+        "2 sessions (sub-01 absolute ses-01 and others) have no stored order with which their "
+        "answers could be compared."
+    )
+
+
+def _swap_models(rows):
+    other = {"full": "simplified", "simplified": "full"}
+    return [[*row[:3], other[row[3]], *row[4:]] for row in rows]
+
+
+def _all_full(rows):
+    return [[*row[:3], "full", *row[4:]] for row in rows]
+
+
+def _renamed(rows):
+    return [[*row[:2], {"canvas": "linen"}.get(row[2], row[2]), *row[3:]] for row in rows]
+
+
+def _without_a_middle_row(rows):
+    return rows[:4] + rows[5:]
+
+
+def _other_first_surface(rows):
+    return [[*row[:5], "real", *row[6:]] for row in rows]
+
+
+def _one_more(rows):
+    return [*rows, ["99", *rows[-1][1:]]]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (_swap_models, "expected model full in answer 1"),
+        (_all_full, "expected model simplified in answer 3"),
+        (_renamed, "expected texture canvas in answer 1"),
+        (_without_a_middle_row, "expected trial 4 in answer 5"),
+        (_other_first_surface, "expected first_surface virtual in answer 2"),
+        (_one_more, "at most 15 answers"),
+    ],
+)
+def test_answers_that_do_not_follow_the_stored_order_are_refused(
+    study_folder, write_task, write_order, absolute_rows, change, expected
+):
+    absolute_rows[0][5] = "real"
+    path = write_task("absolute", change(absolute_rows))
+    write_order("absolute", absolute_rows)
+    with pytest.raises(InputError, match=expected) as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_another_layout_of_the_buttons_is_refused(
+    study_folder, write_task, write_order, relative_rows
+):
+    path = write_task("relative", relative_rows)
+    relative_rows[2][5] = "|".join(reversed(relative_rows[2][5].split("|")))
+    write_order("relative", relative_rows)
+    with pytest.raises(InputError, match="expected layout wall paper|.* in answer 3") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_one_subjects_session_under_anothers_name_is_refused(
+    study_folder, write_task, absolute_rows
+):
+    write_task("absolute", absolute_rows)
+    beh = study_folder / "sub-02" / "ses-01" / "beh"
+    beh.mkdir(parents=True)
+    old = "sub-01_ses-01_task-absolute"
+    (study_folder / f"sub-01/ses-01/beh/{old}_beh.tsv").rename(
+        beh / "sub-02_ses-01_task-absolute_beh.tsv"
+    )
+    source = study_folder / "sourcedata"
+    (source / "sub-02" / "ses-01").mkdir(parents=True)
+    moved = source / "sub-02" / "ses-01" / "sub-02_ses-01_task-absolute_order.json"
+    (source / "sub-01" / "ses-01" / f"{old}_order.json").rename(moved)
+    with pytest.raises(InputError, match="the order of sub-02 ses-01 absolute") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, moved)
+
+
+def _describe(folder, **values):
+    path = folder / "dataset_description.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | values))
+    return path
+
+
+def test_identical_models_are_known_by_their_hashes(study_folder, write_task, absolute_rows):
+    write_task("absolute", absolute_rows)
+    assert load_responses(study_folder).identical == frozenset()
+    models = {"canvas": {"full": "0a", "simplified": "0a"}, "PVC": {"full": "1", "simplified": "2"}}
+    _describe(study_folder, ModelsSHA256=models)
+    responses = load_responses(study_folder)
+    assert responses.models == models
+    assert responses.identical == {"canvas"}
+
+
+@pytest.mark.parametrize("models", [7, {"canvas": "0a"}, {"canvas": {"full": "0a"}}])
+def test_a_damaged_list_of_models_is_refused(study_folder, write_task, absolute_rows, models):
+    write_task("absolute", absolute_rows)
+    path = _describe(study_folder, ModelsSHA256=models)
+    with pytest.raises(InputError, match="a full and a simplified model") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("ModelsSHA256", {"canvas": {"full": "0a"}}), ("StudySHA256", "ff")]
+)
+def test_sessions_with_other_models_or_another_study_are_refused(
+    study_folder, write_task, absolute_rows, key, value
+):
+    path = write_task("absolute", absolute_rows)
+    models = {"canvas": {"full": "0a", "simplified": "1b"}}
+    _describe(study_folder, ModelsSHA256=models, StudySHA256="00")
+    sidecar = path.with_suffix(".json")
+    sidecar.write_text(json.dumps({key: value}))
+    with pytest.raises(InputError, match=f"one {key}") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, sidecar)
+
+
+def test_an_order_without_trials_is_refused(study_folder, write_task, write_order, relative_rows):
     write_task("relative", relative_rows)
-    path = _write_order(study_folder, "sub-01", {"trials": 23})
+    path = write_order("relative", relative_rows)
+    path.write_text(json.dumps({"trials": 23}))
     with pytest.raises(InputError, match="a list of trials") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)

@@ -68,11 +68,13 @@ def test_a_session_left_early_is_named(tmp_path):
             return Choice(button=0, response_time_s=1.0)
 
     truths = {texture: planted_texture(texture) for texture in Study.load().textures}
+    fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
+    fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
     run_relative(
         Study.load(),
         subject=1,
         session=1,
-        models=ModelSets(full=truths, simplified=truths),
+        models=ModelSets(full=truths, simplified=fewer),
         rig=SimulatedRig(),
         respondent=Leaving(),
         data_folder=tmp_path,

@@ -51,6 +51,7 @@ visual.TextStim = NotedText
 vibrated = []
 study = Study.load()
 truths = {texture: planted_texture(texture) for texture in study.textures}
+fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
 run = {"absolute": run_absolute, "relative": run_relative}[task]
 with Console(
     size=(1280, 800),
@@ -60,7 +61,7 @@ with Console(
         study,
         subject=1,
         session=1,
-        models=ModelSets(full=truths, simplified=truths),
+        models=ModelSets(full=truths, simplified=fewer),
         rig=TellingRig(truths),
         respondent=console,
         data_folder=folder,

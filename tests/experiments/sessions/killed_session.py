@@ -29,11 +29,13 @@ class Killed:
 
 study = Study.load()
 truths = {texture: planted_texture(texture) for texture in study.textures}
+fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
+fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
 run_absolute(
     study,
     subject=1,
     session=1,
-    models=ModelSets(full=truths, simplified=truths),
+    models=ModelSets(full=truths, simplified=fewer),
     rig=SimulatedRig(truths),
     respondent=Killed(),
     data_folder=sys.argv[1],

@@ -8,7 +8,7 @@ import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -27,11 +27,17 @@ from modeling import InputError
 
 ROOT = Path(__file__).parents[3]
 COLUMNS = {"trial": {"Description": "number"}, "note": {"Description": "anything"}}
+MODELS = {"canvas": {"full": "0a", "simplified": "1b"}}
 Rows = Callable[[Path], list[dict[str, str]]]
 
 
 def create(
-    folder: Path, plan: SessionPlan, *, simulated: bool = True, rig: bool | None = None
+    folder: Path,
+    plan: SessionPlan,
+    *,
+    simulated: bool = True,
+    rig: bool | None = None,
+    models: Mapping[str, Mapping[str, str]] | None = None,
 ) -> SessionStore:
     """A session whose participant and (unless told otherwise) rig are simulated or not."""
     return SessionStore.create(
@@ -39,6 +45,7 @@ def create(
         plan=plan,
         columns=COLUMNS,
         description="a test",
+        models=MODELS if models is None else models,
         simulated_participant=simulated,
         simulated_rig=simulated if rig is None else rig,
     )

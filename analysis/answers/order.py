@@ -1,0 +1,109 @@
+"""Whether answers are those to the trials that were planned."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+
+from modeling import InputError
+
+
+def planned_trials(
+    stored: Mapping[str, object], session: tuple[str, str, str], *, path: Path
+) -> list[Mapping[str, object]]:
+    """The trials of a stored order, which must be that of its own session.
+
+    Parameters
+    ----------
+    stored : mapping
+        What the file of the order holds.
+    session : (str, str, str)
+        Participant, session and task, as its folders and its name say.
+    path : Path
+        The file, for what is said of it.
+
+    Raises
+    ------
+    InputError
+        Where it holds no trials, or is the order of another session.
+    """
+    trials = stored.get("trials")
+    if not isinstance(trials, list) or not all(isinstance(trial, Mapping) for trial in trials):
+        raise InputError(f"expected a list of trials in {path}, found none; restore the file.")
+    numbers = {"sub": stored.get("subject"), "ses": stored.get("session")}
+    found = (*(_numbered(key, number) for key, number in numbers.items()), str(stored.get("task")))
+    if found != session:
+        raise InputError(
+            f"expected the order of {' '.join(session)} in {path}, found that of "
+            f"{' '.join(found)}; move the session's files back to their own participant's folder."
+        )
+    return trials
+
+
+def _numbered(key: str, number: object) -> str:
+    return f"{key}-{number:02d}" if isinstance(number, int) else f"{key}-{number}"
+
+
+def told_of_unordered(sessions: Sequence[str]) -> list[str]:
+    """One sentence on sessions without a stored order; none where there are none."""
+    if not sessions:
+        return []
+    if len(sessions) == 1:
+        who = f"{sessions[0]} has no stored order with which its"
+    else:
+        several = f"{len(sessions)} sessions ({sessions[0]} and others)"
+        who = f"{several} have no stored order with which their"
+    return [f"{who} answers could be compared."]
+
+
+def check_order(
+    table: pd.DataFrame, planned: Sequence[Mapping[str, object]] | None, *, path: Path
+) -> None:
+    """Refuse answers that do not follow the order that was stored before the first trial.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The answers of one session, checked, a row per trial in the order of the file.
+    planned : sequence of mapping, optional
+        The trials of the stored order: every column that a trial and its answer share. Nothing is
+        compared without it.
+    path : Path
+        The file of the answers, for what is said of them.
+
+    Raises
+    ------
+    InputError
+        For more answers than trials, and for the first row that is not the answer to the trial
+        in its place: another number, phase, texture, model, tray, first surface or layout.
+    """
+    if planned is None:
+        return
+    if len(table) > len(planned):
+        raise InputError(
+            f"expected at most {len(planned)} answers in {path}, as the session's stored order "
+            f"has trials, but found {len(table)}; restore the file."
+        )
+    rows = table.to_dict("records")
+    for number, (row, trial) in enumerate(zip(rows, planned, strict=False), start=1):
+        for column, value in trial.items():
+            if column in row and not _same(row[column], value):
+                raise InputError(
+                    f"expected {column} {_shown(value)} in answer {number} of {path}, as the "
+                    f"session's stored order says, but found {_shown(row[column])}; restore the "
+                    "file, or leave its session out."
+                )
+
+
+def _same(answered: object, planned: object) -> bool:
+    if isinstance(planned, list):  # a layout
+        planned = "|".join(map(str, planned))
+    return answered == planned
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, list):
+        return "|".join(map(str, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
