@@ -84,6 +84,8 @@ VERDICT_COLUMNS = (
     Column("assumed"),
     Column("fills"),
     SIMULATED,
+    Column("full_sha256", "SHA-256 of the full model"),
+    Column("threshold_sha256", "SHA-256 of the threshold"),
 )
 
 
@@ -96,7 +98,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
         worst_frequency_hz (the condition where the layer stands highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1), assumed and fills
-        (as in `modeling.LayerVerdict`), simulated.
+        (as in `modeling.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
     """
     columns = [each.name for each in fields(LayerVerdict)]
     table = pd.DataFrame([asdict(v) for v in simplification.layers], columns=columns)
@@ -104,7 +106,11 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     # No condition is the worst one where no threshold is known in any.
     table.loc[table["distance_db"].isna(), worst] = np.nan
     table.insert(0, "texture", simplification.model.texture)
-    return table.assign(simulated=simplification.model.simulated)
+    return table.assign(
+        simulated=simplification.model.simulated,
+        full_sha256=simplification.full_sha256,
+        threshold_sha256=simplification.threshold.sha256,
+    )
 
 
 def reference_condition(result: TextureResult) -> tuple[float, float]:

@@ -169,6 +169,7 @@ def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, see
 
    {model.n_layers} layers ({_quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} \
 to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N.
+   Model: SHA-256 {model.sha256}
 
    cc -std=c99 -O2 -ffp-contract=off PROGRAM.c -lm, never with -ffast-math. A program:
 

@@ -32,7 +32,7 @@ def write_peq_json(
 ) -> int:
     """Write a model's equalizer as plain JSON that any program can use.
 
-    Fields: `format`, `version`; `texture`, `estimator`, `simulated`; `unit` of the output ("g" or
+    Fields: `format`, `version`; `texture`, `estimator`, `simulated`; `model_sha256`; `unit` of the output ("g" or
     "arbitrary"); `rate_hz`, at which the noise w has unit variance and the filters run;
     `definition`, what the numbers mean, in words; `conditions`, each an object with `speed_mm_s`,
     `force_n`, `noise_gain` (G_w, unit per unit noise) and `layers`. A layer has `frequency_hz`,
@@ -68,6 +68,7 @@ def write_peq_json(
         "texture": layered.texture,
         "estimator": layered.estimator,
         "simulated": layered.simulated,
+        "model_sha256": layered.sha256,
         "unit": layered.unit,
         "rate_hz": layered.rate_hz,
         "definition": DEFINITION,

@@ -49,6 +49,8 @@ COLUMNS = {
     "sha256": "SHA-256 of the file",
     "model_sha256": "SHA-256 of the model's file",
     "recipe_sha256": "SHA-256 of recipe.toml in this folder",
+    "threshold_sha256": "SHA-256 of the threshold's values (`modeling.Threshold.sha256`); n/a where "
+    "loudness was not matched",
     "vibrator": "compensated: the file is the drive for the vibrator of sources/vibrator.json, "
     "whose vibration is then the one meant at the hand, times the flat gain in that file; n/a: the "
     "file is the vibration itself",
@@ -88,6 +90,7 @@ class Stimulus:
     sha256: str
     model_sha256: str
     recipe_sha256: str
+    threshold_sha256: str | None
     vibrator: str | None
     vibrator_sha256: str | None
     simulated: str

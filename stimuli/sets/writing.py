@@ -293,6 +293,7 @@ class _FileMaker:
     def _description(self, take: _Take) -> dict[str, Any]:
         """What all files of a take have in common."""
         model, recipe, vibrator = take.source.model, self.recipe, self.sources.vibrator
+        threshold = self.sources.threshold
         simulated = model.simulated or (vibrator is not None and vibrator.simulated)
         return {
             "texture": model.texture,
@@ -311,6 +312,7 @@ class _FileMaker:
             "full_scale_g": recipe.level.full_scale_g,
             "model_sha256": take.source.sha256,
             "recipe_sha256": self.recipe_sha256,
+            "threshold_sha256": None if threshold is None else threshold.sha256,
             "vibrator": None if vibrator is None else COMPENSATED,
             "vibrator_sha256": self.sources.vibrator_sha256,
             "simulated": str(simulated).lower(),

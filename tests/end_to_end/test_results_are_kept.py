@@ -93,23 +93,30 @@ def study(main, tmp_path: Path) -> Path:
 
 def test_analysis_holds_to_the_models_that_were_presented(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
-    same = main("analyze", "data", *folders, "--margin-db", 3)
+    same = main("analyze", "data", *folders)
     assert same.returncode == 0, same.stderr
     assert Path(same.stdout.splitlines()[-1]) == study / "analysis-results/report.html"
     planted_texture("canvas").save(study / "simplified/canvas.json")
-    refused = main("analyze", "data", *folders, "--margin-db", 3)
+    refused = main("analyze", "data", *folders)
     assert refused.returncode == 1
-    assert "expected the simplified model of canvas to be the one" in refused.stderr
+    assert "to come from the full one in --models, got one of another model" in refused.stderr
+    again = main("simplify", "models/canvas.json", "--threshold", "pen-hold", "--out", "simplified")
+    assert again.returncode == 0, again.stderr
+    refused = main("analyze", "data", *folders)
+    assert "the simplified model of canvas that was presented (SHA-256" in refused.stderr
+    (study / "simplified/canvas_simplification.json").unlink()
+    refused = main("analyze", "data", *folders)
+    assert "why layers of canvas were dropped" in refused.stderr
     (study / "models/canvas.json").unlink()
-    refused = main("analyze", "data", *folders, "--margin-db", 3)
-    assert "expected a model of each texture in the answers, got none of canvas" in refused.stderr
+    refused = main("analyze", "data", *folders)
+    assert "a full model of each texture in the answers, got none of canvas" in refused.stderr
     partial = main("analyze", "data", "--models", "models")
     assert "give all three or none" in partial.stderr
 
 
 def test_a_new_analysis_replaces_the_whole_old_one(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
-    assert main("analyze", "data", *folders, "--margin-db", 3).returncode == 0
+    assert main("analyze", "data", *folders).returncode == 0
     assert (study / "analysis-results/tables/gfc.tsv").is_file()
     assert main("analyze", "data").returncode == 0
     assert not (study / "analysis-results/tables/gfc.tsv").exists()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.labels import ALL_TEXTURES
+from analysis.labels import ALL_TEXTURES, IDENTICAL
 from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.paired import (
     d_z_interval,
@@ -147,6 +147,24 @@ def test_rating_tests_cover_every_scale_and_texture(ratings):
     row = tests[(tests["scale"] == "frequency pattern") & (tests["texture"] == "PVC")].iloc[0]
     assert_allclose([row["t"], row["p"]], [expected.statistic, expected.pvalue])
     assert row["p_holm"] < 0.001
+
+
+def test_identical_models_are_described_but_not_tested(ratings, choices):
+    plain = rating_tests(ratings)
+    marked = rating_tests(ratings, identical={"canvas", "MDF"})
+    same = marked["texture"].isin(["canvas", "MDF"])
+    assert (marked[same]["note"] == IDENTICAL).all()
+    assert marked[same][["t", "p", "p_holm", "d_z", "wilcoxon_p"]].isna().all(axis=None)
+    for name in ("n", "mean_full", "mean_simplified", "mean_difference", "ci_low"):
+        assert_allclose(marked[name], plain[name])
+    for _, family in marked[~same].groupby("scale"):
+        assert len(family) == 5
+        assert_allclose(family["p_holm"], holm(family["p"]))
+    rates = rate_tests(choices, identical={"canvas"}).set_index("texture")
+    assert rates.loc["canvas", "note"] == IDENTICAL
+    assert np.isnan(rates.loc["canvas", "p"])
+    others = rate_tests(choices).set_index("texture").drop("canvas")
+    assert_allclose(rates.drop("canvas")["p"], others["p"])
 
 
 def test_a_participant_without_one_rating_is_named_and_left_out_of_that_pair_only(ratings):

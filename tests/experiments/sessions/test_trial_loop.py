@@ -154,6 +154,42 @@ def test_a_missing_model_is_told_before_anything_is_written(
     assert not (tmp_path / "data").exists()
 
 
+def test_one_identical_pair_of_models_is_a_control_and_all_are_refused(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
+) -> None:
+    one = ModelSets(full=models.full, simplified={**models.simplified, "PVC": models.full["PVC"]})
+    assert "PVC" in one.identical(study.textures)
+    result = session(study, tmp_path / "one", models=one, rig=rig, respondent=respondent)
+    assert result.completed
+    description = json.loads((tmp_path / "one/dataset_description.json").read_text())
+    sidecar = json.loads(result.path.with_suffix(".json").read_text())
+    for stated in (description, sidecar):
+        assert stated["ModelsSHA256"] == one.sha256(study.textures)
+        assert stated["StudySHA256"] == study.sha256
+    assert len(set(sidecar["ModelsSHA256"]["PVC"].values())) == 1
+    same = ModelSets(full=models.full, simplified=models.full)
+    with pytest.raises(InputError, match="identical ones for all"):
+        session(study, tmp_path / "all", models=same, rig=rig, respondent=respondent)
+    assert not (tmp_path / "all").exists()
+
+
+def test_sessions_with_other_models_need_another_data_folder(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
+) -> None:
+    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
+    other = ModelSets(full=models.full, simplified={**models.simplified, "PVC": models.full["PVC"]})
+    with pytest.raises(InputError, match="ModelsSHA256 unchanged.*another PVC"):
+        run_absolute(
+            study,
+            subject=2,
+            session=1,
+            models=other,
+            rig=rig,
+            respondent=respondent,
+            data_folder=tmp_path,
+        )
+
+
 def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets, rig: Any) -> None:
     rig.presses = 1
     surfaces = Surfaces(rig, texture="PVC", models=[models.full["PVC"]])
