@@ -38,6 +38,8 @@ class Responses:
         The study's name.
     models : mapping of texture to mapping of kind to SHA-256
         The full and the simplified model that were presented; empty where the data do not say.
+    study_sha256 : str
+        Of the study that was run; empty where the data do not say.
     warnings : tuple of str
         What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
@@ -48,6 +50,7 @@ class Responses:
     training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    study_sha256: str = ""
     warnings: tuple[str, ...] = field(default=())
 
     @property
@@ -126,6 +129,7 @@ def load_responses(data_folder: str | Path) -> Responses:
         training={task: training for task, (_, training) in parts.items()},
         name=str(description.get("Name", "")),
         models=_models(description, folder),
+        study_sha256=str(description.get("StudySHA256", "")),
         warnings=tuple(warnings),
     )
 

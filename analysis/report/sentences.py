@@ -57,6 +57,9 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
         f"equal RMS scores {full['gfc30_floor'].mean():.4f}, and the recordings' own smoothed "
         f"spectra {full['gfc30_ceiling'].mean():.4f} against draws of themselves.",
     ]
+    if (dropped == 0).any():
+        same = _names([str(texture) for texture in dropped.index[dropped == 0]])
+        sentences.append(f"No layer was dropped from {same}: full and simplified are {IDENTICAL}.")
     if (dropped > 0).any():
         change = -loss[dropped > 0].sort_values(ascending=False)
         sentences.append(

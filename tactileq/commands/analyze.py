@@ -65,7 +65,11 @@ def analyze(
     inputs = [path for path in (data, *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         provenance = write_provenance(
-            fresh / "provenance.json", "analyze", settings_of(results), seed=seed, inputs=inputs
+            fresh / "provenance.json",
+            "analyze",
+            settings_of(responses, results),
+            seed=seed,
+            inputs=inputs,
         )
         write_report(
             fresh / "report.html",
@@ -80,9 +84,9 @@ def analyze(
     print((out / "report.html").resolve())
 
 
-def settings_of(results: Sequence[TextureResult]) -> dict[str, object]:
-    """What the models rest on: of each texture its models, and how layers were dropped."""
-    return {
+def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:
+    """What a report rests on: study, models, and how layers were dropped."""
+    reasons = {
         result.texture: {
             "full_sha256": result.simplification.full_sha256,
             "simplified_sha256": result.simplification.model.sha256,
@@ -93,6 +97,11 @@ def settings_of(results: Sequence[TextureResult]) -> dict[str, object]:
             "hold_above": result.simplification.hold_above,
         }
         for result in results
+    }
+    return {
+        "study_sha256": responses.study_sha256,
+        "models_sha256": responses.models,
+        "simplifications": reasons,
     }
 
 

@@ -11,7 +11,14 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from modeling import Recording, RecordingSet, TextureModel
+from modeling import (
+    Recording,
+    RecordingSet,
+    Simplification,
+    TextureModel,
+    Threshold,
+    simplify,
+)
 from stimuli.planted.textures import planted_texture, record_texture
 
 AXES = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
@@ -164,6 +171,24 @@ def test_clipping_is_told_for_each_texture(main, tmp_path: Path) -> None:
     assert done.returncode == 0
     warnings = done.stderr.splitlines()
     assert [line.split(" at ")[0] for line in warnings] == ["warning: elm", "warning: oak"]
+
+
+def test_simplify_says_where_nothing_is_left_to_compare(main, tmp_path: Path) -> None:
+    full = planted_texture("polyester")
+    full.save(tmp_path / "polyester.json")
+    done = main("simplify", "polyester.json", "--out", "fewer")
+    assert done.returncode == 0, done.stderr
+    assert "identical" not in done.stdout
+    saved = Simplification.load(tmp_path / "fewer/polyester_simplification.json")
+    assert saved == simplify(full, Threshold.shipped("codec"))
+    assert saved.model == TextureModel.load(tmp_path / "fewer/polyester.json")
+    table = pd.read_csv(tmp_path / "fewer/polyester_layers.tsv", sep="\t")
+    assert set(table["full_sha256"]) == {full.sha256}
+    assert set(table["threshold_sha256"]) == {saved.threshold.sha256}
+    # The model that is left has no layer that could go.
+    again = main("simplify", "fewer/polyester.json", "--out", "fewest")
+    assert "polyester: the simplified model is identical to the full one" in again.stdout
+    assert Simplification.load(tmp_path / "fewest/polyester_simplification.json").identical
 
 
 def test_simplify_draws_the_condition_that_was_asked_for(main, three: Path) -> None:

@@ -248,6 +248,7 @@ def test_a_header_says_what_it_is(tmp_path: Path) -> None:
     comment = (tmp_path / "a.h").read_text(encoding="utf-8").split("*/")[0]
     for words in ('"canvas", simulated', "48000 Hz, seed 3", "4 layers", "GPL-3.0-or-later"):
         assert words in comment
+    assert f"SHA-256 {MODELS['canvas'].sha256}" in comment
     write_c_header(tmp_path / "b.h", replace(planted_texture("canvas"), simulated=False))
     assert "simulated" not in (tmp_path / "b.h").read_text(encoding="utf-8")
     assert "Not compensated for a vibrator. Limits: none." in comment
@@ -349,6 +350,7 @@ def test_json_holds_every_condition_of_the_grid(tmp_path: Path, texture: str) ->
     grid = [(v, f) for v in model.speeds_mm_s for f in model.forces_n]
     assert [(c["speed_mm_s"], c["force_n"]) for c in exported["conditions"]] == grid
     assert exported["rate_hz"] == 5000.0
+    assert exported["model_sha256"] == model.sha256
     assert (exported["texture"], exported["unit"], exported["simulated"]) == (texture, "g", True)
     for condition in exported["conditions"]:
         peq = model.peq(condition["speed_mm_s"], condition["force_n"])

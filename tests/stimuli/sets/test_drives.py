@@ -13,7 +13,7 @@ import pytest
 import soundfile
 from scipy.signal import iirpeak, lfilter
 
-from modeling import InputError, TextureModel, Vibrator
+from modeling import InputError, TextureModel, Threshold, Vibrator
 from stimuli.exports.peq_json import write_peq_json
 from stimuli.sets.recipe import Level, ModelEntry, Recipe
 from stimuli.sets.sources import load_sources
@@ -98,6 +98,8 @@ def test_levels_are_matched_at_the_hand(
     for meant, drive in zip(plain, driven, strict=True):
         assert (drive.gain_db, drive.level_db) == (meant.gain_db, meant.level_db)
         assert drive.sensation_level_db == meant.sensation_level_db
+        codec = Threshold.shipped("codec").sha256 if mode == "loudness" else None
+        assert meant.threshold_sha256 == codec
 
 
 def test_the_full_scale_is_that_of_the_drive(tmp_path: Path, recipe: MakeRecipe, pen: Path) -> None:
