@@ -99,21 +99,44 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
 
 
 def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
-    simplification = textures[0].simplification
-    threshold = simplification.threshold
     contact = [r for result in textures for r in result.recordings.recordings if r.force_n > 0]
     simulated = sum(r.simulated for r in contact)
     estimators = ", ".join(sorted({result.model.estimator for result in textures}))
     whose = "simulated " if simulated == len(contact) else ""
     part = f", {simulated} of them simulated" if simulated and not whose else ""
-    return (
+    fitted = (
         f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to "
-        f"{len(contact)} {whose}recordings{part} (estimator {estimators}). A layer was "
-        f"dropped only where it lies below the threshold “{threshold.name}” in every condition "
-        f"(criterion “{simplification.criterion}”, margin {simplification.margin_db:g} dB).",
-        f"Source of the threshold “{threshold.name}”: {threshold.source.rstrip('.')}. Caveat: "
-        f"{threshold.caveat.rstrip('.')}.",
+        f"{len(contact)} {whose}recordings{part} (estimator {estimators})."
     )
+    return fitted, *_rules(textures), *_sources_of_thresholds(textures)
+
+
+def _rules(textures: Sequence[TextureResult]) -> list[str]:
+    """By which threshold, criterion and margin layers were dropped, a sentence for each of them."""
+    by_rule: dict[str, list[str]] = {}
+    for result in textures:
+        made = result.simplification
+        above = "" if made.hold_above else ", nothing assumed above its table"
+        rule = (
+            f"below the threshold “{made.threshold.name}”{above} in every condition (criterion "
+            f"“{made.criterion}”, margin {made.margin_db:g} dB)."
+        )
+        by_rule.setdefault(rule, []).append(result.texture)
+    if len(by_rule) == 1:
+        return [f"A layer was dropped only where it lies {rule}" for rule in by_rule]
+    return [
+        f"A layer of {', '.join(names)} was dropped only where it lies {rule}"
+        for rule, names in by_rule.items()
+    ]
+
+
+def _sources_of_thresholds(textures: Sequence[TextureResult]) -> list[str]:
+    thresholds = {made.sha256: made for made in (r.simplification.threshold for r in textures)}
+    return [
+        f"Source of the threshold “{threshold.name}”: {threshold.source.rstrip('.')}. Caveat: "
+        f"{threshold.caveat.rstrip('.')}."
+        for threshold in thresholds.values()
+    ]
 
 
 def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:

@@ -95,6 +95,20 @@ def test_the_report_needs_nothing_but_itself(folder, shown):
     assert "@import" not in style[1]
 
 
+def test_textures_simplified_in_different_ways_are_told_apart(tmp_path, results):
+    first, second = results
+    otherwise = simplify(second.model, Threshold.shipped("pen-hold"), margin_db=2.0)
+    path = write_report(
+        tmp_path / "report.html", textures=(first, replace(second, simplification=otherwise))
+    )
+    text = Page(path.read_text(encoding="utf-8")).text
+    for result, words in ((first, "“codec” in every"), (second, "“pen-hold” in every")):
+        rule = f"A layer of {result.texture} was dropped only where it lies below the threshold "
+        assert rule + words in text
+    assert "margin 2 dB" in text
+    assert text.count("Source of the threshold") == 2
+
+
 def test_links_lead_somewhere(shown):
     anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
     assert len(anchors) == 7
