@@ -32,13 +32,13 @@ def write_peq_json(
 ) -> int:
     """Write a model's equalizer as plain JSON that any program can use.
 
-    Fields: `format`, `version`; `texture`, `estimator`, `simulated`; `model_sha256`; `unit` of the output ("g" or
-    "arbitrary"); `rate_hz`, at which the noise w has unit variance and the filters run;
-    `definition`, what the numbers mean, in words; `conditions`, each an object with `speed_mm_s`,
-    `force_n`, `noise_gain` (G_w, unit per unit noise) and `layers`. A layer has `frequency_hz`,
-    `bandwidth_hz` (−3 dB), `gain` (G_i, signed) and the coefficients `b` (b0, b1, b2) and `a` (a0,
-    a1, a2) of its unit-gain band-pass as a biquad at `rate_hz`. The filter is that of
-    docs/method/equalizer.md, but a biquad does not share its safety while parameters move.
+    Fields: `format`, `version`; `texture`, `estimator`, `simulated`; `model_sha256`; `unit` of the
+    output ("g" or "arbitrary"); `rate_hz`, at which the noise w has unit variance and the filters
+    run; `definition`, what the numbers mean, in words; `conditions`, each an object with
+    `speed_mm_s`, `force_n`, `noise_gain` (G_w, unit per unit noise) and `layers`. A layer has
+    `frequency_hz`, `bandwidth_hz` (−3 dB), `gain` (G_i, signed) and the coefficients `b` (b0, b1,
+    b2) and `a` (a0, a1, a2) of its unit-gain band-pass as a biquad at `rate_hz`. The filter is that
+    of docs/method/equalizer.md, but a biquad does not share its safety while parameters move.
 
     Parameters
     ----------
