@@ -21,7 +21,7 @@ LOWEST_HZ = 10.0
 HIGHEST_SHARE = 0.98
 SIGMAS_HZ = (30.0, 5.0)
 BAND_EDGES_HZ = (10, 20, 35, 60, 90, 130, 180, 250, 350, 480, 800, 1300, 2500)
-CEILING_DRAWS = 8
+EXPECTED_DRAWS = 8
 
 
 @runtime_checkable
@@ -45,8 +45,10 @@ class PEQModel(Protocol):
 class SimilarityReport:
     """Likeness of a model's response (not of a rendering) and a recording's spectrum.
 
-    Every GFC stands between its floor (white noise of equal RMS) and its ceiling (the recording's
-    smoothed spectrum against random draws shaped by it). `oracle_gap` is 1 − GFC30/ceiling.
+    Beside every GFC stand its floor (white noise of equal RMS) and its expected value (what the true
+    spectrum scores on average: the recording's smoothed spectrum against random draws shaped by
+    it). A model that follows the scatter of the very recording may exceed the expected value.
+    `gfc30_deficit` is 1 − GFC30/expected.
     `band_energy_error_db` has one value per band of `BAND_EDGES_HZ` that the data reach, in dB,
     model over recording; `band_edges_hz` holds those bands' edges. The log-spectral distance is
     over the frequencies where the sensor's floor has left anything of the recording.
@@ -56,13 +58,13 @@ class SimilarityReport:
     gfc5: float
     floor_gfc30: float
     floor_gfc5: float
-    ceiling_gfc30: float
-    ceiling_gfc5: float
+    expected_gfc30: float
+    expected_gfc5: float
     log_spectral_distance_db: float
     rms_error_db: float
     band_edges_hz: Floats
     band_energy_error_db: Floats
-    oracle_gap: float
+    gfc30_deficit: float
 
 
 def gfc(a: ArrayLike, b: ArrayLike) -> float:
@@ -126,7 +128,7 @@ def report(
         A model is taken at the recording's speed and force. Any object with `rate_hz` and
         `response(frequency_hz)` will do for a filter.
     rng : Generator, optional
-        Draws for the ceiling; by default a generator of fixed seed, so that a table repeats.
+        Draws for the expected GFC; by default a generator of fixed seed, so that a table repeats.
     """
     fitted, measured = _at_condition(recording, model)
     return reports(measured, [fitted], rng=rng)[0]
@@ -138,7 +140,7 @@ def reports(
     *,
     rng: np.random.Generator | None = None,
 ) -> list[SimilarityReport]:
-    """`report` of several filters and one spectrum, against the same draws for the ceiling.
+    """`report` of several filters and one spectrum, against the same draws for the expected GFC.
 
     Parameters
     ----------
@@ -153,13 +155,13 @@ def reports(
     step_hz = measured.rate_hz / measured.n_samples
     outline = measured.smoothed()
     draws = _draws(outline, rng)
-    truths, ceilings = [], []
+    truths, expected = [], []
     for sigma_hz in SIGMAS_HZ:
         truths.append(measured.smoothed(sigma_hz)[band])
         shape = smooth(outline, sigma_hz, step_hz=step_hz)[band]
         drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
-        ceilings.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
-    return [_report(measured, fitted, truths, ceilings) for fitted in filters]
+        expected.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
+    return [_report(measured, fitted, truths, expected) for fitted in filters]
 
 
 def _compared(measured: Spectrum) -> Bools:
@@ -172,9 +174,9 @@ def _report(
     measured: Spectrum,
     fitted: SpectralFilter,
     truths: Sequence[Floats],
-    ceilings: Sequence[float],
+    expected: Sequence[float],
 ) -> SimilarityReport:
-    """One filter; `truths` (smoothed, in the band) and `ceilings` in the order of `SIGMAS_HZ`."""
+    """One filter; `truths` (smoothed, in the band) and `expected` in the order of `SIGMAS_HZ`."""
     frequency, band = measured.frequency_hz, _compared(measured)
     step_hz = measured.rate_hz / measured.n_samples
     response = fitted.response(frequency)
@@ -190,13 +192,13 @@ def _report(
         gfc5=scores[1],
         floor_gfc30=floors[0],
         floor_gfc5=floors[1],
-        ceiling_gfc30=ceilings[0],
-        ceiling_gfc5=ceilings[1],
+        expected_gfc30=expected[0],
+        expected_gfc5=expected[1],
         log_spectral_distance_db=log_spectral_distance_db(smoothed[0][heard], truths[0][heard]),
         rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
         band_edges_hz=edges,
         band_energy_error_db=band_errors,
-        oracle_gap=1 - scores[0] / ceilings[0],
+        gfc30_deficit=1 - scores[0] / expected[0],
     )
 
 
@@ -211,7 +213,7 @@ def _rms_error_db(response: Floats, magnitude: Floats) -> float:
 
 def _draws(shape: Floats, rng: np.random.Generator) -> list[Floats]:
     """Magnitudes of Gaussian noise whose mean magnitude is `shape`."""
-    return [shape * rng.rayleigh(np.sqrt(2 / np.pi), shape.size) for _ in range(CEILING_DRAWS)]
+    return [shape * rng.rayleigh(np.sqrt(2 / np.pi), shape.size) for _ in range(EXPECTED_DRAWS)]
 
 
 def _at_condition(

@@ -127,13 +127,13 @@ def level_errors(model: TextureModel, hand: Hand, update_samples: int) -> LevelE
 
 
 def held_gfc30(model: TextureModel, speed_mm_s: float, *, seed: int = 0) -> tuple[float, float]:
-    """GFC30 of the second after a stroke in which the speed is held, and its ceiling."""
+    """GFC30 of the second after a stroke in which the speed is held, and its expected value."""
     renderer = Renderer(model, seed=seed)
     renderer.render(*stroke(model.rate_hz, duration_s=0.6))
     held = renderer.render(speed_mm_s, FORCE_N, samples=round(model.rate_hz))
     recording = Recording(held, model.rate_hz, speed_mm_s, FORCE_N, model.texture, simulated=True)
     report = similarity.report(recording, model)
-    return report.gfc30, report.ceiling_gfc30
+    return report.gfc30, report.expected_gfc30
 
 
 def accuracy_row(model: TextureModel) -> dict[str, object]:
@@ -146,5 +146,5 @@ def accuracy_row(model: TextureModel) -> dict[str, object]:
         row[f"level_error_below_grid_every_{period}"] = errors.below_grid
         if period > 1:
             row[f"error_db_every_{period}"] = update_error_db(model, hand, period)
-    gfc30, ceiling = held_gfc30(model, HELD_MM_S)
-    return row | {"gfc30": gfc30, "ceiling_gfc30": ceiling, "simulated": True}
+    gfc30, expected = held_gfc30(model, HELD_MM_S)
+    return row | {"gfc30": gfc30, "expected_gfc30": expected, "simulated": True}

@@ -54,7 +54,7 @@ def estimators_table(*, textures: int, seed: int) -> pd.DataFrame:
     -------
     DataFrame
         One row per kind (and for all together) and estimator: kind, estimator, textures; gfc30,
-        ceiling_gfc30, oracle_gap and log_spectral_distance_db (means; docs/method/similarity.md);
+        expected_gfc30, gfc30_deficit and log_spectral_distance_db (means; docs/method/similarity.md);
         rms_error_db (mean) and median_absolute_rms_error_db, both of the record; precision and
         recall (of all layers, matched one to one within max(B/2, 10 Hz)) and layers_per_true_layer;
         level_error_db and median_absolute_level_error_db (medians over matched layers: of the gain
@@ -88,7 +88,7 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
 
 
 def _scores_of_one(measured: Spectrum, truth: RandomTruth) -> dict[str, dict[str, Any]]:
-    """Every estimator and filter on one spectrum, compared with the same draws for its ceiling."""
+    """Every estimator and filter on one spectrum, compared with the same draws for its expected GFC."""
     layers: dict[str, tuple[Layers, float]] = {
         name: _timed(partial(find_layers, measured, estimator=name)) for name in ESTIMATORS
     }
@@ -136,7 +136,7 @@ def _timed(work: Callable[[], Result]) -> tuple[Result, float]:
 
 
 def _likeness(report: similarity.SimilarityReport) -> dict[str, Any]:
-    names = ("gfc30", "ceiling_gfc30", "oracle_gap", "log_spectral_distance_db", "rms_error_db")
+    names = ("gfc30", "expected_gfc30", "gfc30_deficit", "log_spectral_distance_db", "rms_error_db")
     return {name: getattr(report, name) for name in names}
 
 
@@ -171,7 +171,7 @@ def _level_errors_db(truth: RandomTruth, found: PEQ, partner: Integers) -> Float
 
 def _summary(scores: Sequence[dict[str, Any]]) -> dict[str, Any]:
     table = pd.DataFrame(scores)
-    means = ("gfc30", "ceiling_gfc30", "oracle_gap", "log_spectral_distance_db", "rms_error_db")
+    means = ("gfc30", "expected_gfc30", "gfc30_deficit", "log_spectral_distance_db", "rms_error_db")
     summary = {
         "textures": len(table),
         **{name: float(table[name].mean()) for name in means},

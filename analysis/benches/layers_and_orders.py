@@ -38,7 +38,7 @@ def layers_and_orders(
     -------
     DataFrame
         One row per model: model, size (layers or order), numbers (per condition); means of gfc30
-        with its floor and ceiling, oracle_gap and log_spectral_distance_db
+        with its floor and expected value, gfc30_deficit and log_spectral_distance_db
         (docs/method/similarity.md, to the record), distance_to_truth_db (of the two responses,
         unsmoothed, 10 Hz to 0.96 of the Nyquist frequency: the measure of
         docs/method/equalizer.md#signs on real textures); lowest_gfc30, level_error_db (root mean
@@ -85,7 +85,7 @@ def _row(
     simulated: bool,
 ) -> dict[str, Any]:
     reports = pd.DataFrame([vars(report) for report, _ in found])
-    means = ("gfc30", "floor_gfc30", "ceiling_gfc30", "oracle_gap", "log_spectral_distance_db")
+    means = ("gfc30", "floor_gfc30", "expected_gfc30", "gfc30_deficit", "log_spectral_distance_db")
     return {
         "model": model,
         "size": size,

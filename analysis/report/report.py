@@ -61,7 +61,7 @@ def write_report(
         Versions, configuration, hashes of inputs; shown as they are.
     title : str
     seed : int
-        Of the bootstrap and of the draws behind the GFC ceilings; shown with the provenance.
+        Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
     progress : callable, optional
         Called with the share done (0–1) and what comes next.
 

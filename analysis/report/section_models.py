@@ -26,7 +26,7 @@ from analysis.textures.results import (
 )
 from modeling.files.writing import file_stem
 
-GFC_SHOWN = without(GFC_COLUMNS, "conditions", "oracle_gap")
+GFC_SHOWN = without(GFC_COLUMNS, "conditions", "gfc30_deficit")
 VERDICTS_SHOWN = chosen(
     VERDICT_COLUMNS,
     *("layer", "verdict", "reason", "distance_db", "worst_speed_mm_s", "worst_force_n"),
@@ -44,7 +44,7 @@ def model_section(
     textures : sequence of TextureResult
         At least one.
     rng : Generator
-        Draws behind the GFC ceilings.
+        Draws behind the expected GFCs.
     progress : callable
         Called with a share (0–1) and what comes next.
     """
@@ -60,7 +60,8 @@ def model_section(
         "Simplification rate and quality",
         "Means over the recorded conditions. GFC30, GFC5: likeness of the model's response and the "
         "recording's spectrum, both smoothed with σ = 30 or 5 Hz; floor: white noise of equal RMS; "
-        "ceiling: draws of the recording's own smoothed spectrum. "
+        "expected: what the true spectrum scores on average, which a model fitted to the very "
+        "recordings may exceed. "
         "RMS error and band energy error: means of absolute values. Cf. the paper's table 3.",
         gfc,
         GFC_SHOWN,
@@ -141,12 +142,12 @@ def _sources_of_thresholds(textures: Sequence[TextureResult]) -> list[str]:
 
 def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
     full, simple = (gfc[gfc["model"] == model] for model in MODELS)
-    floor, ceiling = full["gfc30_floor"].mean(), full["gfc30_ceiling"].mean()
+    floor, expected = full["gfc30_floor"].mean(), full["gfc30_expected"].mean()
     return (
         (f"{full['layers'].sum()} → {simple['layers'].sum()}", "layers, full → simplified"),
         (
             f"{full['gfc30_mean'].mean():.3f} → {simple['gfc30_mean'].mean():.3f}",
-            f"mean GFC30, full → simplified (floor {floor:.3f}, ceiling {ceiling:.3f})",
+            f"mean GFC30, full → simplified (floor {floor:.3f}, expected of the true spectrum {expected:.3f})",
         ),
     )
 

@@ -54,8 +54,8 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
         "condition.",
         f"GFC30 (mean over conditions and textures) is {full['gfc30_mean'].mean():.4f} with the "
         f"full and {simple['gfc30_mean'].mean():.4f} with the simplified models; white noise of "
-        f"equal RMS scores {full['gfc30_floor'].mean():.4f}, and the recordings' own smoothed "
-        f"spectra {full['gfc30_ceiling'].mean():.4f} against draws of themselves.",
+        f"equal RMS scores {full['gfc30_floor'].mean():.4f}, and the true spectra would score "
+        f"{full['gfc30_expected'].mean():.4f} on average.",
     ]
     if (dropped == 0).any():
         same = _names([str(texture) for texture in dropped.index[dropped == 0]])
@@ -181,7 +181,7 @@ def cautions(
     if models:
         sentences.append(
             "GFC judges the shape of a spectrum, not its level, and even white noise scores high: "
-            "read it between its floor and its ceiling, beside the distances in dB."
+            "read it beside its floor, its expected value and the distances in dB."
         )
     return sentences
 

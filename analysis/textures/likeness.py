@@ -15,14 +15,14 @@ MEASURE_COLUMNS = (
     Column("gfc30_mean", "GFC30 mean", format=".4f"),
     Column("gfc30_min", "GFC30 min", format=".4f"),
     Column("gfc30_floor", "GFC30 floor", format=".4f"),
-    Column("gfc30_ceiling", "GFC30 ceiling", format=".4f"),
+    Column("gfc30_expected", "GFC30 expected", format=".4f"),
     Column("gfc5_mean", "GFC5 mean", format=".4f"),
     Column("gfc5_floor", "GFC5 floor", format=".4f"),
-    Column("gfc5_ceiling", "GFC5 ceiling", format=".4f"),
+    Column("gfc5_expected", "GFC5 expected", format=".4f"),
     Column("log_spectral_distance_db", "log-spectral distance", "dB"),
     Column("rms_error_db", "RMS error", "dB"),
     Column("band_energy_error_db", "band energy error", "dB"),
-    Column("oracle_gap", format=".4f"),
+    Column("gfc30_deficit", format=".4f"),
 )
 GFC_COLUMNS = (
     TEXTURE,
@@ -51,7 +51,7 @@ def gfc_table(
     full, simplified : TextureModel
         Before and after simplification.
     rng : Generator
-        Draws behind the ceiling (docs/method/similarity.md#floor-and-ceiling), the same for
+        Draws behind the expected GFC (docs/method/similarity.md#floor-and-expected-gfc), the same for
         both models.
 
     Returns
@@ -59,9 +59,9 @@ def gfc_table(
     DataFrame
         Two rows (model = full, simplified): texture, layers, parameters, conditions (recordings
         above the sensor's floor), then means over them: gfc30_mean (and gfc30_min), gfc30_floor
-        (white noise of equal RMS), gfc30_ceiling (draws of the recording's own spectrum),
-        gfc5_mean, gfc5_floor, gfc5_ceiling, log_spectral_distance_db, rms_error_db (mean of
-        |error|), band_energy_error_db (RMS over bands) and oracle_gap (1 − GFC30/ceiling).
+        (white noise of equal RMS), gfc30_expected (of the true spectrum),
+        gfc5_mean, gfc5_floor, gfc5_expected, log_spectral_distance_db, rms_error_db (mean of
+        |error|), band_energy_error_db (RMS over bands) and gfc30_deficit (1 − GFC30/expected).
     """
     models = {"full": full, "simplified": simplified}
     table = likeness_table(recordings, models, rng=rng)
@@ -121,14 +121,14 @@ def _means(reports: Sequence[similarity.SimilarityReport]) -> dict[str, float]:
         "gfc30_mean": mean_of("gfc30"),
         "gfc30_min": min(report.gfc30 for report in reports),
         "gfc30_floor": mean_of("floor_gfc30"),
-        "gfc30_ceiling": mean_of("ceiling_gfc30"),
+        "gfc30_expected": mean_of("expected_gfc30"),
         "gfc5_mean": mean_of("gfc5"),
         "gfc5_floor": mean_of("floor_gfc5"),
-        "gfc5_ceiling": mean_of("ceiling_gfc5"),
+        "gfc5_expected": mean_of("expected_gfc5"),
         "log_spectral_distance_db": mean_of("log_spectral_distance_db"),
         "rms_error_db": float(np.mean([abs(report.rms_error_db) for report in reports])),
         "band_energy_error_db": float(np.mean([_band_error_db(report) for report in reports])),
-        "oracle_gap": mean_of("oracle_gap"),
+        "gfc30_deficit": mean_of("gfc30_deficit"),
     }
 
 

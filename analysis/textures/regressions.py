@@ -407,7 +407,7 @@ def driving_table(results: Sequence[TextureResult], *, rng: np.random.Generator)
     results : sequence of TextureResult
         Their full models are driven in the three ways.
     rng : Generator
-        Draws behind the GFC ceilings, the same for all three.
+        Draws behind the expected GFCs, the same for all three.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def test_rows_and_columns_of_the_table() -> None:
     assert table.simulated.all()
     assert (table.records == 1).all()
     assert (table.floor_gfc30 < table.gfc30).all()
-    assert table.ceiling_gfc30.nunique() == 1
+    assert table.expected_gfc30.nunique() == 1
 
 
 def test_planted_autoregression_is_matched_by_its_own_order() -> None:

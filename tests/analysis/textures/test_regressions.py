@@ -241,7 +241,7 @@ def test_driven_models_are_compared_on_the_same_recordings(results) -> None:
         assert row["gfc30_mean"] == pytest.approx(np.mean([r.gfc30 for r in reports]))
         distance = np.mean([r.log_spectral_distance_db for r in reports])
         assert row["log_spectral_distance_db"] == pytest.approx(distance)
-    assert table["gfc30_ceiling"][:3].nunique() == 1
+    assert table["gfc30_expected"][:3].nunique() == 1
     means = table.iloc[6:].reset_index()
     for number, way in enumerate(("grid", "conditions", "centroid")):
         chosen = table[:6][table[:6]["driven_by"] == way]

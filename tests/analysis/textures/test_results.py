@@ -49,11 +49,11 @@ def test_gfc_table_holds_means_and_minimum_of_the_reports(results):
         assert row["parameters"] == 1 + 3 * model.n_layers
         assert_allclose(row["gfc30_mean"], np.mean([r.gfc30 for r in reports]))
         assert row["gfc30_min"] == min(r.gfc30 for r in reports)
-        assert_allclose(row["gfc30_ceiling"], np.mean([r.ceiling_gfc30 for r in reports]))
+        assert_allclose(row["gfc30_expected"], np.mean([r.expected_gfc30 for r in reports]))
         assert_allclose(row["rms_error_db"], np.mean([abs(r.rms_error_db) for r in reports]))
-        assert_allclose(row["oracle_gap"], np.mean([r.oracle_gap for r in reports]))
+        assert_allclose(row["gfc30_deficit"], np.mean([r.gfc30_deficit for r in reports]))
         for name in ("gfc30", "gfc5"):
-            assert row[f"{name}_floor"] < row[f"{name}_ceiling"] < 1
+            assert row[f"{name}_floor"] < row[f"{name}_expected"] < 1
             # A fit to this very record may come closer to it than another draw would.
             assert row[f"{name}_floor"] < row[f"{name}_mean"] < 1
 
@@ -101,11 +101,11 @@ def test_a_condition_that_was_not_recorded_is_refused(results):
         results[0].spectrum_at(123.0, 1.0)
 
 
-def test_a_recording_has_one_ceiling_for_both_models(results):
+def test_a_recording_has_one_expected_gfc_for_both_models(results):
     result = results[0]
     bare = result.model.with_layers([0])
     table = gfc_table(result.recordings, result.model, bare, rng=np.random.default_rng(1))
-    for name in ("gfc30_ceiling", "gfc5_ceiling", "gfc30_floor", "gfc5_floor"):
+    for name in ("gfc30_expected", "gfc5_expected", "gfc30_floor", "gfc5_floor"):
         assert table[name].nunique() == 1
     assert table["gfc30_mean"].nunique() == 2
 
