@@ -45,9 +45,9 @@ class PEQModel(Protocol):
 class SimilarityReport:
     """Likeness of a model's response (not of a rendering) and a recording's spectrum.
 
-    Beside every GFC stand its floor (white noise of equal RMS) and its expected value (what the true
-    spectrum scores on average: the recording's smoothed spectrum against random draws shaped by
-    it). A model that follows the scatter of the very recording may exceed the expected value.
+    Beside every GFC stand its floor (white noise of equal RMS) and its expected value (what the
+    true spectrum scores on average: the recording's smoothed spectrum against random draws shaped
+    by it). A model that follows the scatter of the very recording may exceed the expected value.
     `gfc30_deficit` is 1 − GFC30/expected.
     `band_energy_error_db` has one value per band of `BAND_EDGES_HZ` that the data reach, in dB,
     model over recording; `band_edges_hz` holds those bands' edges. The log-spectral distance is

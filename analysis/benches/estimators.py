@@ -54,8 +54,8 @@ def estimators_table(*, textures: int, seed: int) -> pd.DataFrame:
     -------
     DataFrame
         One row per kind (and for all together) and estimator: kind, estimator, textures; gfc30,
-        expected_gfc30, gfc30_deficit and log_spectral_distance_db (means; docs/method/similarity.md);
-        rms_error_db (mean) and median_absolute_rms_error_db, both of the record; precision and
+        expected_gfc30, gfc30_deficit and log_spectral_distance_db (means;
+        docs/method/similarity.md); rms_error_db (mean) and median_absolute_rms_error_db, both of the record; precision and
         recall (of all layers, matched one to one within max(B/2, 10 Hz)) and layers_per_true_layer;
         level_error_db and median_absolute_level_error_db (medians over matched layers: of the gain
         for coherent truth, else of the energy within ±B/2); milliseconds (median for one spectrum);
@@ -88,7 +88,7 @@ def _scores(kind: TruthKind, *, textures: int, seed: int) -> Scores:
 
 
 def _scores_of_one(measured: Spectrum, truth: RandomTruth) -> dict[str, dict[str, Any]]:
-    """Every estimator and filter on one spectrum, compared with the same draws for its expected GFC."""
+    """Every estimator and filter on one spectrum, compared with the same draws."""
     layers: dict[str, tuple[Layers, float]] = {
         name: _timed(partial(find_layers, measured, estimator=name)) for name in ESTIMATORS
     }

@@ -147,7 +147,8 @@ def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
         (f"{full['layers'].sum()} → {simple['layers'].sum()}", "layers, full → simplified"),
         (
             f"{full['gfc30_mean'].mean():.3f} → {simple['gfc30_mean'].mean():.3f}",
-            f"mean GFC30, full → simplified (floor {floor:.3f}, expected of the true spectrum {expected:.3f})",
+            f"mean GFC30, full → simplified (floor {floor:.3f}, expected of the true one "
+            f"{expected:.3f})",
         ),
     )
 

@@ -174,7 +174,7 @@ def _driving_table(driving: pd.DataFrame, *, simulated: bool) -> Table:
         "speed and every parameter as one in SC (PAPER IX-B); force then changes nothing, nor does "
         "speed where SC shows no significant response to it. All three are compared with the very "
         "recordings that they were fitted to. Measures as in the table of simplification rate and "
-        "quality; deficit: 1 − GFC30/expected, below 0 where a model follows the recording's scatter.",
+        "quality; deficit: 1 − GFC30/expected.",
         driving,
         DRIVING_SHOWN,
         simulated,

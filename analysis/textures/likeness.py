@@ -51,8 +51,8 @@ def gfc_table(
     full, simplified : TextureModel
         Before and after simplification.
     rng : Generator
-        Draws behind the expected GFC (docs/method/similarity.md#floor-and-expected-gfc), the same for
-        both models.
+        Draws behind the expected GFC (docs/method/similarity.md#floor-and-expected-gfc), the same
+        for both models.
 
     Returns
     -------

@@ -49,8 +49,8 @@ COLUMNS = {
     "sha256": "SHA-256 of the file",
     "model_sha256": "SHA-256 of the model's file",
     "recipe_sha256": "SHA-256 of recipe.toml in this folder",
-    "threshold_sha256": "SHA-256 of the threshold's values (`Threshold.sha256`); n/a where loudness "
-    "was not matched",
+    "threshold_sha256": "SHA-256 of the threshold's values (`Threshold.sha256`); n/a where "
+    "loudness was not matched",
     "vibrator": "compensated: the file is the drive for the vibrator of sources/vibrator.json, "
     "whose vibration is then the one meant at the hand, times the flat gain in that file; n/a: the "
     "file is the vibration itself",
