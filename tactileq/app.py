@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from typing import Annotated
 
 import typer
 
@@ -28,12 +29,34 @@ COMMANDS = {
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="Record a surface, keep what a finger can feel, render it, and find out with people "
     "whether anybody can tell the difference.",
 )
+
+
+def show_version(wanted: bool) -> None:
+    """Print name and version, and end."""
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"tactileq {version('tactileq')}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    show: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
+    """Options of the program itself, each of which acts by its callback."""
+
+
 for name, file in COMMANDS.items():
     command = getattr(import_module(f"tactileq.commands.{file}"), file)
     if isinstance(command, typer.Typer):

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
+from experiments.console.screens import check_screen
 from experiments.console.widgets import (
     BLUE,
     CARD,
@@ -53,7 +54,7 @@ class Console:
         Window in pixels, at least 4:3.
     fullscreen : bool
     screen : int
-        Which screen, from 0.
+        Which screen, from 0; InputError where there is none.
     on_page : callable, optional
         Told of each page that comes up; lets a test press the right pixels.
     """
@@ -70,6 +71,7 @@ class Console:
     ) -> None:
         from psychopy import logging, visual
 
+        check_screen(screen)
         logging.console.setLevel(logging.ERROR)  # no monitor calibration is needed: not a warning
         self._window = visual.Window(
             size=size,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 
 from modeling.errors import InputError
@@ -57,6 +58,24 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
             )
         rows.append(dict(zip(header, cells, strict=True)))
     return rows
+
+
+def check_columns(names: Iterable[str], known: Sequence[str], table: str | Path) -> None:
+    """Refuse a column that is not known: a misspelt one would be passed over without a word.
+
+    Raises
+    ------
+    InputError
+        Naming the column, the nearest known one, and all that are known.
+    """
+    for name in names:
+        if name in known:
+            continue
+        near = get_close_matches(name, known, n=1)
+        advice = f"rename it to {near[0]!r} or remove it" if near else "remove it"
+        raise InputError(
+            f"expected columns among {', '.join(known)} in {table}, got {name!r}; {advice}."
+        )
 
 
 def is_number(text: str) -> bool:

@@ -17,20 +17,34 @@ def full_scale(value_g: float, file: str) -> float:
     return value_g
 
 
-def read_wav(path: Path) -> tuple[Floats, float]:
-    """Samples (n,), 1 = full scale, and rate (Hz) of a mono WAV file.
+def read_wav(path: Path, *, channel: int | None = None) -> tuple[Floats, float]:
+    """Samples (n,), 1 = full scale, and rate (Hz) of one channel of a WAV file.
+
+    Parameters
+    ----------
+    path : Path
+    channel : int, optional
+        Which one, from 1; may be left out where there is only one.
 
     Raises
     ------
     InputError
-        If the file is no readable WAV, has several channels, or is shorter than it says.
+        If the file is no readable WAV, is shorter than it says, has no such channel, or has several
+        and none is chosen.
     """
     samples, rate_hz = read_wav_channels(path)
-    if samples.shape[1] != 1:
+    count = samples.shape[1]
+    if channel is None and count != 1:
         raise InputError(
-            f"expected one channel in {path}, got {samples.shape[1]}; export one axis as mono."
+            f"expected one channel in {path}, or a choice, got {count} and none chosen; name one "
+            f"from 1 to {count} with --channel, or in a column 'channel' of the list of files."
         )
-    return samples[:, 0], rate_hz
+    chosen = 1 if channel is None else channel
+    if not 1 <= chosen <= count:
+        raise InputError(
+            f"expected a channel from 1 to {count} of {path}, got {chosen}; choose one of those."
+        )
+    return np.ascontiguousarray(samples[:, chosen - 1]), rate_hz
 
 
 def read_wav_channels(path: Path) -> tuple[Floats, float]:

@@ -29,6 +29,8 @@ INDEX_COLUMNS = (
     "samples",
     "clipped_share",
 )
+# What the index says of WAV files beside that; empty for CSV files.
+WAV_COLUMNS = ("g_per_fullscale", "channel")
 
 
 class RecordingSet:
@@ -108,8 +110,8 @@ class RecordingSet:
             rows = []
             for number, recording in enumerate(self.recordings, start=1):
                 name = f"{number:04d}.csv"
-                _write_samples(fresh / name, recording)
-                rows.append((name, *_index_cells(recording)))
+                write_samples(fresh / name, recording)
+                rows.append((name, *index_cells(recording)))
             write_table(fresh / INDEX_NAME, INDEX_COLUMNS, rows)
 
     @staticmethod
@@ -127,7 +129,7 @@ class RecordingSet:
         InputError
             With the file's name, for a folder that is not one and for any unusable record.
         """
-        rows = _listed(Path(folder))
+        rows = listed(Path(folder))
         return RecordingSet(
             _load_row(Path(folder), row) for row in rows if texture in (None, row["texture"])
         )
@@ -145,7 +147,7 @@ def load_usable(
         the first.
     """
     records, refusals = [], []
-    for row in _listed(Path(folder)):
+    for row in listed(Path(folder)):
         if texture not in (None, row["texture"]):
             continue
         try:
@@ -164,10 +166,10 @@ def is_recording_set(folder: Path) -> bool:
 
 def textures_in(folder: str | Path) -> tuple[str, ...]:
     """Names of the textures that a folder lists (none in an empty list); no samples are read."""
-    return tuple(dict.fromkeys(row["texture"] for row in _listed(Path(folder))))
+    return tuple(dict.fromkeys(row["texture"] for row in listed(Path(folder))))
 
 
-def _listed(folder: Path) -> list[dict[str, str]]:
+def listed(folder: Path) -> list[dict[str, str]]:
     """One row of text per recording of a folder, each with its texture (else the folder's name)."""
     if not folder.is_dir():
         raise InputError(
@@ -187,7 +189,8 @@ def _sidecar_files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.glob("*.wav") if p.with_suffix(".json").is_file())
 
 
-def _index_cells(recording: Recording) -> tuple[str, ...]:
+def index_cells(recording: Recording) -> tuple[str, ...]:
+    """What the index says of a recording, in the order of `INDEX_COLUMNS` after `file`."""
     return (
         recording.texture,
         repr(recording.speed_mm_s),
@@ -201,8 +204,9 @@ def _index_cells(recording: Recording) -> tuple[str, ...]:
     )
 
 
-def _write_samples(path: Path, recording: Recording) -> None:
-    # repr of a float is its shortest exact text: the file loads back equal.
+def write_samples(path: Path, recording: Recording) -> None:
+    """Write a recording's samples as one column of numbers, from which they load back equal."""
+    # repr of a float is its shortest exact text.
     header = f"acceleration_{recording.unit}\n"
     lines = "\n".join(map(repr, recording.samples.tolist()))
     path.write_text(header + lines + "\n", encoding="utf-8")
@@ -218,9 +222,12 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     path = folder / row["file"]
     if not path.is_file():
         raise InputError(f"expected the file {path}, got nothing there; restore or unlist it.")
-    unit = row.get("unit", "arbitrary")
+    unit = row.get("unit") or "arbitrary"
     if path.suffix.lower() == ".wav":
-        samples, rate_hz = read_wav(path)
+        channel = row.get("channel")
+        samples, rate_hz = read_wav(
+            path, channel=whole_number(channel, f"channel of {path.name}") if channel else None
+        )
         if row.get("g_per_fullscale"):
             scale_g = number(row["g_per_fullscale"], f"g_per_fullscale of {path.name}")
             samples = samples * full_scale(scale_g, path.name)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -13,63 +14,101 @@ import numpy as np
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
-from modeling.files.tables import is_number, number, read_table, whole_number
+from modeling.files.tables import check_columns, is_number, number, read_table, whole_number
 from modeling.files.wav import full_scale, read_wav
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
+from modeling.recordings.appending import WavSource
 from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import dft321
+from rig.importing.times import TimeColumn
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
 G_PER_UNIT = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY_M_S2, "arbitrary": 1.0}
-SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
-LONGEST_GAP = 2.5
-# A tool's vibration needs more; a rate below this means time in another unit than supposed.
-LOWEST_RATE_HZ = 20.0
-LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
+# Below it layers are missed: docs/method/recordings.md#shortest-records
+SHORTEST_MODELLED_S = 0.2
+LABEL_COLUMNS = (
+    *("file", "speed_mm_s", "force_n"),
+    *("texture", "repeat", "g_per_fullscale", "channel"),
+)
 _TIME_NAMES = {"time", "t", "timestamp"}
 _AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
 
 
 @dataclass(frozen=True)
 class Label:
-    """What a file does not say of itself: surface, speed (mm/s), force (N), which repetition."""
+    """What a file does not say of itself: surface, speed (mm/s), force (N), which repetition.
+
+    Of WAV files also the acceleration (g) of a full-scale sample, and the channel, from 1.
+    """
 
     texture: str
     speed_mm_s: float
     force_n: float
     repeat: int = 1
     g_per_fullscale: float | None = None
+    channel: int | None = None
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A recording from a file, what to be warned of, and the WAV file that holds its samples."""
+
+    recording: Recording
+    warnings: tuple[str, ...] = ()
+    source: WavSource | None = None
 
 
 def import_wav(
-    paths: Sequence[Path], labels: Sequence[Label], *, g_per_fullscale: float | None = None
+    paths: Sequence[Path],
+    labels: Sequence[Label],
+    *,
+    g_per_fullscale: float | None = None,
+    channel: int | None = None,
 ) -> RecordingSet:
-    """Mono WAV files as recordings.
+    """WAV files as recordings, one channel of each.
 
     Parameters
     ----------
     paths : sequence of Path
     labels : sequence of Label
-        One per path.
+        One per path; their own `g_per_fullscale` and `channel` win.
     g_per_fullscale : float, optional
-        Acceleration (g) of a full-scale sample, > 0; a label's own value wins. Without it the unit
-        is `arbitrary`.
+        Acceleration (g) of a full-scale sample, > 0. Without it the unit is `arbitrary`.
+    channel : int, optional
+        From 1; needed where a file has several.
 
     Raises
     ------
     InputError
         Naming the file that cannot be used.
     """
-    records = []
-    for path, label in zip(paths, labels, strict=True):
-        samples, rate_hz = read_wav(path)
-        scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
-        unit = "arbitrary" if scale is None else "g"
-        if scale is not None:
-            samples = samples * full_scale(scale, path.name)
-        records.append(_recording(path, samples, rate_hz, label, unit=unit))
-    return RecordingSet(records)
+    read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
+    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+
+
+def import_wav_file(
+    path: Path,
+    label: Label,
+    *,
+    g_per_fullscale: float | None = None,
+    channel: int | None = None,
+) -> Imported:
+    """One WAV file, with warnings; otherwise as `import_wav`."""
+    channel = channel if label.channel is None else label.channel
+    samples, rate_hz = read_wav(path, channel=channel)
+    scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
+    if scale is not None:
+        full_scale(scale, path.name)
+    recording = _recording(
+        path,
+        samples if scale is None else samples * scale,
+        rate_hz,
+        label,
+        unit="arbitrary" if scale is None else "g",
+    )
+    warnings = [*_beyond_full_scale(path, samples, scale), *_too_short(path, recording)]
+    return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale))
 
 
 def import_csv(
@@ -93,101 +132,172 @@ def import_csv(
         Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
         `arbitrary`.
     rate_hz : float, optional
-        Wins over the time column.
+        Where there is no time column, or one that tells no rate; must not contradict one that does.
 
     Raises
     ------
     InputError
         Naming the file and what is wrong with it.
     """
+    read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
+    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+
+
+def import_csv_file(
+    path: Path,
+    label: Label,
+    *,
+    axis: Axis | None = None,
+    unit: str | None = None,
+    rate_hz: float | None = None,
+) -> Imported:
+    """One CSV file, with warnings; otherwise as `import_csv`."""
     if axis is not None and axis not in AXES:
         raise InputError(f"expected an axis among {', '.join(AXES)}, got {axis!r}; choose one.")
     _check_unit(unit, "--unit")
-    records = []
-    for path, label in zip(paths, labels, strict=True):
-        columns = _read_columns(path)
-        rate = rate_hz if rate_hz is not None else _rate_from_time(path, columns)
-        axes, found_unit = _chosen_axes(path, columns, axis)
-        if unit and found_unit and unit != found_unit:
-            raise InputError(
-                f"expected one unit for {path.name}, got {found_unit!r} in its header and {unit!r} "
-                "from --unit; leave --unit out or correct the header."
-            )
-        final_unit = unit or found_unit or "arbitrary"
-        _check_unit(final_unit, f"the header of {path.name}")
-        name = "arbitrary" if final_unit == "arbitrary" else "g"
-        samples = (dft321(axes) if len(axes) == 3 else axes[0]) * G_PER_UNIT[final_unit]
+    columns, warnings = _read_columns(path)
+    rate_hz, jitter = _rate(path, columns, rate_hz)
+    axes, found_unit = _chosen_axes(path, columns, axis)
+    if unit and found_unit and unit != found_unit:
+        raise InputError(
+            f"expected one unit for {path.name}, got {found_unit!r} in its header and {unit!r} "
+            "from --unit; leave --unit out or correct the header."
+        )
+    final_unit = unit or found_unit or "arbitrary"
+    _check_unit(final_unit, f"the header of {path.name}")
+    recording = _recording(
+        path,
+        (dft321(axes) if len(axes) == 3 else axes[0]) * G_PER_UNIT[final_unit],
+        rate_hz,
+        label,
+        unit="arbitrary" if final_unit == "arbitrary" else "g",
         # Combined axes no longer show their limits, so those are looked for here.
-        clipped = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
-        records.append(_recording(path, samples, rate, label, unit=name, clipped_share=clipped))
-    return RecordingSet(records)
+        clipped_share=float(np.any([clipped_samples(one) for one in axes], axis=0).mean()),
+    )
+    return Imported(recording, (*warnings, *jitter, *_too_short(path, recording)))
 
 
 def usable(
-    read: Callable[[Sequence[Path], Sequence[Label]], RecordingSet],
+    read: Callable[[Path, Label], Imported],
     paths: Sequence[Path],
     labels: Sequence[Label],
-) -> tuple[RecordingSet, tuple[str, ...]]:
+) -> tuple[list[Imported], tuple[str, ...]]:
     """What can be read of some files, and a sentence for each that is left out.
 
     Parameters
     ----------
     read : callable
-        `import_wav` or `import_csv` with its options.
+        `import_wav_file` or `import_csv_file` with its options.
     paths, labels
-        As there.
+        One label per path.
 
     Raises
     ------
     InputError
         Where no file can be read: what is wrong with the first.
     """
-    records: list[Recording] = []
+    records: list[Imported] = []
     refusals: list[InputError] = []
     for path, label in zip(paths, labels, strict=True):
         try:
-            records += read([path], [label]).recordings
+            records.append(read(path, label))
         except InputError as error:
             refusals.append(error)
     if refusals and not records:
         raise refusals[0]
-    return RecordingSet(records), tuple(map(str, refusals))
+    return records, tuple(map(str, refusals))
 
 
-def labels_from_table(table: Path, paths: Sequence[Path], *, texture: str | None) -> list[Label]:
+def labels_from_table(
+    table: Path, paths: Sequence[Path], *, texture: str | None
+) -> tuple[list[Label], tuple[str, ...]]:
     """Labels by file name from a TSV with file, speed_mm_s, force_n (texture, repeat, …).
+
+    Returns
+    -------
+    labels : list of Label
+        One per path.
+    unused : tuple of str
+        The files of rows that belong to no path.
 
     Raises
     ------
     InputError
-        For a file that the table names not once, and for cells that are no usable numbers.
+        For a column that is not known, a file that the table names not once, and cells that are no
+        usable numbers.
     """
     rows: dict[str, dict[str, str]] = {}
-    for row in read_table(table, ("file", "speed_mm_s", "force_n")):
+    for row in read_table(table, LABEL_COLUMNS[:3]):
+        check_columns(row, LABEL_COLUMNS, table)
         if row["file"] in rows:
             raise InputError(
                 f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
             )
         rows[row["file"]] = row
-    labels = []
+    fallback = texture or table.parent.resolve().name
+    used, labels = set(), []
     for path in paths:
         if not (found := rows.get(path.name) or rows.get(str(path))):
             raise InputError(
                 f"expected a row for {path.name} in {table}, got none; add its speed and force."
             )
-        scale = found.get("g_per_fullscale")
-        labels.append(
-            Label(
-                found.get("texture") or texture or table.parent.resolve().name,
-                number(found["speed_mm_s"], f"speed_mm_s of {path.name}"),
-                number(found["force_n"], f"force_n of {path.name}"),
-                whole_number(found.get("repeat") or "1", f"repeat of {path.name}"),
-                full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name)
-                if scale
-                else None,
+        used.add(found["file"])
+        labels.append(_label(path, found, texture=fallback))
+    return labels, tuple(file for file in rows if file not in used)
+
+
+def _label(path: Path, row: Mapping[str, str], *, texture: str) -> Label:
+    scale, channel = row.get("g_per_fullscale"), row.get("channel")
+    return Label(
+        row.get("texture") or texture,
+        number(row["speed_mm_s"], f"speed_mm_s of {path.name}"),
+        number(row["force_n"], f"force_n of {path.name}"),
+        whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
+        full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name) if scale else None,
+        whole_number(channel, f"channel of {path.name}") if channel else None,
+    )
+
+
+def _rate(
+    path: Path, columns: dict[str, Floats], given_hz: float | None
+) -> tuple[float, tuple[str, ...]]:
+    """The rate, given or told by the time column, and what is to be said of uneven samples."""
+    name = _time_column(columns)
+    if name is None:
+        if given_hz is None:
+            raise InputError(
+                f"expected a time column or --rate for {path.name}, got the columns "
+                f"{', '.join(columns)}; give the sampling rate in Hz."
             )
-        )
-    return labels
+        return given_hz, ()
+    time = TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
+    if given_hz is not None:
+        time.check_rate(given_hz)
+    rate_hz = time.rate_hz() if given_hz is None else given_hz
+    jitter = time.jitter_warning(rate_hz)
+    return rate_hz, () if jitter is None else (jitter,)
+
+
+def _beyond_full_scale(path: Path, samples: Floats, scale: float | None) -> list[str]:
+    """A warning of samples beyond ±1, which floats hold, unless the scale is 1: then they are g."""
+    peak = float(np.abs(samples).max())
+    if peak <= 1 or scale == 1:
+        return []
+    taken = "in arbitrary units" if scale is None else f"as {peak * scale:.4g} g"
+    return [
+        f"{path.name}: holds samples up to {peak:.4g}, beyond the full scale of 1, and they are "
+        f"taken {taken}; if they are g already, as in files of tactileq export wav, give "
+        "--g-per-fullscale 1."
+    ]
+
+
+def _too_short(path: Path, recording: Recording) -> list[str]:
+    if recording.duration_s >= SHORTEST_MODELLED_S:
+        return []
+    return [
+        f"{path.name}: lasts {recording.duration_s:.3g} s; models need {SHORTEST_MODELLED_S:g} s "
+        "or more, in a shorter recording layers are missed or misplaced, so record longer."
+    ]
 
 
 def _recording(
@@ -222,7 +332,8 @@ def _check_unit(unit: str | None, where: str) -> None:
         )
 
 
-def _read_lines(path: Path) -> list[str]:
+def _read_lines(path: Path) -> tuple[list[str], bool]:
+    """Lines that are neither empty nor comments, and whether the last one has its end."""
     if not path.is_file():
         raise InputError(f"expected a CSV file at {path}, got nothing there; give its path.")
     text = _decoded(path)
@@ -232,12 +343,20 @@ def _read_lines(path: Path) -> list[str]:
             f"expected a header and rows of numbers in {path.name}, got {len(lines)} lines; "
             "export or record it again."
         )
-    if not text.endswith("\n"):
+    return lines, text.endswith(("\n", "\r"))
+
+
+def _check_last_row(path: Path, row: Sequence[str], header: Sequence[str]) -> str:
+    """Refuse a row without a line end that is not whole; else a warning that it may not be."""
+    if len(row) != len(header) or not is_number(row[-1].replace(",", ".")):
         raise InputError(
-            f"expected a line end after the last line of {path.name}, got {lines[-1]!r} without "
-            "one, so it may be truncated; add a line end if the file is complete."
+            f"expected {path.name} to end with a whole row, got {','.join(row)!r} without a line "
+            "end; the file is truncated, export or record it again."
         )
-    return lines
+    return (
+        f"{path.name}: has no line end after its last row, so its last number, {row[-1]}, may be "
+        "cut short; if so, export or record it again."
+    )
 
 
 def _decoded(path: Path) -> str:
@@ -254,9 +373,9 @@ def _decoded(path: Path) -> str:
     raise InputError(f"expected a text file, got other bytes in {path}; export CSV.")
 
 
-def _read_columns(path: Path) -> dict[str, Floats]:
-    """Columns of numbers by their header."""
-    lines = _read_lines(path)
+def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    """Columns of numbers by their header, and what to be warned of."""
+    lines, ended = _read_lines(path)
     delimiter = max(",;\t", key=lines[0].count)
     rows = list(csv.reader(lines, delimiter=delimiter))
     header = [cell.strip() for cell in rows[0]]
@@ -268,6 +387,7 @@ def _read_columns(path: Path) -> dict[str, Floats]:
         raise InputError(
             f"expected each column name once in {path.name}, got {', '.join(header)}; rename."
         )
+    warnings = () if ended else (_check_last_row(path, rows[-1], header),)
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):
             raise InputError(
@@ -283,7 +403,7 @@ def _read_columns(path: Path) -> dict[str, Floats]:
             f"expected numbers below the header of {path.name}, got a cell that is none ({error});"
             " correct the file."
         ) from None
-    return dict(zip(header, values.T, strict=True))
+    return dict(zip(header, values.T, strict=True)), warnings
 
 
 def _name_and_unit(header: str) -> tuple[str, str]:
@@ -300,49 +420,6 @@ def _name_and_unit(header: str) -> tuple[str, str]:
 
 def _time_column(columns: dict[str, Floats]) -> str | None:
     return next((name for name in columns if _name_and_unit(name)[0] in _TIME_NAMES), None)
-
-
-def _rate_from_time(path: Path, columns: dict[str, Floats]) -> float:
-    name = _time_column(columns)
-    if name is None:
-        raise InputError(
-            f"expected a time column or --rate for {path.name}, got the columns "
-            f"{', '.join(columns)}; give the sampling rate in Hz."
-        )
-    unit = _name_and_unit(name)[1]
-    if unit not in SECONDS_PER_UNIT:
-        raise InputError(
-            f"expected time in s, ms or us in {path.name}, got {unit!r}; convert it or give --rate."
-        )
-    mean_step = _mean_step_s(path, columns[name] * SECONDS_PER_UNIT[unit])
-    lowest = LOWEST_RATE_HZ if unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
-    if 1 / mean_step <= lowest:
-        raise InputError(
-            f"expected a rate above {lowest:g} Hz in {path.name}, got {1 / mean_step:.4g} Hz by "
-            f"its column {name!r}: is time in ms or us? Name the unit in the header (time_s, "
-            "time_ms, time_us) or give --rate."
-        )
-    return 1 / mean_step
-
-
-def _mean_step_s(path: Path, time_s: Floats) -> float:
-    """Mean distance of the samples (s), which must rise evenly."""
-    steps = np.diff(time_s)
-    span = float(time_s[-1] - time_s[0])
-    if not (np.isfinite(time_s).all() and span > 0 and (steps >= 0).all()):
-        raise InputError(
-            f"expected rising times in {path.name}, got some that fall, repeat or are not finite; "
-            "repair the file or give --rate."
-        )
-    mean_step = span / steps.size
-    # Coarse time stamps repeat and jump by whole ticks; lost samples leave a longer gap.
-    tick = float(steps[steps > 0].min())
-    if steps.max() > LONGEST_GAP * max(mean_step, tick):
-        raise InputError(
-            f"expected evenly spaced samples in {path.name}, got a gap of {steps.max():.4g} s "
-            f"among steps of {mean_step:.4g} s; samples are missing, record again or give --rate."
-        )
-    return mean_step
 
 
 def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> tuple[Floats, str]:

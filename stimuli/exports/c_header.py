@@ -24,6 +24,10 @@ from modeling.rendering.plan import RenderPlan
 from stimuli.exports.layered import Layered, check_layered
 from stimuli.sets.recipe import HIGHEST_RATE_HZ
 
+# Noise is within ±√3, and a band-pass adds up a few of its samples.
+HEADROOM = 100.0
+COPYRIGHT = "Copyright (C) 2026 the tactileq authors"
+
 
 def write_c_header(
     path: str | Path,
@@ -40,7 +44,8 @@ def write_c_header(
     It defines `NAME` (a `tq_texture`), `NAME_memory` (how many reals of memory a state needs) and
     `NAME_key` (of the noise); a comment on top shows their use. In double precision its output is
     that of a `Renderer` with the same arguments bit for bit; in single precision it differs by
-    rounding. Headers of several textures go into one program.
+    rounding. Headers of several textures go into one program, which then holds the kernel and comes
+    under its licence, GPL-3.0-or-later; the header says so.
 
     Parameters
     ----------
@@ -66,8 +71,9 @@ def write_c_header(
     Raises
     ------
     InputError
-        For an autoregressive model, a rate out of range, a compensation for another rate, or, in
-        single precision, numbers that it cannot hold or tell apart.
+        For an autoregressive model, a rate out of range, a compensation for another rate, gains
+        with which samples would not stay finite, or, in single precision, numbers that it cannot
+        hold or tell apart.
     """
     layered = check_layered(model)
     name = c_identifier(layered.texture)
@@ -75,6 +81,7 @@ def write_c_header(
     members: Mapping[str, Any] = plan.texture(layered)
     if single:
         members = {member: _in_single(member, value) for member, value in members.items()}
+    _check_output(layered, plan, single=single)
     kernel = files("modeling.rendering").joinpath("kernel.h").read_text(encoding="utf-8")
     precision = "#ifndef TQ_REAL\n#define TQ_REAL float\n#endif\n\n" if single else ""
     tables = _tables(name, members)
@@ -104,6 +111,23 @@ def _plan(
         )
     renderer = Renderer(model, rate_hz=rate_hz, seed=seed, limits=limits, compensation=compensation)
     return renderer.plan
+
+
+def _check_output(model: Layered, plan: RenderPlan, *, single: bool) -> None:
+    """Refuse gains that let the program's numbers grow beyond its precision."""
+    precision: type[np.floating[Any]] = np.float32 if single else np.float64
+    highest = float(np.finfo(precision).max)
+    if np.isfinite(plan.limits.rms):  # that limit squares samples
+        highest = float(np.sqrt(highest))
+    highest /= HEADROOM
+    with np.errstate(over="ignore"):
+        gain = float(model.table.largest_gains.sum() * np.sqrt(plan.rate_hz / model.rate_hz))
+    if not gain <= highest:
+        raise InputError(
+            f"expected gains that add up to at most {highest:.1g} {model.unit}, so that samples "
+            f"stay finite in {'single' if single else 'double'} precision, got {gain:.3g} "
+            f"{model.unit}; correct the model."
+        )
 
 
 def c_identifier(texture: str) -> str:
@@ -164,7 +188,15 @@ def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, see
     speeds, forces = model.table.speeds_mm_s, model.table.forces_n
     made = "simulated" if model.simulated else "from recordings"
     return f"""\
-/* Texture {_quoted(model.texture)}, {made}, for rendering in C99: output in {model.unit} at \
+/* SPDX-License-Identifier: GPL-3.0-or-later
+   {COPYRIGHT}
+
+   Whoever passes on a program that includes this header passes on the renderer in it, and so has
+   to offer the whole program, with its source, under the GNU General Public License, version 3 or
+   later. The numbers of the texture are data of those whose model it is; that licence does not
+   cover them.
+
+   Texture {_quoted(model.texture)}, {made}, for rendering in C99: output in {model.unit} at \
 {plan.rate_hz:g} Hz, seed {seed}.
 
    {model.n_layers} layers ({_quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} \
@@ -187,9 +219,7 @@ to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g
            return 0;
        }}
 
-   {_restraints(plan, model.unit)}
-
-   SPDX-License-Identifier: GPL-3.0-or-later (the kernel below) */
+   {_restraints(plan, model.unit)} */
 
 """
 

@@ -27,7 +27,7 @@ from stimuli.sets.manifest import (
     measured,
     write_manifest,
 )
-from stimuli.sets.recipe import Recipe, TrajectoryEntry
+from stimuli.sets.recipe import Recipe, SampleFormat, TrajectoryEntry
 from stimuli.sets.rendering import (
     BITS,
     at_rate,
@@ -127,7 +127,7 @@ def write_set(
     ------
     InputError
         For a recipe whose sources cannot be used, a silent stimulus that is to be brought to a
-        level, two stimuli of one name, samples beyond the full scale of 24-bit files, or a disk
+        level, two stimuli of one name, samples beyond what the files' format holds, or a disk
         that takes no more; then nothing is written.
     """
     target = Path(folder)
@@ -272,9 +272,11 @@ class _FileMaker:
             if self.sources.vibrator is not None:
                 compensation = compensation_for(self.sources.vibrator, rate_hz=rate_hz)
                 written = resampled(rate_hz=rate_hz, compensation=compensation)
+            file = self._file_name(take, rate_hz)
+            _check_finite(written, file, self.recipe.format)
             data = wav_bytes(written, rate_hz, full_scale_g=self.recipe.level.full_scale_g)
             stimulus = Stimulus(
-                file=self._file_name(take, rate_hz),
+                file=file,
                 rate_hz=rate_hz,
                 duration_s=vibration.size / rate_hz,
                 sha256=hashlib.sha256(data).hexdigest(),
@@ -317,6 +319,16 @@ class _FileMaker:
             "vibrator_sha256": self.sources.vibrator_sha256,
             "simulated": str(simulated).lower(),
         }
+
+
+def _check_finite(samples: Floats, file: str, sample_format: SampleFormat) -> None:
+    """Refuse samples that are not finite in their format; 24-bit ones are checked for clipping."""
+    largest = np.finfo(np.float32 if sample_format == "float32" else np.float64).max
+    if not (np.abs(samples) <= largest).all():
+        raise InputError(
+            f"expected samples of at most {largest:.2g} in {file}, as the format {sample_format} "
+            "holds them, got larger ones or NaN; correct the gains of the model."
+        )
 
 
 def check_clipping(stimuli: Sequence[Stimulus]) -> None:

@@ -41,6 +41,9 @@ def export_c(
     A comment on top of it shows a whole program. In double precision it renders what this program
     renders, bit for bit. Without --peak, --rms and --duration it has no limits.
 
+    The header holds the renderer's source, which is licensed under GPL-3.0-or-later: a program that
+    includes it can be passed on under that licence only. The model's numbers in it are your data.
+
     Example: tactileq export c models/canvas.json --rate 48000 --peak 5 --out canvas.h
     """
     export_c_header(

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -14,8 +14,7 @@ from tactileq.options import Out, Seed
 from tactileq.telling import clipping_warnings, progress
 
 if TYPE_CHECKING:
-    from modeling import RecordingSet
-    from rig.importing.files import Label
+    from rig.importing.files import Imported, Label
     from rig.importing.hatt import HattTexture
 
 imports = typer.Typer(
@@ -29,13 +28,19 @@ SurfaceName = Annotated[
 SpeedOfAll = Annotated[float | None, typer.Option("--speed", help="Speed of all files, mm/s.")]
 ForceOfAll = Annotated[float | None, typer.Option("--force", help="Force of all files, N.")]
 LabelTable = Annotated[
-    Path | None, typer.Option("--labels", help="TSV: file, speed_mm_s, force_n (texture, repeat).")
+    Path | None,
+    typer.Option(
+        "--labels",
+        help="TSV: file, speed_mm_s, force_n (texture, repeat; of WAV g_per_fullscale, channel).",
+    ),
 ]
+# So many names of files are told; the rest are counted.
+MOST_NAMES = 5
 
 
 @imports.command("wav")
 def import_wav(
-    files: Annotated[list[Path], typer.Argument(help="Mono WAV files.")],
+    files: Annotated[list[Path], typer.Argument(help="WAV files.")],
     out: Out = Path("recordings"),
     texture: SurfaceName = None,
     speed: SpeedOfAll = None,
@@ -44,17 +49,20 @@ def import_wav(
     g_per_fullscale: Annotated[
         float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
     ] = None,
+    channel: Annotated[
+        int | None, typer.Option(min=1, help="Which channel, from 1, of files with several.")
+    ] = None,
 ) -> None:
-    """Add WAV recordings to a recording set.
+    """Add WAV recordings to a recording set; it keeps copies of the files.
 
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
-    from rig.importing.files import import_wav as read
-    from rig.importing.files import usable
+    from rig.importing.files import import_wav_file, usable
 
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
-    records, refused = usable(partial(read, g_per_fullscale=g_per_fullscale), files, named)
-    settings = {"g_per_fullscale": g_per_fullscale, "labels": str(labels)}
+    read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
+    records, refused = usable(read, files, named)
+    settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
     add_to_set(out, records, "import wav", settings=settings, files=files, left_out=refused)
 
 
@@ -71,19 +79,19 @@ def import_csv(
     ] = None,
     unit: Annotated[str | None, typer.Option(help="g, mg, m/s2 or arbitrary.")] = None,
     rate_hz: Annotated[
-        float | None, typer.Option("--rate", help="Sampling rate in Hz; else from the time.")
+        float | None,
+        typer.Option("--rate", help="Sampling rate in Hz; the time column's without it."),
     ] = None,
 ) -> None:
     """Add CSV recordings (time and one or three axes) to a recording set.
 
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
     """
-    from rig.importing.files import import_csv as read
-    from rig.importing.files import usable
+    from rig.importing.files import import_csv_file, usable
 
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
-    read_one = partial(read, axis=axis, unit=unit, rate_hz=rate_hz)
-    records, refused = usable(read_one, files, named)
+    read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
+    records, refused = usable(read, files, named)
     settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
     add_to_set(out, records, "import csv", settings=settings, files=files, left_out=refused)
 
@@ -107,7 +115,7 @@ def import_hatt(
 
     Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
     """
-    from modeling import RecordingSet
+    from rig.importing.files import Imported
     from rig.importing.hatt import load_hatt
 
     speeds = speed or [50.0 * step for step in range(1, 8)]
@@ -122,7 +130,7 @@ def import_hatt(
                 )
             )
             advance(texture.material)
-    records = RecordingSet(record for of_texture in made for record in of_texture)
+    records = [Imported(record) for of_texture in made for record in of_texture]
     settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
     add_to_set(out, records, "import hatt", settings=settings, files=files)
     for texture in textures:
@@ -145,7 +153,14 @@ def labels_of(
             raise ValueError(
                 "expected labels from --labels or from --speed and --force, got both; give one."
             )
-        return labels_from_table(table, files, texture=texture)
+        labels, unused = labels_from_table(table, files, texture=texture)
+        if unused:
+            more = f" and {len(unused) - MOST_NAMES} more" if len(unused) > MOST_NAMES else ""
+            print(
+                f"note: rows of {table} for files that were not given: "
+                f"{', '.join(unused[:MOST_NAMES])}{more}"
+            )
+        return labels
     if speed is None or force is None:
         raise ValueError(
             "expected the speed and force of the files, got "
@@ -156,41 +171,62 @@ def labels_of(
 
 def add_to_set(
     out: Path,
-    new: RecordingSet,
+    new: Sequence[Imported],
     command: str,
     *,
     settings: Mapping[str, object],
     files: Sequence[Path],
     left_out: Sequence[str] = (),
 ) -> None:
-    """Save imported recordings, together with those that `out` already holds.
+    """Add imported recordings to those that `out` already holds.
 
     `left_out`: a sentence for each file that could not be used.
     """
     from modeling import RecordingSet
-    from modeling.files.documents import read_json_object
     from modeling.files.provenance import write_provenance
-    from modeling.recordings.recording_set import INDEX_NAME
+    from modeling.recordings.appending import append
 
-    for warning in clipping_warnings(new):
+    records = RecordingSet(one.recording for one in new)
+    for warning in clipping_warnings(records):
         print(warning, file=sys.stderr)
+    for sentence in (sentence for one in new for sentence in one.warnings):
+        print(f"warning: {sentence}", file=sys.stderr)
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
-    known = RecordingSet.load(out).recordings if (out / INDEX_NAME).is_file() else ()
-    earlier = out / "provenance.json"
-    before = read_json_object(earlier, advice="remove the file") if earlier.is_file() else None
-    everything = RecordingSet([*known, *new.recordings])
-    everything.save(out)
-    write_provenance(earlier, command, {**settings, "added to": before}, inputs=files)
-    if any(r.unit == "arbitrary" for r in new.recordings):
+    provenance = out / "provenance.json"
+    before = imports_before(provenance)
+    count = append(out, records, [one.source for one in new])
+    write_provenance(provenance, command, {**settings, "added to": before}, inputs=files)
+    if any(record.unit == "arbitrary" for record in records):
         print(
             "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "
             "(WAV) or --unit (CSV)."
         )
-    rates = sorted({f"{r.rate_hz:g}" for r in new.recordings})
+    rates = sorted({f"{record.rate_hz:g}" for record in records})
     if left_out:
         print(f"note: {len(left_out)} of {len(files)} files left out")
-    print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {len(everything)} in {out}")
+    print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
+
+
+def imports_before(provenance: Path) -> list[dict[str, Any]]:
+    """What a set's provenance tells of its imports so far, in their order, side by side.
+
+    Each in the one after it would be indented deeper with every import.
+    """
+    from modeling.files.documents import read_json_object
+
+    entry: Any = None
+    if provenance.is_file():
+        entry = read_json_object(provenance, advice="remove the file")
+    history: list[dict[str, Any]] = []
+    while isinstance(entry, dict):
+        settings = entry.get("settings")
+        earlier = settings.pop("added to", None) if isinstance(settings, dict) else None
+        history.insert(0, entry)
+        if isinstance(earlier, list):
+            return [*earlier, *history]
+        entry = earlier  # sets of before hold the last import within the one after it
+    return history
 
 
 def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:

@@ -70,9 +70,12 @@ def session(
 def open_console(*, fullscreen: bool, screen: int) -> Console:
     """The console's window; where there is no screen, one sentence instead of a traceback."""
     from experiments.console.console import Console
+    from modeling import InputError
 
     try:
         return Console(fullscreen=fullscreen, screen=screen)
+    except InputError:
+        raise
     except Exception as error:  # whatever the window system raises means the same to a user
         raise ValueError(
             f"expected a screen for the console, got {error or type(error).__name__}; start a "

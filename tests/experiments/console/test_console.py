@@ -23,9 +23,16 @@ DRIVER = Path(__file__).with_name("console_session.py")
 @pytest.fixture(scope="module")
 def display() -> Iterator[str]:
     """A screen of its own, on whatever display number is free."""
+    with x_server(screens=1) as name:
+        yield name
+
+
+@contextmanager
+def x_server(*, screens: int) -> Iterator[str]:
     reader, writer = os.pipe()
+    sizes = [word for n in range(screens) for word in ("-screen", str(n), "1280x800x24")]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x800x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
         pass_fds=[writer],
         stderr=subprocess.DEVNULL,
     )
@@ -191,3 +198,34 @@ def test_a_relative_trial_by_mouse(tmp_path: Path, display: str, rows: Any) -> N
     assert row["correct"] == str(int(trial.layout[4] == trial.texture))
     assert (row["layout"], row["presses"]) == ("|".join(trial.layout), "4")
     assert no_name_is_shown(person.texts, study)
+
+
+OPEN = """
+import sys
+from tactileq.commands.session import open_console
+for screen in map(int, sys.argv[1:]):
+    try:
+        with open_console(fullscreen=False, screen=screen) as console:
+            print("open")
+    except ValueError as refusal:
+        print(refusal)
+"""
+
+
+def test_a_screen_that_is_not_there_is_refused() -> None:
+    with x_server(screens=2) as name:
+        environment = {**os.environ, "DISPLAY": name, "PYTHONPATH": str(ROOT)}
+        opened = subprocess.run(
+            [sys.executable, "-c", OPEN, "2", "-1", "0"],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=60,
+        )
+    too_high, too_low, there = opened.stdout.splitlines()
+    for refusal, number in ((too_high, 2), (too_low, -1)):
+        assert refusal == (
+            f"expected the number of a screen (0 to 1, of 2), got {number}; choose one that is "
+            "there, or connect another."
+        )
+    assert there == "open"

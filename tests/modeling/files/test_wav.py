@@ -77,6 +77,23 @@ def test_null_in_a_sidecar_is_missing(tmp_path: Path) -> None:
         RecordingSet.load(tmp_path)
 
 
+def test_a_channel_named_in_a_list_or_a_sidecar(tmp_path: Path) -> None:
+    channels = np.stack([NOISE, NOISE[::-1]], axis=1) / 10
+    write_wav(tmp_path / "a.wav", channels)
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "channel": 2}))
+    (by_sidecar,) = RecordingSet.load(tmp_path).recordings
+    assert np.array_equal(by_sidecar.samples, channels[:, 1].astype(np.float32))
+    (tmp_path / "recordings.tsv").write_text(
+        "file\ttexture\tspeed_mm_s\tforce_n\tchannel\na.wav\tfelt\t80\t1.5\t1\n"
+    )
+    (by_list,) = RecordingSet.load(tmp_path).recordings
+    assert np.array_equal(by_list.samples, channels[:, 0].astype(np.float32))
+    (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "channel": 3}))
+    (tmp_path / "recordings.tsv").unlink()
+    with pytest.raises(InputError, match=r"a channel from 1 to 2 of .*a\.wav, got 3"):
+        RecordingSet.load(tmp_path)
+
+
 def test_sidecar_speaks_of_its_own_file(tmp_path: Path) -> None:
     write_wav(tmp_path / "a.wav", NOISE / 10)
     (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "file": "../b.wav"}))

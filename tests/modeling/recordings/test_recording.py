@@ -385,7 +385,7 @@ def snapshot(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize(
-    "broken", ["modeling.recordings.recording_set._write_samples", "pathlib.Path.rename"]
+    "broken", ["modeling.recordings.recording_set.write_samples", "pathlib.Path.rename"]
 )
 def test_failed_save_leaves_the_old_folder(
     folder: Path,

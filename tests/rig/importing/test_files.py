@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,15 @@ from numpy.typing import NDArray
 from scipy.io import wavfile
 
 from modeling import InputError, RecordingSet
-from rig.importing.files import Label, import_csv, import_wav, labels_from_table, usable
+from rig.importing.files import (
+    Label,
+    import_csv,
+    import_csv_file,
+    import_wav,
+    import_wav_file,
+    labels_from_table,
+    usable,
+)
 
 LABEL = Label("oak", 100.0, 1.0)
 RATE_HZ = 3200.0
@@ -129,8 +138,9 @@ def test_refused_layouts(
     [
         ("", "got 0 lines"),
         ("time,x\n", "got 1 lines"),
-        ("time,x\n0,1\n0.1,2\n0.2", "add a line end if the file is complete"),
-        ("time,x\n0,1\n0.1,2\n0.2,3", "add a line end if the file is complete"),
+        ("time,x\n0,1\n0.1,2\n0.2", "end with a whole row, got '0.2' without a line end"),
+        ("time,x\n0,1\n0.1,2\n0.2,", "end with a whole row, got '0.2,' without a line end"),
+        ("time,x\n0,1\n0.1,2\n0.2,-", "end with a whole row, got '0.2,-' without a line end"),
         ("time,x\n0,1\n0.1,2\n0.2\n", "truncated or damaged"),
         ("time,x,x,y,z\n0,1,2,3,4\n", "each column name once"),
         ("time;x\n0,5;1.234,5\n", "a cell that is none"),
@@ -159,8 +169,10 @@ def test_nan_and_inf_are_named(
 def test_lost_samples_are_noticed(tmp_path: Path, axes: NDArray[np.float64]) -> None:
     columns = np.delete(with_time(axes[:1]), slice(700, 900), axis=1)
     path = write_csv(tmp_path / "a.csv", "time,x", columns)
-    with pytest.raises(InputError, match="samples are missing"):
+    typical = "a gap of .* among steps of typically 0.0003125 s; samples are missing"
+    with pytest.raises(InputError, match=typical):
         import_csv([path], [LABEL])
+    assert import_csv([path], [LABEL], rate_hz=3000).recordings[0].rate_hz == 3000
 
 
 def test_falling_times_are_refused(tmp_path: Path, axes: NDArray[np.float64]) -> None:
@@ -262,7 +274,7 @@ def test_labels_from_a_table(tmp_path: Path) -> None:
     table.write_text(
         "file\tspeed_mm_s\tforce_n\ttexture\trepeat\na.wav\t50\t0.5\toak\t1\nb.wav\t50\t0.5\t\t2\n"
     )
-    labels = labels_from_table(table, [Path("x/a.wav"), Path("b.wav")], texture="ash")
+    labels, _ = labels_from_table(table, [Path("x/a.wav"), Path("b.wav")], texture="ash")
     assert labels == [Label("oak", 50.0, 0.5), Label("ash", 50.0, 0.5, 2)]
     with pytest.raises(InputError, match=r"expected a row for c\.wav"):
         labels_from_table(table, [Path("c.wav")], texture=None)
@@ -295,7 +307,7 @@ def test_refused_labels(tmp_path: Path, row: str, sentence: str) -> None:
 def test_empty_scale_is_none_given(tmp_path: Path) -> None:
     table = tmp_path / "labels.tsv"
     table.write_text("file\tspeed_mm_s\tforce_n\tg_per_fullscale\na.wav\t50\t1\t\n")
-    labels = labels_from_table(table, [Path("a.wav")], texture="oak")
+    labels, _ = labels_from_table(table, [Path("a.wav")], texture="oak")
     assert labels == [Label("oak", 50.0, 1.0)]
     path = write_wav(tmp_path / "a.wav", np.sin(np.arange(1000.0)) / 2)
     assert import_wav([path], labels, g_per_fullscale=16.0).recordings[0].unit == "g"
@@ -343,9 +355,142 @@ def test_one_broken_file_of_many_is_named_and_left_out(
     paths = [write_csv(tmp_path / f"{n}.csv", "time_s,x_g", with_time(axes[:1])) for n in range(3)]
     paths[1].write_text("nothing of use\n", encoding="utf-8")
     labels = [Label("oak", speed, 1.0) for speed in (100.0, 200.0, 300.0)]
-    records, refusals = usable(import_csv, paths, labels)
-    assert [r.speed_mm_s for r in records] == [100.0, 300.0]
+    records, refusals = usable(import_csv_file, paths, labels)
+    assert [one.recording.speed_mm_s for one in records] == [100.0, 300.0]
     [sentence] = refusals
     assert "1.csv" in sentence
     with pytest.raises(InputError, match=r"1\.csv"):
-        usable(import_csv, paths[1:2], labels[1:2])
+        usable(import_csv_file, paths[1:2], labels[1:2])
+
+
+@pytest.mark.parametrize("rate_hz", [5000.0, 3100.0, 1000.0])
+def test_a_rate_must_not_contradict_the_time_column(
+    tmp_path: Path, axes: NDArray[np.float64], rate_hz: float
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1]))
+    with pytest.raises(InputError, match=rf"got {rate_hz:g} Hz and by its column 'time_s' 3200 Hz"):
+        import_csv([path], [LABEL], rate_hz=rate_hz)
+    assert import_csv([path], [LABEL], rate_hz=3201.0).recordings[0].rate_hz == 3201.0
+
+
+def test_coarse_time_stamps_and_lost_samples_do_not_contradict_the_rate(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    coarse = np.floor(with_time(axes[:1]) * [[1000], [1]])  # 3.2 samples a millisecond
+    path = write_csv(tmp_path / "a.csv", "time_ms,x_g", coarse)
+    assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
+    lost = np.delete(with_time(axes[:1]), slice(5, None, 20), axis=1)  # the mean step is 5 % longer
+    path = write_csv(tmp_path / "b.csv", "time_s,x_g", lost)
+    assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
+    with pytest.raises(InputError, match="agrees with the time column"):
+        import_csv([path], [LABEL], rate_hz=2 * RATE_HZ)
+
+
+@pytest.mark.parametrize("jitter_ms", [0.0, 0.02, 0.2])
+def test_jitter_is_told_with_what_it_does(
+    tmp_path: Path, axes: NDArray[np.float64], jitter_ms: float
+) -> None:
+    """Phone data: 400 Hz, of which a vibration at 200 Hz is the highest that is there."""
+    time_s = np.arange(2000) / 400 + np.random.default_rng(2).normal(0, jitter_ms / 1000, 2000)
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", np.vstack([time_s, axes[0]]))
+    for rate_hz in (None, 400.0):
+        warnings = import_csv_file(path, LABEL, rate_hz=rate_hz).warnings
+        if jitter_ms < 0.1:
+            assert warnings == ()
+            continue
+        [told] = warnings
+        # The power of a sinusoid at f with Gaussian jitter s falls to exp(-(2 pi f s)^2).
+        share = 1 - np.exp(-((2 * np.pi * 200 * jitter_ms / 1000) ** 2))
+        found = re.search(r"\(([\d.]+) ms RMS\).* turns (\d+)% .* at 200 Hz into noise", told)
+        assert found is not None
+        assert float(found[1]) == pytest.approx(jitter_ms, rel=0.05)
+        assert float(found[2]) == pytest.approx(100 * share, abs=1)
+
+
+def test_a_rate_that_wanders_slowly_is_no_jitter(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+    even_s = np.arange(2000) / 400
+    wandering_s = even_s + 3e-3 * np.sin(2 * np.pi * even_s / 2)  # the rate changes by 1 %
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", np.vstack([wandering_s, axes[0]]))
+    assert import_csv_file(path, LABEL).warnings == ()
+
+
+@pytest.mark.parametrize("rate_hz", [3200.0, 700.0, 416.7, 999.0])
+@pytest.mark.parametrize("digits", [3, 4, 6])
+def test_rounded_time_stamps_are_no_jitter(tmp_path: Path, rate_hz: float, digits: int) -> None:
+    time_s = np.round(1.6e9 + np.arange(3000) / rate_hz, digits)
+    columns = np.vstack([time_s, np.random.default_rng(3).normal(0, 0.3, 3000)])
+    path = write_csv(tmp_path / "a.csv", "timestamp,x_g", columns)
+    assert import_csv_file(path, LABEL).warnings == ()
+
+
+def test_a_whole_last_row_without_a_line_end_is_read_with_a_warning(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1]))
+    whole = import_csv_file(path, LABEL)
+    assert whole.warnings == ()
+    path.write_text(path.read_text().rstrip("\n"))
+    read = import_csv_file(path, LABEL)
+    assert read.recording == whole.recording
+    [told] = read.warnings
+    assert f"its last number, {float(axes[0, -1])}, may be cut short" in told
+
+
+def test_a_channel_is_chosen_by_option_or_label(tmp_path: Path) -> None:
+    channels = np.random.default_rng(4).uniform(-0.5, 0.5, (3000, 3)).astype(np.float32)
+    path = tmp_path / "three.wav"
+    wavfile.write(path, 10_000, channels)
+    with pytest.raises(InputError, match=r"got 3 and none chosen; name one from 1 to 3 with --cha"):
+        import_wav([path], [LABEL])
+    second = import_wav([path], [LABEL], channel=2).recordings[0]
+    assert np.array_equal(second.samples, channels[:, 1])
+    label = Label("oak", 100.0, 1.0, channel=3)
+    third = import_wav([path], [label], channel=2).recordings[0]
+    assert np.array_equal(third.samples, channels[:, 2])
+    with pytest.raises(InputError, match="a channel from 1 to 3 .*, got 4"):
+        import_wav([path], [LABEL], channel=4)
+    table = tmp_path / "labels.tsv"
+    table.write_text("file\tspeed_mm_s\tforce_n\tchannel\nthree.wav\t100\t1\t3\n")
+    labels, _ = labels_from_table(table, [path], texture="oak")
+    assert labels == [label]
+
+
+def test_floats_beyond_the_full_scale_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.wav"
+    samples = np.random.default_rng(4).uniform(-1, 1, 4000).astype(np.float32)
+    samples[70] = 3.25
+    wavfile.write(path, 10_000, samples)
+    for options, taken in (({}, "in arbitrary units"), ({"g_per_fullscale": 16.0}, "as 52 g")):
+        [told] = import_wav_file(path, LABEL, **options).warnings
+        assert f"samples up to 3.25, beyond the full scale of 1, and they are taken {taken}" in told
+        assert "give --g-per-fullscale 1" in told
+    assert import_wav_file(path, LABEL, g_per_fullscale=1.0).warnings == ()
+    samples[70] = 1.0
+    wavfile.write(path, 10_000, samples)
+    assert import_wav_file(path, LABEL).warnings == ()
+
+
+def test_recordings_too_short_for_models_are_told(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1, :64]))
+    [told] = import_csv_file(path, LABEL).warnings
+    assert "lasts 0.02 s; models need 0.2 s or more" in told
+    wav = write_wav(tmp_path / "a.wav", axes[0, :1999] / 3)
+    assert "lasts 0.2 s" in import_wav_file(wav, LABEL).warnings[0]
+    wav = write_wav(tmp_path / "b.wav", axes[0, :2000] / 3)
+    assert import_wav_file(wav, LABEL).warnings == ()
+
+
+def test_columns_that_nobody_knows_and_rows_that_nobody_uses_are_named(tmp_path: Path) -> None:
+    table = tmp_path / "labels.tsv"
+    table.write_text("file\tspeed_mm_s\tforce_n\trepaet\na.wav\t50\t1\t2\n")
+    named = r"expected columns among file, .*, repeat, .* got 'repaet'; rename it to 'repeat'"
+    with pytest.raises(InputError, match=named):
+        labels_from_table(table, [Path("a.wav")], texture="oak")
+    table.write_text("file\tspeed_mm_s\tforce_n\tzzz\na.wav\t50\t1\t2\n")
+    with pytest.raises(InputError, match=r"got 'zzz'; remove it\."):
+        labels_from_table(table, [Path("a.wav")], texture="oak")
+    table.write_text("file\tspeed_mm_s\tforce_n\na.wav\t50\t1\nb.wav\t60\t1\nc.wav\t70\t1\n")
+    labels, unused = labels_from_table(table, [Path("b.wav")], texture="oak")
+    assert ([label.speed_mm_s for label in labels], unused) == ([60.0], ("a.wav", "c.wav"))

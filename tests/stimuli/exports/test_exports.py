@@ -36,6 +36,7 @@ from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.writing import write_set
 
+ROOT = Path(__file__).parents[3]
 SEED = 7
 STRICT = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 PRECISIONS = ("double", "float")
@@ -257,6 +258,20 @@ def test_a_header_says_what_it_is(tmp_path: Path) -> None:
     assert "resonance at 80 Hz. Limits: peak 0.3 g, RMS 0.1 g, duration 0.15 s." in comment
 
 
+def test_a_header_states_its_licence(tmp_path: Path) -> None:
+    """That of the kernel in it, which states the same."""
+    write_c_header(tmp_path / "c.h", MODELS["canvas"])
+    first, kernel, *_ = (tmp_path / "c.h").read_text(encoding="utf-8").split("*/")
+    licence, holder = "SPDX-License-Identifier: GPL-3.0-or-later", "the tactileq authors"
+    assert first.startswith(f"/* {licence}\n   Copyright (C) 2026 {holder}\n")
+    words = " ".join(first.split())
+    assert "a program that includes this header" in words
+    assert "The numbers of the texture are data of those whose model it is" in words
+    assert licence in kernel
+    assert f"Copyright (C) 2026 {holder}." in kernel
+    assert 'license = "GPL-3.0-or-later"' in (ROOT / "pyproject.toml").read_text()
+
+
 def test_two_exports_of_one_name_are_not_confused(tmp_path: Path) -> None:
     """The compiler refuses a second, different one, instead of leaving it out in silence."""
     for header, seed in (("a.h", 1), ("b.h", 2)):
@@ -307,6 +322,12 @@ C_REFUSED = {
     ),
     "hold and tell apart, got others in values": (loud(1e40), {"single": True}),
     "hold and tell apart, got others in speed_mm_s": (CLOSE, {"single": True}),
+    r"at most 3e\+36 g, so that samples stay finite in single": (loud(1e38), {"single": True}),
+    r"at most 2e\+17 g, so that samples stay finite in single": (
+        loud(1e18),
+        {"limits": Limits(rms=1.0), "single": True},
+    ),
+    r"at most 2e\+306 g, so that samples stay finite in double": (loud(1e307), {}),
 }
 JSON_REFUSED = {
     "with layers, got the autoregressive one of oak": (autoregressive(), {}),
@@ -420,3 +441,17 @@ def test_a_recipe_of_several_stimuli_is_no_wav(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="at least the model's 5000 Hz"):
         write_wav(tmp_path / "a.wav", recipe(tmp_path / "canvas.json", rates_hz=(4000,)))
     assert [path.name for path in tmp_path.iterdir()] == ["canvas.json"]
+
+
+def test_samples_that_a_wav_cannot_hold_are_refused(tmp_path: Path) -> None:
+    loud(1e40).save(tmp_path / "canvas.json")
+    made = recipe(tmp_path / "canvas.json")
+    sentence = r"samples of at most 3.4e\+38 in canvas_.*\.wav, as the format float32 holds them"
+    with pytest.raises(InputError, match=sentence):
+        write_wav(tmp_path / "a.wav", made)
+    with pytest.raises(InputError, match=sentence):
+        write_set(tmp_path / "set", made)
+    assert [path.name for path in tmp_path.iterdir()] == ["canvas.json"]
+    loud(1e36).save(tmp_path / "canvas.json")
+    write_wav(tmp_path / "a.wav", recipe(tmp_path / "canvas.json"))
+    assert np.isfinite(wavfile.read(tmp_path / "a.wav")[1]).all()

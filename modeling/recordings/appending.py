@@ -1,0 +1,169 @@
+"""Recordings added to a folder's: nothing in it is written again, and WAV files stay WAV files."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from modeling.errors import InputError
+from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.tables import number, read_table, whole_number, write_table
+from modeling.files.writing import write_text
+from modeling.recordings.recording import Recording
+from modeling.recordings.recording_set import (
+    INDEX_COLUMNS,
+    INDEX_NAME,
+    WAV_COLUMNS,
+    RecordingSet,
+    index_cells,
+    listed,
+    write_samples,
+)
+
+# Names the files that an addition is about to write; gone once the index lists them.
+UNFINISHED_NAME = ".unfinished"
+_OWN_NAME = re.compile(r"(\d{4,})\.(csv|wav)")
+
+
+@dataclass(frozen=True)
+class WavSource:
+    """The WAV file that a recording's samples were read from.
+
+    Parameters
+    ----------
+    path : Path
+    channel : int
+        From 1.
+    g_per_fullscale : float, optional
+        What the samples were multiplied by; without it their unit is `arbitrary`.
+    """
+
+    path: Path
+    channel: int = 1
+    g_per_fullscale: float | None = None
+
+
+def append(
+    folder: str | Path, recordings: RecordingSet, sources: Sequence[WavSource | None]
+) -> int:
+    """Add recordings to a folder's; a folder that is not there yet is made.
+
+    Files of earlier recordings are not touched, and the index that lists the new ones takes the
+    place of the old one last: whatever ends this earlier, the set is as it was, and the next
+    addition removes what was left behind.
+
+    Parameters
+    ----------
+    folder : str or Path
+    recordings : RecordingSet
+    sources : sequence of WavSource or None
+        For each recording the file to copy into the set, or None: then it becomes a CSV file.
+
+    Returns
+    -------
+    int
+        How many recordings the set holds now.
+
+    Raises
+    ------
+    InputError
+        For a condition that the set holds already, a folder with other contents than a set, and a
+        disk that takes no more.
+    """
+    target = Path(folder)
+    try:
+        if (target / INDEX_NAME).is_file():
+            return _extend(target, recordings, sources)
+        check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+        with replace_folder(target) as fresh:
+            return _extend(fresh, recordings, sources)
+    except OSError as error:
+        where = f" at {error.filename}" if error.filename else ""
+        raise InputError(
+            f"expected to add recordings to {target}, got {error.strerror or error}{where}, so it "
+            "is as it was; check the path, its permissions and the space on the disk."
+        ) from None
+
+
+def _extend(folder: Path, recordings: RecordingSet, sources: Sequence[WavSource | None]) -> int:
+    index = folder / INDEX_NAME
+    known = listed(folder) if index.is_file() else []
+    _check_conditions(known, recordings)
+    _remove_unfinished(folder)
+    names = _new_names(folder, known, sources)
+    write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
+    try:
+        added = [
+            _write(folder / name, recording, source)
+            for name, recording, source in zip(names, recordings, sources, strict=True)
+        ]
+        _write_index(index, added)
+    finally:
+        _remove_unfinished(folder)
+    return len(known) + len(added)
+
+
+def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
+    """Refuse a second recording of a condition; told by the index, no samples are read."""
+    taken = {
+        (
+            row["texture"],
+            number(row["speed_mm_s"], f"speed_mm_s of {row['file']}"),
+            number(row["force_n"], f"force_n of {row['file']}"),
+            whole_number(row.get("repeat") or "1", f"repeat of {row['file']}"),
+        )
+        for row in known
+    }
+    for recording in recordings:
+        if (recording.texture, *recording.condition, recording.repeat) in taken:
+            raise InputError(
+                f"expected one recording per condition, got two of {recording.describe()}, one of "
+                "them in the set already; leave it out, or number real repetitions in the column "
+                "'repeat'."
+            )
+
+
+def _remove_unfinished(folder: Path) -> None:
+    """Remove what an addition that did not come to its end has left behind, and its note."""
+    note, index = folder / UNFINISHED_NAME, folder / INDEX_NAME
+    if not note.is_file():
+        return
+    listed_names = {row["file"] for row in read_table(index, ("file",))} if index.is_file() else ()
+    for name in note.read_text(encoding="utf-8").split("\n"):
+        if _OWN_NAME.fullmatch(name) and name not in listed_names:
+            (folder / name).unlink(missing_ok=True)
+    note.unlink()
+
+
+def _new_names(
+    folder: Path, known: Iterable[dict[str, str]], sources: Sequence[WavSource | None]
+) -> list[str]:
+    """Names that neither the index nor anything else in the folder has."""
+    names = [row["file"] for row in known] + [path.name for path in folder.iterdir()]
+    last = max((int(found[1]) for name in names if (found := _OWN_NAME.fullmatch(name))), default=0)
+    return [
+        f"{place:04d}.{'csv' if source is None else 'wav'}"
+        for place, source in enumerate(sources, start=last + 1)
+    ]
+
+
+def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[str, str]:
+    """Write a recording's file; its row of the index."""
+    cells = (path.name, *index_cells(recording))
+    row = dict(zip(INDEX_COLUMNS, cells, strict=True))
+    if source is None:
+        write_samples(path, recording)
+        return row
+    shutil.copyfile(source.path, path)
+    scale = "" if source.g_per_fullscale is None else repr(source.g_per_fullscale)
+    return row | dict(zip(WAV_COLUMNS, (scale, str(source.channel)), strict=True))
+
+
+def _write_index(index: Path, added: Sequence[dict[str, str]]) -> None:
+    """The rows that were there, as they were, and the new ones; columns are those of both."""
+    rows = [*(read_table(index, ()) if index.is_file() else ()), *added]
+    columns = list(dict.fromkeys(name for row in rows for name in row))
+    write_table(index, columns, [[row.get(name, "") for name in columns] for row in rows])

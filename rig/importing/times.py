@@ -1,0 +1,157 @@
+"""The sampling rate that a time column tells, and how evenly its samples are spaced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from modeling import InputError
+from modeling.arrays import Floats
+from modeling.recordings.spectrum import MODEL_RATE_HZ
+
+SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+LONGEST_GAP = 2.5
+# A tool's vibration needs more; a rate below this means time in another unit than supposed.
+LOWEST_RATE_HZ = 20.0
+LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
+RATE_TOLERANCE = 0.02
+# Share of the power at the highest frequency of a model that jitter may turn into noise (-20 dB).
+TOLERATED_NOISE_SHARE = 0.01
+LOCAL_S = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class TimeColumn:
+    """A time column of a file.
+
+    Parameters
+    ----------
+    file : str
+        Name of the file, for messages.
+    name : str
+        The column's header.
+    unit : str
+        Of the time, "" where the header names none.
+    values : (n,) ndarray
+        In that unit.
+    """
+
+    file: str
+    name: str
+    unit: str
+    values: Floats
+
+    def rate_hz(self) -> float:
+        """The rate by the mean step.
+
+        Raises
+        ------
+        InputError
+            For an unknown unit, times that fall, lost samples, and a rate that no vibration has.
+        """
+        if self.unit not in SECONDS_PER_UNIT:
+            raise InputError(
+                f"expected time in s, ms or us in {self.file}, got {self.unit!r}; convert it or "
+                "give --rate."
+            )
+        rate_hz = 1 / self._mean_step_s()
+        lowest = LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
+        if rate_hz <= lowest:
+            raise InputError(
+                f"expected a rate above {lowest:g} Hz in {self.file}, got {rate_hz:.4g} Hz by its "
+                f"column {self.name!r}: is time in ms or us? Name the unit in the header (time_s, "
+                "time_ms, time_us) or give --rate."
+            )
+        return rate_hz
+
+    def check_rate(self, rate_hz: float) -> None:
+        """Refuse a rate that neither the mean nor the typical step agrees with.
+
+        Where the column tells no rate, any is accepted: it is given because of that.
+        """
+        try:
+            told_hz = self.rate_hz()
+        except InputError:
+            return
+        # Coarse time stamps keep the mean step, lost samples the typical one.
+        steps = np.diff(self._time_s())
+        steps_s = (1 / told_hz, float(np.median(steps[steps > 0])))
+        if all(abs(rate_hz * step_s - 1) > RATE_TOLERANCE for step_s in steps_s):
+            raise InputError(
+                f"expected a --rate that agrees with the time column of {self.file}, got "
+                f"{rate_hz:g} Hz and by its column {self.name!r} {told_hz:.4g} Hz; leave --rate "
+                "out, or remove the column if it is wrong."
+            )
+
+    def jitter_warning(self, rate_hz: float) -> str | None:
+        """What uneven spacing does to samples that are taken as even, where it matters.
+
+        docs/method/recordings.md#uneven-samples
+        """
+        try:
+            self.rate_hz()
+        except InputError:
+            return None
+        rms_s, most_s = _astray(self._time_s())
+        highest_hz = min(rate_hz, MODEL_RATE_HZ) / 2
+        share = -np.expm1(-((2 * np.pi * highest_hz * rms_s) ** 2))
+        if share <= TOLERATED_NOISE_SHARE:
+            return None
+        return (
+            f"{self.file}: its samples are up to {most_s * 1e3:.2g} ms "
+            f"({rms_s * 1e3:.2g} ms RMS) from where even spacing within {LOCAL_S:g} s puts them, "
+            f"but are taken as evenly spaced; that turns {share:.0%} of the power of a vibration "
+            f"at {highest_hz:.4g} Hz into noise, and less at lower frequencies."
+        )
+
+    def _time_s(self) -> Floats:
+        return self.values * SECONDS_PER_UNIT[self.unit]
+
+    def _mean_step_s(self) -> float:
+        """Mean distance of the samples (s), which must rise evenly."""
+        time_s = self._time_s()
+        steps = np.diff(time_s)
+        span = float(time_s[-1] - time_s[0])
+        if not (np.isfinite(time_s).all() and span > 0 and (steps >= 0).all()):
+            raise InputError(
+                f"expected rising times in {self.file}, got some that fall, repeat or are not "
+                "finite; repair the file or give --rate."
+            )
+        mean_step = span / steps.size
+        # Coarse time stamps repeat and jump by whole ticks; lost samples leave a longer gap.
+        tick = float(steps[steps > 0].min())
+        if steps.max() > LONGEST_GAP * max(mean_step, tick):
+            typical = float(np.median(steps[steps > 0]))
+            raise InputError(
+                f"expected evenly spaced samples in {self.file}, got a gap of {steps.max():.4g} s "
+                f"among steps of typically {typical:.4g} s; samples are missing, record again or "
+                "give --rate."
+            )
+        return mean_step
+
+
+def _astray(time_s: Floats) -> tuple[float, float]:
+    """How far times are from evenly spaced ones (s), RMS and at most; 0 where rounding explains it.
+
+    Even spacing may change from one `LOCAL_S` to the next: that shifts frequencies a little, but
+    makes no noise. Times that were rounded, up or down, are off by no more than the tick that they
+    were rounded to, and by tick/√12 RMS.
+    """
+    from scipy.ndimage import uniform_filter1d  # late: slow to load
+
+    place = np.arange(time_s.size) - (time_s.size - 1) / 2
+    off = time_s - time_s.mean()
+    off -= place * float(place @ off / (place @ place))
+    nearby = round(LOCAL_S / float(np.diff(time_s).mean()))
+    if 1 < nearby < off.size:
+        off -= uniform_filter1d(off, nearby, mode="nearest")
+    steps = np.sort(np.append(np.diff(time_s), 0.0))
+    # Closer than this steps are equal, but for the last digits of the time.
+    same = max(1e-6 * float(steps.mean()), 4 * float(np.spacing(np.abs(time_s).max())))
+    ticks = np.diff(steps)
+    tick = float(ticks[ticks > same].min(initial=steps[-1]))
+    most = float(np.abs(off).max())
+    if most <= tick:
+        return 0.0, 0.0
+    return float(np.sqrt(max(float(np.mean(off**2)) - tick**2 / 12, 0.0))), most

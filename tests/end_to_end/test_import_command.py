@@ -1,0 +1,82 @@
+"""What tactileq import tells, and what it leaves behind."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from scipy.io import wavfile
+
+from modeling import RecordingSet
+
+NOISE = np.random.default_rng(1).uniform(-0.5, 0.5, (4000, 2)).astype(np.float32)
+
+
+def test_a_set_keeps_wav_files_and_tells_of_its_imports_side_by_side(main, tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", 10_000, NOISE)
+    labels = ["--force", 1, "--texture", "oak", "--out", "set"]
+    refused = main("import", "wav", "a.wav", "--speed", 1, *labels)
+    assert refused.returncode == 1
+    assert "with --channel" in refused.stderr
+    assert not (tmp_path / "set").exists()
+    sizes = []
+    for speed in range(10, 90, 10):
+        options = ["--speed", speed, "--channel", 2, "--g-per-fullscale", 4]
+        added = main("import", "wav", "a.wav", *options, *labels)
+        assert added.returncode == 0, added.stderr
+        sizes.append((tmp_path / "set/provenance.json").stat().st_size)
+    assert added.stdout.splitlines()[-1] == "1 recordings added at 10000 Hz, 8 in set"
+    records = RecordingSet.load(tmp_path / "set").recordings
+    assert len(records) == 8
+    assert all(np.array_equal(record.samples, 4 * NOISE[:, 1].astype(float)) for record in records)
+    assert (tmp_path / "set/0008.wav").read_bytes() == (tmp_path / "a.wav").read_bytes()
+    # Every import adds as much to the provenance as the one before it.
+    assert np.unique(np.diff(sizes[1:])).size == 1
+    told = json.loads((tmp_path / "set/provenance.json").read_text())
+    assert [one["settings"].get("added to") for one in told["settings"]["added to"]] == [None] * 7
+    assert all(one["command"] == "tactileq import wav" for one in told["settings"]["added to"])
+
+
+def test_provenance_within_provenance_is_kept_side_by_side(main, tmp_path: Path) -> None:
+    """As sets of before have it."""
+    wavfile.write(tmp_path / "a.wav", 10_000, NOISE[:, 0])
+    options = ["--force", 1, "--texture", "oak", "--out", "set"]
+    assert main("import", "wav", "a.wav", "--speed", 1, *options).returncode == 0
+    first = {"command": "tactileq record", "settings": {"texture": "oak"}}
+    second = {"command": "tactileq import csv", "settings": {"unit": "g", "added to": first}}
+    third = {"command": "tactileq import wav", "settings": {"added to": second}}
+    (tmp_path / "set/provenance.json").write_text(json.dumps(third))
+    assert main("import", "wav", "a.wav", "--speed", 2, *options).returncode == 0
+    told = json.loads((tmp_path / "set/provenance.json").read_text())["settings"]["added to"]
+    assert [one["command"].split(maxsplit=1)[1] for one in told] == [
+        *("record", "import csv", "import wav")
+    ]
+
+
+def test_what_may_be_wrong_with_files_is_told_once_they_are_read(main, tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", 10_000, 8 * NOISE[:, 0])
+    (tmp_path / "labels.tsv").write_text(
+        "file\tspeed_mm_s\tforce_n\na.wav\t50\t1\n"
+        + "".join(f"{n}.wav\t{n}\t1\n" for n in range(7))
+    )
+    added = main("import", "wav", "a.wav", "--labels", "labels.tsv", "--out", "set")
+    assert added.returncode == 0
+    assert "warning: a.wav: holds samples up to 3.999, beyond the full scale of 1" in added.stderr
+    note = "note: rows of labels.tsv for files that were not given: 0.wav, 1.wav, 2.wav, 3.wav, 4."
+    assert f"{note}wav and 2 more" in added.stdout
+    (tmp_path / "labels.tsv").write_text("file\tspeed\tforce_n\na.wav\t50\t1\n")
+    refused = main("import", "wav", "a.wav", "--labels", "labels.tsv", "--out", "set")
+    assert "add speed_mm_s" in refused.stderr
+
+
+def test_a_rate_that_contradicts_the_time_column_is_refused(main, tmp_path: Path) -> None:
+    rows = [f"{n / 3200!r},{value!r}" for n, value in enumerate(NOISE[:, 0].tolist())]
+    (tmp_path / "a.csv").write_text("\n".join(["time_s,x_g", *rows]))
+    labels = ["--speed", 100, "--force", 1, "--out", "set"]
+    refused = main("import", "csv", "a.csv", *labels, "--rate", 5000)
+    assert refused.returncode == 1
+    assert "got 5000 Hz and by its column 'time_s' 3200 Hz" in refused.stderr
+    added = main("import", "csv", "a.csv", *labels, "--rate", 3200)
+    assert added.returncode == 0
+    assert "warning: a.csv: has no line end after its last row" in added.stderr
