@@ -7,10 +7,14 @@ words and with the digits that they carry.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from analysis.labels import ALL_LAYERS, ALL_TEXTURES
+
+HASH_DIGITS = 12
+SHA256 = re.compile(r"[0-9a-f]{64}")
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,8 @@ class Column:
         Its numbers are written as p values.
     is_name : bool
         Its values are names, which stay on one line.
+    is_hash : bool
+        Its values may be SHA-256 hashes, of which the first digits are shown.
     total : str
         The value that marks a row over all others; empty where there is none.
     """
@@ -40,6 +46,7 @@ class Column:
     format: str = ""
     is_p_value: bool = False
     is_name: bool = False
+    is_hash: bool = False
     total: str = ""
 
     @property
@@ -50,13 +57,21 @@ class Column:
 
     def text(self, value: object) -> str:
         """A value as people read it, `n/a` where there is none; the exact one is in the file."""
+        if self.is_hash and isinstance(value, str):
+            return shortened_hash(value)
         if not isinstance(value, float):
             return str(value)
         if math.isnan(value):
             return "n/a"
         if self.is_p_value:
             return p_value(value)
-        return f"{value:{self.format}}" if self.format else _three_digits(value)
+        shown = f"{value:{self.format}}" if self.format else _three_digits(value)
+        return shown.replace("-", "−")
+
+    def tooltip(self, value: object) -> str:
+        """The whole value where `text` shows only its beginning, else nothing."""
+        shortened = self.is_hash and isinstance(value, str) and self.text(value) != value
+        return str(value) if shortened else ""
 
     def is_total(self, value: object) -> bool:
         """Whether this value marks a row over all others."""
@@ -93,7 +108,12 @@ def _three_digits(value: float) -> str:
     digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else 3
     # Below 1e-12 is what sums of thirds leave of a zero.
     tiny = 1e-12 < size < 0.0005
-    return (f"{value:.1e}" if tiny else f"{value:.{digits}f}").replace("-", "−")
+    return f"{value:.1e}" if tiny else f"{value:.{digits}f}"
+
+
+def shortened_hash(text: str) -> str:
+    """The first digits of a SHA-256, as many as tell files apart; any other text as it is."""
+    return f"{text[:HASH_DIGITS]}…" if SHA256.fullmatch(text) else text
 
 
 # Columns of more than one table.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from modeling.files.answer_tables import MODEL_LEVELS
 
 MODELS = tuple(MODEL_LEVELS)
+TASKS = {"absolute": "absolute evaluation", "relative": "forced choice"}
 SCALES = {
     "magnitude_similarity": "vibration magnitude",
     "frequency_similarity": "frequency pattern",

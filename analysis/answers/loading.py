@@ -19,6 +19,14 @@ _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
 
 
+@dataclass(frozen=True)
+class PlannedTask:
+    """How many participants are to do a task, in how many sessions altogether."""
+
+    participants: int
+    sessions: int
+
+
 @dataclass(frozen=True, eq=False)
 class Responses:
     """Every answer of one study, checked.
@@ -40,6 +48,8 @@ class Responses:
         The full and the simplified model that were presented; empty where the data do not say.
     study_sha256 : str
         Of the study that was run; empty where the data do not say.
+    planned : mapping of task to PlannedTask
+        How many are to take part, where the data set's description tells.
     warnings : tuple of str
         What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
@@ -51,6 +61,7 @@ class Responses:
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     study_sha256: str = ""
+    planned: Mapping[str, PlannedTask] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
 
     @property
@@ -75,6 +86,23 @@ class Responses:
         """Textures that were asked about, in the order of the answers."""
         asked = (texture for table in self.answers.values() for texture in table["texture"])
         return tuple(dict.fromkeys(asked))
+
+    def done(self, task: str) -> PlannedTask:
+        """How many participants and sessions have answered main trials of a task so far."""
+        answers = self.answers[task]
+        sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
+        return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+
+    @property
+    def unfinished(self) -> tuple[str, ...]:
+        """Tasks that were begun, with fewer participants or sessions than planned."""
+        short = []
+        for task, planned in self.planned.items():
+            done = self.done(task)
+            fewer = done.participants < planned.participants or done.sessions < planned.sessions
+            if done.participants and fewer:
+                short.append(task)
+        return tuple(short)
 
     @property
     def simulated(self) -> bool:
@@ -130,6 +158,7 @@ def load_responses(data_folder: str | Path) -> Responses:
         name=str(description.get("Name", "")),
         models=_models(description, folder),
         study_sha256=str(description.get("StudySHA256", "")),
+        planned=_planned(description, folder / "dataset_description.json"),
         warnings=tuple(warnings),
     )
 
@@ -159,6 +188,24 @@ def _description(folder: Path) -> Mapping[str, object]:
             f'exactly where "Simulated" is, got {parts[0]} and {parts[1]}; say what was simulated.'
         )
     return description
+
+
+def _planned(description: Mapping[str, object], path: Path) -> dict[str, PlannedTask]:
+    """Participants and sessions of each task in the study's design; none where it is not told."""
+    design = description.get("StudyDesign")
+    plans = design if isinstance(design, dict) else {}
+    planned = {}
+    for task in (task for task in ANSWER_TABLES if task in plans):
+        plan = plans[task]
+        participants = plan.get("participants") if isinstance(plan, dict) else None
+        if not isinstance(participants, int) or isinstance(participants, bool) or participants < 1:
+            raise InputError(
+                f"expected a whole number of at least 1 for the participants of {task} under "
+                f"StudyDesign in {path}, got {participants!r}; restore the file."
+            )
+        a_day_for_each_model = plan.get("schedule") == "by-day"
+        planned[task] = PlannedTask(participants, participants * (1 + a_day_for_each_model))
+    return planned
 
 
 def _json_object(path: Path) -> Mapping[str, object]:

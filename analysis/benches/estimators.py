@@ -55,12 +55,13 @@ def estimators_table(*, textures: int, seed: int) -> pd.DataFrame:
     DataFrame
         One row per kind (and for all together) and estimator: kind, estimator, textures; gfc30,
         expected_gfc30, gfc30_deficit and log_spectral_distance_db (means;
-        docs/method/similarity.md); rms_error_db (mean) and median_absolute_rms_error_db, both of the record; precision and
-        recall (of all layers, matched one to one within max(B/2, 10 Hz)) and layers_per_true_layer;
-        level_error_db and median_absolute_level_error_db (medians over matched layers: of the gain
-        for coherent truth, else of the energy within ±B/2); milliseconds (median for one spectrum);
-        simulated (always true). NaN where there are no layers to match. For coherent truth there is
-        also what no estimator can have: the likelihood's maximum next to the truth, untimed.
+        docs/method/similarity.md); rms_error_db (mean) and median_absolute_rms_error_db, both of
+        the record; precision and recall (of all layers, matched one to one within max(B/2, 10 Hz))
+        and layers_per_true_layer; level_error_db and median_absolute_level_error_db (medians over
+        matched layers: of the gain for coherent truth, else of the energy within ±B/2);
+        milliseconds (median for one spectrum); simulated (always true). NaN where there are no
+        layers to match. For coherent truth there is also what no estimator can have: the
+        likelihood's maximum next to the truth, untimed.
     """
     rows = []
     everything: Scores = {}

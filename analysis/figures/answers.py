@@ -19,88 +19,151 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import ALL_TEXTURES, MODELS, SCALES, significance_mark
+from analysis.labels import ALL_TEXTURES, IDENTICAL, MODELS, SCALES, significance_mark
 from analysis.statistics.confusion import ConfusionMatrix
+from modeling.arrays import Floats
 
 MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
 MODEL_HATCHES = {"full": "", "simplified": "///"}
-LEGEND_OF_MARKS = "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
-BAR_WIDTH = 0.38
+LEGEND_OF_BARS = (
+    "bars: mean ± standard error; points: means of the participants, a line joins one person's\n"
+    "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
+)
+BAR_WIDTH = 0.42
+BAR_OPACITY = 0.35
+POINTS_WIDTH = 0.85  # of a bar
+SIDES = (-0.5, 0.5)
+GOLDEN_RATIO = (5**0.5 - 1) / 2
 
 
-def figure_ratings(tests: pd.DataFrame, *, simulated: bool) -> Figure:
+def figure_ratings(tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool) -> Figure:
     """Rated similarity, both scales, before and after simplification (PAPER fig. 9).
 
     Parameters
     ----------
     tests : DataFrame
         From `paired.rating_tests`.
+    means : DataFrame
+        From `paired.rating_means`.
     simulated : bool
         Written into the figure.
     """
-    figure = Figure(figsize=(10.5, 4.6), layout="constrained")
+    figure = Figure(figsize=(12.5, 5), layout="constrained")
     for panel, ax, scale in zip("ab", figure.subplots(1, 2), SCALES.values(), strict=True):
-        chosen = tests[tests["scale"] == scale]
-        plot_paired_bars(chosen, simulated=simulated, ax=ax)
+        chosen, points = tests[tests["scale"] == scale], means[means["scale"] == scale]
+        plot_paired_bars(chosen, points, simulated=simulated, ax=ax)
         ax.set_title(f"({panel}) {scale}", loc="left")
         ax.set_ylabel(f"rated similarity of {scale} (0–100)")
         ax.set_ylim(0, 115)
         ax.set_yticks(range(0, 101, 20))
-    shared_legend(figure, figure.axes[:1])
-    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    shared_legend(figure, figure.axes[:1], ncols=3)
+    figure.supxlabel(LEGEND_OF_BARS, fontsize=9, color=GREY)
     return figure
 
 
-def figure_correct_rates(tests: pd.DataFrame, *, simulated: bool, chance: float = 1 / 7) -> Figure:
+def figure_correct_rates(
+    tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool, chance: float = 1 / 7
+) -> Figure:
     """Correct rates before and after simplification against chance (PAPER fig. 11).
 
     Parameters
     ----------
     tests : DataFrame
         From `rates.rate_tests`; the row over all textures is left out.
+    means : DataFrame
+        From `paired.participant_means` of the correct answers.
     simulated : bool
         Written into the figure.
     chance : float
         Rate of a guessing participant, drawn as a line.
     """
-    figure = Figure(figsize=(8, 4.6), layout="constrained")
+    figure = Figure(figsize=(9.5, 5), layout="constrained")
     ax = figure.subplots()
-    plot_paired_bars(tests[tests["texture"] != ALL_TEXTURES], simulated=simulated, ax=ax)
+    plot_paired_bars(tests[tests["texture"] != ALL_TEXTURES], means, simulated=simulated, ax=ax)
     ax.axhline(chance, color=BLACK, ls="--", lw=1)
     ax.text(1.0, chance, f" chance\n {chance:.1%}", transform=ax.get_yaxis_transform(), va="center")
     ax.set_ylabel("correct rate (share of trials, 0–1)")
     ax.set_ylim(0, 1.15)
     ax.set_yticks(np.arange(0, 1.01, 0.2))
-    shared_legend(figure, figure.axes[:1])
-    figure.supxlabel(f"mean ± standard error. {LEGEND_OF_MARKS}", fontsize=9, color=GREY)
+    shared_legend(figure, figure.axes[:1], ncols=3)
+    figure.supxlabel(LEGEND_OF_BARS, fontsize=9, color=GREY)
     return figure
 
 
-def plot_paired_bars(tests: pd.DataFrame, *, simulated: bool, ax: Axes | None = None) -> Axes:
-    """Mean ± standard error per texture, full beside simplified, with significance marks."""
+def plot_paired_bars(
+    tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool, ax: Axes | None = None
+) -> Axes:
+    """Bars of mean ± standard error per texture, full beside simplified, over their participants.
+
+    Parameters
+    ----------
+    tests : DataFrame
+        A row per texture, as from `paired.paired_family`.
+    means : DataFrame
+        texture, participant_id, full, simplified: a point each, one person's two joined by a line.
+    simulated : bool
+        Written into the figure.
+    ax : Axes, optional
+    """
     ax = axes_or_new(ax)
     place = np.arange(len(tests))
-    for side, model in zip((-0.5, 0.5), MODELS, strict=True):
+    for side, model in zip(SIDES, MODELS, strict=True):
         ax.bar(
             place + side * BAR_WIDTH,
             tests[f"mean_{model}"],
             BAR_WIDTH,
-            yerr=tests[f"se_{model}"].fillna(0.0),
-            capsize=3,
-            color=MODEL_COLOURS[model],
+            color=(MODEL_COLOURS[model], BAR_OPACITY),
             hatch=MODEL_HATCHES[model],
-            edgecolor="white",
+            edgecolor=MODEL_COLOURS[model],
             label=f"{model} model",
         )
-    columns = zip(MODELS, ("se_full", "se_simplified"), strict=True)
-    tops = [tests[f"mean_{model}"] + tests[se].fillna(0.0) for model, se in columns]
-    for x, full_top, top, p in zip(place, *tops, tests["p_holm"], strict=True):
-        _significance_bracket(ax, float(x), top=max(full_top, top), p=float(p))
-    ax.set_xticks(place, list(tests["texture"]), rotation=30, ha="right")
+    for x, test in zip(place, tests.to_dict("records"), strict=True):
+        own = means.loc[means["texture"] == test["texture"], list(MODELS)].to_numpy(dtype=float)
+        _participants(ax, float(x), own)
+        top = max(np.nanmax(own, initial=0.0), *(test[f"mean_{model}"] for model in MODELS))
+        _significance_bracket(ax, float(x), top=float(top), p=float(test["p_holm"]))
+    for side, model in zip(SIDES, MODELS, strict=True):
+        ax.errorbar(
+            place + side * BAR_WIDTH,
+            tests[f"mean_{model}"],
+            tests[f"se_{model}"].fillna(0.0),
+            ls="",
+            color=BLACK,
+            lw=1.8,
+            capsize=4,
+            capthick=1.8,
+            zorder=4,
+        )
+    if ax.lines:
+        ax.lines[0].set_label("one participant")
+    same = tests["note"] == IDENTICAL
+    labels = np.where(same, tests["texture"] + " (identical)", tests["texture"])
+    ax.set_xticks(place, list(labels), rotation=30, ha="right")
     ax.set_xlabel("texture")
     finish_axes(ax)
     stamp_if_simulated(ax, simulated)
     return ax
+
+
+def _participants(ax: Axes, x: float, means: Floats) -> None:
+    """Points (n, 2) of one texture, spread over most of their bars, always alike."""
+    # Steps of the golden ratio lie apart from each other, however many there are.
+    spread = (np.arange(len(means)) * GOLDEN_RATIO % 1.0 - 0.5) * POINTS_WIDTH
+    at = x + (np.array(SIDES) + spread[:, None]) * BAR_WIDTH
+    ax.plot(
+        at.T,
+        means.T,
+        color=GREY,
+        lw=0.5,
+        marker="o",
+        ms=2.8,
+        mfc=BLACK,
+        mec="white",
+        mew=0.4,
+        alpha=0.75,
+        zorder=3,
+        clip_on=False,  # a rate of 0 stands on the axis
+    )
 
 
 def _significance_bracket(ax: Axes, x: float, *, top: float, p: float) -> None:
@@ -149,7 +212,7 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
     ax.imshow(shares, vmin=0, vmax=100, cmap="Blues", aspect="auto")
     for (row, column), share in np.ndenumerate(shares):
         text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
-        shade = "black" if not share > 55 else "white"
+        shade = "black" if not share > 65 else "white"
         shade = shade if np.isfinite(share) else GREY
         ax.text(column, row, text, ha="center", va="center", fontsize=9, color=shade)
     names = list(matrix.textures)

@@ -12,7 +12,9 @@ from matplotlib.ticker import LogLocator, NullLocator
 from analysis.figures.drawing import (
     BLACK,
     BLUE,
+    GREEN,
     GREY,
+    PURPLE,
     SKY_BLUE,
     VERMILLION,
     axes_or_new,
@@ -24,6 +26,7 @@ from analysis.labels import MODELS
 from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
 
 PANELS_IN_A_ROW = 3
+JUST_FELT_DASHES = (0, (1.2, 0.5))  # dense, since these lines are short
 LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side on a log axis
 AMPLITUDE_LABELS = {
     "energy": "amplitude of the sinusoid of equal power",
@@ -77,8 +80,9 @@ def plot_model_spectrum(
         ax.plot(
             frequency,
             comparison.layer_threshold[layer],
-            color=BLACK,
-            lw=1.2,
+            color=GREEN,
+            lw=2.4,
+            ls=JUST_FELT_DASHES,
             label="" if layer else "gain at which the layer here would be just felt",
         )
     # Far skirts of layers must not stretch the axis.
@@ -112,9 +116,10 @@ def plot_layers_and_threshold(
         ax.plot(
             [end, comparison.frequency_hz[-1]],
             [last, last],
-            color=BLACK,
+            color=PURPLE,
+            lw=2.0,
             ls="--",
-            label="assumed lower bound",
+            label="assumed lower bound of the threshold",
         )
     # A layer without power must not stretch the axis: weaker ones stand on its lower edge.
     bottom = float(threshold.acceleration_g.min()) / 1000

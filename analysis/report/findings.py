@@ -137,12 +137,13 @@ def save_findings(found: Findings, out: Path, *, plot: bool) -> Path:
 def _draw(found: Findings, start: Path) -> None:
     # Late: without pictures there is nothing to load Matplotlib for.
     from analysis.figures.layers_over_grid import figure_layers_over_grid
+    from analysis.figures.saving import save_figure
     from analysis.figures.spectra import figure_spectra
     from analysis.spectra.comparison import spectrum_panels
     from analysis.spectra.layers_over_grid import layers_over_grid
 
     panels = spectrum_panels(found.measured, estimator=found.estimator, model=found.model)
-    figure_spectra(panels).savefig(f"{start}_spectra.png", dpi=DOTS_PER_INCH)
+    save_figure(figure_spectra(panels), f"{start}_spectra.png", dpi=DOTS_PER_INCH)
     if found.model is not None:
         figure = figure_layers_over_grid(layers_over_grid(found.model))
-        figure.savefig(f"{start}_layers.png", dpi=DOTS_PER_INCH)
+        save_figure(figure, f"{start}_layers.png", dpi=DOTS_PER_INCH)

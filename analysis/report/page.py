@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import base64
-import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -15,6 +14,8 @@ from analysis.columns import Column, Columns, names
 
 PICTURE_DPI = 150
 PIXELS_PER_INCH = 92
+MOST_COLUMNS_AT_FULL_SIZE = 11
+MOST_ROWS_KEPT_TOGETHER = 15
 
 STYLE = """
 :root { --ink: #1b1f24; --soft: #59636e; --line: #d8dee4; --paper: #fff; --tint: #f4f7fa;
@@ -31,7 +32,7 @@ h3 { margin: 30px 0 8px; font-size: 17px; }
 .banner { background: var(--warn); color: #fff; font-weight: 600; padding: 10px 0; }
 .banner div { max-width: 1240px; margin: 0 auto; padding: 0 28px; }
 nav { margin-top: 16px; font-size: 15px; }
-nav a { color: var(--blue); text-decoration: none; margin-right: 22px; }
+nav a { color: var(--blue); text-decoration: none; margin-right: 22px; white-space: nowrap; }
 nav a:hover { text-decoration: underline; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;
           padding: 26px 30px; margin: 26px 0; }
@@ -40,6 +41,9 @@ section { background: var(--paper); border: 1px solid var(--line); border-radius
 .tile b { display: block; font-size: 23px; line-height: 1.25; white-space: nowrap;
           color: var(--blue); }
 .tile span { color: var(--soft); font-size: 14px; }
+h4 { margin: 16px 0 0; font-size: 15px; color: var(--soft); }
+.answer { margin: 10px 0 12px; padding-left: 14px; border-left: 4px solid var(--blue);
+          font-size: 19px; line-height: 1.45; max-width: 90ch; }
 ul { margin: 8px 0 0; padding-left: 22px; max-width: 95ch; } li { margin: 7px 0; }
 p { max-width: 95ch; }
 .caution { border-left: 4px solid var(--warn); padding: 2px 0 2px 18px; margin-top: 26px; }
@@ -58,7 +62,39 @@ details { border-top: 1px solid var(--line); padding: 10px 0; }
 summary { cursor: pointer; font-weight: 600; }
 footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--soft);
          font-size: 14px; }
-@media print { body { background: none; } section { border: 0; break-inside: avoid-page; } }
+/* Paper lies across, since many tables have more columns than it is wide upright. */
+@page { size: A4 landscape; margin: 12mm; }
+@media print {
+  body { background: none; font-size: 10.5pt; }
+  main, header > div, footer, .banner div { max-width: none; padding: 0; }
+  header { padding: 0 0 8px; } nav { display: none; }
+  .banner { padding: 6px 10px; print-color-adjust: exact; -webkit-print-color-adjust: exact; }
+  section { border: 0; border-radius: 0; padding: 0; margin: 16px 0; }
+  h2, h3, h4, summary, caption { break-after: avoid; }
+  figure, .tile, .short, tr { break-inside: avoid; }
+  figure img { max-height: 155mm; width: auto; }
+  .scroll { overflow: visible; }
+  table { width: 100%; font-size: 8pt; }
+  .wide table { font-size: 7pt; }
+  thead { display: table-header-group; }
+  th, td { padding: 2px 6px 2px 0; overflow-wrap: anywhere; }
+  th, td.number, td.name { overflow-wrap: normal; }
+  td.name { white-space: normal; }
+  caption, figcaption, p, ul, .answer { max-width: none; }
+  caption, figcaption { font-size: 9pt; }
+  /* What is folded on the screen is unfolded on paper, where browsers can without a script. */
+  details::details-content { content-visibility: visible; display: block; block-size: auto; }
+  summary { list-style: none; }
+}
+"""
+
+# Browsers that do not know ::details-content print what is folded closed, unless it is opened.
+UNFOLD_FOR_PRINT = """
+const folds = document.getElementsByTagName("details");
+addEventListener("beforeprint", () => { for (const fold of folds) {
+  if (!fold.open) { fold.open = true; fold.dataset.folded = ""; } } });
+addEventListener("afterprint", () => { for (const fold of folds) {
+  if ("folded" in fold.dataset) { fold.open = false; delete fold.dataset.folded; } } });
 """
 
 
@@ -106,6 +142,11 @@ def bullets(sentences: Sequence[str]) -> str:
     return f"<ul>{items}</ul>" if items else ""
 
 
+def grouped(groups: Mapping[str, Sequence[str]]) -> str:
+    """Lists of plain sentences, each below its heading."""
+    return "".join(f"<h4>{escape(head)}</h4>{bullets(told)}" for head, told in groups.items())
+
+
 def tiles(figures: Sequence[tuple[str, str]]) -> str:
     """Key figures as (value, what it is)."""
     cells = (
@@ -124,13 +165,6 @@ def folded(fold: Fold, content: str) -> str:
 def section(anchor: str, heading: str, *, content: str) -> str:
     """A part of the page with its heading; `content` is HTML."""
     return f'<section id="{escape(anchor)}"><h2>{escape(heading)}</h2>{content}</section>'
-
-
-def picture_png(figure: Figure) -> bytes:
-    """The figure as PNG."""
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=PICTURE_DPI)
-    return buffer.getvalue()
 
 
 def picture_html(picture: Picture, png: bytes) -> str:
@@ -158,9 +192,15 @@ def table_html(table: Table) -> str:
         _row_html(columns, values, css=css) for values in frame.itertuples(index=False, name=None)
     )
     return (
-        f'<div class="scroll" id="table-{escape(table.name)}"><table><caption>{_caption(table)}'
-        f"</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+        f'<div class="{_classes(columns, len(frame))}" id="table-{escape(table.name)}"><table>'
+        f"<caption>{_caption(table)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
+
+
+def _classes(columns: Columns, rows: int) -> str:
+    """On paper a table of many columns is set smaller, and one of few rows stays on one page."""
+    wide, short = len(columns) > MOST_COLUMNS_AT_FULL_SIZE, rows <= MOST_ROWS_KEPT_TOGETHER
+    return "scroll" + " wide" * wide + " short" * short
 
 
 def _with_content(table: Table) -> Columns:
@@ -179,14 +219,16 @@ def _css(column: Column, values: pd.Series) -> str:
 
 def _row_html(columns: Columns, values: Sequence[object], *, css: Sequence[str]) -> str:
     cells = "".join(
-        f"<td {c}>{escape(column.text(value))}</td>"
+        f"<td {c}{_title(column.tooltip(value))}>{escape(column.text(value))}</td>"
         for column, value, c in zip(columns, values, css, strict=True)
     )
     total = any(column.is_total(value) for column, value in zip(columns, values, strict=True))
     return f'<tr class="total">{cells}</tr>' if total else f"<tr>{cells}</tr>"
 
 
-def page(*, title: str, lead: str, banner: str, sections: Sequence[tuple[str, str, str]]) -> str:
+def page(
+    *, title: str, answer: str, lead: str, banner: str, sections: Sequence[tuple[str, str, str]]
+) -> str:
     """The whole page from (anchor, heading, HTML) sections; no banner where its text is empty."""
     links = "".join(f'<a href="#{escape(a)}">{escape(heading)}</a>' for a, heading, _ in sections)
     warning = f'<div class="banner"><div>{escape(banner)}</div></div>' if banner else ""
@@ -195,9 +237,14 @@ def page(*, title: str, lead: str, banner: str, sections: Sequence[tuple[str, st
         f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<style>{STYLE}</style></head><body>{warning}<header><div><h1>{escape(title)}</h1>"
-        f'<p class="lead">{escape(lead)}</p><nav>{links}</nav></div></header>'
-        f"<main>{body}</main></body></html>\n"
+        f'<p class="answer">{escape(answer)}</p><p class="lead">{escape(lead)}</p>'
+        f"<nav>{links}</nav></div></header>"
+        f"<main>{body}</main><script>{UNFOLD_FOR_PRINT}</script></body></html>\n"
     )
+
+
+def _title(tooltip: str) -> str:
+    return f' title="{escape(tooltip)}"' if tooltip else ""
 
 
 def _full_title(item: Table | Picture) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,16 +10,20 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.columns import Column, names
+from analysis.columns import without
+from analysis.figures.saving import missing_fonts, png_of
+from analysis.report.answer import answer, overall_outcomes, unfinished_tasks
+from analysis.report.outcomes import by_weight
 from analysis.report.page import (
+    PICTURE_DPI,
     Fold,
     Item,
     Table,
     bullets,
     folded,
+    grouped,
     page,
     picture_html,
-    picture_png,
     table_html,
     tiles,
 )
@@ -26,15 +31,17 @@ from analysis.report.section_answers import choice_section, rating_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
+from analysis.report.section_provenance import provenance_table
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
+from analysis.statistics.overall import OVERALL_COLUMNS, overall_tests
 from analysis.textures.results import TextureResult
 from modeling import InputError
 from modeling.files.writing import write_text
 
+OVERALL_SHOWN = without(OVERALL_COLUMNS, "se_full", "se_simplified", "shapiro_p", "wilcoxon_w")
 MODELS_SHARE = 0.35  # of the time that a report of a whole study takes
 PARAMETERS_SHARE = 0.3
-PROVENANCE_COLUMNS = (Column("what"), Column("value"))
 
 
 def write_report(
@@ -42,7 +49,7 @@ def write_report(
     *,
     responses: Responses | None = None,
     textures: Sequence[TextureResult] = (),
-    provenance: Mapping[str, str] | None = None,
+    provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
     seed: int = 0,
     progress: Progress | None = None,
@@ -57,8 +64,8 @@ def write_report(
         Answers of the study; without them the report is on the models alone.
     textures : sequence of TextureResult, optional
         Models, their simplification and, where known, the planted truth.
-    provenance : mapping of str to str, optional
-        Versions, configuration, hashes of inputs; shown as they are.
+    provenance : mapping of str to object, optional
+        Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
     seed : int
         Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
@@ -78,25 +85,40 @@ def write_report(
     target = Path(path)
     tell = progress or (lambda share, what: None)
     rng = np.random.default_rng(seed)
-    sections = _sections(responses, textures, rng=rng, tell=tell)
+    same = frozenset(r.texture for r in textures if r.simplification.identical)
+    identical = same if responses is None else same | responses.identical
+    sections = _sections(responses, textures, identical=identical, rng=rng, tell=tell)
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
     tell(0.8, "writing the report")
-    facts = {**(provenance or {}), "seed of this report": str(seed)}
-    parts = [
-        ("overview", "At a glance", _overview(sections, responses, models=bool(textures))),
-        *((s.anchor, s.heading, _section_html(s, folder=target.parent)) for s in sections),
-        ("origin", "Provenance", _item_html(_provenance(facts), folder=target.parent)),
-    ]
+    overall = pd.DataFrame()
+    if responses is not None:
+        overall = overall_tests(responses, identical=identical)
+    families = [section.tests for section in sections if section.tests is not None]
+    facts = {**(provenance or {}), "seed of this report": seed}
+    files = _Files(target.parent)
+    compared = files.html(_overall_items(overall, responses))
+    shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
+    undrawn = missing_fonts("".join(sorted(files.lacking)))
+    overview = _overview(
+        sections, responses, overall=overall, models=bool(textures), undrawn=undrawn
+    )
     html = page(
         title=title,
+        answer=answer(overall, families, responses=responses),
         lead="Surfaces recorded, modelled, simplified by what can be felt, and judged.",
         banner=_banner(responses, textures),
-        sections=parts,
+        sections=[
+            ("overview", "At a glance", overview + compared),
+            *shown,
+            ("origin", "Provenance", files.html([provenance_table(facts)])),
+        ],
     )
     write_text(target, html)
+    if undrawn:
+        warnings.warn(undrawn, stacklevel=2)
     tell(1.0, "done")
     return target
 
@@ -105,6 +127,7 @@ def _sections(
     responses: Responses | None,
     textures: Sequence[TextureResult],
     *,
+    identical: frozenset[str],
     rng: np.random.Generator,
     tell: Progress,
 ) -> list[Section]:
@@ -122,34 +145,61 @@ def _sections(
     if responses is not None:
         tell(MODELS_SHARE + PARAMETERS_SHARE, "analysing answers")
         if not responses.absolute.empty:
-            sections.append(rating_section(responses))
+            sections.append(rating_section(responses, identical=identical))
         if not responses.relative.empty:
-            sections.append(choice_section(responses, rng=rng))
+            sections.append(choice_section(responses, identical=identical, rng=rng))
     planted = [result for result in textures if result.truth is not None]
     if planted:
         sections.append(planted_section(planted))
     return sections
 
 
-def _overview(sections: Sequence[Section], responses: Responses | None, *, models: bool) -> str:
+def _overview(
+    sections: Sequence[Section],
+    responses: Responses | None,
+    *,
+    overall: pd.DataFrame,
+    models: bool,
+    undrawn: str,
+) -> str:
     warned = cautions(
         [section.tests for section in sections if section.tests is not None],
         simulated_participants=responses is not None and responses.simulated_participants,
         simulated_rig=responses is not None and responses.simulated_rig,
         models=models,
+        unfinished=[] if responses is None else unfinished_tasks(responses),
     )
-    warnings = responses.warnings if responses is not None else ()
+    outcomes = overall_outcomes(overall)
+    outcomes += [outcome for section in sections for outcome in section.outcomes]
+    noticed = responses.warnings if responses is not None else ()
     done = [sentence for section in sections for sentence in section.done]
-    done += [f"On reading the answers: {warning}" for warning in warnings]
+    done += [f"On reading the answers: {warning}" for warning in noticed]
+    done += [f"On drawing the pictures: {undrawn}"] * bool(undrawn)
     return (
         tiles([tile for section in sections for tile in section.tiles])
         + "<h3>What came out</h3>"
-        + bullets([sentence for section in sections for sentence in section.outcomes])
+        + grouped(by_weight(outcomes))
         + '<div class="caution"><h3>What may not be concluded</h3>'
         + bullets(warned)
         + "</div><h3>What was done</h3>"
         + bullets(done)
     )
+
+
+def _overall_items(overall: pd.DataFrame, responses: Responses | None) -> tuple[Item, ...]:
+    if overall.empty or responses is None:
+        return ()
+    table = Table(
+        "overall_tests",
+        "Full against simplified models over all textures",
+        "The comparison behind the sentence on top. A participant's value is the mean over the "
+        "textures that they judged with both models; the correct rate is a share. Differences are "
+        "simplified − full. Holm over the measures. Intervals: 95% each, not corrected.",
+        overall,
+        OVERALL_SHOWN,
+        responses.simulated,
+    )
+    return (table,)
 
 
 def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:
@@ -165,34 +215,29 @@ def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> s
     return f"SIMULATED: {'; '.join(reasons)}." if reasons else ""
 
 
-def _provenance(facts: Mapping[str, str]) -> Table:
-    return Table(
-        "provenance",
-        "Where this report comes from",
-        "Exact tables are in tables/*.tsv, pictures in figures/*.png beside this file.",
-        pd.DataFrame([*facts.items()], columns=names(PROVENANCE_COLUMNS)),
-        PROVENANCE_COLUMNS,
-        simulated=False,
-    )
+class _Files:
+    """The folder beside the report, and what none of its pictures could draw."""
 
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.lacking: set[str] = set()
 
-def _section_html(section: Section, *, folder: Path) -> str:
-    return "".join(_item_html(item, folder=folder) for item in section.items)
+    def html(self, items: Sequence[Item]) -> str:
+        """The items as HTML; their tables and pictures are written to the folder as well."""
+        return "".join(self._item_html(item) for item in items)
 
-
-def _item_html(item: Item, *, folder: Path) -> str:
-    """The item as HTML; its table or picture is written to the folder as well."""
-    if isinstance(item, Fold):
-        content = "".join(_item_html(inner, folder=folder) for inner in item.items)
-        return folded(item, content)
-    if isinstance(item, Table):
-        _save_table(item, folder / "tables")
-        return table_html(item)
-    png = picture_png(item.figure)
-    target = folder / "figures" / f"{item.name}.png"
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(png)
-    return picture_html(item, png)
+    def _item_html(self, item: Item) -> str:
+        if isinstance(item, Fold):
+            return folded(item, self.html(item.items))
+        if isinstance(item, Table):
+            _save_table(item, self.folder / "tables")
+            return table_html(item)
+        png, lacking = png_of(item.figure, dpi=PICTURE_DPI)
+        self.lacking.update(lacking)
+        target = self.folder / "figures" / f"{item.name}.png"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(png)
+        return picture_html(item, png)
 
 
 def _save_table(table: Table, folder: Path) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
+
 import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
 from analysis.columns import chosen, without
 from analysis.figures.answers import figure_confusion, figure_correct_rates, figure_ratings
-from analysis.labels import ALL_TEXTURES, MODELS
+from analysis.labels import ALL_TEXTURES, MODELS, TASKS
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes, rating_outcomes
@@ -18,7 +20,12 @@ from analysis.statistics.confusion import (
     confusion_matrices,
     confusion_table,
 )
-from analysis.statistics.paired import RATING_TEST_COLUMNS, rating_tests
+from analysis.statistics.paired import (
+    RATING_TEST_COLUMNS,
+    participant_means,
+    rating_means,
+    rating_tests,
+)
 from analysis.statistics.rates import (
     CORRECT_RATE_COLUMNS,
     RATE_TEST_COLUMNS,
@@ -38,15 +45,16 @@ CORRECT_RATES_SHOWN = (
 )
 
 
-def rating_section(responses: Responses) -> Section:
-    """Absolute evaluation (PAPER VIII-A)."""
-    tests = rating_tests(responses.absolute, identical=responses.identical)
-    done, tile = _participants(responses, responses.absolute, where="absolute evaluation")
+def rating_section(responses: Responses, *, identical: Set[str] = frozenset()) -> Section:
+    """Absolute evaluation (PAPER VIII-A); `identical`: textures with nothing to compare."""
+    tests = rating_tests(responses.absolute, identical=identical)
+    done, tile = _participants(responses, "absolute")
     picture = Picture(
         "ratings",
         "Rated similarity of virtual and real surface",
-        "Means over participants ± standard error. Cf. the paper's figure 9.",
-        figure_ratings(tests, simulated=responses.simulated),
+        "Bars: means over participants ± standard error; points: participants. Cf. the paper's "
+        "figure 9.",
+        figure_ratings(tests, rating_means(responses.absolute), simulated=responses.simulated),
         responses.simulated,
     )
     table = Table(
@@ -70,14 +78,20 @@ def rating_section(responses: Responses) -> Section:
     )
 
 
-def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section:
-    """Relative evaluation (PAPER VIII-B); `rng` draws the bootstrap."""
+def choice_section(
+    responses: Responses, *, identical: Set[str] = frozenset(), rng: np.random.Generator
+) -> Section:
+    """Relative evaluation (PAPER VIII-B); `rng` draws the bootstrap.
+
+    `identical`: textures with nothing to compare.
+    """
     relative, simulated = responses.relative, responses.simulated
     matrices = confusion_matrices(relative)
     chance = 1 / len(matrices["full"].textures)
     rates = correct_rates(relative, rng=rng, chance=chance)
-    tests = rate_tests(relative, identical=responses.identical)
-    done, tile = _participants(responses, relative, where="forced choice")
+    tests = rate_tests(relative, identical=identical)
+    means = participant_means(relative, "correct")
+    done, tile = _participants(responses, "relative")
     overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)
     rate_tile = (shown, f"right answers, full → simplified (chance {chance:.0%})")
@@ -89,7 +103,7 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
         "choices",
         "Relative evaluation: forced choice",
         (
-            *_choice_pictures(tests, matrices, simulated=simulated),
+            *_choice_pictures(tests, means, matrices=matrices, simulated=simulated),
             *_rate_tables(rates, tests, simulated=simulated),
             counts,
         ),
@@ -101,14 +115,19 @@ def choice_section(responses: Responses, *, rng: np.random.Generator) -> Section
 
 
 def _choice_pictures(
-    tests: pd.DataFrame, matrices: dict[str, ConfusionMatrix], *, simulated: bool
+    tests: pd.DataFrame,
+    means: pd.DataFrame,
+    *,
+    matrices: dict[str, ConfusionMatrix],
+    simulated: bool,
 ) -> tuple[Picture, Picture]:
     chance = 1 / len(matrices["full"].textures)
     rates_picture = Picture(
         "correct_rates",
         "Correct rates of the forced choice",
-        "Means over participants ± standard error; dashed: chance. Cf. the paper's figure 11.",
-        figure_correct_rates(tests, simulated=simulated, chance=chance),
+        "Bars: means over participants ± standard error; points: participants; dashed: chance. "
+        "Cf. the paper's figure 11.",
+        figure_correct_rates(tests, means, simulated=simulated, chance=chance),
         simulated,
     )
     confusion_picture = Picture(
@@ -147,15 +166,22 @@ def _rate_tables(
     return against_chance, paired
 
 
-def _participants(
-    responses: Responses, trials: pd.DataFrame, *, where: str
-) -> tuple[str, tuple[str, str]]:
-    """The sentence and the tile that say how many took part."""
-    people = trials["participant_id"].nunique()
+def _participants(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:
+    """The sentence and the tile that say how many took part, of how many."""
+    where = TASKS[task]
+    done, planned = responses.done(task), responses.planned.get(task)
+    people = str(done.participants)
     who = "simulated participants" if responses.simulated_participants else "participants"
     who += " at the simulated rig" if responses.simulated_rig else ""
-    sentence = f"{where.capitalize()}: {people} {who}, {len(trials)} trials (training left out)."
-    return sentence, (str(people), f"{who}, {where}")
+    trials = f"{len(responses.answers[task])} trials (training left out)"
+    if planned is None:
+        return f"{where.capitalize()}: {people} {who}, {trials}.", (people, f"{who}, {where}")
+    people += f" of {planned.participants}"
+    sentence = (
+        f"{where.capitalize()}: {people} planned {who}, {done.sessions} of {planned.sessions} "
+        f"planned sessions, {trials}."
+    )
+    return sentence, (people, f"planned {who}, {where}")
 
 
 def _confusion_table(matrix: ConfusionMatrix, *, simulated: bool) -> Table:

@@ -13,7 +13,7 @@ from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Progress, Section
-from analysis.report.sentences import left_out_outcomes, simplification_outcomes
+from analysis.report.sentences import described, left_out_outcomes, simplification_outcomes
 from analysis.spectra.comparison import compare_spectra
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
@@ -75,7 +75,7 @@ def model_section(
         (table, *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
-            *left_out_outcomes(left_out),
+            *described(left_out_outcomes(left_out)),
         ),
         done=_models_done(textures),
         tiles=_model_tiles(gfc),
@@ -191,7 +191,7 @@ def _threshold_picture(result: TextureResult, stem: str) -> Picture:
         f"threshold_{stem}",
         f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
         "Above: smoothed spectrum of the recording and of each model; thin lines: each layer "
-        "alone, and in black the gain at which it would be just felt. Below: each layer's "
+        "alone, and in green dashes the gain at which it would be just felt. Below: each layer's "
         "amplitude by the criterion against the threshold; open crosses mark dropped layers. A "
         "layer may lie below the threshold here and yet be kept, because another condition, its "
         "uncertainty or the sum of the dropped layers decides. Cf. the paper's figure 6.",

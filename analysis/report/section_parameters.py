@@ -11,7 +11,7 @@ from analysis.columns import chosen
 from analysis.figures.regression import figure_centroid
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Progress, Section
-from analysis.report.sentences import driving_outcomes, regression_outcomes
+from analysis.report.sentences import described, driving_outcomes, regression_outcomes
 from analysis.textures.regressions import (
     CENTROID_AMPLITUDE_COLUMNS,
     CENTROID_COLUMNS,
@@ -85,10 +85,7 @@ def parameter_section(
             *_centroid_items(models, simulated=simulated),
             _driving_table(driving, simulated=simulated),
         ),
-        outcomes=(
-            *regression_outcomes(support),
-            *driving_outcomes(driving),
-        ),
+        outcomes=tuple(described([*regression_outcomes(support), *driving_outcomes(driving)])),
     )
 
 

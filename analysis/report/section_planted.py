@@ -10,7 +10,7 @@ from analysis.columns import without
 from analysis.labels import ALL_LAYERS
 from analysis.report.page import Fold, Item, Table
 from analysis.report.sections import Section
-from analysis.report.sentences import planted_outcomes
+from analysis.report.sentences import described, planted_outcomes
 from analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
 from analysis.textures.recovery import (
     PLANTED_LAYER_COLUMNS,
@@ -41,7 +41,7 @@ def planted_section(textures: Sequence[TextureResult]) -> Section:
         "planted",
         "Planted truth",
         (tables[0], *between, *tables[1:]),
-        outcomes=tuple(planted_outcomes(score)),
+        outcomes=tuple(described(planted_outcomes(score))),
     )
 
 
@@ -68,8 +68,10 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "Planted layers found",
         "Planted and estimated layers are paired one to one within max(B/2, 10 Hz) in every "
         "condition. Precision: share of the estimated layers nearest to this planted layer that "
-        "have a partner; recall: share of the conditions in which it was found; median errors over "
-        "the pairs. Levels compare |G| at one rate.",
+        "have a partner; recall: share of the conditions in which it was found; medians over the "
+        "pairs and, beside each, the worst pair with its sign and place. Bandwidth ratio: "
+        "estimated over planted. Frequency errors are estimated − planted; their median is of "
+        "absolute values. Levels compare |G| at one rate.",
         score,
         PLANTED_TRUTH_COLUMNS,
         simulated=True,
@@ -79,7 +81,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "Planted layers found, by texture",
         "The rows for all layers of the table below; its caption explains the columns.",
         score[score["layer"] == ALL_LAYERS].drop(columns="layer"),
-        without(PLANTED_TRUTH_COLUMNS, "layer"),
+        without(PLANTED_TRUTH_COLUMNS, "layer", "median_absolute_level_error_db"),
         simulated=True,
     )
     detail = Table(

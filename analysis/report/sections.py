@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from analysis.report.outcomes import Outcome
 from analysis.report.page import Item
 
 Progress = Callable[[float, str], None]
@@ -21,8 +22,8 @@ class Section:
     anchor, heading : str
     items : tuple of Table, Picture or Fold
         In the order of the page.
-    outcomes : tuple of str
-        What came out, one sentence each, computed from the numbers.
+    outcomes : tuple of Outcome
+        What came out, computed from the numbers.
     done : tuple of str
         What was done.
     tiles : tuple of (str, str)
@@ -34,7 +35,7 @@ class Section:
     anchor: str
     heading: str
     items: tuple[Item, ...]
-    outcomes: tuple[str, ...] = ()
+    outcomes: tuple[Outcome, ...] = ()
     done: tuple[str, ...] = ()
     tiles: tuple[tuple[str, str], ...] = ()
     tests: pd.DataFrame | None = None

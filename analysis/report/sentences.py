@@ -2,46 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from analysis.columns import p_value
 from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, MODELS, SCALES
+from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 
 ALPHA = 0.05
 
 
-def rating_outcomes(tests: pd.DataFrame) -> list[str]:
+def rating_outcomes(tests: pd.DataFrame) -> list[Outcome]:
     """One sentence per rating scale, from `paired.rating_tests`."""
+    families = {scale: tests[tests["scale"] == scale] for scale in SCALES.values()}
     return [
-        f"Rated similarity of {scale}: "
-        + _differences(tests[tests["scale"] == scale], unit="points", factor=1.0)
-        for scale in SCALES.values()
+        Outcome(
+            _weight_of_family(family),
+            f"Rated similarity of {scale}: " + _differences(family, unit="points", factor=1.0),
+        )
+        for scale, family in families.items()
     ]
 
 
 def rate_outcomes(
     rates: pd.DataFrame, tests: pd.DataFrame, *, matrices: Mapping[str, ConfusionMatrix]
-) -> list[str]:
+) -> list[Outcome]:
     """Sentences on the forced choice, from the three results of `statistics`."""
-    sentences = []
+    family = tests[tests["texture"] != ALL_TEXTURES]
+    differ = "Correct rates: " + _differences(family, unit="percentage points", factor=100.0)
+    outcomes = [Outcome(_weight_of_family(family), differ)]
     for model in MODELS:
         chosen = rates[rates["model"] == model]
         if not chosen.empty:
             chance = 1 / len(matrices[model].textures)
-            sentences.append(_against_chance(chosen, model=model, chance=chance))
-            sentences.extend(_strongest_confusion(matrices[model]))
-    family = tests[tests["texture"] != ALL_TEXTURES]
-    sentences.append(
-        "Correct rates: " + _differences(family, unit="percentage points", factor=100.0)
-    )
-    return sentences
+            told = _against_chance(chosen, model=model, chance=chance)
+            outcomes.append(Outcome(Weight.SECONDARY, told))
+            outcomes += described(_strongest_confusion(matrices[model]))
+    return outcomes
 
 
-def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
+def described(sentences: Iterable[str]) -> list[Outcome]:
+    """These sentences as findings that describe and test nothing."""
+    return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences]
+
+
+def _weight_of_family(tests: pd.DataFrame) -> Weight:
+    """Tests that show a difference in some texture weigh more than those that show none."""
+    return Weight.TEXTURES if (tests["p_holm"] < ALPHA).any() else Weight.SECONDARY
+
+
+def simplification_outcomes(gfc: pd.DataFrame) -> list[Outcome]:
     """Sentences on what was dropped and what it cost, from `likeness.gfc_table` rows."""
     full = gfc[gfc["model"] == "full"].set_index("texture")
     simple = gfc[gfc["model"] == "simplified"].set_index("texture")
@@ -59,14 +72,14 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[str]:
     ]
     if (dropped == 0).any():
         same = _names([str(texture) for texture in dropped.index[dropped == 0]])
-        sentences.append(f"No layer was dropped from {same}: full and simplified are {IDENTICAL}.")
+        sentences.append(f"No layer was dropped from {same}: {IDENTICAL}.")
     if (dropped > 0).any():
         change = -loss[dropped > 0].sort_values(ascending=False)
         sentences.append(
-            f"Where layers were dropped, GFC30 changed by {_signed(change.iloc[0], 4)} "
-            f"({change.index[0]}) to {_signed(change.iloc[-1], 4)} ({change.index[-1]})."
+            f"Where layers were dropped, GFC30 changed by {signed(change.iloc[0], 4)} "
+            f"({change.index[0]}) to {signed(change.iloc[-1], 4)} ({change.index[-1]})."
         )
-    return sentences
+    return [Outcome(Weight.SECONDARY, sentence) for sentence in sentences]
 
 
 def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
@@ -77,7 +90,7 @@ def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
         sentences.append(
             f"Conditions that were left out are predicted by {name} with a level error of "
             f"{rows['median_level_error_db'].median():.2f} dB (median over textures; at worst "
-            f"{_signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
+            f"{signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
             f"{worst['worst_level_error_at']}) and a log-spectral distance of "
             f"{rows['median_distance_db'].median():.2f} dB."
         )
@@ -129,10 +142,24 @@ def _planted_outcome(estimator: str, rows: pd.DataFrame) -> str:
         f"{rows['precision'].mean():.0%} of the layers it reports were planted; median errors: "
         f"{rows['median_frequency_error_hz'].mean():.1f} Hz in frequency, a factor of "
         f"{rows['median_bandwidth_ratio'].mean():.2f} in bandwidth, "
-        f"{_signed(rows['median_level_error_db'].mean(), 1)} dB in level, "
-        f"{_signed(rows['median_noise_gain_error_db'].mean(), 1)} dB in noise gain (medians over "
-        f"the conditions, averaged over {len(rows)} texture{'s' * (len(rows) != 1)})."
+        f"{signed(rows['median_level_error_db'].mean(), 1)} dB in level, "
+        f"{signed(rows['median_noise_gain_error_db'].mean(), 1)} dB in noise gain (medians over "
+        f"the conditions, averaged over {len(rows)} texture{'s' * (len(rows) != 1)}); at worst "
+        f"{_worst_of(rows, 'frequency_error', digits=1, unit='_hz')}, a factor of "
+        f"{_worst_of(rows, 'bandwidth_ratio', digits=2)} and "
+        f"{_worst_of(rows, 'level_error', digits=1, unit='_db')}."
     )
+
+
+def _worst_of(rows: pd.DataFrame, name: str, *, digits: int, unit: str = "") -> str:
+    """The worst of all textures, with its place."""
+    values = rows[f"worst_{name}{unit}"]
+    far = values.abs() if unit else np.log(values).abs()
+    worst = rows.iloc[int(far.fillna(0.0).to_numpy().argmax())]
+    value = float(worst[f"worst_{name}{unit}"])
+    units = {"_hz": " Hz", "_db": " dB", "": ""}
+    shown = signed(value, digits) if unit else f"{value:.{digits}f}"
+    return f"{shown}{units[unit]} ({worst['texture']}, {worst[f'worst_{name}_at']})"
 
 
 def cautions(
@@ -141,6 +168,7 @@ def cautions(
     simulated_participants: bool,
     simulated_rig: bool,
     models: bool,
+    unfinished: Sequence[str] = (),
 ) -> list[str]:
     """What may not be concluded.
 
@@ -152,8 +180,15 @@ def cautions(
         Whether the answers are simulated, and whether the rig was.
     models : bool
         Whether the report shows likeness of spectra.
+    unfinished : sequence of str
+        For each task with less than was planned: how much of it there is.
     """
     sentences = []
+    if unfinished:
+        sentences.append(
+            f"The study is not complete ({'; '.join(unfinished)}): these results are preliminary, "
+            "and p values do not hold where they decide whether to go on."
+        )
     if families and simulated_participants:
         sentences.append(
             "Simulated participants follow a model that was written down beforehand: their "
@@ -200,10 +235,10 @@ def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
         text = f"no difference between the models was shown in any of {count} textures"
     else:
         shown = "; ".join(
-            f"{row['texture']} {_signed(factor * row['mean_difference'], 1)} {unit} (95% CI "
-            f"{_signed(factor * row['ci_low'], 1)} to {_signed(factor * row['ci_high'], 1)}, "
-            f"t({row['df']}) = {_signed(row['t'], 2)}, Holm p {_p(row['p_holm'])}, "
-            f"d_z = {_signed(row['d_z'], 2)})"
+            f"{row['texture']} {signed(factor * row['mean_difference'], 1)} {unit} (95% CI "
+            f"{signed(factor * row['ci_low'], 1)} to {signed(factor * row['ci_high'], 1)}, "
+            f"t({row['df']}) = {signed(row['t'], 2)}, Holm p {_p(row['p_holm'])}, "
+            f"d_z = {signed(row['d_z'], 2)})"
             for row in different.to_dict("records")
         )
         text = f"simplified and full models differ in {len(different)} of {count} textures: {shown}"
@@ -259,7 +294,8 @@ def _names(textures: Sequence[str] | pd.Series) -> str:
     return ", ".join(textures) or "none"
 
 
-def _signed(value: float, digits: int) -> str:
+def signed(value: float, digits: int) -> str:
+    """A number with its sign, as people write it."""
     return f"{value:+.{digits}f}".replace("-", "−")
 
 

@@ -192,17 +192,21 @@ def rating_tests(
     return pd.concat(families, ignore_index=True)[names(RATING_TEST_COLUMNS)]
 
 
+def rating_means(absolute: pd.DataFrame) -> pd.DataFrame:
+    """`participant_means` of both rating scales, with a column scale."""
+    means = [
+        participant_means(absolute, column).assign(scale=scale) for column, scale in SCALES.items()
+    ]
+    return pd.concat(means, ignore_index=True)
+
+
 def paired_family(
     table: pd.DataFrame, column: str, *, identical: Collection[str] = frozenset()
 ) -> pd.DataFrame:
     """Test every texture of a table but the identical ones; the Holm family is these textures."""
     rows = []
-    for texture, cells in table.groupby("texture", sort=False):
-        means = cells.pivot_table(
-            index="participant_id", columns="model", values=column, aggfunc="mean", dropna=False
-        ).reindex(columns=list(MODELS))
-        # Named against everybody in the table, so that a whole missing cell is seen too.
-        means = means.reindex(sorted(table["participant_id"].unique()))
+    for texture, means in participant_means(table, column).groupby("texture", sort=False):
+        means = means.set_index("participant_id")[list(MODELS)]
         both = means.dropna()
         result = asdict(paired_test(both["full"], both["simplified"]))
         if texture in identical:
@@ -213,6 +217,37 @@ def paired_family(
         raise InputError(f"expected answers in column {column}, got none; run a session first.")
     family = pd.DataFrame(rows).sort_values("texture", key=ignoring_case)
     return family.assign(p_holm=holm(family["p"]))
+
+
+def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
+    """What each participant's answers on each texture average to, with either model.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Columns participant_id, texture, model and `column`.
+    column : str
+
+    Returns
+    -------
+    DataFrame
+        texture, participant_id, full, simplified: a row for every participant of the table and
+        every texture, textures in the order of the answers; NaN where there is no answer.
+    """
+    means = table.pivot_table(
+        index=["texture", "participant_id"],
+        columns="model",
+        values=column,
+        aggfunc="mean",
+        dropna=False,
+        observed=True,
+    ).reindex(columns=list(MODELS))
+    # Everybody in every texture, so that a whole missing cell is seen too.
+    people = sorted(table["participant_id"].unique())
+    every = pd.MultiIndex.from_product(
+        [table["texture"].unique(), people], names=["texture", "participant_id"]
+    )
+    return means.reindex(every).rename_axis(columns=None).reset_index()
 
 
 def t_test(differences: Floats) -> tuple[float, float, float, float]:

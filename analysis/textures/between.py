@@ -188,7 +188,7 @@ def _squares(measured: Measured, colour: int) -> set[Condition]:
 
 MEDIAN_AND_WORST_COLUMNS = (
     CONDITIONS,
-    Column("median_level_error_db", "level error, median", "dB"),
+    Column("median_level_error_db", "absolute level error, median", "dB"),
     Column("worst_level_error_db", "worst", "dB"),
     Column("worst_level_error_at", "at", is_name=True),
     Column("median_distance_db", "distance, median", "dB"),
@@ -282,7 +282,7 @@ PLANTED_BETWEEN_COLUMNS = (
     ESTIMATOR,
     Column("distance_at_db", "distance at", "dB"),
     Column("distance_between_db", "distance between", "dB"),
-    Column("median_level_error_between_db", "level error between, median", "dB"),
+    Column("median_level_error_between_db", "absolute level error between, median", "dB"),
     Column("worst_level_error_between_db", "worst", "dB"),
 )
 

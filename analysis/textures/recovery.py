@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column
+from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column, names
 from analysis.labels import ALL_LAYERS
 from modeling import InputError, TextureModel
 from modeling.arrays import Bools, Floats, Integers
@@ -69,11 +70,19 @@ PLANTED_TRUTH_COLUMNS = (
     LAYER,
     Column("precision"),
     Column("recall"),
-    Column("median_frequency_error_hz", "median frequency error", "Hz"),
-    Column("median_bandwidth_ratio"),
-    Column("median_level_error_db", "level error, median", "dB"),
-    Column("median_absolute_level_error_db", "median absolute level error", "dB"),
-    Column("median_noise_gain_error_db", "median noise gain error", "dB"),
+    Column("median_frequency_error_hz", "frequency error, median", "Hz"),
+    Column("worst_frequency_error_hz", "worst", "Hz"),
+    Column("worst_frequency_error_at", "at"),
+    Column("median_bandwidth_ratio", "bandwidth ratio, median"),
+    Column("worst_bandwidth_ratio", "worst"),
+    Column("worst_bandwidth_ratio_at", "at"),
+    Column("median_level_error_db", "layer level error, median", "dB"),
+    Column("median_absolute_level_error_db", "layer level error, absolute median", "dB"),
+    Column("worst_level_error_db", "worst", "dB"),
+    Column("worst_level_error_at", "at"),
+    Column("median_noise_gain_error_db", "noise gain error, median", "dB"),
+    Column("worst_noise_gain_error_db", "worst", "dB"),
+    Column("worst_noise_gain_error_at", "at"),
 )
 
 
@@ -96,7 +105,10 @@ def planted_truth_table(truth: TextureModel, estimates: Sequence[TextureModel]) 
         (share of conditions where the true layer has a partner), median_frequency_error_hz
         (|Δf|), median_bandwidth_ratio (estimated/true), median_level_error_db and
         median_absolute_level_error_db (20·log10 |G|/|G|, estimated over true), and, in the row
-        for all layers, median_noise_gain_error_db.
+        for all layers, median_noise_gain_error_db. Beside each median stands the worst one, with
+        its sign, and where it is: worst_frequency_error_hz, worst_bandwidth_ratio (farthest from
+        1 on a logarithmic scale), worst_level_error_db and worst_noise_gain_error_db, each with
+        a column ending in _at (`layer 2, 350 mm/s, 1 N`; empty where there is none).
 
     Raises
     ------
@@ -111,14 +123,15 @@ def planted_truth_table(truth: TextureModel, estimates: Sequence[TextureModel]) 
         for name, chosen in layers:
             scores = _scores(pairing, chosen)
             if name == ALL_LAYERS:
-                scores["median_noise_gain_error_db"] = _noise_gain_error_db(pairing)
+                scores |= _noise_gain_scores(pairing)
             labels = {
                 "texture": truth.texture,
                 "estimator": estimated.estimator,
                 "layer": name,
             }
             rows.append(labels | scores)
-    return pd.DataFrame(rows)
+    table = pd.DataFrame(rows, columns=names(PLANTED_TRUTH_COLUMNS))
+    return table.fillna({"worst_noise_gain_error_at": ""})
 
 
 PLANTED_LAYER_COLUMNS = (
@@ -201,7 +214,7 @@ def _pair(truth: TextureModel, estimated: TextureModel) -> _Pairing:
     return _Pairing(truth, same_rate, conditions, np.array(partner), nearest)
 
 
-def _scores(pairing: _Pairing, layers: Integers) -> dict[str, float]:
+def _scores(pairing: _Pairing, layers: Integers) -> dict[str, object]:
     """Scores of the true layers with these indices."""
     condition, chosen = np.nonzero(pairing.partner[:, layers] != NO_PARTNER)
     true_index = layers[chosen]
@@ -218,20 +231,60 @@ def _scores(pairing: _Pairing, layers: Integers) -> dict[str, float]:
     attributed = np.isin(pairing.nearest, layers)
     true_f, found_f = matched("frequencies_hz")
     true_b, found_b = matched("bandwidths_hz")
-    level_error_db = _ratio_db(*matched("gains"))
+    true_g, found_g = matched("gains")
+    frequency_error_hz, bandwidth_ratio = found_f - true_f, found_b / true_b
+    # No ratio to a layer without a level.
+    level_error_db, heard = _ratio_db(true_g, found_g), true_g > 0
+    places = _places(pairing, condition, layers=true_index)
     return {
         "precision": _mean(has_partner[attributed].astype(float)),
         "recall": _mean((pairing.partner[:, layers] != NO_PARTNER).astype(float)),
-        "median_frequency_error_hz": _median(np.abs(found_f - true_f)),
-        "median_bandwidth_ratio": _median(found_b / true_b),
+        "median_frequency_error_hz": _median(np.abs(frequency_error_hz)),
+        **_worst("frequency_error", frequency_error_hz, places=places, unit="_hz"),
+        "median_bandwidth_ratio": _median(bandwidth_ratio),
+        **_worst("bandwidth_ratio", bandwidth_ratio, places=places, size=np.log(bandwidth_ratio)),
         "median_level_error_db": _median(level_error_db),
         "median_absolute_level_error_db": _median(np.abs(level_error_db)),
+        **_worst("level_error", level_error_db, places=places[heard], unit="_db"),
     }
 
 
-def _noise_gain_error_db(pairing: _Pairing) -> float:
+def _noise_gain_scores(pairing: _Pairing) -> dict[str, object]:
     true = pairing.truth.noise_gains[pairing.conditions]
-    return _median(_ratio_db(true, pairing.estimated.noise_gains[pairing.conditions]))
+    error_db = _ratio_db(true, pairing.estimated.noise_gains[pairing.conditions])
+    places = _places(pairing, np.flatnonzero(true > 0))
+    return {
+        "median_noise_gain_error_db": _median(error_db),
+        **_worst("noise_gain_error", error_db, places=places, unit="_db"),
+    }
+
+
+def _places(
+    pairing: _Pairing, conditions: Integers, *, layers: Integers | None = None
+) -> NDArray[np.str_]:
+    """Names of these conditions, with a layer each where layers are given."""
+    row, column = np.nonzero(pairing.conditions)
+    speeds = pairing.truth.speeds_mm_s[row[conditions]]
+    forces = pairing.truth.forces_n[column[conditions]]
+    places = [f"{speed:g} mm/s, {force:g} N" for speed, force in zip(speeds, forces, strict=True)]
+    if layers is not None:
+        places = [f"layer {n + 1}, {place}" for n, place in zip(layers, places, strict=True)]
+    return np.array(places, dtype=np.str_)
+
+
+def _worst(
+    name: str,
+    values: Floats,
+    *,
+    places: NDArray[np.str_],
+    size: Floats | None = None,
+    unit: str = "",
+) -> dict[str, object]:
+    """The value whose size (by default itself) is farthest from 0, and where it is."""
+    if not values.size:
+        return {f"worst_{name}{unit}": float("nan"), f"worst_{name}_at": ""}
+    worst = int(np.abs(values if size is None else size).argmax())
+    return {f"worst_{name}{unit}": float(values[worst]), f"worst_{name}_at": str(places[worst])}
 
 
 def _ratio_db(true: Floats, found: Floats) -> Floats:

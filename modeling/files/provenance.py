@@ -20,7 +20,7 @@ def write_provenance(
     *,
     seed: int | None = None,
     inputs: Sequence[Path] = (),
-) -> dict[str, str]:
+) -> dict[str, Any]:
     """Write what the results came from: versions, seed, settings, hashes of the inputs."""
     libraries = ("tactileq", "numpy", "scipy", "pandas", "pingouin", "psychopy")
     values: dict[str, Any] = {
@@ -32,9 +32,7 @@ def write_provenance(
         "inputs_sha256": {str(path): _hash(path) for path in inputs},
     }
     write_text(path, json.dumps(values, indent=2) + "\n")
-    return {
-        key: value if isinstance(value, str) else json.dumps(value) for key, value in values.items()
-    }
+    return values
 
 
 def _hash(path: Path) -> str:

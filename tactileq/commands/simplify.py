@@ -114,6 +114,7 @@ def draw_condition(
     Writes `start`_threshold.png. Without speed (mm/s) or force (N) it is the fastest and strongest
     condition, of the recordings if there are any, else of the grid.
     """
+    from analysis.figures.saving import save_figure
     from analysis.figures.spectra import figure_spectra_and_threshold
     from analysis.report.findings import DOTS_PER_INCH
     from analysis.spectra.comparison import compare_condition, compare_spectra
@@ -132,7 +133,7 @@ def draw_condition(
     )
     start.parent.mkdir(parents=True, exist_ok=True)
     picture = figure_spectra_and_threshold(shown)
-    picture.savefig(f"{start}_threshold.png", dpi=DOTS_PER_INCH)
+    save_figure(picture, f"{start}_threshold.png", dpi=DOTS_PER_INCH)
 
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:

@@ -136,13 +136,15 @@ def render_set(recipe: Recipe, out: Path) -> tuple[Sources, int]:
     check_place(out)
     sources = load_sources(recipe)
     count = stimulus_count(recipe, sources)
+    from analysis.figures.saving import save_figure
     from analysis.figures.stimuli import figure_contact_sheet
     from analysis.report.findings import DOTS_PER_INCH
     from analysis.spectra.contact_sheet import contact_sheet
 
     with progress("Rendering stimuli", count) as advance:
         write_set(out, recipe, sources=sources, progress=advance)
-    figure_contact_sheet(contact_sheet(out)).savefig(out / CONTACT_SHEET, dpi=DOTS_PER_INCH)
+    sheet = figure_contact_sheet(contact_sheet(out))
+    save_figure(sheet, out / CONTACT_SHEET, dpi=DOTS_PER_INCH)
     return sources, count
 
 

@@ -30,6 +30,10 @@ COLUMNS = (PLAIN, P, EXACT)
         (PLAIN, "wall paper", "wall paper"),
         (EXACT, 0.98765, "0.9877"),
         (EXACT, np.nan, "n/a"),
+        (EXACT, -0.98765, "−0.9877"),
+        (Column("hash", is_hash=True), "0a" * 32, "0a0a0a0a0a0a…"),
+        (Column("hash", is_hash=True), "tactileq-demo", "tactileq-demo"),
+        (PLAIN, "wall-paper", "wall-paper"),
         (Column("speed", format="g"), 350.0, "350"),
     ],
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.answers.loading import load_responses
+from analysis.answers.loading import PlannedTask, load_responses
 from modeling import InputError
 
 
@@ -420,3 +420,44 @@ def _one_sentence(error: InputError, path: Path) -> None:
 def _relative_columns() -> tuple[str, ...]:
     names = "trial phase texture model tray layout answer correct presses response_time_s simulated"
     return tuple(names.split())
+
+
+@pytest.mark.parametrize(
+    ("design", "planned"),
+    [
+        ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48)),
+        ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20)),
+    ],
+)
+def test_what_was_planned_is_read_from_the_design(
+    study_folder, relative_rows, write_task, design, planned
+):
+    write_task("relative", relative_rows)
+    describe(study_folder, StudyDesign={"name": "Seven surfaces", "relative": design})
+    responses = load_responses(study_folder)
+    assert responses.planned == {"relative": planned}
+    assert responses.done("relative") == PlannedTask(1, 1)
+    assert responses.done("absolute") == PlannedTask(0, 0)
+    assert responses.unfinished == ("relative",)
+
+
+def test_nothing_is_planned_where_there_is_no_design(study_folder, relative_rows, write_task):
+    write_task("relative", relative_rows)
+    responses = load_responses(study_folder)
+    assert (responses.planned, responses.unfinished) == ({}, ())
+
+
+@pytest.mark.parametrize("design", [{"participants": 0}, {"participants": "24"}, {}, 24])
+def test_a_design_without_a_number_of_participants_is_refused(
+    study_folder, relative_rows, write_task, design
+):
+    write_task("relative", relative_rows)
+    describe(study_folder, StudyDesign={"relative": design})
+    with pytest.raises(InputError, match="expected a whole number of at least 1"):
+        load_responses(study_folder)
+
+
+def describe(folder: Path, **more: object) -> None:
+    """Add to the description of the data set."""
+    path = folder / "dataset_description.json"
+    path.write_text(json.dumps(json.loads(path.read_text()) | more))

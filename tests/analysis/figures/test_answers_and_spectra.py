@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.figures.answers import (
+    BAR_WIDTH,
     MODEL_COLOURS,
     figure_confusion,
     figure_correct_rates,
@@ -27,7 +28,7 @@ from analysis.figures.spectra import (
 from analysis.spectra.comparison import compare_spectra, spectrum_panels
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.paired import rating_tests
+from analysis.statistics.paired import participant_means, rating_means, rating_tests
 from analysis.statistics.rates import rate_tests
 from modeling import InputError, RecordingSet
 from modeling.fitting.conditions import recording_spectra
@@ -91,7 +92,7 @@ def test_a_condition_off_the_grid_is_refused(results):
 
 
 def test_ratings(ratings):
-    figure = figure_ratings(rating_tests(ratings), simulated=True)
+    figure = figure_ratings(rating_tests(ratings), rating_means(ratings), simulated=True)
     axes = drawn(figure)
     assert [ax.get_ylabel() for ax in axes] == [
         "rated similarity of vibration magnitude (0–100)",
@@ -107,7 +108,9 @@ def test_ratings(ratings):
 
 
 def test_correct_rates(choices):
-    figure = figure_correct_rates(rate_tests(choices), simulated=True)
+    figure = figure_correct_rates(
+        rate_tests(choices), participant_means(choices, "correct"), simulated=True
+    )
     (ax,) = drawn(figure)
     assert "SIMULATED" in texts(ax)
     assert "14.3%" in texts(ax)
@@ -116,9 +119,45 @@ def test_correct_rates(choices):
     assert "all textures" not in texts(ax)
 
 
+def test_every_participant_is_a_point_at_their_mean(choices):
+    means = participant_means(choices, "correct")
+    ax = drawn(figure_correct_rates(rate_tests(choices), means, simulated=True))[0]
+    people = [line for line in ax.lines if len(line.get_xdata()) == 2 and line.get_marker() == "o"]
+    assert len(people) == 7 * 16
+    aluminum = means[means["texture"] == "aluminum"]
+    pairs = [tuple(line.get_ydata()) for line in people[:16]]  # textures in alphabetic order
+    assert pairs == list(zip(aluminum["full"], aluminum["simplified"], strict=True))
+    for line in people[:16]:
+        left, right = line.get_xdata()
+        assert -BAR_WIDTH < left < 0 < right < BAR_WIDTH  # each within its own bar
+    assert len({line.get_xdata()[0] for line in people[:16]}) == 16
+    again = drawn(figure_correct_rates(rate_tests(choices), means, simulated=True))[0]
+    places = [[list(line.get_xdata()) for line in each.lines] for each in (ax, again)]
+    assert places[0] == places[1]
+    assert "one participant" in texts(ax.figure)
+
+
+def test_lines_of_thresholds_are_told_apart_by_colour_and_by_dashes(results):
+    comparison = compare_spectra(results[0], speed_mm_s=350.0, force_n=3.0)
+    axes = drawn(figure_spectra_and_threshold(comparison))
+    lines = {str(line.get_label()): line for ax in axes for line in ax.lines}
+    names = (
+        "gain at which the layer here would be just felt",
+        "detection threshold (codec)",
+        "assumed lower bound of the threshold",
+    )
+    colours = {to_hex(lines[name].get_color()) for name in names}
+    assert len(colours) == 3
+    assert colours < OKABE_ITO
+    assert len({str(lines[name]._unscaled_dash_pattern) for name in names}) == 3
+    assert set(names) <= set(texts(axes[0].figure).split("\n"))
+
+
 def test_undefined_and_missing_values_do_not_break_the_bars(choices):
     always_right = choices.assign(correct=1.0)
-    figure = figure_correct_rates(rate_tests(always_right), simulated=False)
+    figure = figure_correct_rates(
+        rate_tests(always_right), participant_means(always_right, "correct"), simulated=False
+    )
     figure.draw_without_rendering()
     heights = {bar.get_height() for bar in figure.axes[0].patches}
     assert heights == {1.0}
@@ -174,8 +213,10 @@ def test_small_multiples_of_spectra_need_no_grid(results, count):
 
 def test_real_results_are_not_called_simulated(ratings, choices, results):
     for figure in (
-        figure_ratings(rating_tests(ratings), simulated=False),
-        figure_correct_rates(rate_tests(choices), simulated=False),
+        figure_ratings(rating_tests(ratings), rating_means(ratings), simulated=False),
+        figure_correct_rates(
+            rate_tests(choices), participant_means(choices, "correct"), simulated=False
+        ),
         figure_confusion(confusion_matrices(choices), simulated=False),
     ):
         figure.draw_without_rendering()

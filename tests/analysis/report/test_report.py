@@ -12,7 +12,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import Responses
+from analysis.answers.loading import PlannedTask, Responses
+from analysis.figures import saving
 from analysis.report.report import write_report
 from analysis.textures.results import TextureResult
 from modeling import InputError, RecordingSet, Threshold, simplify
@@ -88,7 +89,8 @@ def shown(folder) -> Page:
 def test_the_report_needs_nothing_but_itself(folder, shown):
     for reference in shown.references:
         assert reference.startswith(("#", "data:image/png;base64,"))
-    assert not {"script", "link", "iframe", "object"} & set(shown.tags)
+    assert not {"link", "iframe", "object"} & set(shown.tags)
+    assert shown.tags.count("script") == 1  # inline: what has a src is among the references
     style = re.search(r"<style>(.*?)</style>", (folder / "report.html").read_text(), re.DOTALL)
     assert style
     assert "url(" not in style[1]
@@ -107,6 +109,104 @@ def test_textures_simplified_in_different_ways_are_told_apart(tmp_path, results)
         assert rule + words in text
     assert "margin 2 dB" in text
     assert text.count("Source of the threshold") == 2
+
+
+def test_identical_models_are_told_and_not_tested(tmp_path, ratings, choices, results):
+    same = "canvas"
+    kinds = {name: {"full": "0", "simplified": "1"} for name in ("leather", "PVC")}
+    answers = replace(
+        responses_of(ratings, choices, simulated=False),
+        models=kinds | {same: {"full": "0", "simplified": "0"}},
+    )
+    path = write_report(tmp_path / "report.html", responses=answers)
+    text = Page(path.read_text(encoding="utf-8")).text
+    assert text.count(f"identical models, nothing to compare: {same}.") == 3
+    assert "Yes, over 6 textures together" in text
+    table = pd.read_csv(tmp_path / "tables/rating_tests.tsv", sep="\t", na_values="n/a")
+    rows = table[table["texture"] == same]
+    assert (rows["note"] == "identical models, nothing to compare").all()
+    assert rows["p_holm"].isna().all()
+    assert table[table["texture"] != same]["p_holm"].notna().all()
+    # Without a word in the data the models themselves tell.
+    first, second = results
+    kept = simplify(first.model, Threshold("low", [1, 2500], [1e-9, 1e-9], "planted", "none"))
+    assert kept.identical
+    path = write_report(
+        tmp_path / "again" / "report.html",
+        responses=responses_of(ratings, choices, simulated=False),
+        textures=(replace(first, simplification=kept), second),
+    )
+    text = Page(path.read_text(encoding="utf-8")).text
+    assert f"No layer was dropped from {first.texture}: identical models" in text
+    assert f"identical models, nothing to compare: {first.texture}." in text
+
+
+def test_paper_shows_what_the_screen_folds_and_scrolls(folder):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    on_paper = html[html.index("@page") : html.index("</style>")]
+    assert "size: A4 landscape" in on_paper
+    rules = dict(re.findall(r"([^{}]+?)\s*\{([^{}]*)\}", on_paper.split("@media print {")[1]))
+    rules = {name.split("*/")[-1].strip(): rule for name, rule in rules.items()}
+    assert "content-visibility: visible" in rules["details::details-content"]
+    assert "overflow: visible" in rules[".scroll"]
+    assert "width: 100%" in rules["table"]
+    assert "font-size: 7pt" in rules[".wide table"]
+    assert "white-space: normal" in rules["td.name"]  # wraps, where the screen scrolls
+    script = html[html.index("<script>") : html.index("</script>")]
+    assert '"beforeprint"' in script
+    assert '"afterprint"' in script
+
+
+def test_many_columns_are_set_smaller_on_paper(folder):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    found = re.findall(r'<div class="scroll([^"]*)" id="table-([^"]*)"', html)
+    kinds = {name: kind.split() for kind, name in found}
+    assert "wide" in kinds["rating_tests"]
+    assert kinds["provenance"] == ["short"]
+    assert kinds["overall_tests"] == ["wide", "short"]
+    assert "short" not in kinds["confusion_full"]
+
+
+def test_the_answer_comes_first(folder, shown):
+    html = (folder / "report.html").read_text(encoding="utf-8")
+    told = "In a simulation without people, yes, over 7 textures together: mean difference"
+    assert html.index("</h1>") < html.index(told) < html.index("<nav>")
+    assert shown.text.index("Correct rate, simplified − full") < shown.text.index(
+        "differ in 1 of 7 textures: PVC −"
+    )
+    assert shown.text.index("differ in 1 of 7 textures: PVC −") < shown.text.index(
+        "Simplification dropped"
+    )
+    assert shown.text.index("Forced choice, full model") < shown.text.index("Most frequent")
+
+
+def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choices):
+    begun = replace(
+        responses_of(ratings, choices, simulated=False),
+        planned={"absolute": PlannedTask(16, 16), "relative": PlannedTask(24, 48)},
+    )
+    shown = Page(write_report(tmp_path / "report.html", responses=begun).read_text("utf-8"))
+    assert "16 of 24planned participants, forced choice" in shown.text  # a tile
+    assert "16 of 16planned participants, absolute evaluation" in shown.text
+    assert "Forced choice: 16 of 24 planned participants, 16 of 48 planned sessions" in shown.text
+    assert (
+        "The study is not complete (forced choice: 16 of 24 planned participants, 16 of 48 "
+        "planned sessions): these results are preliminary"
+    ) in shown.text
+    assert "So far, yes" in shown.text
+
+
+def test_names_that_no_font_has_are_told_once(tmp_path, ratings, monkeypatch):
+    path = saving.findfont(saving.FontProperties(family=saving.DEFAULT_FAMILY))
+    monkeypatch.setattr(saving, "_faces", lambda: ((saving.DEFAULT_FAMILY, path, 0),))
+    saving._families_for.cache_clear()
+    named = ratings.replace({"texture": {"PVC": "木材"}})
+    answers = responses_of(named, named.iloc[:0].assign(correct=0.0), simulated=False)
+    with pytest.warns(UserWarning, match="expected fonts") as told:
+        report = write_report(tmp_path / "report.html", responses=answers)
+    saving._families_for.cache_clear()
+    assert [str(warning.message) for warning in told] == [saving.missing_fonts("木材")]
+    assert saving.missing_fonts("木材") in Page(report.read_text("utf-8")).text
 
 
 def test_links_lead_somewhere(shown):
@@ -131,7 +231,14 @@ def test_every_figure_is_inline_and_beside_the_report(folder, shown):
 
 def test_every_table_is_in_the_report_and_beside_it(folder, shown):
     names = {path.stem for path in (folder / "tables").iterdir()}
-    assert {"gfc", "rating_tests", "correct_rates", "rate_tests", "planted_truth"} <= names
+    assert {
+        "gfc",
+        "overall_tests",
+        "rating_tests",
+        "correct_rates",
+        "rate_tests",
+        "planted_truth",
+    } <= names
     assert {"planted_layers", "confusion_full", "confusion_simplified", "provenance"} <= names
     assert {"regressions", "regression_support", "regression_coefficients"} <= names
     assert {"centroid", "centroid_amplitude", "driving"} <= names

@@ -17,12 +17,13 @@ from analysis.answers.loading import Responses
 from analysis.columns import TEXTURE, Column, Columns, chosen, names, without
 from analysis.labels import ALL_TEXTURES
 from analysis.report.page import Fold, Item, Table, table_html
-from analysis.report.report import PROVENANCE_COLUMNS
 from analysis.report.section_answers import choice_section, rating_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
+from analysis.report.section_provenance import PROVENANCE_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
+from analysis.statistics.overall import OVERALL_COLUMNS
 from analysis.statistics.paired import RATING_TEST_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, RATE_TEST_COLUMNS
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
@@ -58,7 +59,9 @@ DECLARED = {
     "planted_layers": PLANTED_LAYER_COLUMNS,
     "planted_between": PLANTED_BETWEEN_COLUMNS,
     "provenance": PROVENANCE_COLUMNS,
+    "overall_tests": OVERALL_COLUMNS,
 }
+OF_THE_REPORT = {"provenance", "overall_tests"}  # stand in no section
 EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
 
 
@@ -103,7 +106,7 @@ def tables(results, ratings, choices) -> list[Table]:
 
 
 def test_no_table_is_without_a_declaration(tables: list[Table]) -> None:
-    assert {kind(table) for table in tables} | {"provenance"} == set(DECLARED)
+    assert {kind(table) for table in tables} | OF_THE_REPORT == set(DECLARED)
 
 
 def test_tables_have_the_columns_that_are_declared(tables: list[Table]) -> None:
@@ -131,6 +134,14 @@ def test_units_are_those_that_names_end_with() -> None:
         for column in columns:
             assert column.unit == unit, column.name
             assert column.heading.endswith(f" ({unit})"), column.name
+
+
+def test_level_errors_of_conditions_and_of_layers_have_headings_of_their_own() -> None:
+    headings = [
+        {column.heading for column in columns if "median_" in column.name}
+        for columns in (LEFT_OUT_COLUMNS, PLANTED_TRUTH_COLUMNS, PLANTED_BETWEEN_COLUMNS)
+    ]
+    assert len(set.union(*headings)) == sum(len(each) for each in headings)
 
 
 def shown(frame: pd.DataFrame, columns: Columns) -> str:

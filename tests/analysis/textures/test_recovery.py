@@ -80,6 +80,40 @@ def test_several_estimators_stand_beneath_each_other(truth):
     assert_allclose(overall["median_level_error_db"], [0.0, 3.0], atol=1e-12)
 
 
+def test_the_worst_error_and_its_place_stand_beside_the_median(truth):
+    frequencies, gains = truth.frequencies_hz.copy(), truth.gains.copy()
+    widths, noise = truth.bandwidths_hz.copy(), truth.noise_gains.copy()
+    frequencies[1, 0, 2] -= 4.0
+    widths[0, 1, 1] /= 3.0  # farther from 1 than a factor of 2
+    widths[0, 0, 0] *= 2.0
+    gains[0, 0, 3] *= 10 ** (-12 / 20)
+    gains[1, 1, 0] *= 10 ** (6 / 20)
+    noise[1, 1] *= 10 ** (5 / 20)
+    estimate = replace(
+        truth, frequencies_hz=frequencies, bandwidths_hz=widths, gains=gains, noise_gains=noise
+    )
+    table = planted_truth_table(truth, [estimate]).set_index("layer")
+    overall = table.loc[ALL_LAYERS]
+    assert overall["median_frequency_error_hz"] == 0.0
+    assert overall["worst_frequency_error_hz"] == pytest.approx(-4.0)
+    assert overall["worst_frequency_error_at"] == "layer 3, 350 mm/s, 1 N"
+    assert overall["worst_bandwidth_ratio"] == pytest.approx(1 / 3)
+    assert overall["worst_bandwidth_ratio_at"] == "layer 2, 200 mm/s, 3 N"
+    assert overall["worst_level_error_db"] == pytest.approx(-12.0)
+    assert overall["worst_level_error_at"] == "layer 4, 200 mm/s, 1 N"
+    assert overall["worst_noise_gain_error_db"] == pytest.approx(5.0)
+    assert overall["worst_noise_gain_error_at"] == "350 mm/s, 3 N"
+    assert table.loc["1", "worst_level_error_db"] == pytest.approx(6.0)
+    assert table.loc["1", "worst_level_error_at"] == "layer 1, 350 mm/s, 3 N"
+    assert table.loc["1", "worst_noise_gain_error_at"] == ""
+
+
+def test_what_was_not_found_has_no_worst_error(truth):
+    overall = planted_truth_table(truth, [truth.with_layers([])]).iloc[-1]
+    assert np.isnan(overall["worst_frequency_error_hz"])
+    assert overall["worst_frequency_error_at"] == overall["worst_level_error_at"] == ""
+
+
 def test_interpolated_conditions_are_left_out(truth):
     spoilt = truth.frequencies_hz.copy()
     spoilt[0, 0] += 200.0

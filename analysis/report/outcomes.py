@@ -1,0 +1,40 @@
+"""What came out, and how much it weighs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class Weight(IntEnum):
+    """How near a finding is to the question of the study, from the nearest."""
+
+    OVERALL = 0
+    TEXTURES = 1
+    SECONDARY = 2
+    DESCRIPTIVE = 3
+
+
+HEADINGS = {
+    Weight.OVERALL: "Over all textures: the question of the study",
+    Weight.TEXTURES: "Single textures that differ",
+    Weight.SECONDARY: "Further findings",
+    Weight.DESCRIPTIVE: "Described, not tested",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A finding in one sentence, with its weight."""
+
+    weight: Weight
+    sentence: str
+
+
+def by_weight(outcomes: Iterable[Outcome]) -> dict[str, list[str]]:
+    """Heading to sentences, the weightiest first, each in the order given; no empty heading."""
+    groups: dict[str, list[str]] = {}
+    for outcome in sorted(outcomes, key=lambda each: each.weight):
+        groups.setdefault(HEADINGS[outcome.weight], []).append(outcome.sentence)
+    return groups

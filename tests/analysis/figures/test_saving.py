@@ -1,0 +1,73 @@
+"""Names in any script are drawn, or said to lack a font; the settings of Matplotlib stay."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from matplotlib.text import Text
+
+from analysis.figures import saving
+from analysis.figures.saving import DEFAULT_FAMILY, missing_fonts, png_of, save_figure
+
+pytestmark = pytest.mark.filterwarnings("error")
+NAMES = ("木材", "나무", "ひのき")
+
+
+def figure_of(*names: str) -> Figure:
+    figure = Figure(figsize=(3, 2), layout="constrained")
+    ax = figure.subplots()
+    ax.set_xticks(range(len(names)), names)
+    return figure
+
+
+def families(figure: Figure) -> set[str]:
+    texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
+    return {family for text in texts for family in text.get_fontfamily()}
+
+
+def test_chinese_korean_and_japanese_names_are_drawn():
+    figure = figure_of(*NAMES)
+    picture, lacking = png_of(figure, dpi=80)
+    if lacking:
+        pytest.skip("no font has these names; tools/system-packages installs fonts-wqy-microhei")
+    assert len(families(figure)) > 1
+    # Boxes for characters that are not there are all alike; these are not.
+    drawn = [imread(io.BytesIO(png_of(figure_of(name), dpi=80)[0])) for name in ("木木", "材材")]
+    assert picture.startswith(b"\x89PNG")
+    assert drawn[0].shape == drawn[1].shape
+    assert np.abs(drawn[0] - drawn[1]).sum() > 10
+
+
+def test_names_that_matplotlib_can_draw_ask_for_no_other_font():
+    figure = figure_of("wall paper", "Blech − µ")
+    before = dict(mpl.rcParams)
+    assert png_of(figure, dpi=80)[1] == ""
+    assert families(figure) <= {DEFAULT_FAMILY, "sans-serif"}
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.fixture
+def only_matplotlibs_font(monkeypatch):
+    """A machine without any other font."""
+    path = saving.findfont(saving.FontProperties(family=DEFAULT_FAMILY))
+    monkeypatch.setattr(saving, "_faces", lambda: ((DEFAULT_FAMILY, path, 0),))
+    saving._families_for.cache_clear()
+    yield
+    saving._families_for.cache_clear()
+
+
+@pytest.mark.usefixtures("only_matplotlibs_font")
+def test_what_no_font_has_is_told_once_in_one_sentence(tmp_path: Path):
+    assert png_of(figure_of("oak", "木木"), dpi=80)[1] == "木"
+    with pytest.warns(UserWarning, match="expected fonts") as told:
+        save_figure(figure_of("木", "材木"), tmp_path / "x.png", dpi=80)
+    assert [str(warning.message) for warning in told] == [missing_fonts("木材")]
+    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+    assert "for 木 材, drawn as boxes; install one" in missing_fonts("木材")
+    assert missing_fonts("") == ""
