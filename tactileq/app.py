@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import sys
+from contextlib import suppress
 from importlib import import_module
 from typing import Annotated
 
 import typer
 
+from tactileq.interruption import Interrupted, ended_by_signals
 from tactileq.telling import sentence_of
 
 # The name of every command, and its file in tactileq/commands, which holds a function or a group of
@@ -66,11 +68,21 @@ for name, file in COMMANDS.items():
 
 
 def main() -> None:
-    """Run the command line; bad input ends with one sentence and exit code 1."""
+    """Run the command line; bad input ends with one sentence and exit code 1.
+
+    A signal that asks it to end: one sentence, and 128 + its number.
+    """
     try:
-        app(standalone_mode=True)
+        with ended_by_signals():
+            app(standalone_mode=True)
         return
+    except Interrupted as end:
+        sentence, code = (
+            f"interrupted by {end.signal_name}; nothing is left half written.",
+            end.code,
+        )
     except (ValueError, OSError, MemoryError) as error:  # InputError is a ValueError
-        sentence = sentence_of(error)
-    print(f"error: {sentence}", file=sys.stderr)
-    raise SystemExit(1)
+        sentence, code = f"error: {sentence_of(error)}", 1
+    with suppress(OSError):  # the terminal may be gone
+        print(sentence, file=sys.stderr)
+    raise SystemExit(code)

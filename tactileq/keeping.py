@@ -2,58 +2,151 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 
-def check_own_results(out: Path, command: str, *, contents: set[str]) -> None:
-    """Refuse to replace a folder unless an earlier run of the same command made all of it."""
+def check_own_results(out: Path, command: str) -> None:
+    """Refuse to replace a folder unless an earlier run of the same command made all of it.
+
+    Its provenance lists what that run wrote; any other file or folder below it is foreign.
+    """
     from modeling.files.folders import folder_behind
+    from modeling.files.provenance import PROVENANCE_NAME
 
     folder_behind(out)
-    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+    if not out.exists():
         return
     foreign = "a file"
     if out.is_dir():
-        marker = out / "provenance.json"
-        maker = _object(marker).get("command") if marker.is_file() else None
-        others = sorted({path.name for path in out.iterdir()} - contents)
-        if maker == f"tactileq {command}" and not others:
+        note = _object(out / PROVENANCE_NAME)
+        own = {PROVENANCE_NAME, *_files(note)} if _is_of(note, command) else set()
+        other = next(_beside(out, own), None)
+        if other is None:
             return
-        foreign = f"a folder with other files in it ({(others or ['not made by this command'])[0]})"
+        foreign = f"a folder with other files in it ({other})"
     raise ValueError(
         f"expected a new folder or earlier results of tactileq {command} at {out}, got {foreign}; "
         "choose another folder with --out."
     )
 
 
-def check_own_model(start: Path, command: str) -> None:
-    """Refuse to put one command's model in the place of another's (full beside simplified).
+def check_own_files(
+    files: Iterable[Path],
+    note: Path,
+    *,
+    command: str,
+    texture: str | None = None,
+    inputs: Iterable[Path] = (),
+) -> None:
+    """Refuse to write files in the place of an input or of anything that is not the same run's.
 
-    `start` is the model's path without its ending.
+    Parameters
+    ----------
+    files : iterable of Path
+        All that may be written, in one folder.
+    note : Path
+        Their provenance beside them: an existing file may be replaced if this names the same
+        command and texture and lists the file.
+    command : str
+    texture : str, optional
+        What the files are about.
+    inputs : iterable of Path
+        What the run reads.
     """
-    marker = Path(f"{start}_provenance.json")
-    made = Path(f"{start}.json").exists() and marker.is_file()
-    if made and _object(marker).get("command") != f"tactileq {command}":
+    from modeling.files.places import clear_unfinished
+
+    clear_unfinished(note.parent)
+    given = [path for path in inputs if path.exists()]
+    found = [path for path in (*files, note) if os.path.lexists(path)]
+    for path in found:
+        if path.exists() and any(path.samefile(one) for one in given):
+            raise ValueError(
+                f"expected a place beside the input, got {path}, which is the input itself; "
+                "choose another name or folder with --out."
+            )
+    if not found:
+        return
+    made = _object(note)
+    own = {note.name, *_files(made)} if _is_of(made, command) else set()
+    foreign = [path for path in found if path.name not in own]
+    if foreign:
+        maker = made.get("command")
+        other = f"one of {maker}" if maker and not _is_of(made, command) else "something else"
         raise ValueError(
-            f"expected a folder without models of another command, got {start}.json made by "
-            f"{_object(marker).get('command')}; choose another folder with --out."
+            f"expected a new file or an earlier result of tactileq {command} at {foreign[0]}, got "
+            f"{other}; choose another name or folder with --out."
+        )
+    if made.get("texture") != texture:
+        raise ValueError(
+            f"expected a new file or an earlier result for {texture!r} at {found[0]}, got one for "
+            f"{made.get('texture')!r}, whose file has the same name; choose another name or folder "
+            "with --out."
         )
 
 
-def check_own_file(out: Path, command: str) -> Path:
-    """Refuse to replace a file that is not the same command's; where its provenance goes."""
-    marker = Path(f"{out}_provenance.json")
-    maker = _object(marker).get("command") if marker.is_file() else None
-    if out.exists() and maker != f"tactileq {command}":
-        raise ValueError(
-            f"expected a new file or an earlier result of tactileq {command} at {out}, got "
-            "something else; choose another name."
-        )
-    return marker
+def note_of_file(out: Path, command: str, *, texture: str | None = None) -> Path:
+    """Where the provenance of a single file goes; refused as by `check_own_files`."""
+    note = Path(f"{out}_provenance.json")
+    check_own_files([out], note, command=command, texture=texture)
+    return note
 
 
-def _object(marker: Path) -> dict[str, Any]:
+def write_own_files(
+    contents: Mapping[Path, bytes],
+    note: Path,
+    provenance: Mapping[str, Any],
+    *,
+    texture: str | None = None,
+) -> None:
+    """Write files with their provenance, all or none, once more refusing what is not our own.
+
+    The provenance lists them, and what earlier runs wrote beside it for the same texture.
+    """
+    from modeling.files.places import locked
+    from modeling.files.provenance import provenance_text
+    from modeling.files.writing import write_files
+
+    command = str(provenance["command"]).removeprefix("tactileq ")
+    with locked(note):
+        check_own_files(contents, note, command=command, texture=texture)
+        earlier = [name for name in _files(_object(note)) if (note.parent / name).exists()]
+        names = sorted({path.name for path in contents} | set(earlier))
+        text = provenance_text({**provenance, "texture": texture, "files": names})
+        # Provenance first: a run that is killed here does not leave files that nobody owns.
+        write_files({note: text.encode(), **contents})
+
+
+def _is_of(note: Mapping[str, Any], command: str) -> bool:
+    return bool(note.get("command") == f"tactileq {command}")
+
+
+def _files(note: Mapping[str, Any]) -> list[str]:
+    """The names that a provenance lists; none in one of an earlier version."""
+    names = note.get("files")
+    return [name for name in names if isinstance(name, str)] if isinstance(names, list) else []
+
+
+def _beside(folder: Path, own: Iterable[str]) -> Iterator[str]:
+    """Names of files and folders below a folder that are not its own, in order."""
+    own = set(own)
+    parents = {parent.as_posix() for name in own for parent in Path(name).parents}
+    for here, folders, files in os.walk(folder):
+        place = Path(here).relative_to(folder)
+        for name in sorted(files):
+            if (place / name).as_posix() not in own:
+                yield (place / name).as_posix()
+        for name in sorted(folders):
+            path = place / name
+            if path.as_posix() not in parents or (folder / path).is_symlink():
+                yield f"{path.as_posix()}{os.sep}"
+        folders.sort()
+
+
+def _object(note: Path) -> dict[str, Any]:
+    """What a provenance says; nothing where there is none."""
     from modeling.files.documents import read_json_object
 
-    return read_json_object(marker, advice="remove the file")
+    return read_json_object(note, advice="remove the file") if note.is_file() else {}

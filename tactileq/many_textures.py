@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from tactileq.keeping import check_own_model
+from tactileq.keeping import check_own_files, write_own_files
 from tactileq.telling import (
     clipping_warnings,
     left_out_warnings,
@@ -17,6 +17,7 @@ from tactileq.telling import (
     sentence_of,
     simulated_note,
 )
+from tactileq.workers import working
 
 if TYPE_CHECKING:
     from analysis.report.findings import Findings
@@ -49,6 +50,24 @@ class Outcome:
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     error: str = ""
+
+
+@dataclass(frozen=True)
+class _Made:
+    """What a process hands back of one texture: its files are written by the process that asked.
+
+    Parameters
+    ----------
+    outcome : Outcome
+    files : mapping of str to bytes
+        By the ending of their names.
+    provenance : mapping
+        Of the files; empty without them.
+    """
+
+    outcome: Outcome
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    provenance: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -105,40 +124,50 @@ def _model_all(
     sources: Sequence[Source], out: Path, *, how: HowToModel, jobs: int | None
 ) -> list[Outcome]:
     """Outcomes in the order of the sources, with a progress bar."""
-    outcomes: list[Outcome] = []
+    outcomes: dict[int, Outcome] = {}
     work = partial(_model_one, out=out, how=how)
     with progress("Finding layers, fitting", len(sources)) as advance:
         try:
-            for source, outcome in zip(sources, _each(work, sources, jobs), strict=True):
-                outcomes.append(outcome)
-                advance(source.texture)
+            with working(work, sources, jobs=jobs) as results:
+                for number, made in results:
+                    source = sources[number]
+                    start = _start(source, out)
+                    outcomes[number] = _write(made, start, texture=source.texture)
+                    advance(source.texture)
         except BrokenExecutor:
             raise ValueError(
                 "expected every process to end by itself, got one that the system stopped, "
                 "perhaps for want of memory; run again with a smaller --jobs."
             ) from None
-    return outcomes
+    return [outcomes[number] for number in range(len(sources))]
 
 
-def _each(
-    work: Callable[[Source], Outcome], sources: Sequence[Source], jobs: int | None
-) -> Iterable[Outcome]:
-    """The work on each source, in processes of its own where there are several."""
-    if len(sources) < 2 or jobs == 1:
-        return map(work, sources)
-    from joblib import Parallel, cpu_count, delayed
+def _start(source: Source, out: Path) -> Path:
+    """What the names of a texture's files begin with."""
+    from modeling.files.writing import file_stem
 
-    parallel = Parallel(n_jobs=min(jobs or cpu_count(), len(sources)), return_as="generator")
-    results: Iterable[Outcome] = parallel(map(delayed(work), sources))
-    return results
+    return out / file_stem(source.texture)
 
 
-def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
-    """Load, model and write one texture; what is wrong with it becomes its outcome's error."""
+def _write(made: _Made, start: Path, *, texture: str) -> Outcome:
+    """Write a texture's files, all or none; what is wrong becomes the outcome's error."""
+    if made.outcome.error:
+        return made.outcome
+    contents = {Path(f"{start}{ending}"): data for ending, data in made.files.items()}
+    note = Path(f"{start}_provenance.json")
+    try:
+        write_own_files(contents, note, made.provenance, texture=texture)
+    except (ValueError, OSError) as error:
+        return Outcome(made.outcome.what, error=sentence_of(error))
+    return made.outcome
+
+
+def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
+    """Load and model one texture; what is wrong with it becomes its outcome's error."""
     from threadpoolctl import threadpool_limits
 
-    from analysis.report.findings import find_in, save_findings
-    from modeling.files.provenance import write_provenance
+    from analysis.report.findings import find_in, findings_files
+    from modeling.files.provenance import provenance_of
     from modeling.recordings.recording_set import load_usable
 
     what = f"{source.texture} in {source.folder}"
@@ -154,24 +183,24 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> Outcome:
                 check=how.check,
                 alone=how.alone,
             )
-            start = save_findings(found, out, plot=how.plot)
+            files = findings_files(found, plot=how.plot)
             settings = {
                 "estimator": how.estimator,
                 "layers": how.layers,
                 "keep_hum": how.keep_hum,
                 "left_out": list(unusable),
             }
-            provenance = Path(f"{start}_provenance.json")
-            write_provenance(provenance, "model", settings, inputs=[source.folder])
+            provenance = provenance_of("model", settings, inputs=[source.folder])
     except (ValueError, OSError, MemoryError) as error:
-        return Outcome(what, error=sentence_of(error))
-    notes = (*_rate_notes(records), *_told(found, start, plot=how.plot))
+        return _Made(Outcome(what, error=sentence_of(error)))
+    notes = (*_rate_notes(records), *_told(found, _start(source, out), plot=how.plot))
     warnings = (
         *left_out_warnings(source.texture, unusable),
         *clipping_warnings(records),
         *_mended(found),
     )
-    return Outcome(what, notes=notes, warnings=warnings)
+    outcome = Outcome(what, notes=notes, warnings=warnings)
+    return _Made(outcome, files, provenance)
 
 
 def _mended(found: Findings) -> list[str]:
@@ -269,17 +298,22 @@ def _sources_in(folders: Iterable[Path]) -> tuple[list[Source], list[Outcome]]:
 
 def _require_own_files(sources: Iterable[Source], out: Path) -> None:
     """Refuse textures whose files would overwrite each other's or another command's."""
-    from modeling.files.writing import file_stem
+    from analysis.report.findings import ENDINGS
 
-    taken: dict[str, Source] = {}
+    taken: dict[Path, Source] = {}
     for source in sources:
-        stem = file_stem(source.texture)
-        if stem in taken:
-            other = taken[stem]
+        start = _start(source, out)
+        if start in taken:
+            other = taken[start]
             raise ValueError(
                 "expected each texture once, with names that differ in letters or digits, got "
                 f"{other.texture!r} in {other.folder} and {source.texture!r} in {source.folder}; "
                 "rename one, or model them one by one with different --out."
             )
-        taken[stem] = source
-        check_own_model(out / stem, "model")
+        taken[start] = source
+        check_own_files(
+            [Path(f"{start}{ending}") for ending in ENDINGS],
+            Path(f"{start}_provenance.json"),
+            command="model",
+            texture=source.texture,
+        )

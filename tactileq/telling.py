@@ -22,6 +22,11 @@ def sentence_of(error: Exception) -> str:
             f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
             "path, its permissions and the space on the disk."
         )
+    if isinstance(error, OSError) and error.errno is not None:
+        return (
+            f"expected to read and write files, got {error.strerror!r}; make room on the disk, or "
+            "check it, and run again."
+        )
     if isinstance(error, MemoryError):
         return "expected a task that fits the memory, got a larger one; ask for less at once."
     return str(error)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pandas as pd
 
@@ -17,11 +17,23 @@ from analysis.textures.recordings import (
     spectra_table,
 )
 from modeling import GridError, Recording, RecordingSet, Spectrum, TextureModel
-from modeling.files.writing import file_stem, write_text
 from modeling.fitting.conditions import only_unit, recording_spectra
 from modeling.fitting.texture import fit_spectra
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 DOTS_PER_INCH = 110
+# Of the names of all files that hold what was found in one texture's recordings.
+ENDINGS = (
+    ".json",
+    "_layers.tsv",
+    "_spectra.tsv",
+    "_alone.tsv",
+    "_check.tsv",
+    "_spectra.png",
+    "_layers.png",
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,24 +111,20 @@ def find_in(
     return Findings(records.texture, estimator, measured, each, model, why_not, quality, left_out)
 
 
-def save_findings(found: Findings, out: Path, *, plot: bool) -> Path:
-    """Write the tables and the model, if there is one, into `out`; pictures on request.
+def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
+    """The tables and the model, if there is one, as files; pictures on request.
 
     Parameters
     ----------
     found : Findings
-    out : Path
-        Made if it is not there.
     plot : bool
         Also draw spectra of conditions in all parts of the grid, and the layers over the grid.
 
     Returns
     -------
-    Path
-        What all files begin with: TEXTURE.json, TEXTURE_layers.tsv, TEXTURE_spectra.tsv,
-        TEXTURE_alone.tsv, TEXTURE_check.tsv, TEXTURE_spectra.png and TEXTURE_layers.png.
+    dict of str to bytes
+        By the ending of the file's name, of `ENDINGS`.
     """
-    start = out / file_stem(found.texture)
     tables = {"spectra": spectra_table(found.measured)}
     if found.model is not None:
         tables["layers"] = model_layers_table(found.model)
@@ -125,25 +133,36 @@ def save_findings(found: Findings, out: Path, *, plot: bool) -> Path:
     if found.left_out is not None:
         simulated = any(recording.simulated for recording, _ in found.measured)
         tables["check"] = found.left_out.assign(texture=found.texture, simulated=simulated)
-    for name, table in tables.items():
-        write_text(f"{start}_{name}.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
+    files = {f"_{name}.tsv": table_bytes(table) for name, table in tables.items()}
     if found.model is not None:
-        found.model.save(f"{start}.json")
-    if plot:
-        _draw(found, start)
-    return start
+        files[".json"] = found.model.to_json().encode()
+    return files | (_pictures(found) if plot else {})
 
 
-def _draw(found: Findings, start: Path) -> None:
+def table_bytes(table: pd.DataFrame) -> bytes:
+    """A table as the text of a TSV file."""
+    return bytes(table.to_csv(sep="\t", index=False, na_rep="n/a").encode())
+
+
+def picture_bytes(figure: Figure) -> bytes:
+    """A figure as a PNG file; a warning names what no font of this machine can draw."""
+    from analysis.figures.saving import png_of, warn_of_missing_fonts  # late: loads Matplotlib
+
+    picture, lacking = png_of(figure, dpi=DOTS_PER_INCH)
+    warn_of_missing_fonts(lacking)
+    return picture
+
+
+def _pictures(found: Findings) -> dict[str, bytes]:
     # Late: without pictures there is nothing to load Matplotlib for.
     from analysis.figures.layers_over_grid import figure_layers_over_grid
-    from analysis.figures.saving import save_figure
     from analysis.figures.spectra import figure_spectra
     from analysis.spectra.comparison import spectrum_panels
     from analysis.spectra.layers_over_grid import layers_over_grid
 
     panels = spectrum_panels(found.measured, estimator=found.estimator, model=found.model)
-    save_figure(figure_spectra(panels), f"{start}_spectra.png", dpi=DOTS_PER_INCH)
+    pictures = {"_spectra.png": picture_bytes(figure_spectra(panels))}
     if found.model is not None:
         figure = figure_layers_over_grid(layers_over_grid(found.model))
-        save_figure(figure, f"{start}_layers.png", dpi=DOTS_PER_INCH)
+        pictures["_layers.png"] = picture_bytes(figure)
+    return pictures

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from modeling.errors import InputError
+from modeling.files.places import (
+    behind_links,
+    clear_unfinished,
+    locked,
+    unfinished_folder,
+)
 from modeling.files.tables import read_table
-from modeling.files.writing import behind_links
 
 
 def folder_behind(path: str | Path) -> Path:
     """The folder that `replace_folder` would replace, behind links.
+
+    What killed processes left beside it and in it is cleared up first.
 
     Raises
     ------
@@ -29,6 +35,8 @@ def folder_behind(path: str | Path) -> Path:
             f"expected a folder that can be replaced as a whole, got {path}, which you are in; "
             "name another one, or go to the folder above it."
         )
+    clear_unfinished(target.parent)
+    clear_unfinished(target)
     return target
 
 
@@ -37,38 +45,56 @@ def replace_folder(path: str | Path) -> Iterator[Path]:
     """A fresh folder to fill, which takes the place of `path` when the block ends well.
 
     After an exception nothing has changed at `path`. Of a link, what it leads to is replaced.
+    Of two processes that do so at once, what the one that ends last made stays.
 
     Raises
     ------
     InputError
         For a `path` that `folder_behind` refuses.
+    OSError
+        With the name that a file would have had at `path`, not with its hidden one.
     """
     target = folder_behind(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    fresh = Path(tempfile.mkdtemp(dir=target.parent, prefix=f".{target.name}."))
+    with unfinished_folder(target) as hidden:
+        fresh = hidden / target.name
+        with _named(target, fresh):
+            fresh.mkdir()
+            yield fresh
+            fresh.chmod(0o755)
+            with locked(target):
+                _swap(fresh, target)
+
+
+@contextmanager
+def _named(target: Path, fresh: Path) -> Iterator[None]:
+    """The system's errors name places in `target`, or `target` where they named none."""
     try:
-        yield fresh
-        fresh.chmod(0o755)
-        _swap(fresh, target)
-    except BaseException:
-        shutil.rmtree(fresh, ignore_errors=True)
+        yield
+    except OSError as error:
+        named = fresh if error.filename is None else error.filename
+        if error.errno is not None and isinstance(named, str | Path):
+            inside = Path(named).is_relative_to(fresh)
+            place = target / Path(named).relative_to(fresh) if inside else named
+            error.filename, error.filename2 = str(place), None
         raise
 
 
 def _swap(fresh: Path, target: Path) -> None:
     """Put `fresh` at `target`; what was there is deleted only once that has worked.
 
-    What cannot be deleted then is no reason to fail: the new folder is in its place.
+    What cannot be deleted then is no reason to fail: the new folder is in its place. A process that
+    is killed between the two steps leaves the old folder to `clear_unfinished`.
     """
     if not target.exists():
         fresh.rename(target)
         return
     old = fresh.with_name(fresh.name + ".old")
-    target.rename(old)
     try:
+        target.rename(old)
         fresh.rename(target)
     except BaseException:
-        old.rename(target)
+        if old.exists() and not target.exists():
+            old.rename(target)
         raise
     shutil.rmtree(old, ignore_errors=True)
     if old.exists():

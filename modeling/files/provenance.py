@@ -12,6 +12,27 @@ from typing import Any
 
 from modeling.files.writing import write_text
 
+PROVENANCE_NAME = "provenance.json"
+
+
+def provenance_of(
+    command: str,
+    settings: Mapping[str, object],
+    *,
+    seed: int | None = None,
+    inputs: Sequence[Path] = (),
+) -> dict[str, Any]:
+    """What results come from: versions, seed, settings, hashes of the inputs."""
+    libraries = ("tactileq", "numpy", "scipy", "pandas", "pingouin", "psychopy")
+    return {
+        "command": f"tactileq {command}",
+        "python": sys.version.split()[0],
+        "versions": {name: version(name) for name in libraries},
+        "settings": dict(settings),
+        "seed": seed,
+        "inputs_sha256": {str(path): _hash(path) for path in inputs},
+    }
+
 
 def write_provenance(
     path: Path,
@@ -20,19 +41,23 @@ def write_provenance(
     *,
     seed: int | None = None,
     inputs: Sequence[Path] = (),
-) -> dict[str, Any]:
-    """Write what the results came from: versions, seed, settings, hashes of the inputs."""
-    libraries = ("tactileq", "numpy", "scipy", "pandas", "pingouin", "psychopy")
-    values: dict[str, Any] = {
-        "command": f"tactileq {command}",
-        "python": sys.version.split()[0],
-        "versions": {name: version(name) for name in libraries},
-        "settings": dict(settings),
-        "seed": seed,
-        "inputs_sha256": {str(path): _hash(path) for path in inputs},
-    }
-    write_text(path, json.dumps(values, indent=2) + "\n")
-    return values
+) -> None:
+    """Write what the results beside `path` came from."""
+    write_text(path, provenance_text(provenance_of(command, settings, seed=seed, inputs=inputs)))
+
+
+def seal_folder(folder: Path, provenance: Mapping[str, Any]) -> None:
+    """Write a folder's provenance, with the names of all files that it holds by now.
+
+    By these names a later run knows what it may replace.
+    """
+    files = sorted(p.relative_to(folder).as_posix() for p in folder.rglob("*") if not p.is_dir())
+    write_text(folder / PROVENANCE_NAME, provenance_text({**provenance, "files": files}))
+
+
+def provenance_text(values: Mapping[str, Any]) -> str:
+    """The text of a file of provenance."""
+    return json.dumps(values, indent=2) + "\n"
 
 
 def _hash(path: Path) -> str:

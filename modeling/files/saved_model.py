@@ -31,7 +31,11 @@ class SavedModel(_Base):
 
     def save(self, path: str | Path) -> None:
         """Write the model as versioned JSON; the file is there whole or not at all."""
-        write_text(path, dump_json(self.to_dict()))
+        write_text(path, self.to_json())
+
+    def to_json(self) -> str:
+        """The text of the model's file."""
+        return dump_json(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
         """The model as plain values, those of its file; `from_dict` makes it again."""
@@ -41,7 +45,7 @@ class SavedModel(_Base):
     @property
     def sha256(self) -> str:
         """SHA-256 of the file that `save` writes: equal exactly where models are equal."""
-        return sha256_of(dump_json(self.to_dict()))
+        return sha256_of(self.to_json())
 
     @classmethod
     def load(cls, path: str | Path) -> Self:

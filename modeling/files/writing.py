@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from modeling.errors import InputError
+from modeling.files.places import behind_links, unfinished_file
 
 
 def file_stem(name: str) -> str:
@@ -23,27 +25,53 @@ def write_text(path: str | Path, text: str) -> None:
 
 def write_bytes(path: str | Path, data: bytes) -> None:
     """Write a file so that it is there whole or not at all; a link keeps leading to it."""
-    target = behind_links(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    write_files({Path(path): data})
+
+
+def write_files(contents: Mapping[Path, bytes]) -> None:
+    """Write several files so that all are there, each whole, or none; links keep leading to theirs.
+
+    All are complete on the disk before the first takes its place, in the order given.
+
+    Raises
+    ------
+    OSError
+        With the name of the file that could not be written; then nothing has changed.
+    """
+    with ExitStack() as stack:
+        ready: list[tuple[Path, Path]] = []
+        for path, data in contents.items():
+            target = behind_links(path)
+            if target.is_dir():
+                raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+            with _named(target):
+                ready.append((stack.enter_context(unfinished_file(target, data)), target))
+        try:
+            _put(ready)
+        except Exception:
+            raise
+        except BaseException:
+            # Interrupted between two of them: some new beside some old would be worse than all new.
+            _put(ready)
+            raise
+
+
+def _put(ready: list[tuple[Path, Path]]) -> None:
+    """Move files to their places, and from the list."""
+    while ready:
+        hidden, target = ready[0]
+        if hidden.exists():
+            with _named(target):
+                os.replace(hidden, target)
+        ready.pop(0)
+
+
+@contextmanager
+def _named(target: Path) -> Iterator[None]:
+    """The system's errors name the file that was asked for, not the hidden one or none."""
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        os.unlink(name)
+        yield
+    except OSError as error:
+        if error.errno is not None:
+            error.filename, error.filename2 = str(target), None
         raise
-
-
-def behind_links(path: str | Path) -> Path:
-    """Where something written to `path` belongs: what a link leads to, so that the link stays."""
-    target = Path(path)
-    if not target.is_symlink():
-        return target
-    if not target.exists():
-        raise InputError(
-            f"expected a place to write to, got the link {target}, which leads nowhere (to "
-            f"{target.readlink()}); make what it leads to, or remove it."
-        )
-    return target.resolve()

@@ -98,7 +98,11 @@ class Simplification:
 
     def save(self, path: str | Path) -> None:
         """Write all of it as versioned JSON; the file is there whole or not at all."""
-        write_text(path, dump_json(self._values()))
+        write_text(path, self.to_json())
+
+    def to_json(self) -> str:
+        """The text of its file."""
+        return dump_json(self._values())
 
     @staticmethod
     def load(path: str | Path) -> Simplification:

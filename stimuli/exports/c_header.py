@@ -75,6 +75,30 @@ def write_c_header(
         with which samples would not stay finite, or, in single precision, numbers that it cannot
         hold or tell apart.
     """
+    name, text = c_header(
+        Path(path).name,
+        model,
+        rate_hz=rate_hz,
+        seed=seed,
+        single=single,
+        limits=limits,
+        compensation=compensation,
+    )
+    write_text(path, text)
+    return name
+
+
+def c_header(
+    file_name: str,
+    model: AnyModel,
+    *,
+    rate_hz: float | None = None,
+    seed: int = 0,
+    single: bool = False,
+    limits: Limits | None = None,
+    compensation: Compensation | None = None,
+) -> tuple[str, str]:
+    """NAME and the text of the header that `write_c_header` writes; refused as there."""
     layered = check_layered(model)
     name = c_identifier(layered.texture)
     plan = _plan(layered, rate_hz, seed=seed, limits=limits, compensation=compensation)
@@ -86,13 +110,11 @@ def write_c_header(
     precision = "#ifndef TQ_REAL\n#define TQ_REAL float\n#endif\n\n" if single else ""
     tables = _tables(name, members)
     key = f"static const uint64_t {name}_key = UINT64_C({int(stream_key(seed)):#x});\n"
-    comment = _comment(layered, plan, name=name, file_name=Path(path).name, seed=seed)
+    comment = _comment(layered, plan, name=name, file_name=file_name, seed=seed)
     # Two exports of one name in one program: the same twice is one, others the compiler refuses.
     guard = f"{name}_{hashlib.sha256((tables + key).encode()).hexdigest()[:16]}"
     opening, closing = f"#ifndef {guard}\n#define {guard}\n\n", "\n#endif\n"
-    text = "".join([comment, opening, precision, kernel, "\n", tables, key, closing])
-    write_text(path, text)
-    return name
+    return name, "".join([comment, opening, precision, kernel, "\n", tables, key, closing])
 
 
 def _plan(

@@ -60,9 +60,18 @@ def write_peq_json(
     InputError
         For an autoregressive model, a condition out of range, or only one of speed and force.
     """
+    values = peq_document(model, speed_mm_s=speed_mm_s, force_n=force_n)
+    write_text(path, dump_json(values))
+    return len(values["conditions"])
+
+
+def peq_document(
+    model: AnyModel, *, speed_mm_s: float | None = None, force_n: float | None = None
+) -> dict[str, Any]:
+    """The fields of the file that `write_peq_json` writes; refused as there."""
     layered = check_layered(model)
     conditions = _conditions(layered, speed_mm_s, force_n)
-    values = {
+    return {
         "format": JSON_FORMAT,
         "version": JSON_VERSION,
         "texture": layered.texture,
@@ -76,8 +85,6 @@ def write_peq_json(
             {"speed_mm_s": v, "force_n": f, **_equalizer(layered.peq(v, f))} for v, f in conditions
         ],
     }
-    write_text(path, dump_json(values))
-    return len(conditions)
 
 
 def _conditions(

@@ -34,7 +34,13 @@ def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = Non
     InputError
         For a recipe of several stimuli, or one that `write_set` refuses.
     """
-    sources = sources or load_sources(recipe)
+    stimulus, data = only_stimulus(recipe, sources or load_sources(recipe))
+    write_bytes(path, data)
+    return stimulus
+
+
+def only_stimulus(recipe: Recipe, sources: Sources) -> tuple[Stimulus, bytes]:
+    """The only stimulus of a recipe and its WAV file; refused as by `write_wav`."""
     count = stimulus_count(recipe, sources)
     if count != 1:
         raise InputError(
@@ -43,5 +49,4 @@ def write_wav(path: str | Path, recipe: Recipe, *, sources: Sources | None = Non
         )
     ((stimulus, data),) = rendered(recipe, sources)
     check_clipping([stimulus])
-    write_bytes(path, data)
-    return stimulus
+    return stimulus, data

@@ -99,6 +99,7 @@ def write_set(
     *,
     sources: Sources | None = None,
     progress: Callable[[str], None] | None = None,
+    finish: Callable[[Path], None] | None = None,
 ) -> tuple[Stimulus, ...]:
     """Render every model on every trajectory with every seed, at every rate, to a WAV file.
 
@@ -117,6 +118,9 @@ def write_set(
         The recipe's, where they are loaded already.
     progress : callable, optional
         Called with the file's name after each file.
+    finish : callable, optional
+        Called with the complete set before it takes its place, to put its picture and provenance
+        beside it.
 
     Returns
     -------
@@ -145,8 +149,10 @@ def write_set(
                     progress(stimulus.file)
             check_clipping(stimuli)
             write_manifest(fresh, stimuli)
+            if finish:
+                finish(fresh)
     except OSError as error:
-        where = f" at {error.filename}" if error.filename else ""
+        where = "" if error.filename in (None, str(target)) else f" at {error.filename}"
         raise InputError(
             f"expected to write a stimulus set to {target}, got {error.strerror or error}{where}; "
             "check the path, its permissions and the space on the disk."

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from analysis.textures.results import TextureResult
     from modeling import Simplification, TextureModel
 
-REPORT_CONTENTS = {"report.html", "tables", "figures", "provenance.json"}
-
 
 def analyze(
     data: Annotated[Path, typer.Argument(help="Folder of the study's answers.")],
@@ -41,11 +39,11 @@ def analyze(
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
     from modeling.files.folders import replace_folder
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of, seal_folder
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
-    check_own_results(out, "analyze", contents=REPORT_CONTENTS)
+    check_own_results(out, "analyze")
     responses = load_responses(data)
     folders = (recordings, models, simplified)
     results = []
@@ -64,13 +62,8 @@ def analyze(
         )
     inputs = [path for path in (data, *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
-        provenance = write_provenance(
-            fresh / "provenance.json",
-            "analyze",
-            settings_of(responses, results),
-            seed=seed,
-            inputs=inputs,
-        )
+        settings = settings_of(responses, results)
+        provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",
             responses=responses,
@@ -79,6 +72,7 @@ def analyze(
             seed=seed,
             progress=tell,
         )
+        seal_folder(fresh, provenance)
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())

@@ -19,7 +19,6 @@ bench = typer.Typer(
     rich_markup_mode=None,
     help="Time what runs beside what would run instead.",
 )
-BENCH_CONTENTS = {"times.tsv", "layers.tsv", "aims.tsv", "rendering.png", "provenance.json"}
 
 
 @bench.command("render")
@@ -44,9 +43,9 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     from analysis.figures.rendering import figure_rendering
     from analysis.report.findings import DOTS_PER_INCH
     from modeling.files.folders import replace_folder
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of, seal_folder
 
-    check_own_results(out, "bench render", contents=BENCH_CONTENTS)
+    check_own_results(out, "bench render")
     with progress("Timing", PARTS) as advance:
         timed = bench_rendering(QUICK if quick else None, progress=advance)
     with replace_folder(out) as fresh:
@@ -60,7 +59,7 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
             "memory_bytes": timed.memory_bytes,
             "import_s": timed.import_s,
         }
-        write_provenance(fresh / "provenance.json", "bench render", settings)
+        seal_folder(fresh, provenance_of("bench render", settings))
     _tell_bench(timed)
     print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} aims met: {out / 'aims.tsv'}")
 

@@ -6,19 +6,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactileq.commands.analyze import REPORT_CONTENTS
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stimuli import render_set
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
 from tactileq.telling import progress, share_of
+from tactileq.workers import working
 
 if TYPE_CHECKING:
     from analysis.textures.results import TextureResult
     from modeling import Threshold
     from stimuli.sets.recipe import Recipe
-
-DEMO_CONTENTS = REPORT_CONTENTS | {"recordings", "models", "simplified", "stimuli", "data"}
 
 
 def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
@@ -26,30 +24,28 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
 
     Example: tactileq demo --out demo
     """
-    from joblib import Parallel, delayed
-
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
     from modeling.files.folders import replace_folder
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of, seal_folder
     from stimuli.planted.textures import TEXTURES
 
-    check_own_results(out, "demo", contents=DEMO_CONTENTS)
+    check_own_results(out, "demo")
     plan = Study.load()
     threshold = Threshold.named("codec")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
     with replace_folder(out) as fresh:
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
             record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
-            results = []
-            for result in Parallel(n_jobs=2, return_as="generator")(
-                delayed(record)(name) for name in TEXTURES
-            ):
-                results.append(result)
-                advance(result.texture)
+            made = {}
+            with working(record, tuple(TEXTURES), jobs=2) as done:
+                for number, result in done:
+                    made[number] = result
+                    advance(result.texture)
+            results = [made[number] for number in sorted(made)]
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
             full={r.texture: r.model for r in results},
@@ -74,7 +70,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             "margin_db": results[0].simplification.margin_db,
             "study": plan.to_dict(),
         }
-        provenance = write_provenance(fresh / "provenance.json", "demo", settings, seed=seed)
+        provenance = provenance_of("demo", settings, seed=seed)
         with share_of("Analyzing") as tell:
             write_report(
                 fresh / "report.html",
@@ -84,6 +80,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
                 seed=seed,
                 progress=tell,
             )
+        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tactileq.commands.stimuli import recipe_from, tell_beyond_grid
-from tactileq.keeping import check_own_file
+from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import ModelFile, Seed, VibratorFile
 from tactileq.telling import simulated_note
 
@@ -116,22 +116,22 @@ def export_c_header(
     `limits` are those of `modeling.Limits`, None for none.
     """
     from modeling import Limits, Vibrator, compensation_for
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
-    from stimuli.exports.c_header import write_c_header
+    from stimuli.exports.c_header import c_header
 
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.h")
-    marker = check_own_file(target, "export c")
+    note = note_of_file(target, "export c", texture=model.texture)
     rate_hz = model.rate_hz if rate_hz is None else rate_hz
     compensation, played_by = None, ""
     if vibrator is not None:
         found = Vibrator.load(vibrator)
         compensation = compensation_for(found, rate_hz=rate_hz)
         played_by = f" for a vibrator{' (simulated)' if found.simulated else ''}"
-    name = write_c_header(
-        target,
+    name, text = c_header(
+        target.name,
         model,
         rate_hz=rate_hz,
         seed=seed,
@@ -141,7 +141,8 @@ def export_c_header(
     )
     settings = {"rate_hz": rate_hz, "single": single, "limits": dict(limits)}
     inputs = [path for path in (model_file, vibrator) if path is not None]
-    write_provenance(marker, "export c", settings, seed=seed, inputs=inputs)
+    provenance = provenance_of("export c", settings, seed=seed, inputs=inputs)
+    write_own_files({target: text.encode()}, note, provenance, texture=model.texture)
     print(f"{name}{simulated_note(model)}{played_by}: {target}")
 
 
@@ -157,15 +158,15 @@ def export_wav_file(
     vibrator: Path | None,
 ) -> None:
     """Write a model's vibration at one speed and force, with provenance, and tell its level."""
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
-    from stimuli.exports.wav import write_wav
+    from stimuli.exports.wav import only_stimulus
     from stimuli.sets.sources import load_sources
 
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.wav")
-    marker = check_own_file(target, "export wav")
+    note = note_of_file(target, "export wav", texture=model.texture)
     recipe = recipe_from(
         [model_file],
         target,
@@ -177,9 +178,10 @@ def export_wav_file(
         vibrator=vibrator,
     )
     sources = load_sources(recipe)
-    stimulus = write_wav(target, recipe, sources=sources)
+    stimulus, data = only_stimulus(recipe, sources)
     settings = {"recipe": recipe.to_toml()}
-    write_provenance(marker, "export wav", settings, seed=seed, inputs=recipe.files())
+    provenance = provenance_of("export wav", settings, seed=seed, inputs=recipe.files())
+    write_own_files({target: data}, note, provenance, texture=model.texture)
     tell_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
@@ -194,16 +196,20 @@ def export_peq_json(
     model_file: Path, out: Path | None, *, speed: float | None, force: float | None
 ) -> None:
     """Write a model's equalizer at one condition or over its grid as JSON, with provenance."""
-    from modeling.files.provenance import write_provenance
+    from modeling.files.documents import dump_json
+    from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
-    from stimuli.exports.peq_json import write_peq_json
+    from stimuli.exports.peq_json import peq_document
 
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}_peq.json")
-    marker = check_own_file(target, "export json")
-    count = write_peq_json(target, model, speed_mm_s=speed, force_n=force)
+    note = note_of_file(target, "export json", texture=model.texture)
+    document = peq_document(model, speed_mm_s=speed, force_n=force)
+    count = len(document["conditions"])
     settings = {"speed_mm_s": speed, "force_n": force}
-    write_provenance(marker, "export json", settings, inputs=[model_file])
+    provenance = provenance_of("export json", settings, inputs=[model_file])
+    contents = {target: dump_json(document).encode()}
+    write_own_files(contents, note, provenance, texture=model.texture)
     conditions = "1 condition" if count == 1 else f"{count} conditions"
     print(f"{conditions} of {model.texture}{simulated_note(model)}: {target}")

@@ -183,6 +183,7 @@ def add_to_set(
     `left_out`: a sentence for each file that could not be used.
     """
     from modeling import RecordingSet
+    from modeling.files.places import locked
     from modeling.files.provenance import write_provenance
     from modeling.recordings.appending import append
 
@@ -194,9 +195,10 @@ def add_to_set(
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
     provenance = out / "provenance.json"
-    before = imports_before(provenance)
-    count = append(out, records, [one.source for one in new])
-    write_provenance(provenance, command, {**settings, "added to": before}, inputs=files)
+    with locked(out):  # another import must not add to what this one is adding to
+        before = imports_before(provenance)
+        count = append(out, records, [one.source for one in new])
+        write_provenance(provenance, command, {**settings, "added to": before}, inputs=files)
     if any(record.unit == "arbitrary" for record in records):
         print(
             "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "

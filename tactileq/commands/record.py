@@ -22,18 +22,21 @@ def record(
 
     Example: tactileq record recordings/canvas --texture canvas
     """
+    from modeling.files.folders import folder_behind, replace_folder
     from modeling.files.provenance import write_provenance
     from stimuli.planted.textures import planted_texture, record_texture
 
     if not duration_s > 0:
         raise ValueError(f"expected a duration above 0 s, got {duration_s:g}; give a longer one.")
+    folder_behind(folder)
     if folder.exists() and (folder.is_file() or any(folder.iterdir())):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")
     truth = planted_texture(texture)
     with progress(f"Recording {texture} in silico", 1) as advance:
         records = record_texture(truth, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
-        records.save(folder)
+        settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
+        with replace_folder(folder) as fresh:
+            records.save(fresh)
+            write_provenance(fresh / "provenance.json", "record", settings, seed=seed)
         advance("")
-    settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
-    write_provenance(folder / "provenance.json", "record", settings, seed=seed)
     print(f"{len(records)} simulated recordings of {texture} in {folder}")

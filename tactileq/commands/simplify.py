@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.keeping import check_own_model
+from tactileq.keeping import check_own_files, write_own_files
 from tactileq.many_textures import recording_folders
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
 from tactileq.telling import simulated_note, usable_recordings
 
 if TYPE_CHECKING:
     from modeling import RecordingSet, Simplification, TextureModel
+
+# Of the names of all files that the command may write, beside their provenance.
+ENDINGS = (".json", "_simplification.json", "_layers.tsv", "_threshold.png")
 
 
 def simplify(
@@ -42,16 +45,23 @@ def simplify(
 
     Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
     """
+    from analysis.report.findings import table_bytes
     from analysis.textures.results import simplification_table
     from modeling import TextureModel, Threshold
     from modeling import simplify as drop_layers
-    from modeling.files.provenance import write_provenance
-    from modeling.files.writing import file_stem, write_text
-    from modeling.perception.verdicts import ENDING
+    from modeling.files.provenance import provenance_of
+    from modeling.files.writing import file_stem
 
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
-    check_own_model(start, "simplify")
+    note = Path(f"{start}_provenance.json")
+    check_own_files(
+        [Path(f"{start}{ending}") for ending in ENDINGS],
+        note,
+        command="simplify",
+        texture=full.texture,
+        inputs=[model_file],
+    )
     result = drop_layers(
         full,
         Threshold.named(threshold),
@@ -59,17 +69,19 @@ def simplify(
         margin_db=margin_db,
         hold_above=hold_above,
     )
+    files = {
+        ".json": result.model.to_json().encode(),
+        "_simplification.json": result.to_json().encode(),
+        "_layers.tsv": table_bytes(simplification_table(result)),
+    }
     if plot:
-        draw_condition(full, result, start, recordings=recordings, speed=speed, force=force)
+        files["_threshold.png"] = draw_condition(
+            full, result, recordings=recordings, speed=speed, force=force
+        )
     elif (recordings, speed, force) != (None, None, None):
         raise ValueError(
             "expected --plot with --recordings, --speed or --force, got none; add --plot."
         )
-    result.model.save(f"{start}.json")
-    result.save(f"{start}{ENDING}")
-    table = simplification_table(result)
-    write_text(f"{start}_layers.tsv", table.to_csv(sep="\t", index=False, na_rep="n/a"))
-    tell_verdicts(result)
     settings: dict[str, object] = {
         "threshold": threshold,
         "criterion": criterion,
@@ -77,8 +89,10 @@ def simplify(
         "hold_above": hold_above,
     }
     settings |= {"full_sha256": full.sha256, "threshold_sha256": result.threshold.sha256}
-    provenance = Path(f"{start}_provenance.json")
-    write_provenance(provenance, "simplify", settings, inputs=[model_file])
+    contents = {Path(f"{start}{ending}"): data for ending, data in files.items()}
+    provenance = provenance_of("simplify", settings, inputs=[model_file])
+    write_own_files(contents, note, provenance, texture=full.texture)
+    tell_verdicts(result)
     if result.identical:
         print(
             f"note: {full.texture}: the simplified model is identical to the full one: nothing to "
@@ -103,20 +117,18 @@ def tell_verdicts(result: Simplification) -> None:
 def draw_condition(
     full: TextureModel,
     result: Simplification,
-    start: Path,
     *,
     recordings: Path | None,
     speed: float | None,
     force: float | None,
-) -> None:
+) -> bytes:
     """Draw spectra, layers and threshold of one condition (PAPER fig. 6), beside its recording.
 
-    Writes `start`_threshold.png. Without speed (mm/s) or force (N) it is the fastest and strongest
+    Returns a PNG file. Without speed (mm/s) or force (N) it is the fastest and strongest
     condition, of the recordings if there are any, else of the grid.
     """
-    from analysis.figures.saving import save_figure
     from analysis.figures.spectra import figure_spectra_and_threshold
-    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.report.findings import picture_bytes
     from analysis.spectra.comparison import compare_condition, compare_spectra
     from analysis.textures.results import TextureResult, reference_condition
 
@@ -131,9 +143,7 @@ def draw_condition(
         speed_mm_s=fastest if speed is None else speed,
         force_n=strongest if force is None else force,
     )
-    start.parent.mkdir(parents=True, exist_ok=True)
-    picture = figure_spectra_and_threshold(shown)
-    save_figure(picture, f"{start}_threshold.png", dpi=DOTS_PER_INCH)
+    return picture_bytes(figure_spectra_and_threshold(shown))
 
 
 def _recordings_of(texture: str, folder: Path) -> RecordingSet:

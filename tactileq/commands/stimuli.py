@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -115,17 +115,23 @@ def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) ->
     """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
     from modeling.files.provenance import write_provenance
 
-    sources, count = render_set(recipe, out)
-    settings = {"recipe": recipe.to_toml()}
-    inputs = [*inputs, *recipe.files()]
-    write_provenance(out / "provenance.json", "stimuli", settings, inputs=inputs)
+    def tell_origin(folder: Path) -> None:
+        settings = {"recipe": recipe.to_toml()}
+        files = [*inputs, *recipe.files()]
+        write_provenance(folder / "provenance.json", "stimuli", settings, inputs=files)
+
+    sources, count = render_set(recipe, out, finish=tell_origin)
     tell_passed_over(sources.passed_over)
     tell_beyond_grid(sources)
     print(f"{count} files: {out / 'manifest.tsv'}")
 
 
-def render_set(recipe: Recipe, out: Path) -> tuple[Sources, int]:
+def render_set(
+    recipe: Recipe, out: Path, *, finish: Callable[[Path], None] | None = None
+) -> tuple[Sources, int]:
     """Write a stimulus set with its contact sheet, behind a progress bar.
+
+    `finish` puts more beside them before the set takes its place.
 
     Returns what it was rendered from and how many files it has.
     """
@@ -141,10 +147,14 @@ def render_set(recipe: Recipe, out: Path) -> tuple[Sources, int]:
     from analysis.report.findings import DOTS_PER_INCH
     from analysis.spectra.contact_sheet import contact_sheet
 
+    def draw(folder: Path) -> None:
+        sheet = figure_contact_sheet(contact_sheet(folder))
+        save_figure(sheet, folder / CONTACT_SHEET, dpi=DOTS_PER_INCH)
+        if finish:
+            finish(folder)
+
     with progress("Rendering stimuli", count) as advance:
-        write_set(out, recipe, sources=sources, progress=advance)
-    sheet = figure_contact_sheet(contact_sheet(out))
-    save_figure(sheet, out / CONTACT_SHEET, dpi=DOTS_PER_INCH)
+        write_set(out, recipe, sources=sources, progress=advance, finish=draw)
     return sources, count
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from tactileq.keeping import check_own_file
+from tactileq.keeping import note_of_file, write_own_files
 
 if TYPE_CHECKING:
     from analysis.spectra.vibrator import CompensatedVibrator
@@ -52,17 +51,17 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
         Whether the test was simulated.
     """
     from analysis.figures.vibrator import figure_vibrator
-    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.report.findings import picture_bytes
     from analysis.spectra.vibrator import compensated
     from modeling import identify_vibrator
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import provenance_of
     from modeling.files.wav import read_wav_channels
 
     files = {path: ending for path, ending in ((out, ".json"), (plot, ".png")) if path is not None}
     for path, ending in files.items():
         if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
-    markers = {path: check_own_file(path, "vibrator") for path in files}
+    notes = {path: note_of_file(path, "vibrator") for path in files}
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:
         raise ValueError(
@@ -73,18 +72,12 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     shown = compensated(
         identify_vibrator(drive, acceleration, rate_hz=rate_hz, simulated=simulated)
     )
-    shown.vibrator.save(out)
-    tell_origin = partial(
-        write_provenance,
-        command="vibrator",
-        settings={"simulated": simulated},
-        inputs=[test],
-    )
-    tell_origin(markers[out])
+    contents = {out: shown.vibrator.to_json().encode()}
     if plot is not None:
-        plot.parent.mkdir(parents=True, exist_ok=True)
-        figure_vibrator(shown).savefig(plot, dpi=DOTS_PER_INCH)
-        tell_origin(markers[plot])
+        contents[plot] = picture_bytes(figure_vibrator(shown))
+    provenance = provenance_of("vibrator", {"simulated": simulated}, inputs=[test])
+    for path, data in contents.items():
+        write_own_files({path: data}, notes[path], provenance)
     print(f"{_found(shown)}: {out}")
 
 

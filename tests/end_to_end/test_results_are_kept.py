@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import json
+import os
+import resource
+import shutil
+import signal
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from modeling import Recording, RecordingSet, TextureModel
+from modeling.files.provenance import provenance_of, seal_folder
 from stimuli.planted.textures import planted_texture, record_texture
 
 SMALL_STUDY = """
@@ -71,9 +78,9 @@ def test_full_and_simplified_models_do_not_replace_each_other(main, tmp_path: Pa
     assert main("simplify", "models/canvas.json", "--out", "fewer").returncode == 0
     over_full = main("simplify", "fewer/canvas.json", "--out", "models")
     over_simplified = main("model", "canvas", "--out", "fewer")
-    for refused in (over_full, over_simplified):
+    for refused, other in ((over_full, "model"), (over_simplified, "simplify")):
         assert refused.returncode == 1
-        assert "expected a folder without models of another command" in refused.stderr
+        assert f"canvas.json, got one of tactileq {other}; choose" in refused.stderr
     assert TextureModel.load(tmp_path / "models/canvas.json") == full
 
 
@@ -131,11 +138,166 @@ def test_a_new_analysis_replaces_the_whole_old_one(main, study: Path) -> None:
 
 
 def test_provenance_names_seed_settings_and_inputs(main, study: Path) -> None:
-    import json
-
     note = json.loads((study / "data/sourcedata/simulate_provenance.json").read_text())
     assert note["seed"] == 0
     assert note["settings"]["threshold"] == "codec"
     assert note["settings"]["study"]["name"] == "small"
     assert set(note["inputs_sha256"]) == {"models", "simplified"}
     assert all(len(digest) == 64 for digest in note["inputs_sha256"].values())
+
+
+FOREIGN = {
+    "a file beside figures": "figures/mine.png",
+    "a file in a new folder": "figures/mine/photo.png",
+    "a folder": "mine/",
+}
+
+
+@pytest.mark.parametrize("command", ["analyze data", "demo", "bench render"])
+@pytest.mark.parametrize("foreign", FOREIGN.values(), ids=FOREIGN)
+def test_folders_with_one_foreign_file_are_not_replaced(
+    main, tmp_path: Path, command: str, foreign: str
+) -> None:
+    made = tmp_path / "made"
+    (made / "figures").mkdir(parents=True)
+    (made / "figures/a.png").write_bytes(b"ours")
+    seal_folder(made, provenance_of(command.removesuffix(" data"), {}))
+    path = made / foreign
+    if foreign.endswith("/"):
+        path.mkdir()
+    else:
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(b"theirs")
+    before = sorted(made.rglob("*"))
+    refused = main(*command.split(), "--out", "made")
+    assert refused.returncode == 1
+    named = foreign if path.parent == made / "figures" else f"{Path(foreign).parent}/"
+    assert f"a folder with other files in it ({named.removeprefix('./')}" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    assert sorted(made.rglob("*")) == before
+
+
+def test_folders_of_another_command_or_of_none_are_not_replaced(main, tmp_path: Path) -> None:
+    (tmp_path / "made").mkdir()
+    (tmp_path / "made/a.png").write_bytes(b"ours")
+    for provenance in ({"command": "tactileq demo"}, provenance_of("analyze", {})):
+        seal_folder(tmp_path / "made", provenance)
+        refused = main("bench", "render", "--out", "made")
+        assert "a folder with other files in it (a.png)" in refused.stderr
+    (tmp_path / "made/provenance.json").write_text('{"command": "tactileq bench render"}')
+    refused = main("bench", "render", "--out", "made")  # by a version that listed no files
+    assert "a folder with other files in it (a.png)" in refused.stderr
+    assert (tmp_path / "made/a.png").read_bytes() == b"ours"
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    """A planted model at models/canvas.json."""
+    planted_texture("canvas").save(tmp_path / "models/canvas.json")
+    return tmp_path / "models/canvas.json"
+
+
+def test_simplify_does_not_overwrite_its_input(main, tmp_path: Path, model: Path) -> None:
+    before = contents(tmp_path)
+    refused = main("simplify", "models/canvas.json", "--out", "models")
+    assert "got models/canvas.json, which is the input itself" in refused.stderr
+    for link in ("hard", "soft"):
+        (tmp_path / link).mkdir()
+    os.link(model, tmp_path / "hard/canvas.json")
+    (tmp_path / "soft/canvas.json").symlink_to(model)
+    for out in (".", "hard", "soft", "models/../models"):
+        source = tmp_path / "canvas.json" if out == "." else model
+        if out == ".":
+            shutil.copy(model, source)
+        refused = main("simplify", source, "--out", out)
+        assert refused.returncode == 1
+        assert "which is the input itself" in refused.stderr
+    assert (tmp_path / "soft/canvas.json").is_symlink()
+    assert before.items() <= contents(tmp_path).items()
+    assert main("simplify", model, "--out", "fewer").returncode == 0
+    before = contents(tmp_path)
+    again = main("simplify", "fewer/canvas.json", "--out", "fewer")
+    assert "which is the input itself" in again.stderr
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize("ending", [".json", "_layers.tsv", "_threshold.png", "_provenance.json"])
+def test_simplify_does_not_overwrite_what_others_wrote(
+    main, tmp_path: Path, model: Path, ending: str
+) -> None:
+    (tmp_path / "fewer").mkdir()
+    (tmp_path / f"fewer/canvas{ending}").write_text("{}")
+    before = contents(tmp_path)
+    refused = main("simplify", model, "--out", "fewer")
+    assert refused.returncode == 1
+    assert f"at fewer/canvas{'' if ending == '_provenance.json' else ending}" in refused.stderr
+    assert contents(tmp_path) == before
+
+
+def test_simplify_replaces_its_own_results_and_no_namesakes(main, tmp_path: Path) -> None:
+    for file, name in (("1", "a b"), ("2", "a-b")):
+        replace(planted_texture("canvas"), texture=name).save(tmp_path / f"{file}.json")
+    assert main("simplify", "1.json", "--out", "fewer", "--plot").returncode == 0
+    done = main("simplify", "1.json", "--out", "fewer", "--margin-db", 3)
+    assert done.returncode == 0, done.stderr
+    listed = json.loads((tmp_path / "fewer/a-b_provenance.json").read_text())["files"]
+    assert listed == ["a-b.json", "a-b_layers.tsv", "a-b_threshold.png"]
+    before = contents(tmp_path)
+    refused = main("simplify", "2.json", "--out", "fewer")
+    assert refused.returncode == 1
+    assert "for 'a-b' at fewer/a-b.json, got one for 'a b'" in refused.stderr
+    assert contents(tmp_path) == before
+
+
+def test_model_does_not_overwrite_namesakes_or_what_others_wrote(main, tmp_path: Path) -> None:
+    records = grid("canvas")
+    for folder, name in (("1", "a b"), ("2", "a-b")):
+        of_name = [replace(recording, texture=name) for recording in records]
+        RecordingSet(of_name).save(tmp_path / folder)
+    for _ in range(2):
+        assert main("model", "1", "--out", "models", "--layers", 1).returncode == 0
+    before = contents(tmp_path)
+    refused = main("model", "2", "--out", "models")
+    assert "for 'a-b' at models/a-b.json, got one for 'a b'" in refused.stderr
+    assert contents(tmp_path) == before
+    (tmp_path / "models/a-b_check.tsv").write_text("mine")
+    before = contents(tmp_path)
+    refused = main("model", "1", "--out", "models")
+    assert "at models/a-b_check.tsv, got something else" in refused.stderr
+    assert contents(tmp_path) == before
+
+
+def test_exports_replace_their_own_files_alone(main, tmp_path: Path, model: Path) -> None:
+    replace(planted_texture("canvas"), texture="MDF").save(tmp_path / "MDF.json")
+    for _ in range(2):
+        assert main("export", "json", model, "--out", "x.json").returncode == 0
+    before = contents(tmp_path)
+    refused = main("export", "json", "MDF.json", "--out", "x.json")
+    assert "for 'MDF' at x.json, got one for 'canvas'" in refused.stderr
+    refused = main("export", "wav", model, "--speed", 1, "--force", 1, "--out", "x.json")
+    assert "at x.json, got one of tactileq export json" in refused.stderr
+    (tmp_path / "y.json_provenance.json").write_text('{"mine": 1}')
+    refused = main("export", "json", model, "--out", "y.json")
+    assert "at y.json_provenance.json, got something else" in refused.stderr
+    assert before.items() <= contents(tmp_path).items()
+    assert not (tmp_path / "y.json").exists()
+
+
+def test_a_full_disk_leaves_no_part_of_a_model(main, tmp_path: Path, model: Path) -> None:
+    assert main("simplify", model, "--out", "fewer").returncode == 0
+    before = contents(tmp_path)
+    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
+    try:
+        refused = [main("simplify", model, "--out", out) for out in ("fewer", "new")]
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, handler)
+    for out, done in zip(("fewer", "new"), refused, strict=True):
+        assert done.returncode == 1
+        assert done.stderr.startswith(f"error: expected to read or write {out}/canvas")
+        assert done.stderr.count("\n") == 1
+        assert done.stdout == ""
+    assert contents(tmp_path) == before
+    assert not any((tmp_path / "new").iterdir())
