@@ -7,9 +7,15 @@ from math import inf
 from numbers import Integral, Real
 from typing import TypeGuard
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shortened, shown
 
 UNITS = ("g", "arbitrary")
+HIGHEST_RATE_HZ = 1e7  # above any accelerometer's; a second then holds 80 MB
+LARGEST_VALUE = 1e100  # of samples and gains, so that powers of them stay finite
+HIGHEST_SPEED_MM_S = 1e5  # beyond any hand's, as the force
+HIGHEST_FORCE_N = 1e4
+MOST_SAMPLES = 10_000_000  # of one simulated record: 80 MB, and a set may have dozens
+LONGEST_NAME = 100  # of a texture: it is part of file names
 
 
 def is_number(value: object) -> TypeGuard[float]:
@@ -26,7 +32,12 @@ def check_texture_name(name: object) -> None:
     """Refuse what cannot be a texture's name in a table: anything but one line of text."""
     if not isinstance(name, str) or not name.strip() or any(c in name for c in "\t\r\n"):
         raise InputError(
-            f"expected a texture name of one line without tabs, got {name!r}; name it."
+            f"expected a texture name of one line without tabs, got {shown(name)}; name it."
+        )
+    if len(name) > LONGEST_NAME:
+        raise InputError(
+            f"expected a texture name of at most {LONGEST_NAME} characters, got {len(name)} in "
+            f"{shown(name)}; shorten it."
         )
 
 
@@ -39,30 +50,51 @@ def is_positive(value: object) -> TypeGuard[float]:
 
 
 def check_rate(rate_hz: object) -> None:
-    """Refuse what cannot be a sampling rate: anything but a finite number above 0."""
+    """Refuse what cannot be a sampling rate: anything but a number above 0, up to 10 MHz."""
     if not is_positive(rate_hz):
-        got = str(rate_hz) if is_number(rate_hz) else repr(rate_hz)
-        raise InputError(f"expected a rate above 0 Hz, got {got}; give the rate.")
+        raise InputError(f"expected a rate above 0 Hz, got {shown(rate_hz)}; give the rate.")
+    if rate_hz > HIGHEST_RATE_HZ:
+        raise InputError(
+            f"expected a rate of at most {HIGHEST_RATE_HZ:.0f} Hz, got {shown(rate_hz)}; give the "
+            "rate in Hz."
+        )
+
+
+def check_duration(duration_s: float, rate_hz: float) -> None:
+    """Refuse a rate, and a duration above 0 s of more samples than one record may have."""
+    check_rate(rate_hz)
+    if not is_positive(duration_s):
+        raise InputError(
+            f"expected a duration above 0 s, got {shown(duration_s)}; give a longer one."
+        )
+    if duration_s * rate_hz > MOST_SAMPLES:
+        raise InputError(
+            f"expected a duration of at most {MOST_SAMPLES / rate_hz:g} s at {rate_hz:g} Hz "
+            f"({MOST_SAMPLES} samples), got {duration_s:g} s; give a shorter one, or a lower rate."
+        )
 
 
 def check_name(what: str, name: object) -> None:
     """Refuse all but printable text in one line."""
     if not isinstance(name, str) or not name.strip() or not name.isprintable():
-        raise InputError(f"expected printable text in one line as {what}, got {name!r}; rename it.")
+        raise InputError(
+            f"expected printable text in one line as {what}, got {shown(name)}; rename it."
+        )
 
 
 def check_choice(what: str, value: object, choices: tuple[str, ...]) -> None:
     """Refuse all but one of the choices."""
     if value not in choices:
         either = " or ".join(f'"{choice}"' for choice in choices)
-        raise InputError(f"expected {what} to be {either}, got {value!r}; choose one.")
+        raise InputError(f"expected {what} to be {either}, got {shown(value)}; choose one.")
 
 
 def check_number(what: str, value: object, *, low: float = 0.0, high: float) -> None:
     """Refuse all but a number from `low` to `high`."""
     if not (is_number(value) and low <= value <= high):
         raise InputError(
-            f"expected a number from {low:g} to {high:g} for {what}, got {value!r}; correct it."
+            f"expected a number from {low:g} to {high:g} for {what}, got {shown(value)}; correct "
+            "it."
         )
 
 
@@ -70,7 +102,8 @@ def check_whole(what: str, value: object, *, low: int, high: int) -> None:
     """Refuse all but a whole number from `low` to `high`."""
     if not (is_whole(value) and low <= value <= high):
         raise InputError(
-            f"expected a whole number from {low} to {high} for {what}, got {value!r}; correct it."
+            f"expected a whole number from {low} to {high} for {what}, got {shown(value)}; correct "
+            "it."
         )
 
 
@@ -79,6 +112,6 @@ def check_keys(values: Iterable[str], known: Sequence[str], *, where: str) -> No
     unknown = sorted(set(values) - set(known))
     if unknown:
         raise InputError(
-            f"expected only {', '.join(known)} in {where}, got {', '.join(unknown)}; correct the "
-            "spelling or remove it."
+            f"expected only {', '.join(known)} in {where}, got {shortened(', '.join(unknown))}; "
+            "correct the spelling or remove it."
         )

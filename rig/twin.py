@@ -12,6 +12,7 @@ import numpy as np
 
 from modeling import InputError, Renderer, TextureModel
 from modeling.arrays import Floats
+from modeling.errors import shown
 from modeling.hand import Hand
 from rig.interface import RigReading
 
@@ -72,7 +73,7 @@ class SimulatedRig:
             return
         if texture not in self._real:
             raise InputError(
-                f"expected a mounted sample among {', '.join(self._real)}, got {texture!r}; "
+                f"expected a mounted sample among {', '.join(self._real)}, got {shown(texture)}; "
                 "give the twin its truth."
             )
         self.present_model(self._real[texture])

@@ -8,6 +8,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modeling.errors import shortened
+from modeling.files.reading import reason_of
+
 if TYPE_CHECKING:
     from experiments.study.models import ModelSets
     from modeling import RecordingSet
@@ -17,15 +20,11 @@ if TYPE_CHECKING:
 def sentence_of(error: Exception) -> str:
     """What a user is told of an error: one sentence, never a traceback."""
     # A StoreError carries its own sentence, the system's errors only a number and a word.
-    if isinstance(error, OSError) and error.errno is not None and error.filename is not None:
-        return (
-            f"expected to read or write {error.filename}, got {error.strerror!r}; check the "
-            "path, its permissions and the space on the disk."
-        )
     if isinstance(error, OSError) and error.errno is not None:
+        place = "a file" if error.filename is None else shortened(str(error.filename), longest=200)
         return (
-            f"expected to read and write files, got {error.strerror!r}; make room on the disk, or "
-            "check it, and run again."
+            f"expected to read or write {place}, got {reason_of(error)}; check the path, its "
+            "permissions and the space on the disk."
         )
     if isinstance(error, MemoryError):
         return "expected a task that fits the memory, got a larger one; ask for less at once."

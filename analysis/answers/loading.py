@@ -13,7 +13,11 @@ import pandas as pd
 from analysis.answers.order import check_order, planned_trials, told_of_unordered
 from analysis.labels import MODELS
 from modeling import InputError
+from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.documents import read_json_object
+from modeling.files.reading import read_bytes
+from modeling.files.tables import check_named_once
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
@@ -209,13 +213,7 @@ def _planned(description: Mapping[str, object], path: Path) -> dict[str, Planned
 
 
 def _json_object(path: Path) -> Mapping[str, object]:
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise InputError(
-            f"expected JSON in {path}, but it cannot be read ({problem}); restore the file."
-        ) from None
-    return values if isinstance(values, dict) else {}
+    return read_json_object(path, advice="restore the file")
 
 
 def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> None:
@@ -355,10 +353,10 @@ def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -
     if wrong.any():
         row = int(np.flatnonzero(wrong.to_numpy())[0])
         value = column.loc[wrong[wrong].index[0]]
-        shown = "n/a" if pd.isna(value) else value
+        found = "n/a" if pd.isna(value) else value
         raise InputError(
-            f"expected {expected} in {path}, but answer {row + 1} has {shown!r}; correct the file "
-            f"or leave it out."
+            f"expected {expected} in {path}, but answer {row + 1} has {shown(found)}; correct the "
+            "file or leave it out."
         )
 
 
@@ -374,12 +372,12 @@ def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], *, path: Pat
 
 def _read_lines(path: Path, warnings: list[str]) -> pd.DataFrame:
     """All complete lines as text; n/a becomes missing. No columns where even the first is cut."""
+    complete, _, rest = read_bytes(path, "a table").rpartition(b"\n")
     try:
-        complete, _, rest = path.read_bytes().rpartition(b"\n")
         lines = [line.rstrip("\r") for line in complete.decode("utf-8-sig").split("\n")]
-    except (OSError, UnicodeDecodeError) as problem:
+    except UnicodeDecodeError:
         raise InputError(
-            f"expected UTF-8 text in {path}, but it cannot be read ({problem}); restore the file."
+            f"expected UTF-8 text in {path}, got other bytes; restore the file."
         ) from None
     if not complete:
         warnings.append(
@@ -387,6 +385,7 @@ def _read_lines(path: Path, warnings: list[str]) -> pd.DataFrame:
         )
         return pd.DataFrame()
     header = lines[0].split("\t")
+    check_named_once(header, path)
     rows = [line.split("\t") for line in lines[1:]]
     if rest:
         tail = rest.decode("utf-8", errors="replace")

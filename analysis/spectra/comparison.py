@@ -21,6 +21,7 @@ from modeling import (
 )
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import band_response
+from modeling.errors import shown
 from modeling.perception.simplification import layer_amplitudes_g
 from modeling.perception.verdicts import CriterionName
 from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
@@ -188,7 +189,7 @@ def _require_within_grid(model: TextureModel, speed_mm_s: float, *, force_n: flo
     speeds, forces = model.speeds_mm_s, model.forces_n
     if not (speeds[0] <= speed_mm_s <= speeds[-1] and forces[0] <= force_n <= forces[-1]):
         raise InputError(
-            f"expected a condition within the grid of {model.texture!r}, {speeds[0]:g} to "
+            f"expected a condition within the grid of {shown(model.texture)}, {speeds[0]:g} to "
             f"{speeds[-1]:g} mm/s and {forces[0]:g} to {forces[-1]:g} N, got {speed_mm_s:g} mm/s "
             f"and {force_n:g} N; choose one inside."
         )

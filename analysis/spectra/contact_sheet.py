@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from modeling.arrays import Bools, Floats
+from modeling.files.folders import listed_file
 from stimuli.sets.manifest import COMPENSATED, MANIFEST
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.rendering import steady_part
@@ -76,7 +77,8 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
     power = np.full(shape, np.nan)
     for of_one, files in chosen.groupby(list(_NAMES)):
         at = tuple(known.index(name) for known, name in zip(names, of_one, strict=True))
-        found = [_density(place / row.file, row.full_scale_g) for row in files.itertuples()]
+        listed = [listed_file(place, name, index_name=MANIFEST) for name in files["file"]]
+        found = list(map(_density, listed, files["full_scale_g"]))
         density[at] = np.mean(found, axis=0)[shown]
         power[at] = np.mean(10 ** (files["level_db"] / 10))
     simulated = chosen.groupby("texture", sort=False)["simulated"].any()

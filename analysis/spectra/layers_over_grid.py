@@ -8,6 +8,7 @@ import numpy as np
 
 from modeling import InputError, TextureModel
 from modeling.arrays import Bools, Floats
+from modeling.errors import shown
 from modeling.perception.simplification import layer_amplitudes_g
 
 
@@ -16,8 +17,8 @@ def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tu
     force = np.flatnonzero(model.forces_n == force_n)
     if not (speed.size and force.size):
         raise InputError(
-            f"expected a condition of the grid of {model.texture!r}, got {speed_mm_s:g} mm/s and "
-            f"{force_n:g} N; choose among {model.speeds_mm_s.tolist()} mm/s and "
+            f"expected a condition of the grid of {shown(model.texture)}, got {speed_mm_s:g} mm/s "
+            f"and {force_n:g} N; choose among {model.speeds_mm_s.tolist()} mm/s and "
             f"{model.forces_n.tolist()} N."
         )
     return int(speed[0]), int(force[0])

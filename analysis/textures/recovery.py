@@ -14,6 +14,7 @@ from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column, names
 from analysis.labels import ALL_LAYERS
 from modeling import InputError, TextureModel
 from modeling.arrays import Bools, Floats, Integers
+from modeling.errors import shown
 
 LEAST_TOLERANCE_HZ = 10.0
 NO_PARTNER = -1
@@ -194,13 +195,13 @@ def _pair(truth: TextureModel, estimated: TextureModel) -> _Pairing:
         and np.array_equal(truth.forces_n, estimated.forces_n)
     ):
         raise InputError(
-            f"expected a model of {truth.texture!r} on the planted grid, got speeds "
+            f"expected a model of {shown(truth.texture)} on the planted grid, got speeds "
             f"{estimated.speeds_mm_s.tolist()} mm/s and forces {estimated.forces_n.tolist()} N; "
             "record the planted texture on its own grid."
         )
     if not truth.n_layers:
         raise InputError(
-            f"expected planted layers in {truth.texture!r}, got none; plant at least one."
+            f"expected planted layers in {shown(truth.texture)}, got none; plant at least one."
         )
     same_rate = estimated.at_rate(truth.rate_hz)
     conditions = ~np.asarray(same_rate.interpolated, dtype=bool)

@@ -10,6 +10,7 @@ import pandas as pd
 
 from analysis.columns import LAYER, SIMULATED, TEXTURE, Column
 from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
+from modeling.errors import shown
 from modeling.fitting.conditions import recording_spectra
 
 
@@ -63,7 +64,7 @@ class TextureResult:
         here = [r for r in self.recordings if r.condition == condition]
         if not here:
             raise InputError(
-                f"expected a recording of {self.texture!r} at {speed_mm_s:g} mm/s and "
+                f"expected a recording of {shown(self.texture)} at {speed_mm_s:g} mm/s and "
                 f"{force_n:g} N, got none; choose a recorded condition."
             )
         floor = [r for r in self.recordings if r.force_n == 0]

@@ -20,6 +20,7 @@ from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from modeling import InputError, TextureModel, Threshold
 from modeling.arrays import Floats
+from modeling.errors import shown
 from modeling.seeds import generator
 
 SurfaceKind = Literal["real", "full", "simplified"]
@@ -62,7 +63,7 @@ def sensation_levels(
     if model.unit != "g":
         raise InputError(
             f"expected a model in g for a simulated participant, got one of {model.texture} in "
-            f"unit {model.unit!r}; record it with a calibrated sensor."
+            f"unit {shown(model.unit)}; record it with a calibrated sensor."
         )
     edges = np.array(BAND_EDGES_HZ)
     frequency_hz = np.arange(edges[0], edges[-1], STEP_HZ) + STEP_HZ / 2

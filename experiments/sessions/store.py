@@ -21,6 +21,9 @@ import numpy as np
 from experiments.study.design import SessionPlan
 from experiments.study.study import Study
 from modeling import InputError
+from modeling.errors import shown
+from modeling.files.documents import read_json_object
+from modeling.files.reading import read_text
 
 BIDS_VERSION = "1.10.0"
 ORDER_FORMAT = "tactileq.session-order"
@@ -355,10 +358,7 @@ def _describe_data_set(root: Path, study: Study, *, origin: Mapping[str, Any]) -
 
 
 def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError:
-        found = {}
+    found = read_json_object(path, advice="choose another data folder for these sessions")
     for key, value in wanted.items():
         there = found.get(key)
         if there == value:
@@ -367,8 +367,8 @@ def _check_description(path: Path, wanted: Mapping[str, Any]) -> None:
             changed = sorted(k for k in value.keys() | there if value.get(k) != there.get(k))
             key, there, value = f"{key} unchanged", f"another {', '.join(changed)}", "as begun"
         raise InputError(
-            f"expected a data folder with {key} {value!r} in {path}, got {there!r}; choose "
-            "another data folder for these sessions."
+            f"expected a data folder with {key} {shown(value)} in {path}, got {shown(there)}; "
+            "choose another data folder for these sessions."
         )
 
 
@@ -387,7 +387,7 @@ def _add_participant(root: Path, subject: int, *, simulated: bool) -> None:
     name = f"sub-{subject:02d}"
     with suppress(FileExistsError):
         _write_new(path, "\t".join(PARTICIPANT_COLUMNS) + "\n", made=[])
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path, "the list of participants").splitlines()
     if name in (line.split("\t")[0] for line in lines):
         return
     handle = os.open(path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from modeling import InputError
 from modeling.checks import check_keys, check_whole
+from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_toml
 from modeling.files.hashes import sha256_of_values
@@ -35,7 +36,7 @@ def _require_label(name: str, value: object, *, forbidden: str) -> None:
         listed = f" and none of {' '.join(forbidden)}" if forbidden else ""
         raise InputError(
             f"expected printable text for {name}, without tabs, line ends or spaces around it"
-            f"{listed}, got {value!r}; rename it."
+            f"{listed}, got {shown(value)}; rename it."
         )
 
 
@@ -64,7 +65,7 @@ class TaskPlan:
         check_whole("participants", self.participants, low=1, high=9999)
         if self.schedule not in SCHEDULES:
             raise InputError(
-                f"expected a schedule of {' or '.join(SCHEDULES)}, got {self.schedule!r}; "
+                f"expected a schedule of {' or '.join(SCHEDULES)}, got {shown(self.schedule)}; "
                 "choose one of the two."
             )
         if self.schedule == "by-day" and self.participants % 2:
@@ -136,7 +137,8 @@ class Study:
         for task, plan in planned.items():
             if not isinstance(plan, TaskPlan):
                 raise InputError(
-                    f"expected a TaskPlan for {task}, got {plan!r}; give participants and schedule."
+                    f"expected a TaskPlan for {task}, got {shown(plan)}; give participants and "
+                    "schedule."
                 )
         in_order = {task: planned[task] for task in TASKS if task in planned}
         object.__setattr__(self, "tasks", in_order)
@@ -182,7 +184,7 @@ class Study:
         """
         if task not in self.tasks:
             raise InputError(
-                f"expected the task {' or '.join(self.tasks)}, got {task!r}; choose one."
+                f"expected the task {' or '.join(self.tasks)}, got {shown(task)}; choose one."
             )
         return self.tasks[task]
 
@@ -223,12 +225,12 @@ class Study:
         tasks = {name: _task_plan(name, settings.pop(name)) for name in TASKS if name in settings}
         if not isinstance(settings.get("trays", {}), Mapping):
             raise InputError(
-                f"expected a table [trays] of texture = tray, got {settings['trays']!r}; "
+                f"expected a table [trays] of texture = tray, got {shown(settings['trays'])}; "
                 "write one line per texture under [trays]."
             )
         if not isinstance(settings.get("textures", []), list | tuple):
             raise InputError(
-                f"expected a list of textures, got {settings['textures']!r}; "
+                f"expected a list of textures, got {shown(settings['textures'])}; "
                 'write textures = ["…", "…"].'
             )
         return Study(**settings, tasks=tasks)
@@ -258,7 +260,7 @@ _STUDY_KEYS = tuple(
 def _task_plan(task: str, values: object) -> TaskPlan:
     if not isinstance(values, Mapping):
         raise InputError(
-            f"expected a table [{task}] with participants and schedule, got {values!r}; "
+            f"expected a table [{task}] with participants and schedule, got {shown(values)}; "
             "write both under that heading."
         )
     known = tuple(f.name for f in fields(TaskPlan))

@@ -9,12 +9,13 @@ from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan
 from experiments.study.study import TASKS, Study
 from modeling import InputError
+from modeling.errors import shown
 
 
 def task_named(name: str) -> Task:
     """The task that `ANSWER_TABLES` declares under this name; InputError for another name."""
     if name not in TASKS:
-        raise InputError(f"expected the task {' or '.join(TASKS)}, got {name!r}; choose one.")
+        raise InputError(f"expected the task {' or '.join(TASKS)}, got {shown(name)}; choose one.")
     found: Task = import_module(f"experiments.tasks.{name}").TASK
     return found
 

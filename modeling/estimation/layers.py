@@ -9,7 +9,7 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,5 +64,5 @@ def check_estimator(estimator: str) -> EstimatorName:
         if name == estimator:
             return name
     raise InputError(
-        f"expected an estimator among {', '.join(ESTIMATORS)}, got {estimator!r}; choose one."
+        f"expected an estimator among {', '.join(ESTIMATORS)}, got {shown(estimator)}; choose one."
     )

@@ -6,34 +6,83 @@ import json
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
+from sys import float_info
 from typing import Any
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shortened
+from modeling.files.reading import read_text
+
+_TOO_DEEP = "values nested too deeply"
+_TOO_LARGE = "a whole number too large for any calculation"
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The contents of a TOML file; InputError naming `what` is expected where it is none."""
+    text = read_text(path, what)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"expected {what} at {path}, got {error.strerror}; give its path."
-        ) from None
-    except ValueError as error:
-        raise InputError(
-            f"expected TOML in {path}, got something else ({error}); correct that line."
-        ) from None
-
-
-def read_json_object(path: Path, *, advice: str) -> dict[str, Any]:
-    """The object that a JSON file holds; InputError ending in `advice` where it holds none."""
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = tomllib.loads(text)
+        _check_values(values)
+    except tomllib.TOMLDecodeError as error:
+        got = f"something else ({shortened(str(error))})"
+    except RecursionError:
+        got = _TOO_DEEP
     except ValueError:
-        values = None
-    if not isinstance(values, dict):
-        raise InputError(f"expected a JSON object in {path}, got something else; {advice}.")
-    return values
+        got = _TOO_LARGE
+    else:
+        return values
+    raise InputError(f"expected TOML in {path}, got {got}; correct it.")
+
+
+def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> dict[str, Any]:
+    """The object that a JSON file holds.
+
+    Parameters
+    ----------
+    path : Path
+    advice : str
+        What to do about a file that holds none; the end of the message.
+    what : str
+        What is expected there, for files that cannot be read.
+
+    Raises
+    ------
+    InputError
+    """
+    text = read_text(path, what)
+    try:
+        values = json.loads(text)
+        _check_values(values)
+    except json.JSONDecodeError as error:
+        got = f"something else at line {error.lineno}"
+    except RecursionError:
+        got = _TOO_DEEP
+    except ValueError:
+        got = "a whole number too large for any calculation, or text that is no Unicode"
+    else:
+        if isinstance(values, dict):
+            return values
+        got = "a value that is no object"
+    raise InputError(f"expected JSON in {path}, got {got}; {advice}.")
+
+
+def _check_values(values: object) -> None:
+    """Refuse whole numbers beyond floating-point ones, and text that cannot be written again.
+
+    Raises
+    ------
+    ValueError
+    """
+    if isinstance(values, dict):
+        for key, value in values.items():
+            key.encode("utf-8")
+            _check_values(value)
+    elif isinstance(values, list):
+        for value in values:
+            _check_values(value)
+    elif isinstance(values, str):
+        values.encode("utf-8")  # JSON can write one half of a surrogate pair
+    elif isinstance(values, int) and abs(values) > float_info.max:
+        raise ValueError("a whole number beyond floating-point ones")
 
 
 def dump_json(values: dict[str, Any]) -> str:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import warnings
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.places import (
     behind_links,
     clear_unfinished,
     locked,
     unfinished_folder,
 )
+from modeling.files.reading import check_file
 from modeling.files.tables import read_table
 
 
@@ -30,7 +32,8 @@ def folder_behind(path: str | Path) -> Path:
         stands in a folder is left in the old one when that is replaced.
     """
     target = behind_links(path)
-    if Path.cwd().is_relative_to(target.resolve()):
+    # Not resolve(), which raises for links in a circle.
+    if Path.cwd().is_relative_to(os.path.realpath(target)):
         raise InputError(
             f"expected a folder that can be replaced as a whole, got {path}, which you are in; "
             "name another one, or go to the folder above it."
@@ -125,10 +128,32 @@ def check_replaceable(
         return
     own = {index_name, "provenance.json", *beside}
     if (target / index_name).is_file():
-        own |= {row["file"] for row in read_table(target / index_name, ("file",))}
+        listed = {row["file"] for row in read_table(target / index_name, ("file",))}
+        # A folder of that name is none of the set's files, and may hold anything.
+        own |= {name for name in listed if not (target / name).is_dir()}
     foreign = sorted({path.name for path in target.iterdir()} - own)
     if foreign:
         raise InputError(
             f"expected a new folder or {what}, got {target} with other files in it "
             f"({foreign[0]}); choose another folder."
         )
+
+
+def listed_file(folder: Path, name: str, *, index_name: str) -> Path:
+    """The file that the index of a folder names, which must lie in that folder.
+
+    A link in the folder may lead to a file elsewhere, as where data are kept by git-annex.
+
+    Raises
+    ------
+    InputError
+        For a name that leads out of the folder, and where no file is.
+    """
+    if Path(name).is_absolute() or ".." in Path(os.path.normpath(name)).parts:
+        raise InputError(
+            f"expected only files within {folder} in its {index_name}, got {shown(name)}, which "
+            "lies outside; copy the file into the folder."
+        )
+    path = folder / name
+    check_file(path, "the file", advice=f"restore it, or take it out of {index_name}")
+    return path

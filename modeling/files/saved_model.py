@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -11,8 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling.errors import InputError
-from modeling.files.documents import dump_json
+from modeling.errors import InputError, shortened, shown
+from modeling.files.documents import dump_json, read_json_object
 from modeling.files.hashes import sha256_of
 from modeling.files.writing import write_text
 
@@ -56,7 +55,10 @@ class SavedModel(_Base):
         InputError
             If the file is missing, is no such model, or has another version.
         """
-        return cls.from_dict(_load_json(Path(path)), source=Path(path))
+        return cls.from_dict(
+            read_json_object(Path(path), what="a model file", advice="fit it again"),
+            source=Path(path),
+        )
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any], *, source: Path) -> Self:
@@ -80,12 +82,17 @@ class SavedModel(_Base):
         if wrong:
             raise InputError(
                 f"expected the fields of a {cls.FORMAT} in {source}, got too few or too many "
-                f"({wrong}); make the file again."
+                f"({shortened(wrong)}); make the file again."
             )
         try:
             return cls(**given)
-        except (TypeError, ValueError) as error:
+        except InputError as error:
             raise InputError(f"{source}: {error}") from None
+        except (TypeError, ValueError, OverflowError):
+            raise InputError(
+                f"{source}: expected numbers in rows of one length, got others; make the file "
+                "again."
+            ) from None
 
     def __eq__(self, other: object) -> bool:
         if type(other) is not type(self):
@@ -100,22 +107,19 @@ class SavedModel(_Base):
         """Make these fields read-only arrays, of floats or, where named so, of booleans."""
         for name in names:
             kind = np.bool_ if name in booleans else np.float64
-            value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
+            try:
+                value: NDArray[Any] = np.array(getattr(self, name), dtype=kind)
+            except (TypeError, ValueError, OverflowError):
+                raise InputError(
+                    f"expected numbers in {name}, in rows of one length, got "
+                    f"{shown(getattr(self, name))}; make the model again."
+                ) from None
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
 
 def _plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray) else value
-
-
-def _load_json(source: Path) -> Any:
-    if not source.is_file():
-        raise InputError(f"expected a model file at {source}, got no file there; give its path.")
-    try:
-        return json.loads(source.read_text(encoding="utf-8"))
-    except ValueError:
-        raise InputError(f"expected JSON in {source}, got something else; fit it again.") from None
 
 
 def _fields(values: Any, file_format: str, *, version: int, source: Path) -> dict[str, Any]:
@@ -128,6 +132,6 @@ def _fields(values: Any, file_format: str, *, version: int, source: Path) -> dic
     if values.get("version") != version:
         raise InputError(
             f"expected a model of version {version} in {source}, got version "
-            f"{values.get('version')!r}; update tactileq or fit the model again."
+            f"{shown(values.get('version'))}; update tactileq or fit the model again."
         )
     return {name: value for name, value in values.items() if name not in ("format", "version")}

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shortened, shown
+from modeling.files.reading import read_text
 from modeling.files.writing import write_text
 
 
@@ -27,18 +29,11 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
     Raises
     ------
     InputError
-        If the file is not there, is empty, lacks a required column, or a row has another number
-        of cells than the header.
+        If the file cannot be read, is empty, lacks a required column, names one twice, or a row
+        has another number of cells than the header.
     """
     source = Path(path)
-    if not source.is_file():
-        raise InputError(f"expected a table at {source}, got no file there; give its path.")
-    try:
-        text = source.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise InputError(
-            f"expected a text table, got other bytes in {source}; save it as UTF-8."
-        ) from None
+    text = read_text(source, "a table")
     # Not splitlines(): that would also break cells at characters that `write_table` allows.
     lines = [line for line in text.split("\n") if line.strip() and not line.startswith("#")]
     header = lines[0].split("\t") if lines else []
@@ -46,15 +41,17 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
     if missing:
         raise InputError(
             f"expected the columns {', '.join(required)} in {source}, got "
-            f"{', '.join(header) or 'an empty file'}; add {', '.join(missing)} (tab-separated)."
+            f"{shortened(', '.join(header)) or 'an empty file'}; add {', '.join(missing)} "
+            "(tab-separated)."
         )
+    check_named_once(header, source)
     rows = []
     for line in lines[1:]:
         cells = line.split("\t")
         if len(cells) != len(header):
             raise InputError(
                 f"expected {len(header)} cells in each row of {source}, got {len(cells)} in "
-                f"{line!r}; the table is damaged or not tab-separated."
+                f"{shown(line)}; the table is damaged or not tab-separated."
             )
         rows.append(dict(zip(header, cells, strict=True)))
     return rows
@@ -74,8 +71,45 @@ def check_columns(names: Iterable[str], known: Sequence[str], table: str | Path)
         near = get_close_matches(name, known, n=1)
         advice = f"rename it to {near[0]!r} or remove it" if near else "remove it"
         raise InputError(
-            f"expected columns among {', '.join(known)} in {table}, got {name!r}; {advice}."
+            f"expected columns among {', '.join(known)} in {table}, got {shown(name)}; {advice}."
         )
+
+
+def check_named_once(header: Sequence[str], source: Path) -> None:
+    """Refuse a table with two columns of one name."""
+    twice = [name for name in header if header.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"expected each column once in {source}, got {shown(twice[0])} twice; rename one."
+        )
+
+
+def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
+    """The cells of one line of a CSV.
+
+    Line by line, since a quote that nobody closed would swallow all lines up to the next one.
+
+    Parameters
+    ----------
+    line : str
+    where : str
+        Which line, for the message.
+    delimiter : str
+
+    Raises
+    ------
+    InputError
+        For a quote that is not closed, or within a cell.
+    """
+    if '"' not in line:
+        return line.split(delimiter)
+    try:
+        return next(csv.reader([line], delimiter=delimiter, strict=True))
+    except csv.Error:
+        raise InputError(
+            f"expected quotes only around whole cells in {where}, got {shown(line)}; close or "
+            "remove the quote."
+        ) from None
 
 
 def is_number(text: str) -> bool:
@@ -96,7 +130,7 @@ def number(text: str, name: str) -> float:
         Naming `name`, where the cell is empty or no number.
     """
     if not is_number(text):
-        got = repr(text) if text.strip() else "nothing"
+        got = shown(text) if text.strip() else "nothing"
         raise InputError(f"expected a number for {name}, got {got}; fill it in.")
     return float(text)
 
@@ -105,5 +139,7 @@ def whole_number(text: str, name: str) -> int:
     """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
     value = number(text, name)
     if not (value.is_integer() and value >= 1):
-        raise InputError(f"expected a whole number for {name}, at least 1, got {text}; correct it.")
+        raise InputError(
+            f"expected a whole number for {name}, at least 1, got {shortened(text)}; correct it."
+        )
     return int(value)

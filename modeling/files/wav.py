@@ -8,6 +8,10 @@ import numpy as np
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
+from modeling.files.reading import check_file
+
+# The beginnings of sound files. In others libsndfile would look for MP3, and tell of it on stderr.
+_FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")
 
 
 def full_scale(value_g: float, file: str) -> float:
@@ -57,12 +61,21 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
     """
     import soundfile  # late: loads a shared library that most uses never need
 
-    try:
-        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
-    except (soundfile.LibsndfileError, OSError) as error:
-        raise InputError(f"expected a WAV file, got {path} ({error}); convert it.") from None
+    check_file(path, "a WAV file")
     with path.open("rb") as file:
         form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
+    if form not in _FORMS:
+        raise InputError(f"expected a WAV file, got {path}, which holds no sound; convert it.")
+    try:
+        samples, rate_hz = soundfile.read(path, dtype="float64", always_2d=True)
+    except soundfile.LibsndfileError as error:
+        raise InputError(
+            f"expected a WAV file, got {path} ({error.error_string.rstrip('.')}); convert it."
+        ) from None
+    except MemoryError:
+        raise InputError(
+            f"expected a WAV file that fits the memory, got {path}; cut it into parts."
+        ) from None
     # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
     if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:
         raise InputError(

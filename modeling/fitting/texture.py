@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modeling.checks import is_whole
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.estimation.layers import EstimatorName, check_estimator
 from modeling.estimation.likelihood import is_silent
 from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
@@ -112,8 +112,8 @@ def _check_layers(layers: object, estimator: EstimatorName) -> None:
         return
     if estimator != "joint" or not (is_whole(layers) and 1 <= layers <= MOST_LAYERS):
         raise InputError(
-            f"expected 1 to {MOST_LAYERS} layers with the estimator joint, got {layers!r} with "
-            f"{estimator}; leave the number out, or give another."
+            f"expected 1 to {MOST_LAYERS} layers with the estimator joint, got {shown(layers)} "
+            f"with {estimator}; leave the number out, or give another."
         )
 
 

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from modeling.arrays import Bools, Floats
 from modeling.checks import UNITS, check_rate, check_texture_name
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
 from modeling.models.grid import Cells, check_axes, within_grid
 from modeling.models.line_spectral import (
@@ -131,7 +131,8 @@ class ARModel(SavedModel):
         if self.unit not in UNITS or not isinstance(self.simulated, bool):
             raise InputError(
                 f"{self.texture}: expected a unit among {', '.join(UNITS)} and true or false for "
-                f"simulated, got {self.unit!r} and {self.simulated!r}; fit the model again."
+                f"simulated, got {shown(self.unit)} and {shown(self.simulated)}; fit the model "
+                "again."
             )
         if np.size(self.interpolated) == 0:
             object.__setattr__(self, "interpolated", np.zeros(np.shape(self.gains), dtype=bool))
@@ -153,7 +154,7 @@ class ARModel(SavedModel):
             values = getattr(self, name)
             if not (np.isfinite(values).all() and (values >= 0).all()):
                 raise InputError(
-                    f"expected finite {name} of at least 0, got {values.min()}; fit it again."
+                    f"expected finite {name} of at least 0, got {values.min():g}; fit it again."
                 )
         check_line_spectral(self.line_spectral_frequencies, f"the model of {self.texture}")
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
+from modeling.files.documents import read_json_object
 from modeling.models.ar_model import ARModel
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.texture_model import TextureModel
@@ -66,8 +66,8 @@ def load_models(folder: Path) -> dict[str, TextureModel]:
         fitted = TextureModel.load(path)
         if fitted.texture in models:
             raise InputError(
-                f"expected one model of each texture in {folder}, got two of {fitted.texture!r}; "
-                f"move {path.name} or the other one away."
+                f"expected one model of each texture in {folder}, got two of "
+                f"{shown(fitted.texture)}; move {path.name} or the other one away."
             )
         models[fitted.texture] = fitted
     return models
@@ -75,7 +75,7 @@ def load_models(folder: Path) -> dict[str, TextureModel]:
 
 def _stated_format(path: Path) -> str | None:
     try:
-        stated = json.loads(path.read_text(encoding="utf-8")).get("format")
-    except (OSError, ValueError, AttributeError):
+        stated = read_json_object(path, advice="fit it again").get("format")
+    except InputError:
         return None
     return stated if isinstance(stated, str) else None

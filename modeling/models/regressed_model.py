@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.checks import UNITS, check_texture_name, is_positive
+from modeling.checks import UNITS, check_rate, check_texture_name, is_positive
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
 from modeling.models.grid import check_axes
 from modeling.models.parameter_table import Parameters, ParameterTable
@@ -94,9 +94,11 @@ class RegressedModel(SavedModel):
         if not (kinds and is_positive(rate) and self.unit in UNITS):
             raise InputError(
                 f"{self.texture}: expected a rate above 0 Hz, a unit among {', '.join(UNITS)}, "
-                f"true or false for simulated and text for estimator, got {rate!r}, "
-                f"{self.unit!r}, {self.simulated!r} and {self.estimator!r}; make the model again."
+                f"true or false for simulated and text for estimator, got {shown(rate)}, "
+                f"{shown(self.unit)}, {shown(self.simulated)} and {shown(self.estimator)}; make "
+                "the model again."
             )
+        check_rate(rate)
         check_driver(self.driven_by)
 
     def _check_shapes(self) -> None:

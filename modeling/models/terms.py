@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 
 DrivenBy = Literal["conditions", "centroid"]
 CENTROID = "centroid"
@@ -18,5 +18,5 @@ def check_driver(driven_by: str) -> None:
     names = tuple(DRIVING_TERMS)  # a file may hold a list, which no dictionary can look up
     if driven_by not in names:
         raise InputError(
-            f"expected a model driven by {' or '.join(names)}, got {driven_by!r}; choose one."
+            f"expected a model driven by {' or '.join(names)}, got {shown(driven_by)}; choose one."
         )

@@ -13,7 +13,7 @@ from modeling.arrays import Bools, Floats
 from modeling.checks import UNITS, check_rate, check_texture_name, is_number
 from modeling.equalizer.bands import check_bands, clamp_bands
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
 from modeling.models.grid import check_axes
 from modeling.models.parameter_table import (
@@ -96,6 +96,7 @@ class TextureModel(SavedModel):
 
     def __post_init__(self) -> None:
         self._check_kinds()
+        self._freeze(("gains",))
         shape = np.shape(self.gains)
         for name in _BOOLEAN_ARRAYS:
             if np.size(getattr(self, name)) == 0:
@@ -125,14 +126,16 @@ class TextureModel(SavedModel):
         if not (is_number(self.rate_hz) and kinds):
             raise InputError(
                 f"{self.texture}: expected a number for rate_hz, true or false for simulated and "
-                f"text for estimator, got {self.rate_hz!r}, {self.simulated!r} and "
-                f"{self.estimator!r}; fit the model again."
+                f"text for estimator, got {shown(self.rate_hz)}, {shown(self.simulated)} and "
+                f"{shown(self.estimator)}; fit the model again."
             )
 
     def _check_values(self) -> None:
         check_rate(self.rate_hz)
         if self.unit not in UNITS:
-            raise InputError(f"expected a unit among {', '.join(UNITS)}, got {self.unit!r}; fix.")
+            raise InputError(
+                f"expected a unit among {', '.join(UNITS)}, got {shown(self.unit)}; fix."
+            )
         for name in ("noise_gains", "gains", "level_sd_db"):
             if not np.isfinite(getattr(self, name)).all():
                 raise InputError(f"expected finite {name}, got NaN or inf; fit the model again.")
@@ -144,7 +147,8 @@ class TextureModel(SavedModel):
         check_bands(self.frequencies_hz, self.bandwidths_hz, self.rate_hz)
         if self.blending not in BLENDINGS:
             raise InputError(
-                f"expected a blending among {', '.join(BLENDINGS)}, got {self.blending!r}; fix it."
+                f"expected a blending among {', '.join(BLENDINGS)}, got {shown(self.blending)}; "
+                "fix it."
             )
         crossing = (self.gains > 0).any(axis=(0, 1)) & (self.gains < 0).any(axis=(0, 1))
         if self.blending == "logarithmic" and crossing.any():

@@ -11,7 +11,7 @@ from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response, band_rms
 from modeling.equalizer.peq import PEQ
 from modeling.equalizer.signs import neighbouring_patterns
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.models.own_peaks import own_peaks
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold
@@ -201,12 +201,12 @@ def _response(model: TextureModel, at: tuple[int, ...], bands: NDArray[np.comple
 def _check_input(model: TextureModel, criterion: str, margin_db: float) -> None:
     if model.unit != "g":
         raise InputError(
-            f"{model.texture}: expected a model in g, got the unit {model.unit!r}; thresholds are "
-            "in g, so calibrate the recordings (g per full scale) first."
+            f"{model.texture}: expected a model in g, got the unit {shown(model.unit)}; "
+            "thresholds are in g, so calibrate the recordings (g per full scale) first."
         )
     if criterion not in CRITERIA:
         raise InputError(
-            f"expected a criterion among {', '.join(CRITERIA)}, got {criterion!r}; choose one."
+            f"expected a criterion among {', '.join(CRITERIA)}, got {shown(criterion)}; choose one."
         )
     if not (np.isfinite(margin_db) and margin_db >= 0):
         raise InputError(f"expected a margin of at least 0 dB, got {margin_db}; correct it.")

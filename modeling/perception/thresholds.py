@@ -14,12 +14,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.hashes import sha256_of_values
+from modeling.files.reading import read_text
 from modeling.files.tables import number, read_table
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold", "mobile")
+# Beyond anybody's threshold on both sides; within, levels in decibels and pictures stay finite.
+FREQUENCIES_HZ = (1e-6, 1e6)
+LEVELS_G = (1e-9, 1e6)
 LEVEL_COLUMNS = ("acceleration_g", "displacement_um")
 
 
@@ -38,9 +42,9 @@ class Threshold:
     ----------
     name : str
     frequency_hz : (n,) array_like
-        Rising, > 0, n ≥ 2.
+        Rising, 1e-6 … 1e6, n ≥ 2.
     acceleration_g : (n,) array_like
-        Peak acceleration at threshold, > 0.
+        Peak acceleration at threshold, 1e-9 … 1e6.
     source, caveat : str
         Where the numbers come from and what speaks against them.
 
@@ -64,8 +68,9 @@ class Threshold:
         wrong = _what_is_wrong(self.frequency_hz, self.acceleration_g)
         if wrong:
             raise InputError(
-                "expected at least two rising frequencies with levels above 0 in the threshold "
-                f"{self.name!r}, got {wrong}; correct the table."
+                "expected at least two rising frequencies with levels above 0 "
+                f"({LEVELS_G[0]:g} to {LEVELS_G[1]:g} g) in the threshold {shown(self.name)}, got "
+                f"{wrong}; correct the table."
             )
 
     @property
@@ -155,7 +160,8 @@ class Threshold:
         """One of `SHIPPED`, which come along (docs/method/perception.md#shipped-thresholds)."""
         if name not in SHIPPED:
             raise InputError(
-                f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got {name!r}; "
+                f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got "
+                f"{shown(name)}; "
                 "give one of them."
             )
         with resources.as_file(
@@ -170,14 +176,14 @@ def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
         return f"arrays of shapes {frequency_hz.shape} and {acceleration_g.shape}"
     if frequency_hz.size < 2:
         return f"{frequency_hz.size} of them"
-    wrong = ~(np.isfinite(frequency_hz) & (frequency_hz > 0))
+    wrong = ~((frequency_hz >= FREQUENCIES_HZ[0]) & (frequency_hz <= FREQUENCIES_HZ[1]))
     if wrong.any():
         return f"a frequency of {frequency_hz[wrong][0]:g} Hz"
     falls = np.diff(frequency_hz) <= 0
     if falls.any():
         at = int(np.argmax(falls))
         return f"{frequency_hz[at + 1]:g} Hz after {frequency_hz[at]:g} Hz"
-    wrong = ~(np.isfinite(acceleration_g) & (acceleration_g > 0))
+    wrong = ~((acceleration_g >= LEVELS_G[0]) & (acceleration_g <= LEVELS_G[1]))
     if wrong.any():
         return f"the level {acceleration_g[wrong][0]:g} at {frequency_hz[wrong][0]:g} Hz"
     return ""
@@ -185,7 +191,7 @@ def _what_is_wrong(frequency_hz: Floats, acceleration_g: Floats) -> str:
 
 def _notes(path: Path) -> dict[str, str]:
     notes = {}
-    for line in path.read_text(encoding="utf-8-sig").splitlines():
+    for line in read_text(path, "a table").splitlines():
         if line.startswith("#") and ":" in line:
             key, value = line[1:].split(":", 1)
             notes[key.strip().lower()] = value.strip()

@@ -9,8 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Bools, Floats
-from modeling.checks import UNITS, check_texture_name
-from modeling.errors import InputError
+from modeling.checks import (
+    HIGHEST_FORCE_N,
+    HIGHEST_RATE_HZ,
+    HIGHEST_SPEED_MM_S,
+    LARGEST_VALUE,
+    UNITS,
+    check_texture_name,
+)
+from modeling.errors import InputError, shown
 
 MIN_SAMPLES = 64
 
@@ -22,12 +29,13 @@ class Recording:
     Parameters
     ----------
     samples : (n,) array_like
-        Acceleration in `unit`; n ≥ 64, finite, not constant.
+        Acceleration in `unit`; n ≥ 64, within ±1e100, not constant.
     rate_hz : float
-        Sampling rate, > 0.
+        Sampling rate, > 0, up to 10 MHz.
     speed_mm_s, force_n : float
-        Tangential speed (mm/s) and normal force (N), ≥ 0. A force of 0 marks a no-contact
-        recording, which gives the sensor's floor (docs/method/recordings.md#sensor-floor).
+        Tangential speed (mm/s), 0 … 1e5, and normal force (N), 0 … 1e4. A force of 0 marks a
+        no-contact recording, which gives the sensor's floor
+        (docs/method/recordings.md#sensor-floor).
     texture : str
         Name of the surface.
     unit : {"g", "arbitrary"}
@@ -59,7 +67,7 @@ class Recording:
 
     def __post_init__(self) -> None:
         check_texture_name(self.texture)
-        where = f"recording of {self.texture!r}"
+        where = f"recording of {shown(self.texture)}"
         object.__setattr__(self, "samples", _checked_samples(self.samples, where))
         for name in ("rate_hz", "speed_mm_s", "force_n"):
             object.__setattr__(self, name, float(getattr(self, name)))
@@ -67,15 +75,24 @@ class Recording:
             raise InputError(
                 f"{where}: expected a sampling rate above 0 Hz, got {self.rate_hz}; give the rate."
             )
-        for name, unit in (("speed_mm_s", "mm/s"), ("force_n", "N")):
+        if self.rate_hz > HIGHEST_RATE_HZ:
+            raise InputError(
+                f"{where}: expected a sampling rate of at most {HIGHEST_RATE_HZ:.0f} Hz, got "
+                f"{self.rate_hz:g}; give the rate in Hz."
+            )
+        for name, unit, highest in (
+            ("speed_mm_s", "mm/s", HIGHEST_SPEED_MM_S),
+            ("force_n", "N", HIGHEST_FORCE_N),
+        ):
             value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0):
+            if not 0 <= value <= highest:
                 raise InputError(
-                    f"{where}: expected {name} of at least 0 {unit}, got {value}; correct it."
+                    f"{where}: expected {name} of at least 0 {unit} and at most {highest:g}, got "
+                    f"{value:g}; correct it."
                 )
         if self.unit not in UNITS:
             raise InputError(
-                f"{where}: expected a unit among {', '.join(UNITS)}, got {self.unit!r}; "
+                f"{where}: expected a unit among {', '.join(UNITS)}, got {shown(self.unit)}; "
                 "convert the data to g or call them arbitrary."
             )
         if self.repeat < 1:
@@ -139,6 +156,11 @@ def _checked_samples(samples: ArrayLike, where: str) -> Floats:
         raise InputError(
             f"{where}: expected finite samples, got {bad.size} NaN or infinite ones, the first "
             f"at sample {bad[0]}; repair or record again."
+        )
+    if np.abs(array).max() > LARGEST_VALUE:
+        raise InputError(
+            f"{where}: expected samples within ±{LARGEST_VALUE:g}, got {np.abs(array).max():g}; "
+            "repair or record again."
         )
     if np.ptp(array) == 0:
         raise InputError(

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.errors import InputError, shortened, shown
 from modeling.files.documents import read_json_object
-from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.folders import check_replaceable, listed_file, replace_folder
+from modeling.files.reading import read_text
 from modeling.files.tables import is_number, number, read_table, whole_number, write_table
 from modeling.files.wav import full_scale, read_wav
 from modeling.recordings.recording import Recording
@@ -219,9 +220,7 @@ def _sidecar_row(path: Path) -> dict[str, str]:
 
 
 def _load_row(folder: Path, row: dict[str, str]) -> Recording:
-    path = folder / row["file"]
-    if not path.is_file():
-        raise InputError(f"expected the file {path}, got nothing there; restore or unlist it.")
+    path = listed_file(folder, row["file"], index_name=INDEX_NAME)
     unit = row.get("unit") or "arbitrary"
     if path.suffix.lower() == ".wav":
         channel = row.get("channel")
@@ -254,8 +253,8 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     expected = row.get("samples")
     if expected and samples.size != number(expected, f"samples of {path.name}"):
         raise InputError(
-            f"expected {expected} samples in {path.name}, got {samples.size}; the file is "
-            "truncated or was changed, copy or record it again."
+            f"expected {shortened(expected)} samples in {path.name}, got {samples.size}; the file "
+            "is truncated or was changed, copy or record it again."
         )
     return recording
 
@@ -263,36 +262,31 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
 def _flag(text: str, name: str) -> bool:
     # A typing error must not turn simulated data into measured ones.
     if text.lower() not in ("true", "false"):
-        raise InputError(f"expected true or false for {name}, got {text!r}; correct it.")
+        raise InputError(f"expected true or false for {name}, got {shown(text)}; correct it.")
     return text.lower() == "true"
 
 
 def _read_samples(path: Path) -> Floats:
     """One column of numbers below a header; a last line without its end counts as truncated."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise InputError(
-            f"expected one number per line in {path}, got other bytes; import files of another "
-            "layout with tactileq import csv."
-        ) from None
+    text = read_text(path, "a recording")
     lines = text.split("\n")
     if len(lines) < 2 or not text.strip():
         raise InputError(f"expected a header and samples in {path}, got an empty file; re-record.")
     if is_number(lines[0]):
         raise InputError(
             f"expected a header such as acceleration_g as the first line of {path}, got the number "
-            f"{lines[0]}; add one, or the first sample would be lost."
+            f"{shortened(lines[0])}; add one, or the first sample would be lost."
         )
     if lines[-1] != "":
         raise InputError(
-            f"expected {path} to end with a whole line, got {lines[-1]!r} at its end: "
+            f"expected {path} to end with a whole line, got {shown(lines[-1])} at its end: "
             "the file is truncated; copy or record it again."
         )
     try:
         return np.array(list(map(float, lines[1:-1])))
-    except ValueError as error:
+    except ValueError:
+        other = next(line for line in lines[1:-1] if not is_number(line))
         raise InputError(
-            f"expected one number per line in {path}, got a line that is none ({error}); "
-            "import files of another layout with tactileq import csv."
+            f"expected one number per line in {path}, got {shown(other)}; import files of another "
+            "layout with tactileq import csv."
         ) from None

@@ -103,13 +103,14 @@ def prepare(recording: Recording, *, rate_hz: float = MODEL_RATE_HZ) -> Floats:
             f"{target_hz:g} Hz; record faster."
         )
     samples = recording.samples - recording.samples.mean()
-    if target_hz != recording.rate_hz:
-        samples = resample(samples, round(samples.size * target_hz / recording.rate_hz))
-    if samples.size < 64:
+    count = round(samples.size * target_hz / recording.rate_hz)
+    if count < 64:
         raise InputError(
             f"{recording.describe()}: expected at least 64 samples at {target_hz:g} Hz, got "
-            f"{samples.size}; record longer."
+            f"{count}; record longer, or correct its rate of {recording.rate_hz:g} Hz."
         )
+    if target_hz != recording.rate_hz:
+        samples = resample(samples, count)
     filtered: Floats = sosfilt(_high_pass(target_hz), samples)
     return filtered
 

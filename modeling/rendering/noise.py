@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from modeling.arrays import Floats
 from modeling.checks import is_whole
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 
 _GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 _MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
@@ -31,7 +31,9 @@ def stream_key(seed: int, stream: int = 0) -> np.uint64:
     """The key of one noise stream; `seed` and `stream` are 0 … 2⁶⁴ − 1, else InputError."""
     for name, value in (("seed", seed), ("stream", stream)):
         if not (is_whole(value) and 0 <= value < 2**64):
-            raise InputError(f"expected a {name} of 0 … 2⁶⁴ − 1, got {value!r}; choose another.")
+            raise InputError(
+                f"expected a {name} of 0 … 2⁶⁴ − 1, got {shown(value)}; choose another."
+            )
     pair = np.array([seed, stream], dtype=np.uint64)
     first = _mix(pair[:1] + _GOLDEN)
     return np.uint64(_mix((first ^ pair[1:]) + _GOLDEN)[0])

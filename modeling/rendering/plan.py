@@ -9,7 +9,7 @@ import numpy as np
 
 from modeling.arrays import Floats
 from modeling.checks import is_whole
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.models.parameter_table import ParameterTable
 from modeling.rendering.limits import Limits
 
@@ -95,7 +95,8 @@ class RenderPlan:
         if not (is_whole(self.update_samples) and 1 <= self.update_samples <= _LONGEST_UPDATE):
             raise InputError(
                 f"expected parameter updates every 1 to {_LONGEST_UPDATE} samples, got "
-                f"{self.update_samples!r}; give a whole number of update_samples in that range."
+                f"{shown(self.update_samples)}; give a whole number of update_samples in that "
+                "range."
             )
         if self.compensation is not None and self.compensation.rate_hz != self.rate_hz:
             raise InputError(

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.checks import is_positive
+from modeling.checks import check_rate, is_positive
 from modeling.equalizer.bands import check_bands
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
 
 _CURVES = ("curve_hz", "curve_response", "curve_coherence")
@@ -67,6 +67,7 @@ class Vibrator(SavedModel):
             value = getattr(self, name)
             _check_positive(name, value)
             object.__setattr__(self, name, float(value))
+        check_rate(self.rate_hz)
         check_height(self.height)
         self._freeze(_CURVES)
         curves = np.array([getattr(self, name).size for name in _CURVES])
@@ -77,7 +78,7 @@ class Vibrator(SavedModel):
             )
         if not isinstance(self.simulated, bool):
             raise InputError(
-                f"expected true or false for simulated, got {self.simulated!r}; identify the "
+                f"expected true or false for simulated, got {shown(self.simulated)}; identify the "
                 "vibrator again."
             )
         check_band(self.frequency_hz, self.bandwidth_hz, rate_hz=self.rate_hz)
@@ -97,7 +98,7 @@ class Vibrator(SavedModel):
 def _check_positive(name: str, value: float) -> None:
     if not is_positive(value):
         raise InputError(
-            f"expected a finite {name} above 0, got {value!r}; identify the vibrator again."
+            f"expected a finite {name} above 0, got {shown(value)}; identify the vibrator again."
         )
 
 

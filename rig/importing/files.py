@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,16 @@ import numpy as np
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
-from modeling.files.tables import check_columns, is_number, number, read_table, whole_number
+from modeling.errors import shortened, shown
+from modeling.files.reading import read_bytes
+from modeling.files.tables import (
+    check_columns,
+    csv_cells,
+    is_number,
+    number,
+    read_table,
+    whole_number,
+)
 from modeling.files.wav import full_scale, read_wav
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.recordings.appending import WavSource
@@ -153,15 +161,17 @@ def import_csv_file(
 ) -> Imported:
     """One CSV file, with warnings; otherwise as `import_csv`."""
     if axis is not None and axis not in AXES:
-        raise InputError(f"expected an axis among {', '.join(AXES)}, got {axis!r}; choose one.")
+        raise InputError(
+            f"expected an axis among {', '.join(AXES)}, got {shown(axis)}; choose one."
+        )
     _check_unit(unit, "--unit")
     columns, warnings = _read_columns(path)
     rate_hz, jitter = _rate(path, columns, rate_hz)
     axes, found_unit = _chosen_axes(path, columns, axis)
     if unit and found_unit and unit != found_unit:
         raise InputError(
-            f"expected one unit for {path.name}, got {found_unit!r} in its header and {unit!r} "
-            "from --unit; leave --unit out or correct the header."
+            f"expected one unit for {path.name}, got {shown(found_unit)} in its header and "
+            f"{shown(unit)} from --unit; leave --unit out or correct the header."
         )
     final_unit = unit or found_unit or "arbitrary"
     _check_unit(final_unit, f"the header of {path.name}")
@@ -267,7 +277,7 @@ def _rate(
         if given_hz is None:
             raise InputError(
                 f"expected a time column or --rate for {path.name}, got the columns "
-                f"{', '.join(columns)}; give the sampling rate in Hz."
+                f"{shortened(', '.join(columns), longest=120)}; give the sampling rate in Hz."
             )
         return given_hz, ()
     time = TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
@@ -327,15 +337,13 @@ def _recording(
 def _check_unit(unit: str | None, where: str) -> None:
     if unit is not None and unit not in G_PER_UNIT:
         raise InputError(
-            f"expected a unit among {', '.join(G_PER_UNIT)} in {where}, got {unit!r}; convert the "
-            "data or name the unit with --unit."
+            f"expected a unit among {', '.join(G_PER_UNIT)} in {where}, got {shown(unit)}; "
+            "convert the data or name the unit with --unit."
         )
 
 
 def _read_lines(path: Path) -> tuple[list[str], bool]:
     """Lines that are neither empty nor comments, and whether the last one has its end."""
-    if not path.is_file():
-        raise InputError(f"expected a CSV file at {path}, got nothing there; give its path.")
     text = _decoded(path)
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
@@ -350,18 +358,18 @@ def _check_last_row(path: Path, row: Sequence[str], header: Sequence[str]) -> st
     """Refuse a row without a line end that is not whole; else a warning that it may not be."""
     if len(row) != len(header) or not is_number(row[-1].replace(",", ".")):
         raise InputError(
-            f"expected {path.name} to end with a whole row, got {','.join(row)!r} without a line "
-            "end; the file is truncated, export or record it again."
+            f"expected {path.name} to end with a whole row, got {shown(','.join(row))} without a "
+            "line end; the file is truncated, export or record it again."
         )
     return (
-        f"{path.name}: has no line end after its last row, so its last number, {row[-1]}, may be "
-        "cut short; if so, export or record it again."
+        f"{path.name}: has no line end after its last row, so its last number, "
+        f"{shortened(row[-1])}, may be cut short; if so, export or record it again."
     )
 
 
 def _decoded(path: Path) -> str:
     """The text of a file in UTF-8, UTF-16 with its mark, or the Western code page."""
-    data = path.read_bytes()
+    data = read_bytes(path, "a CSV file")
     marked = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     for encoding in ("utf-16",) if marked else ("utf-8-sig", "cp1252"):
         try:
@@ -377,7 +385,10 @@ def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
     """Columns of numbers by their header, and what to be warned of."""
     lines, ended = _read_lines(path)
     delimiter = max(",;\t", key=lines[0].count)
-    rows = list(csv.reader(lines, delimiter=delimiter))
+    rows = [
+        csv_cells(line, f"line {number} of {path.name}", delimiter=delimiter)
+        for number, line in enumerate(lines, start=1)
+    ]
     header = [cell.strip() for cell in rows[0]]
     if all(is_number(cell) for cell in header):
         raise InputError(
@@ -385,7 +396,8 @@ def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
         )
     if len(set(header)) < len(header):
         raise InputError(
-            f"expected each column name once in {path.name}, got {', '.join(header)}; rename."
+            f"expected each column name once in {path.name}, got "
+            f"{shortened(', '.join(header))}; rename."
         )
     warnings = () if ended else (_check_last_row(path, rows[-1], header),)
     for line, row in enumerate(rows[1:], start=2):
@@ -398,10 +410,11 @@ def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
         rows = [[c if "." in c else c.replace(",", ".") for c in row] for row in rows]
     try:
         values = np.array(rows[1:], dtype=np.float64)
-    except ValueError as error:
+    except ValueError:
+        other = next((cell for row in rows[1:] for cell in row if not is_number(cell)), "text")
         raise InputError(
-            f"expected numbers below the header of {path.name}, got a cell that is none ({error});"
-            " correct the file."
+            f"expected numbers below the header of {path.name}, got {shown(other)}; correct the "
+            "file."
         ) from None
     return dict(zip(header, values.T, strict=True)), warnings
 
@@ -429,13 +442,14 @@ def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> t
     if axis is None and len(others) != 1:
         raise InputError(
             f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "
-            f"{', '.join(others)}; choose an axis."
+            f"{shortened(', '.join(others), longest=120)}; choose an axis."
         )
     chosen = others if axis is None else _names_of_axes(path, others, axis)
     units = {_name_and_unit(name)[1] for name in chosen}
     if len(units) > 1:
         raise InputError(
-            f"expected one unit for all axes of {path.name}, got {' and '.join(sorted(units))}; "
+            f"expected one unit for all axes of {path.name}, got "
+            f"{shortened(' and '.join(sorted(units)))}; "
             "convert them."
         )
     samples = np.array([columns[name] for name in chosen])
@@ -454,7 +468,8 @@ def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:
     if [letters[name] for name in chosen] != list(wanted):
         raise InputError(
             f"expected columns named {', '.join(wanted)} (each once) in {path.name}, got "
-            f"{', '.join(names)}; rename them, choose another axis, or leave --axis out where "
+            f"{shortened(', '.join(names), longest=120)}; rename them, choose another axis, or "
+            "leave --axis out where "
             "there is only one."
         )
     return chosen

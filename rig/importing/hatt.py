@@ -19,8 +19,17 @@ from scipy.signal import freqz, lfilter, resample
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats, Integers
+from modeling.checks import (
+    HIGHEST_FORCE_N,
+    HIGHEST_RATE_HZ,
+    HIGHEST_SPEED_MM_S,
+    check_duration,
+)
+from modeling.errors import shortened, shown
+from modeling.files.reading import read_bytes
 from modeling.models.line_spectral import check_line_spectral, prediction_coefficients
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
+from modeling.recordings.recording import MIN_SAMPLES
 from modeling.seeds import generator, number_of
 
 AGREEMENT = 5e-5
@@ -158,8 +167,12 @@ class HattTexture:
                 f"{self.material}: expected a rate above 0 and up to the file's {self.rate_hz:g} "
                 f"Hz, got {rate:g}; leave it out to keep the file's."
             )
-        if not 0 < duration_s < np.inf:
-            raise InputError(f"expected a duration above 0 s, got {duration_s:g}; give another.")
+        check_duration(duration_s, self.rate_hz)
+        if round(duration_s * rate) < MIN_SAMPLES:
+            raise InputError(
+                f"{self.material}: expected at least {MIN_SAMPLES} samples, got {duration_s:g} s "
+                f"at {rate:g} Hz; give a longer duration, or leave the rate out."
+            )
         grid = [(float(speed), float(force)) for speed in speeds_mm_s for force in forces_n]
         for condition in grid:
             self._check_condition(*condition)
@@ -188,10 +201,11 @@ class HattTexture:
         ]
 
     def _check_condition(self, speed_mm_s: float, force_n: float) -> None:
-        if not (0 < speed_mm_s < np.inf and 0 < force_n < np.inf):
+        if not (0 < speed_mm_s <= HIGHEST_SPEED_MM_S and 0 < force_n <= HIGHEST_FORCE_N):
             raise InputError(
-                f"{self.material}: expected speeds and forces above 0, got {speed_mm_s:g} mm/s and "
-                f"{force_n:g} N; choose others."
+                f"{self.material}: expected speeds and forces above 0, up to "
+                f"{HIGHEST_SPEED_MM_S:g} mm/s and {HIGHEST_FORCE_N:g} N, got {speed_mm_s:g} mm/s "
+                f"and {force_n:g} N; choose others."
             )
 
     def _recording(
@@ -228,8 +242,10 @@ def load_hatt(path: str | Path) -> HattTexture:
         if (given := root.findtext(name, unit).strip()) != unit:
             file.refuse(f"{name} of {unit}", given, "convert its models")
     rate_hz = file.number(root, "SampleRate")
-    if rate_hz <= 0:
-        file.refuse("a SampleRate above 0 Hz", f"{rate_hz:g}", "correct it")
+    if not 0 < rate_hz <= HIGHEST_RATE_HZ:
+        file.refuse(
+            f"a SampleRate above 0 and up to {HIGHEST_RATE_HZ:.0f} Hz", f"{rate_hz:g}", "correct it"
+        )
     speeds, forces = file.values(root, "speedList"), file.values(root, "forceList")
     if speeds.size != forces.size or not speeds.size or min(speeds.min(), forces.min()) < 0:
         file.refuse(
@@ -269,7 +285,7 @@ class _Reader:
     name: str
 
     def refuse(self, expected: str, got: str, remedy: str) -> NoReturn:
-        raise InputError(f"expected {expected} in {self.name}, got {got}; {remedy}.")
+        raise InputError(f"expected {expected} in {self.name}, got {shortened(got)}; {remedy}.")
 
     def text(self, element: ElementTree.Element, field: str) -> str:
         found = (element.findtext(field) or "").strip()
@@ -293,26 +309,25 @@ class _Reader:
         try:
             numbers = np.array(texts, dtype=np.float64)
         except ValueError:
-            self.refuse(f"numbers in {field}", f"{list(texts)[:3]}", "download it again")
+            self.refuse(f"numbers in {field}", shown(list(texts)), "download it again")
         if not np.isfinite(numbers).all():
             self.refuse(f"finite numbers in {field}", "NaN or infinity", "download it again")
         return numbers
 
 
 def _root(path: Path) -> ElementTree.Element:
-    if not path.is_file():
-        raise InputError(f"expected a file at {path}, got none there; give its path.")
+    data = read_bytes(path, "a file")
     try:
-        root = ElementTree.parse(path).getroot()
+        root = ElementTree.fromstring(data)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(
-            f"expected XML in {path.name}, got something else ({error}); give a Models_….xml of "
-            "the toolkit."
+            f"expected XML in {path.name}, got something else ({shortened(str(error))}); give a "
+            "Models_….xml of the toolkit."
         ) from None
     if root.tag != "modelSet":
         raise InputError(
-            f"expected a modelSet in {path.name}, got the XML element {root.tag}; give a "
-            "Models_….xml of the toolkit."
+            f"expected a modelSet in {path.name}, got the XML element {shortened(root.tag)}; give "
+            "a Models_….xml of the toolkit."
         )
     return root
 
@@ -394,7 +409,7 @@ def _triangles(file: _Reader, root: ElementTree.Element, conditions: Floats) -> 
         if not whole or row.min() < 1 or row.max() > count or len(set(row.tolist())) < 3:
             file.refuse(
                 f"three different models of 1 to {count} in each tri",
-                f"{row.tolist()}",
+                shown(row),
                 "download it again",
             )
     if not rows:

@@ -8,6 +8,7 @@ import numpy as np
 
 from modeling import InputError
 from modeling.arrays import Floats
+from modeling.errors import shown
 from modeling.recordings.spectrum import MODEL_RATE_HZ
 
 SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -52,16 +53,16 @@ class TimeColumn:
         """
         if self.unit not in SECONDS_PER_UNIT:
             raise InputError(
-                f"expected time in s, ms or us in {self.file}, got {self.unit!r}; convert it or "
-                "give --rate."
+                f"expected time in s, ms or us in {self.file}, got {shown(self.unit)}; convert it "
+                "or give --rate."
             )
         rate_hz = 1 / self._mean_step_s()
         lowest = LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
         if rate_hz <= lowest:
             raise InputError(
                 f"expected a rate above {lowest:g} Hz in {self.file}, got {rate_hz:.4g} Hz by its "
-                f"column {self.name!r}: is time in ms or us? Name the unit in the header (time_s, "
-                "time_ms, time_us) or give --rate."
+                f"column {shown(self.name)}: is time in ms or us? Name the unit in the header "
+                "(time_s, time_ms, time_us) or give --rate."
             )
         return rate_hz
 
@@ -80,8 +81,8 @@ class TimeColumn:
         if all(abs(rate_hz * step_s - 1) > RATE_TOLERANCE for step_s in steps_s):
             raise InputError(
                 f"expected a --rate that agrees with the time column of {self.file}, got "
-                f"{rate_hz:g} Hz and by its column {self.name!r} {told_hz:.4g} Hz; leave --rate "
-                "out, or remove the column if it is wrong."
+                f"{rate_hz:g} Hz and by its column {shown(self.name)} {told_hz:.4g} Hz; leave "
+                "--rate out, or remove the column if it is wrong."
             )
 
     def jitter_warning(self, rate_hz: float) -> str | None:

@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike
 
 from modeling import InputError, Recording, RecordingSet, Renderer, TextureModel
 from modeling.arrays import Floats
+from modeling.checks import check_duration
 from modeling.equalizer.bands import band_rms
+from modeling.errors import shown
 from modeling.seeds import noise_seed
 
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
@@ -153,7 +155,8 @@ def planted_texture(
     """
     if name not in CATALOGUE:
         raise InputError(
-            f"expected a planted texture among {', '.join(TEXTURES)}, got {name!r}; choose one."
+            f"expected a planted texture among {', '.join(TEXTURES)}, got {shown(name)}; choose "
+            "one."
         )
     planted = CATALOGUE[name]
     v = (np.asarray(speeds_mm_s) / REFERENCE_SPEED_MM_S)[:, None]
@@ -228,7 +231,7 @@ def record_texture(
     rate_hz : float
         The recorder's rate, at least twice the highest layer's frequency.
     duration_s : float
-        Length of each record, > 0.
+        Length of each record, > 0; ten million samples at most.
     seed : int
         Each texture and each condition has its own stream of noise under this seed.
 
@@ -237,6 +240,7 @@ def record_texture(
     RecordingSet
         All marked `simulated`.
     """
+    check_duration(duration_s, rate_hz)
     at_rate = truth.at_rate(rate_hz)
     settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
     records = []

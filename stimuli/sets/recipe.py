@@ -41,6 +41,7 @@ What stands in brackets applies where the key is left out; `name` under [set], `
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -48,6 +49,8 @@ from typing import Any, Literal, get_args
 
 from modeling import InputError
 from modeling.checks import (
+    HIGHEST_FORCE_N,
+    HIGHEST_SPEED_MM_S,
     check_choice,
     check_keys,
     check_name,
@@ -56,6 +59,7 @@ from modeling.checks import (
     is_number,
     is_whole,
 )
+from modeling.errors import shown
 from modeling.files.documents import read_toml
 
 SampleFormat = Literal["float32", "pcm24"]
@@ -67,8 +71,6 @@ LONGEST_S = 3600.0
 LONGEST_SETTLING_S = 60.0
 HIGHEST_RATE_HZ = 768_000
 HIGHEST_SEED = 2**63 - 1
-HIGHEST_SPEED_MM_S = 1e5
-HIGHEST_FORCE_N = 1e4
 # Beyond any vibration: limits that keep gains finite.
 LEVELS_DB = (-200.0, 200.0)
 FULL_SCALES_G = (1e-9, 1e9)
@@ -111,7 +113,7 @@ class TrajectoryEntry:
 
     def __post_init__(self) -> None:
         check_name("name of a trajectory", self.name)
-        where = f"the trajectory {self.name!r}"
+        where = f"the trajectory {shown(self.name)}"
         _check_given((n for n, value in vars(self).items() if value is not None), where=where)
         if self.file is None:
             check_number(f"speed_mm_s in {where}", self.speed_mm_s, high=HIGHEST_SPEED_MM_S)
@@ -319,8 +321,8 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
     version = values.get("version")
     if type(version) is not int or version != VERSION:
         raise InputError(
-            f"expected version = {VERSION} at the top of a recipe, got {version!r}; write that "
-            "line, or update tactileq if the recipe is newer."
+            f"expected version = {VERSION} at the top of a recipe, got {shown(version)}; write "
+            "that line, or update tactileq if the recipe is newer."
         )
     settings = _table(values, "set")
     level = _table(values, "level")
@@ -353,7 +355,7 @@ def _model_entry(values: dict[str, Any], folder: Path) -> ModelEntry:
 
 def model_entry(path: Path) -> ModelEntry:
     """A model file or a folder of them, labelled by the name of the folder."""
-    place = path.resolve()
+    place = Path(os.path.realpath(path))  # not resolve(), which raises for links in a circle
     return ModelEntry(path, place.name if place.is_dir() else place.parent.name)
 
 
@@ -361,7 +363,7 @@ def _trajectory_entry(values: dict[str, Any], folder: Path) -> TrajectoryEntry:
     if "file" in values:
         file = folder / _text(values["file"], "file under [[trajectory]]")
         return TrajectoryEntry(**{"name": file.stem, **values, "file": file})
-    named = f"the trajectory {values['name']!r}" if "name" in values else "each [[trajectory]]"
+    named = f"the trajectory {shown(values['name'])}" if "name" in values else "each [[trajectory]]"
     _check_given(values, where=named)
     entry = TrajectoryEntry.constant(values["speed_mm_s"], values["force_n"])
     return TrajectoryEntry(**{**vars(entry), "name": values.get("name", entry.name)})
@@ -372,7 +374,7 @@ def _table(values: Mapping[str, Any], name: str) -> dict[str, Any]:
     table = values.get(name, {})
     if not isinstance(table, Mapping):
         raise InputError(
-            f"expected a table [{name}], got {table!r}; write [{name}] above its keys."
+            f"expected a table [{name}], got {shown(table)}; write [{name}] above its keys."
         )
     check_keys(table, _SECTIONS[name], where=f"[{name}]")
     return dict(table)
@@ -382,7 +384,8 @@ def _tables(values: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     tables = values.get(name, [])
     if not isinstance(tables, list) or not all(isinstance(table, Mapping) for table in tables):
         raise InputError(
-            f"expected tables [[{name}]], got {tables!r}; write [[{name}]] above the keys of each."
+            f"expected tables [[{name}]], got {shown(tables)}; write [[{name}]] above the keys of "
+            "each."
         )
     for table in tables:
         check_keys(table, _SECTIONS[name], where=f"[[{name}]]")
@@ -402,7 +405,7 @@ def whole_or_as_it_is(value: Any) -> Any:
 
 def _text(value: object, name: str) -> str:
     if not isinstance(value, str):
-        raise InputError(f"expected text for {name}, got {value!r}; put it in quotes.")
+        raise InputError(f"expected text for {name}, got {shown(value)}; put it in quotes.")
     return value
 
 

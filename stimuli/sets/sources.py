@@ -10,6 +10,7 @@ from math import ceil
 from pathlib import Path
 
 from modeling import InputError, Threshold, Vibrator, compensation_for
+from modeling.errors import shown
 from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
@@ -109,7 +110,7 @@ def _check_fits(model: AnyModel, name: str, recipe: Recipe) -> None:
         )
     if recipe.level.mode == "loudness" and model.unit != "g":
         raise InputError(
-            f"expected models in g to match loudness, got the unit {model.unit!r} for {name}; "
+            f"expected models in g to match loudness, got the unit {shown(model.unit)} for {name}; "
             "calibrate its recordings, or match RMS levels."
         )
 
@@ -119,8 +120,8 @@ def _check_lasts(trajectory: Trajectory, recipe: Recipe) -> None:
     if round(trajectory.duration_s * slowest) < 1:
         raise InputError(
             f"expected a trajectory of at least one sample at {slowest} Hz, got "
-            f"{trajectory.duration_s:g} s in {trajectory.name!r}; see whether its times are in "
-            "seconds."
+            f"{trajectory.duration_s:g} s in {shown(trajectory.name)}; see whether its times are "
+            "in seconds."
         )
 
 

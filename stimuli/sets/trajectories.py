@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,9 @@ import numpy as np
 
 from modeling import InputError
 from modeling.arrays import Floats
-from modeling.files.tables import number
+from modeling.errors import shown
+from modeling.files.reading import read_text
+from modeling.files.tables import check_named_once, csv_cells, number
 from modeling.hand import Hand
 from stimuli.sets.recipe import LONGEST_S, TrajectoryEntry
 
@@ -50,12 +51,12 @@ class Trajectory:
         if wrong:
             raise InputError(
                 "expected at least two rising times, with a speed and a force at each, in the "
-                f"trajectory {self.name!r}, got {wrong}; correct it."
+                f"trajectory {shown(self.name)}, got {wrong}; correct it."
             )
         if not 0 < self.duration_s <= LONGEST_S:
             raise InputError(
                 f"expected a trajectory of at most {LONGEST_S:g} s, got {self.duration_s:g} s in "
-                f"{self.name!r}; cut it, and see whether the times are in seconds."
+                f"{shown(self.name)}; cut it, and see whether the times are in seconds."
             )
 
     def _what_is_wrong(self) -> str:
@@ -119,27 +120,25 @@ def load_trajectory(path: str | Path, *, name: str) -> Trajectory:
         For a missing file, missing columns, cells that are no numbers, or times that do not rise.
     """
     source = Path(path)
-    try:
-        with source.open(encoding="utf-8-sig", newline="") as file:
-            reader = csv.DictReader(file)
-            missing = [column for column in COLUMNS if column not in (reader.fieldnames or ())]
-            if missing:
-                raise InputError(
-                    f"expected the columns {', '.join(COLUMNS)} in {source}, got no "
-                    f"{', '.join(missing)}; name them in the first line, separated by commas."
-                )
-            rows = [_row(row, f"line {reader.line_num} of {source}") for row in reader]
-    except OSError as error:
+    lines = [line for line in read_text(source, "a trajectory (CSV)").split("\n") if line.strip()]
+    header = csv_cells(lines[0], f"line 1 of {source}") if lines else []
+    missing = [column for column in COLUMNS if column not in header]
+    if missing:
         raise InputError(
-            f"expected a trajectory (CSV) at {source}, got {error.strerror}; give its path."
-        ) from None
-    except (UnicodeDecodeError, csv.Error):
-        raise InputError(
-            f"expected a CSV in {source}, got other bytes; save it as UTF-8 text."
-        ) from None
+            f"expected the columns {', '.join(COLUMNS)} in {source}, got no "
+            f"{', '.join(missing)}; name them in the first line, separated by commas."
+        )
+    check_named_once(header, source)
+    rows = [_row(line, header, f"line {n} of {source}") for n, line in enumerate(lines[1:], 2)]
     time_s, speed_mm_s, force_n = np.array(rows, dtype=np.float64).reshape(-1, 3).T
     return Trajectory(name, time_s, speed_mm_s, force_n)
 
 
-def _row(row: dict[str, str], where: str) -> list[float]:
-    return [number(row[column] or "", f"{column} in {where}") for column in COLUMNS]
+def _row(line: str, header: list[str], where: str) -> list[float]:
+    cells = csv_cells(line, where)
+    if len(cells) != len(header):
+        raise InputError(
+            f"expected {len(header)} values in {where}, got {len(cells)}; correct the line."
+        )
+    row = dict(zip(header, cells, strict=True))
+    return [number(row[column], f"{column} in {where}") for column in COLUMNS]

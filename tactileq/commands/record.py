@@ -26,8 +26,6 @@ def record(
     from modeling.files.provenance import write_provenance
     from stimuli.planted.textures import planted_texture, record_texture
 
-    if not duration_s > 0:
-        raise ValueError(f"expected a duration above 0 s, got {duration_s:g}; give a longer one.")
     folder_behind(folder)
     if folder.exists() and (folder.is_file() or any(folder.iterdir())):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")

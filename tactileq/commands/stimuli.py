@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -93,7 +94,7 @@ def recipe_from(
     models, others = models_among(named)
     tell_passed_over(others)
     return Recipe(
-        name=out.resolve().name,
+        name=Path(os.path.realpath(out)).name,
         models=tuple(map(model_entry, models)),
         trajectories=tuple(
             TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]

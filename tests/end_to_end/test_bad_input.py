@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from modeling import Recording, RecordingSet
+from modeling import InputError, Recording, RecordingSet
 from stimuli.planted.textures import planted_texture
 
 NOISE = np.random.default_rng(3).normal(0, 0.1, 3000)
+SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+LABELS = ("--speed", "1", "--force", "1")
 
 
 def make_set(folder: Path, damage: Callable[[Path], object]) -> None:
@@ -163,3 +166,145 @@ def test_results_do_not_overwrite_foreign_folders(main, tmp_path: Path) -> None:
     ):
         assert_refused(main(*command), "mine")
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
+
+
+def threshold(level: str) -> str:
+    return f"frequency_hz\tacceleration_g\n10\t{level}\n600\t{level}\n"
+
+
+def link_to_itself(path: Path) -> None:
+    path.symlink_to(path)
+
+
+def link_to_zeros(path: Path) -> None:
+    path.symlink_to("/dev/zero")
+
+
+# How a place is filled, and what is then said of it; each hung, or ended in a traceback or in words
+# of the system or a library, before.
+PLACES = {
+    "pipe": (os.mkfifo, "got a pipe, a socket or a device; give its path"),
+    "device": (link_to_zeros, "got a pipe, a socket or a device; give its path"),
+    "loop": (link_to_itself, "got a link that leads back to itself; give its path"),
+    "folder": (Path.mkdir, "got a folder; give its path"),
+    "nothing": (lambda path: None, "got nothing there; give its path"),
+}
+READERS = {
+    "m.json": ["simplify", "m.json"],
+    "v.json": ["export", "c", "good.json", "--vibrator", "v.json"],
+    "set.toml": ["stimuli", "set.toml"],
+    "study.toml": ["simulate", "--study", "study.toml"],
+    "t.tsv": ["simplify", "good.json", "--threshold", "t.tsv"],
+    "labels.tsv": ["import", "wav", "a.wav", "--labels", "labels.tsv"],
+    "a.wav": ["import", "wav", "a.wav", *LABELS],
+    "test.wav": ["vibrator", "test.wav"],
+    "run.csv": ["import", "csv", "run.csv", *LABELS],
+    "M.xml": ["import", "hatt", "M.xml"],
+}
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("place", PLACES)
+def test_what_is_no_file_is_never_opened(main, tmp_path: Path, place: str, name: str) -> None:
+    make, sentence = PLACES[place]
+    if "good.json" in READERS[name]:
+        planted_texture("canvas", **SMALL).save(tmp_path / "good.json")
+    make(tmp_path / name)
+    done = main(*READERS[name])
+    assert_refused(done, sentence)
+    assert f"at {name}, got" in done.stderr
+    assert {path.name for path in tmp_path.iterdir()} <= {name, "good.json"}
+
+
+def test_links_in_a_circle_are_no_place(main, tmp_path: Path) -> None:
+    planted_texture("canvas", **SMALL).save(tmp_path / "m.json")
+    link_to_itself(tmp_path / "loop")
+    link_to_itself(tmp_path / "loop.json")
+    assert_refused(main("stimuli", "loop.json"), "got a link that leads back to itself")
+    assert_refused(main("stimuli", "m.json", "--out", "loop"), "got the link loop")
+    assert_refused(main("simplify", "m.json", "--out", "loop/x"), "loop")
+    assert_refused(main("record", "loop/x", "--texture", "canvas"), "loop")
+
+
+CONTENTS = {
+    "deep JSON": ("m.json", b"[" * 100_000, "got values nested too deeply; fit it again"),
+    "deep TOML": ("set.toml", b"a = " + b"[" * 100_000, "got values nested too deeply"),
+    "JSON beyond numbers": ("m.json", b'{"a": ' + b"9" * 310 + b"}", "number too large"),
+    "JSON beyond digits": ("m.json", b'{"a": ' + b"9" * 5000 + b"}", "number too large"),
+    "TOML beyond numbers": ("study.toml", b"seed = " + b"9" * 310, "number too large"),
+    "TOML beyond digits": ("study.toml", b"seed = " + b"9" * 5000, "number too large"),
+    "half a character": ("m.json", b'{"texture": "\\ud800"}', "text that is no Unicode"),
+    "other letters": ("t.tsv", "é".encode("cp1252"), "got other bytes; save it as UTF-8"),
+    "no sound": ("a.wav", b"\xff\xfb" * 2000, "which holds no sound"),
+    "open quote": ("run.csv", b'time,x\n0,"1\n' + b"0.1,2\n" * 90_000, "only around whole cells"),
+    "long line": ("t.tsv", b"frequency_hz\n1\t" + b"9" * 5_000_000 + b"\n", "expected 1 cells"),
+    "long name": ("labels.tsv", b"x" * 5_000_000, "expected the columns file"),
+    "no threshold": ("t.tsv", threshold("1e300").encode(), "got the level 1e+300 at 10 Hz"),
+    "no level": ("t.tsv", threshold("1e-300").encode(), "got the level 1e-300 at 10 Hz"),
+}
+
+
+@pytest.mark.parametrize("what", CONTENTS)
+def test_hostile_contents_end_in_one_short_sentence(main, tmp_path: Path, what: str) -> None:
+    name, data, sentence = CONTENTS[what]
+    planted_texture("canvas", **SMALL).save(tmp_path / "good.json")
+    (tmp_path / name).write_bytes(data)
+    plot = ["--plot"] if name == "t.tsv" else []
+    done = main(*READERS[name], *plot)
+    assert_refused(done, sentence)
+    assert len(done.stderr) < 400
+
+
+def test_a_byte_order_mark_is_read(main, tmp_path: Path) -> None:
+    planted_texture("canvas").save(tmp_path / "plain.json")
+    model = (tmp_path / "plain.json").read_bytes()
+    recipe = b'version = 1\n[set]\nname = "marked"\n[[model]]\npath = "m.json"\n'
+    recipe += b"[[trajectory]]\nspeed_mm_s = 100\nforce_n = 1\n"
+    for name, data in (
+        ("m.json", model),
+        ("set.toml", recipe),
+        ("t.tsv", threshold("0.1").encode()),
+    ):
+        (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + data)
+    for command in (["simplify", "m.json", "--threshold", "t.tsv"], ["stimuli", "set.toml"]):
+        done = main(*command)
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "sentence"),
+    [
+        (["record", "new", "--texture", "canvas", "--rate", "1e12"], "at most 10000000 Hz, got"),
+        (["record", "new", "--texture", "canvas", "--duration", "1e9"], "of at most 440.451 s at"),
+        (["record", "new", "--texture", "canvas", "--duration", "inf"], "duration above 0 s, got"),
+        (["import", "csv", "run.csv", "--rate", "1e12", *LABELS], "of at most 10000000 Hz, got"),
+        (
+            ["import", "csv", "run.csv", "--rate", "5000", "--speed", "1e308", "--force", "1"],
+            "1e+308",
+        ),
+        (["import", "hatt", "M.xml", "--rate", "1e-300"], "expected at least 64 samples"),
+        (["import", "hatt", "M.xml", "--duration", "1e300"], "of at most 10000 s at 1000 Hz"),
+        (
+            ["stimuli", "m.json", "--rate", "1e12"],
+            "from 1 to 768000 for rate_hz, got 1000000000000",
+        ),
+        (["export", "c", "m.json", "--rate", "1e12"], "output rate of at most 768000 Hz, got"),
+    ],
+)
+def test_numbers_beyond_sense(
+    main, tmp_path: Path, hatt_xml: Callable[..., str], command: list[str], sentence: str
+) -> None:
+    planted_texture("canvas").save(tmp_path / "m.json")
+    (tmp_path / "M.xml").write_text(hatt_xml())
+    (tmp_path / "run.csv").write_text("x\n" + "".join(f"{x}\n" for x in NOISE[:100]))
+    assert_refused(main(*command), sentence)
+    assert len(list(tmp_path.iterdir())) == 3
+
+
+@pytest.mark.parametrize("way", ["../loud.csv", "absolute"])
+def test_a_set_names_no_file_outside_its_folder(tmp_path: Path, way: str) -> None:
+    make_set(tmp_path / "set", lambda folder: (folder / "0002.csv").rename(tmp_path / "loud.csv"))
+    named = {"absolute": str(tmp_path / "loud.csv")}.get(way, way)
+    edit("recordings.tsv", "0002.csv", named)(tmp_path / "set")
+    with pytest.raises(InputError, match="which lies outside; copy the file into the folder"):
+        RecordingSet.load(tmp_path / "set")

@@ -9,6 +9,8 @@ from pathlib import Path
 import pandas as pd
 
 from modeling import RecordingSet, TextureModel
+from modeling.models.loading import models_in
+from modeling.perception.verdicts import load_simplifications
 from stimuli.planted.textures import TEXTURES
 
 
@@ -30,7 +32,12 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     assert all(r.simulated and r.rate_hz == 22704 for s in sets for r in s.recordings)
 
     full = {p.name: TextureModel.load(p) for p in (demo / "models").glob("*.json")}
-    fewer = {p.name: TextureModel.load(p) for p in (demo / "simplified").glob("*.json")}
+    shown = models_in(demo / "simplified")[0]
+    fewer = {p.name: TextureModel.load(p) for p in shown}
+    reasons = load_simplifications(demo / "simplified")
+    assert {name: why.model for name, why in reasons.items()} == {
+        model.texture: model for model in fewer.values()
+    }
     assert full.keys() == fewer.keys()
     assert all(m.simulated for m in [*full.values(), *fewer.values()])
     assert sum(m.n_layers for m in fewer.values()) < sum(m.n_layers for m in full.values())

@@ -81,6 +81,6 @@ def lives(pid: int) -> bool:
 
 def test_the_systems_errors_are_told_in_a_sentence() -> None:
     assert sentence_of(OSError(28, "No space left on device")) == (
-        "expected to read and write files, got 'No space left on device'; make room on the disk, "
-        "or check it, and run again."
+        "expected to read or write a file, got a full disk; check the path, its permissions and "
+        "the space on the disk."
     )

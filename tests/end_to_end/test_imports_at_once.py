@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from modeling import Recording, RecordingSet
+from rig.importing.files import Imported
 from tactileq.commands.imports import add_to_set
 
 
@@ -17,7 +18,7 @@ def test_six_imports_at_once_all_arrive(tmp_path: Path) -> None:
     samples = np.random.default_rng(1).normal(0, 0.1, 500)
 
     def add(number: int) -> None:
-        new = RecordingSet([Recording(samples, 5000.0, 100.0 + number, 1.0, "oak")])
+        new = [Imported(Recording(samples, 5000.0, 100.0 + number, 1.0, "oak"))]
         ready.wait()
         add_to_set(out, new, "import csv", settings={}, files=[])
 

@@ -221,7 +221,10 @@ def test_simplify_does_not_overwrite_its_input(main, tmp_path: Path, model: Path
     assert contents(tmp_path) == before
 
 
-@pytest.mark.parametrize("ending", [".json", "_layers.tsv", "_threshold.png", "_provenance.json"])
+@pytest.mark.parametrize(
+    "ending",
+    [".json", "_simplification.json", "_layers.tsv", "_threshold.png", "_provenance.json"],
+)
 def test_simplify_does_not_overwrite_what_others_wrote(
     main, tmp_path: Path, model: Path, ending: str
 ) -> None:
@@ -241,7 +244,8 @@ def test_simplify_replaces_its_own_results_and_no_namesakes(main, tmp_path: Path
     done = main("simplify", "1.json", "--out", "fewer", "--margin-db", 3)
     assert done.returncode == 0, done.stderr
     listed = json.loads((tmp_path / "fewer/a-b_provenance.json").read_text())["files"]
-    assert listed == ["a-b.json", "a-b_layers.tsv", "a-b_threshold.png"]
+    endings = (".json", "_layers.tsv", "_simplification.json", "_threshold.png")
+    assert listed == [f"a-b{ending}" for ending in endings]
     before = contents(tmp_path)
     refused = main("simplify", "2.json", "--out", "fewer")
     assert refused.returncode == 1

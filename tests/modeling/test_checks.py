@@ -10,9 +10,11 @@ import pytest
 from modeling import InputError
 from modeling.checks import (
     check_choice,
+    check_duration,
     check_name,
     check_number,
     check_rate,
+    check_texture_name,
     check_whole,
     is_number,
     is_positive,
@@ -69,3 +71,21 @@ def test_words() -> None:
     for name in ("", "  ", "two\nlines", 5):
         with pytest.raises(InputError, match="expected printable text in one line as a label"):
             check_name("a label", name)
+
+
+def test_rates_and_durations_have_upper_ends() -> None:
+    check_rate(1e7)
+    check_duration(1.0, 1e7)
+    with pytest.raises(InputError, match="a rate of at most 10000000 Hz, got 10000001"):
+        check_rate(10_000_001)
+    for duration_s in (0, -1, float("nan"), float("inf")):
+        with pytest.raises(InputError, match="a duration above 0 s, got"):
+            check_duration(duration_s, 5000.0)
+    with pytest.raises(InputError, match=r"at most 2000 s at 5000 Hz \(10000000 samples\), got 1e"):
+        check_duration(1e300, 5000.0)
+
+
+def test_names_are_short() -> None:
+    check_texture_name("x" * 100)
+    with pytest.raises(InputError, match="at most 100 characters, got 5000 in 'xxx.*; shorten it"):
+        check_texture_name("x" * 5000)

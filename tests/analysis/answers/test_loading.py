@@ -386,7 +386,7 @@ def test_a_folder_that_is_none_is_refused(study_folder, spoil, expected):
     ("text", "expected"),
     [
         ("{", "expected JSON"),
-        ("[]", '"Simulated": true or false'),
+        ("[]", "a value that is no object"),
         (json.dumps({"Name": "x"}), '"Simulated": true or false'),
         (json.dumps({"Simulated": "no"}), '"Simulated": true or false'),
         (None, "dataset_description.json, which is not there"),

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
-from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.tables import read_table, write_table
 from modeling.files.writing import file_stem, write_text
 
@@ -165,3 +165,27 @@ def test_an_old_folder_that_stays_does_not_undo_the_new_one(
     monkeypatch.undo()
     assert [p.name for p in place.iterdir()] == ["new"]
     assert link.is_symlink()
+
+
+def test_a_folder_that_an_index_lists_is_none_of_its_files(tmp_path: Path) -> None:
+    target = tmp_path / "set"
+    write_table(target / "index.tsv", ("file",), [("0001.csv",), ("photos",)])
+    (target / "0001.csv").write_text("1\n")
+    check_replaceable(target, index_name="index.tsv", what="a set")
+    (target / "photos").mkdir()
+    with pytest.raises(InputError, match=r"other files in it \(photos\)"):
+        check_replaceable(target, index_name="index.tsv", what="a set")
+
+
+@pytest.mark.parametrize("name", ["../secret", "/dev/../etc/passwd", "a/../../secret"])
+def test_an_index_names_no_file_outside_its_folder(tmp_path: Path, name: str) -> None:
+    folder = tmp_path / "set"
+    (folder / "a").mkdir(parents=True)
+    (tmp_path / "secret").write_text("1\n")
+    (folder / "own").write_text("1\n")
+    (folder / "again").symlink_to("own")
+    (folder / "annexed").symlink_to("../secret")  # put there by who keeps the folder
+    for own in ("own", "again", "annexed", "a/../own"):
+        assert listed_file(folder, own, index_name="index.tsv").read_text() == "1\n"
+    with pytest.raises(InputError, match=r"within .* in its index.tsv, got .*, which lies outside"):
+        listed_file(folder, name, index_name="index.tsv")

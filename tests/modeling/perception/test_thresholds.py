@@ -200,7 +200,23 @@ def test_shipped_tables_state_their_range(name: str, lowest: float, highest: flo
 
 
 def test_missing_tables_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no file there"):
+    with pytest.raises(InputError, match="nothing there"):
         Threshold.load(tmp_path / "lab.tsv")
     with pytest.raises(InputError, match="codec, pen-hold, mobile or a TSV file"):
         Threshold.shipped("ours")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("frequencies", "levels", "got"),
+    [
+        ([10.0, 600.0], [1e300, 1.0], r"the level 1e\+300 at 10 Hz"),
+        ([10.0, 600.0], [1.0, 1e-300], "the level 1e-300 at 600 Hz"),
+        ([1e-300, 600.0], [1.0, 1.0], "a frequency of 1e-300 Hz"),
+        ([10.0, 1e300], [1.0, 1.0], r"a frequency of 1e\+300 Hz"),
+    ],
+)
+def test_levels_and_frequencies_of_no_threshold(
+    frequencies: list[float], levels: list[float], got: str
+) -> None:
+    with pytest.raises(InputError, match=rf"\(1e-09 to 1e\+06 g\) .*, got {got}; correct"):
+        Threshold("lab", frequencies, levels, "test", "none")

@@ -247,7 +247,7 @@ def recording_sets(draw: st.DrawFn) -> RecordingSet:
         samples[:2] = 0.1, -0.2
         recordings.append(
             Recording(
-                np.clip(samples, -1e150, 1e150),
+                np.clip(samples, -1e100, 1e100),
                 draw(st.floats(1e-3, 1e6)),
                 draw(st.floats(0, 1e4)),
                 draw(st.floats(0, 1e4)),

@@ -143,8 +143,8 @@ def test_refused_layouts(
         ("time,x\n0,1\n0.1,2\n0.2,-", "end with a whole row, got '0.2,-' without a line end"),
         ("time,x\n0,1\n0.1,2\n0.2\n", "truncated or damaged"),
         ("time,x,x,y,z\n0,1,2,3,4\n", "each column name once"),
-        ("time;x\n0,5;1.234,5\n", "a cell that is none"),
-        ("time,x\n0,1\n0.1,two\n", "a cell that is none"),
+        ("time;x\n0,5;1.234,5\n", "below the header of .*, got .1.234,5."),
+        ("time,x\n0,1\n0.1,two\n", "below the header of .*, got .two."),
         ("0,1\n0.1,2\n", "expected a header line"),
     ],
 )

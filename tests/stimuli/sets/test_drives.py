@@ -117,7 +117,7 @@ def test_the_full_scale_is_that_of_the_drive(tmp_path: Path, recipe: MakeRecipe,
 
 
 VIBRATORS_REFUSED = {
-    "model file at .*none.json, got no file": ("none.json", {}, {}),
+    "model file at .*none.json, got nothing there": ("none.json", {}, {}),
     r"settling_s of at least 0.55 under \[set\].*pen.json settles, got 0.5": (
         "pen.json",
         {"bandwidth_hz": 1.0},

@@ -56,7 +56,7 @@ def test_constant_entries() -> None:
         (HEADER + "0,10,1\nnan,10,1\n", "got the time nan s"),
         (HEADER + "0,10,1\n4000,10,1\n", "at most 3600 s, got 4000 s in 'hand'"),
         (HEADER + "0,10,1\n1,fast,1\n", "a number for speed_mm_s in line 3 of .*, got 'fast'"),
-        (HEADER + "0,10,1\n1,10\n", "a number for force_n in line 3 of .*, got nothing"),
+        (HEADER + "0,10,1\n1,10\n", "expected 3 values in line 3 of .*, got 2"),
     ],
 )
 def test_what_is_no_stroke(tmp_path: Path, text: str, sentence: str) -> None:
@@ -66,10 +66,12 @@ def test_what_is_no_stroke(tmp_path: Path, text: str, sentence: str) -> None:
 
 
 def test_files_that_are_no_csv(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"trajectory \(CSV\) at .*, got No such file"):
+    with pytest.raises(InputError, match=r"trajectory \(CSV\) at .*, got nothing there"):
         load_trajectory(tmp_path / "none.csv", name="hand")
     (tmp_path / "bytes.csv").write_bytes(b"\xff\xfe\x00\x01")
-    with pytest.raises(InputError, match="expected a CSV in .*bytes.csv, got other bytes"):
+    with pytest.raises(
+        InputError, match="expected a trajectory .* in .*bytes.csv, got other bytes"
+    ):
         load_trajectory(tmp_path / "bytes.csv", name="hand")
 
 

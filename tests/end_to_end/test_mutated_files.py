@@ -1,0 +1,437 @@
+"""Files of every kind, changed at random, load with finite values or end in one sentence."""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import warnings
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from analysis.answers.loading import load_responses
+from experiments.study.study import SHIPPED_STUDY, Study
+from experiments.tasks import plan_session
+from modeling import (
+    ARModel,
+    InputError,
+    Recording,
+    RecordingSet,
+    Renderer,
+    TextureModel,
+    Threshold,
+    Vibrator,
+    compensation_for,
+    regressed,
+    simplify,
+)
+from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.fitting.conditions import recording_spectra
+from modeling.models.loading import AnyModel, load_model
+from rig.importing.files import Label, import_csv, import_wav, labels_from_table
+from rig.importing.hatt import load_hatt
+from stimuli.planted.textures import planted_texture
+from stimuli.planted.vibrators import planted_vibrator
+from stimuli.sets.recipe import Recipe
+from stimuli.sets.sources import load_sources
+from stimuli.sets.trajectories import load_trajectory
+
+MUTATIONS = 100  # of each kind; the answers of a study are five files
+LONGEST_MESSAGE = 400
+
+# --- how a file is changed
+
+NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
+WORD = re.compile(rb"[A-Za-z_]{3,}")
+VALUES = (
+    *(b"nan", b"NaN", b"inf", b"-Infinity", b"1e400", b"-1e308", b"1e-320", b"1e200", b"0", b"-1"),
+    *(
+        b"",
+        b"loud",
+        b'"loud"',
+        b"null",
+        b"true",
+        b"[]",
+        b"{}",
+        b"[[1], 2]",
+        b"1_0",
+        b"0x1F",
+        b"1,5",
+    ),
+    *(b"9" * 310, b"7" * 5000, b"9" * 30, b"[" * 100_000, b"[" * 70 + b"1" + b"]" * 70),
+    *(b'"\\ud800"', b'"', b"'", b"\t", b"\0", "é".encode("cp1252"), "猫".encode(), b"x" * 100_000),
+)
+INSERTED = (
+    b"\0",
+    b'"',
+    b"\t",
+    b",",
+    b"{",
+    b"}",
+    b"]",
+    b"\n",
+    b"\r",
+    b"\xff",
+    b"<a>",
+    b"&a;",
+    b"#",
+    b"=",
+)
+Generator = np.random.Generator
+Change = Callable[[bytes, Generator], bytes]
+
+
+def place(data: bytes, rng: Generator) -> int:
+    """Anywhere; half of the time near the beginning, where headers are."""
+    end = len(data) if rng.random() < 0.5 else min(len(data), 64)
+    return int(rng.integers(end + 1))
+
+
+def flip(data: bytes, rng: Generator) -> bytes:
+    changed = bytearray(data)
+    for _ in range(int(rng.integers(1, 9))):
+        at = place(data, rng)
+        if at < len(changed):
+            changed[at] = int(rng.integers(256))
+    return bytes(changed)
+
+
+def truncate(data: bytes, rng: Generator) -> bytes:
+    return data[: place(data, rng)]
+
+
+def remove(data: bytes, rng: Generator) -> bytes:
+    at = place(data, rng)
+    return data[:at] + data[at + int(rng.integers(1, 200)) :]
+
+
+def insert(data: bytes, rng: Generator) -> bytes:
+    at = place(data, rng)
+    return data[:at] + INSERTED[rng.integers(len(INSERTED))] + data[at:]
+
+
+def lines(data: bytes, rng: Generator) -> bytes:
+    """A line doubled, lost, or swapped with another."""
+    rows = data.split(b"\n")
+    first, second = (int(at) for at in rng.integers(len(rows), size=2))
+    action = rng.integers(3)
+    if action == 0:
+        rows.insert(second, rows[first])
+    elif action == 1:
+        rows.pop(first)
+    else:
+        rows[first], rows[second] = rows[second], rows[first]
+    return b"\n".join(rows)
+
+
+def columns(data: bytes, rng: Generator) -> bytes:
+    """Two columns of a table swapped, in all rows or in one."""
+    rows = [re.split(rb"([\t,])", row) for row in data.split(b"\n")]
+    widest = max(len(row) for row in rows) // 2 + 1
+    first, second = (2 * int(at) for at in rng.integers(widest, size=2))
+    chosen = set(range(len(rows))) if rng.random() < 0.5 else {int(rng.integers(len(rows)))}
+    for number, row in enumerate(rows):
+        if number in chosen and max(first, second) < len(row):
+            row[first], row[second] = row[second], row[first]
+    return b"\n".join(map(b"".join, rows))
+
+
+def one_of(pattern: re.Pattern[bytes], data: bytes, rng: Generator, *, by: bytes) -> bytes:
+    found = list(pattern.finditer(data))
+    if not found:
+        return data + by
+    hit = found[int(rng.integers(len(found)))]
+    return data[: hit.start()] + by + data[hit.end() :]
+
+
+def value(data: bytes, rng: Generator) -> bytes:
+    return one_of(NUMBER, data, rng, by=VALUES[rng.integers(len(VALUES))])
+
+
+def word(data: bytes, rng: Generator) -> bytes:
+    """A word, which may be a key, lost, changed, or replaced by another one of the file."""
+    others = [*WORD.findall(data), b"", b"other", b"a\\tb", b"..", b"/dev/zero", b"y" * 9999]
+    return one_of(WORD, data, rng, by=others[rng.integers(len(others))])
+
+
+def encoding(data: bytes, rng: Generator) -> bytes:
+    text = data.decode("utf-8", errors="replace")
+    forms = (
+        lambda: b"\xef\xbb\xbf" + data,
+        lambda: data.replace(b"\n", b"\r\n"),
+        lambda: data.replace(b"\n", b"\r"),
+        lambda: text.encode("utf-16"),
+        lambda: text.encode("utf-32-le"),
+        lambda: data.replace(b"e", b"\xe9", 1),
+        lambda: b"\0" * 100 + data,
+    )
+    return forms[rng.integers(len(forms))]()
+
+
+CHANGES: tuple[Change, ...] = (
+    *(flip, truncate, remove, insert, lines, columns, value, value, value, word, word, encoding),
+)
+
+
+def mutated(data: bytes, seed: int) -> bytes:
+    """The data after one to three changes that follow from the seed."""
+    rng = np.random.default_rng(seed)
+    for _ in range(int(rng.integers(1, 4))):
+        data = CHANGES[rng.integers(len(CHANGES))](data, rng)
+    return data
+
+
+# --- a good file of each kind, and what is done with one that loads
+
+Use = Callable[[Path], Iterable[object]]
+NOISE = np.random.default_rng(5).normal(0, 0.1, 400)
+GRID = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+TEXTURE = planted_texture("wall paper", **GRID)
+LABEL = Label("oak", 100.0, 1.0)
+FREQUENCY_HZ = np.linspace(0.0, 0.5, 20)
+
+
+def use_model(path: Path) -> Iterable[object]:
+    model: AnyModel = load_model(path)
+    model.save(path.with_name("again.json"))
+    assert load_model(path.with_name("again.json")) == model
+    yield Renderer(model).render(200.0, 2.0, samples=100)
+    if isinstance(model, ARModel):
+        yield model.filter(200.0, 2.0).response(FREQUENCY_HZ * model.rate_hz)
+        return
+    yield model.peq(200.0, 2.0).response(FREQUENCY_HZ * model.rate_hz)
+    if isinstance(model, TextureModel) and model.unit == "g":
+        yield from verdicts(model, Threshold.named("codec"))
+
+
+def verdicts(model: TextureModel, threshold: Threshold) -> Iterable[object]:
+    result = simplify(model, threshold)
+    yield result.model.gains
+    # NaN: where no threshold is known.
+    distances = np.array([layer.distance_db for layer in result.layers])
+    yield distances[~np.isnan(distances)]
+
+
+def use_wav(path: Path) -> Iterable[object]:
+    return usable_samples(import_wav([path], [LABEL], g_per_fullscale=2.0))
+
+
+def use_csv(path: Path) -> Iterable[object]:
+    return usable_samples(import_csv([path], [LABEL], axis="x"))
+
+
+def use_labels(path: Path) -> Iterable[object]:
+    for label in labels_from_table(path, [Path("a.wav"), Path("b.wav")], texture=None)[0]:
+        yield Recording(NOISE, 5000.0, label.speed_mm_s, label.force_n, label.texture).samples
+
+
+def use_set(path: Path) -> Iterable[object]:
+    return usable_samples(RecordingSet.load(path.parent))
+
+
+def usable_samples(records: RecordingSet) -> Iterable[object]:
+    for record in records:
+        yield record.samples
+        yield record.duration_s
+        yield [found.magnitude for _, found in recording_spectra(RecordingSet([record]))]
+
+
+def use_hatt(path: Path) -> Iterable[object]:
+    texture = load_hatt(path)
+    yield texture.filter(160.0, 1.5).response(FREQUENCY_HZ * texture.rate_hz)
+    yield from usable_samples(texture.recordings([160.0], [1.5], duration_s=0.1))
+
+
+def use_recipe(path: Path) -> Iterable[object]:
+    recipe = Recipe.load(path)
+    (path.parent / "again.toml").write_text(recipe.to_toml(), encoding="utf-8")
+    sources = load_sources(recipe)
+    yield [trajectory.duration_s for trajectory in sources.trajectories]
+
+
+def use_study(path: Path) -> Iterable[object]:
+    study = Study.load(path)
+    assert Study.from_dict(json.loads(json.dumps(study.to_dict()))) == study
+    yield len(plan_session(study, task="relative", subject=1, session=1).trials)
+
+
+def use_answers(path: Path) -> Iterable[object]:
+    folder = next(parent for parent in path.parents if parent.name == "data")
+    responses = load_responses(folder)
+    yield responses.absolute["trial"].to_numpy(float)
+    yield len(responses.textures)
+
+
+def use_vibrator(path: Path) -> Iterable[object]:
+    found = Vibrator.load(path)
+    yield found.peq.response(FREQUENCY_HZ * found.rate_hz)
+    yield compensation_for(found).settling_s
+
+
+def use_threshold(path: Path) -> Iterable[object]:
+    threshold = Threshold.load(path)
+    yield threshold.at(threshold.valid_range_hz)
+    yield from verdicts(TEXTURE, threshold)
+
+
+def use_trajectory(path: Path) -> Iterable[object]:
+    yield load_trajectory(path, name="hand").duration_s
+
+
+def ar_model() -> ARModel:
+    return ARModel(
+        texture="oak",
+        rate_hz=5000.0,
+        **GRID,
+        line_spectral_frequencies=np.tile([0.4, 0.9, 1.7, 2.5], (2, 2, 1)),
+        gains=np.full((2, 2), 0.1),
+        level_sd_db=np.zeros((2, 2)),
+    )
+
+
+def wav_bytes() -> bytes:
+    buffer = io.BytesIO()
+    soundfile.write(buffer, NOISE, 5000, format="WAV", subtype="PCM_16")
+    return buffer.getvalue()
+
+
+def csv_bytes() -> bytes:
+    rows = (f"{n / 5000:.4f},{x:.6f},{x / 2:.6f}" for n, x in enumerate(NOISE[:100]))
+    return "\n".join(["time (s),x (g),y (g)", *rows, ""]).encode()
+
+
+def answer_rows() -> str:
+    cells = {column.name: "" for column in ANSWER_TABLES["absolute"]}
+    rows = ["\t".join(cells)]
+    for trial, texture in enumerate(("canvas", "MDF", "PVC", "oak"), start=1):
+        given = {"trial": str(trial), "phase": "main" if trial > 1 else "training"}
+        given |= {"texture": texture, "model": "full", "tray": "A", "first_surface": "real"}
+        given |= {"magnitude_similarity": "50", "frequency_similarity": "70", "toggles": "3"}
+        given |= {"response_time_s": "12.5", "simulated": "false"}
+        rows.append("\t".join((cells | given).values()))
+    return "\n".join([*rows, ""])
+
+
+ANSWERS = "data/sub-01/ses-01/beh/sub-01_ses-01_task-absolute_beh"
+DATA = {
+    "data/dataset_description.json": json.dumps({"Name": "Seven surfaces", "Simulated": False}),
+    "data/participants.tsv": "participant_id\tsimulated\nsub-01\tfalse\n",
+    f"{ANSWERS}.tsv": answer_rows(),
+    f"{ANSWERS}.json": json.dumps({"Simulated": False, "trial": {"Description": "Number"}}),
+    "data/sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute_order.json": json.dumps(
+        {"trials": [1, 2, 3, 4]}
+    ),
+}
+RECIPE = b"""version = 1
+[set]
+name = "test"
+rate_hz = [5000, 8000]
+seeds = [1, 2]
+duration_s = 0.25
+vibrator = "vibrator.json"
+[level]
+mode = "loudness"
+threshold = "pen-hold"
+[[model]]
+path = "model.json"
+label = "full"
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.5
+[[trajectory]]
+file = "hand.csv"
+"""
+HAND = b"time_s,speed_mm_s,force_n\n0,100,1\n0.5,150,1.5\n1,nan,2\n2,0,0\n"
+THRESHOLD = (
+    b"# source: test\n# caveat: none\nfrequency_hz\tdisplacement_um\n10\t5\n100\t0.5\n600\t2\n"
+)
+LABELS = b"file\tspeed_mm_s\tforce_n\trepeat\na.wav\t50\t1.5\t1\nb.wav\t100\t1.5\t1\n"
+KINDS: dict[str, tuple[str, Use]] = {
+    "model": ("model.json", use_model),
+    "regressed model": ("regressed.json", use_model),
+    "autoregressive model": ("ar.json", use_model),
+    "recording (WAV)": ("a.wav", use_wav),
+    "recording (CSV)": ("run.csv", use_csv),
+    "labels": ("labels.tsv", use_labels),
+    "recording set": ("set/recordings.tsv", use_set),
+    "samples of a set": ("set/0001.csv", use_set),
+    "toolkit": ("Models_Planted.xml", use_hatt),
+    "recipe": ("set.toml", use_recipe),
+    "trajectory": ("hand.csv", use_trajectory),
+    "study": ("study.toml", use_study),
+    "vibrator": ("vibrator.json", use_vibrator),
+    "threshold": ("threshold.tsv", use_threshold),
+    **{f"answers: {Path(name).name}": (name, use_answers) for name in DATA},
+}
+
+
+def write_good_files(folder: Path, hatt_xml: str) -> None:
+    """One good file of each kind, and what it rests on."""
+    TEXTURE.save(folder / "model.json")
+    regressed(TEXTURE).save(folder / "regressed.json")
+    ar_model().save(folder / "ar.json")
+    planted_vibrator().save(folder / "vibrator.json")
+    RecordingSet(Recording(NOISE[:80], 5000.0, v, 1.0, "oak") for v in (50, 100)).save(
+        folder / "set"
+    )
+    contents = {
+        "a.wav": wav_bytes(),
+        "run.csv": csv_bytes(),
+        "labels.tsv": LABELS,
+        "Models_Planted.xml": hatt_xml.encode(),
+        "set.toml": RECIPE,
+        "hand.csv": HAND,
+        "study.toml": SHIPPED_STUDY.read_bytes(),
+        "threshold.tsv": THRESHOLD,
+        **{name: text.encode() for name, text in DATA.items()},
+    }
+    for name, data in contents.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(data)
+
+
+def complaint(use: Use, path: Path) -> str:
+    """What is wrong with how a file is taken; empty where it is used or refused as it should."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            finite = all(np.isfinite(np.asarray(found)).all() for found in use(path))
+        except InputError as error:
+            return wrong_with(str(error).replace(str(path.parent), ""))
+        except Exception as error:  # any other is what this test is to find
+            return f"{type(error).__name__}: {error}"
+    return "" if finite else "values that are not finite"
+
+
+def wrong_with(message: str) -> str:
+    plain = "\n" not in message and "np." not in message and "numpy" not in message
+    short = len(message) < LONGEST_MESSAGE
+    return "" if plain and short and message.endswith(".") else f"the message {message[:600]!r}"
+
+
+def complaints(name: str, folder: Path, seeds: Iterable[int]) -> list[str]:
+    """What goes wrong with the mutations of one kind of file under these seeds."""
+    file, use = KINDS[name]
+    path = folder / file
+    good = path.read_bytes()
+    assert complaint(use, path) == ""
+    found = []
+    for seed in seeds:
+        path.write_bytes(mutated(good, seed))
+        if wrong := complaint(use, path):
+            found.append(f"seed {seed}: {wrong}")
+    path.write_bytes(good)
+    return found
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_a_mutated_file_is_used_or_refused_in_one_sentence(
+    name: str, tmp_path: Path, hatt_xml: Callable[..., str]
+) -> None:
+    write_good_files(tmp_path, hatt_xml())
+    count = MUTATIONS // len(DATA) if name.startswith("answers") else MUTATIONS
+    assert complaints(name, tmp_path, range(count)) == []
