@@ -31,7 +31,7 @@ h3 { margin: 30px 0 8px; font-size: 17px; }
 .lead { color: var(--soft); margin: 0; max-width: 75ch; }
 .banner { background: var(--warn); color: #fff; font-weight: 600; padding: 10px 0; }
 .banner div { max-width: 1240px; margin: 0 auto; padding: 0 28px; }
-nav { margin-top: 16px; font-size: 15px; }
+nav { margin-top: 16px; font-size: 15px; display: flex; flex-wrap: wrap; }
 nav a { color: var(--blue); text-decoration: none; margin-right: 22px; white-space: nowrap; }
 nav a:hover { text-decoration: underline; }
 section { background: var(--paper); border: 1px solid var(--line); border-radius: 10px;

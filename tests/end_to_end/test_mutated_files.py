@@ -22,6 +22,7 @@ from modeling import (
     Recording,
     RecordingSet,
     Renderer,
+    Simplification,
     TextureModel,
     Threshold,
     Vibrator,
@@ -272,6 +273,11 @@ def use_vibrator(path: Path) -> Iterable[object]:
     yield compensation_for(found).settling_s
 
 
+def use_simplification(path: Path) -> Iterable[object]:
+    loaded = Simplification.load(path)
+    yield from (loaded.model.gains, [layer.worst_force_n for layer in loaded.layers])
+
+
 def use_threshold(path: Path) -> Iterable[object]:
     threshold = Threshold.load(path)
     yield threshold.at(threshold.valid_range_hz)
@@ -304,10 +310,13 @@ def csv_bytes() -> bytes:
     return "\n".join(["time (s),x (g),y (g)", *rows, ""]).encode()
 
 
+TEXTURES = ("canvas", "MDF", "PVC", "oak")
+
+
 def answer_rows() -> str:
     cells = {column.name: "" for column in ANSWER_TABLES["absolute"]}
     rows = ["\t".join(cells)]
-    for trial, texture in enumerate(("canvas", "MDF", "PVC", "oak"), start=1):
+    for trial, texture in enumerate(TEXTURES, start=1):
         given = {"trial": str(trial), "phase": "main" if trial > 1 else "training"}
         given |= {"texture": texture, "model": "full", "tray": "A", "first_surface": "real"}
         given |= {"magnitude_similarity": "50", "frequency_similarity": "70", "toggles": "3"}
@@ -323,7 +332,15 @@ DATA = {
     f"{ANSWERS}.tsv": answer_rows(),
     f"{ANSWERS}.json": json.dumps({"Simulated": False, "trial": {"Description": "Number"}}),
     "data/sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute_order.json": json.dumps(
-        {"trials": [1, 2, 3, 4]}
+        {
+            "task": "absolute",
+            "subject": 1,
+            "session": 1,
+            "trials": [
+                {"trial": trial, "texture": texture, "model": "full", "first_surface": "real"}
+                for trial, texture in enumerate(TEXTURES, start=1)
+            ],
+        }
     ),
 }
 RECIPE = b"""version = 1
@@ -364,6 +381,7 @@ KINDS: dict[str, tuple[str, Use]] = {
     "trajectory": ("hand.csv", use_trajectory),
     "study": ("study.toml", use_study),
     "vibrator": ("vibrator.json", use_vibrator),
+    "simplification": ("x_simplification.json", use_simplification),
     "threshold": ("threshold.tsv", use_threshold),
     **{f"answers: {Path(name).name}": (name, use_answers) for name in DATA},
 }
@@ -375,6 +393,7 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
     regressed(TEXTURE).save(folder / "regressed.json")
     ar_model().save(folder / "ar.json")
     planted_vibrator().save(folder / "vibrator.json")
+    simplify(TEXTURE, Threshold.shipped("codec")).save(folder / "x_simplification.json")
     RecordingSet(Recording(NOISE[:80], 5000.0, v, 1.0, "oak") for v in (50, 100)).save(
         folder / "set"
     )
@@ -418,7 +437,7 @@ def complaints(name: str, folder: Path, seeds: Iterable[int]) -> list[str]:
     file, use = KINDS[name]
     path = folder / file
     good = path.read_bytes()
-    assert complaint(use, path) == ""
+    list(use(path))  # the good one is used, not refused
     found = []
     for seed in seeds:
         path.write_bytes(mutated(good, seed))
