@@ -139,7 +139,7 @@ def logarithmic_nodes(
         The given nodes are among them, with their very values.
     """
     largest = np.abs(values).max(axis=(0, 1), initial=0.0)
-    signs = np.sign(values.sum(axis=(0, 1)))
+    signs = np.sign(np.sign(values).sum(axis=(0, 1)))  # a sum of values could overflow
     floor = np.maximum(LOWEST_GAIN_SHARE * largest, np.finfo(np.float64).tiny)
     logs = np.log(np.maximum(np.abs(values), floor))
     speeds, by_speed = _finer(

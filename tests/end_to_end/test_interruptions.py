@@ -20,6 +20,7 @@ import pytest
 
 from modeling import simplify as drop_layers
 from modeling.perception.thresholds import Threshold
+from modeling.perception.verdicts import ENDING
 from stimuli.planted.textures import planted_texture, record_texture
 
 MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "0"))
@@ -73,8 +74,9 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str]) -> Path:
         records = record_texture(truth, rate_hz=5000.0, duration_s=0.5)
         records.save(tmp_path / "recordings" / name)
         truth.save(tmp_path / f"models/{name}.json")
-        fewer = drop_layers(truth, Threshold.named("codec")).model
-        fewer.save(tmp_path / f"simplified/{name}.json")
+        fewer = drop_layers(truth, Threshold.named("codec"))
+        fewer.model.save(tmp_path / f"simplified/{name}.json")
+        fewer.save(tmp_path / f"simplified/{name}{ENDING}")
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY)
