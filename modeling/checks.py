@@ -29,10 +29,10 @@ def is_whole(value: object) -> TypeGuard[int]:
 
 
 def check_texture_name(name: object) -> None:
-    """Refuse what cannot be a texture's name in a table: anything but one line of text."""
-    if not isinstance(name, str) or not name.strip() or any(c in name for c in "\t\r\n"):
+    """Refuse what cannot be a texture's name in a table: anything but printable text."""
+    if not isinstance(name, str) or not name.strip() or not name.isprintable():
         raise InputError(
-            f"expected a texture name of one line without tabs, got {shown(name)}; name it."
+            f"expected a texture name of printable text in one line, got {shown(name)}; name it."
         )
     if len(name) > LONGEST_NAME:
         raise InputError(

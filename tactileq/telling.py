@@ -31,6 +31,11 @@ def sentence_of(error: Exception) -> str:
     return str(error)
 
 
+def tell_warning(message: Warning | str, *where: object, **more: object) -> None:
+    """Print a warning as one line, for `warnings.showwarning`."""
+    print(f"warning: {message}", file=sys.stderr)
+
+
 @contextmanager
 def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
     """A progress bar over countable steps; in a log it is one line at the end."""

@@ -10,12 +10,18 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.answers.order import check_order, planned_trials, told_of_unordered
+from analysis.answers.order import (
+    check_order,
+    check_stored,
+    planned_trials,
+    told_of_unordered,
+)
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_json_object
+from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_bytes
 from modeling.files.tables import check_named_once
 
@@ -140,6 +146,7 @@ def load_responses(data_folder: str | Path) -> Responses:
     """
     folder = Path(data_folder)
     description = _description(folder)
+    models = _models(description, folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
     origin = {**simulated, **{key: description[key] for key in _RESTS_ON if key in description}}
     warnings: list[str] = []
@@ -160,7 +167,7 @@ def load_responses(data_folder: str | Path) -> Responses:
         simulated_rig=simulated["SimulatedRig"],
         training={task: training for task, (_, training) in parts.items()},
         name=str(description.get("Name", "")),
-        models=_models(description, folder),
+        models=models,
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
         warnings=tuple(warnings),
@@ -190,6 +197,12 @@ def _description(folder: Path) -> Mapping[str, object]:
         raise InputError(
             f'expected "SimulatedParticipant" and "SimulatedRig" in {path}, one of them true '
             f'exactly where "Simulated" is, got {parts[0]} and {parts[1]}; say what was simulated.'
+        )
+    design, stated = description.get("StudyDesign"), description.get("StudySHA256")
+    if isinstance(design, dict) and stated not in (None, sha256_of_values(design)):
+        raise InputError(
+            f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
+            "got another design; restore the file."
         )
     return description
 
@@ -249,14 +262,16 @@ def _load_task(
                 f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
                 f"move the file back to its own participant's folder."
             )
-        _check_sidecar(path.with_suffix(".json"), origin)
+        sidecar = _checked_sidecar(path.with_suffix(".json"), origin)
         table = _read_lines(path, warnings)
         order = folder / "sourcedata" / participant / session
         order /= path.name.removesuffix("beh.tsv") + "order.json"
         what = f"{participant} {task} {session}"
         planned = None
         if order.is_file():
-            planned = planned_trials(_json_object(order), (participant, session, task), path=order)
+            stored = _json_object(order)
+            check_stored(stored, order, sidecar=sidecar, study=origin.get("StudySHA256"))
+            planned = planned_trials(stored, (participant, session, task), path=order)
             if len(table) < len(planned):
                 ended = f"answered {len(table)} of {len(planned)} trials (ended early)."
                 warnings.append(f"{what} {ended}")
@@ -269,12 +284,17 @@ def _load_task(
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)
-    warnings += told_of_unordered(unordered)
+    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
 
 
-def _check_sidecar(path: Path, origin: Mapping[str, object]) -> None:
-    """Refuse a session that says otherwise than the data set what was simulated or presented."""
+def _checked_sidecar(path: Path, origin: Mapping[str, object]) -> Mapping[str, object]:
+    """The sidecar of a session, refused where it says otherwise than the data set what it is of."""
+    if not path.is_file() and any(key in origin for key in _RESTS_ON):
+        raise InputError(
+            f"expected the sidecar {path}, which names the study and the models of the session, "
+            "found none; restore the file."
+        )
     sidecar = _json_object(path) if path.is_file() else {}
     for key, value in origin.items():
         if sidecar.get(key, value) != value:
@@ -285,6 +305,18 @@ def _check_sidecar(path: Path, origin: Mapping[str, object]) -> None:
                 f"never a mixture, but found {found}; correct the file or leave "
                 "its session out."
             )
+    return sidecar
+
+
+def _unanswered(folder: Path, task: str) -> list[str]:
+    """A sentence for each session whose order is stored but whose answers are not there."""
+    told = []
+    for order in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_order.json")):
+        stem = order.name.removesuffix("order.json")
+        participant, session = order.parts[-3:-1]
+        if not (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():
+            told.append(f"{participant} {task} {session} has a stored order, but no answers.")
+    return told
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:

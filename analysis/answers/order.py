@@ -8,6 +8,8 @@ from pathlib import Path
 import pandas as pd
 
 from modeling import InputError
+from modeling.files.hashes import sha256_of
+from modeling.files.reading import read_text
 
 
 def planned_trials(
@@ -40,6 +42,39 @@ def planned_trials(
             f"{' '.join(found)}; move the session's files back to their own participant's folder."
         )
     return trials
+
+
+def check_stored(
+    stored: Mapping[str, object], path: Path, *, sidecar: Mapping[str, object], study: object
+) -> None:
+    """Refuse an order that was changed since, or that is of another study than the data set.
+
+    Parameters
+    ----------
+    stored : mapping
+        What the file of the order holds.
+    path : Path
+        The file.
+    sidecar : mapping
+        Of the session's answers; it names the order by its SHA-256.
+    study : object
+        SHA-256 of the data set's study, None where it is not stated.
+
+    Raises
+    ------
+    InputError
+    """
+    if study is not None and stored.get("study_sha256", study) != study:
+        raise InputError(
+            f"expected an order of the data set's study in {path}, found that of another; restore "
+            "the file."
+        )
+    named = sidecar.get("OrderSHA256")
+    if named is not None and named != sha256_of(read_text(path, "the order of a session")):
+        raise InputError(
+            f"expected the order in {path} as it was stored before the session, found a changed "
+            "one; restore the file."
+        )
 
 
 def _numbered(key: str, number: object) -> str:

@@ -23,7 +23,8 @@ from experiments.study.study import Study
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import read_json_object
-from modeling.files.reading import read_text
+from modeling.files.hashes import sha256_of
+from modeling.files.reading import read_text, reason_of
 
 BIDS_VERSION = "1.10.0"
 ORDER_FORMAT = "tactileq.session-order"
@@ -100,7 +101,8 @@ class SessionStore:
                 "ModelsSHA256": {texture: dict(kinds) for texture, kinds in models.items()},
             }
             _describe_data_set(root, plan.study, origin=origin)
-            sidecar = _sidecar_text(plan, columns, description=description, origin=origin)
+            fixed = origin | {"OrderSHA256": sha256_of(_order_text(plan))}
+            sidecar = _sidecar_text(plan, columns, description=description, origin=fixed)
             store = cls._make_files(root, plan, columns=tuple(columns), sidecar=sidecar, made=made)
             _add_participant(root, plan.subject, simulated=simulated_participant)
             _sync_folder(root)
@@ -136,7 +138,7 @@ class SessionStore:
         except FileExistsError as error:
             raise InputError(
                 f"expected a session that has not been run, got {stem}, which has the file "
-                f"{error.filename}; choose another session, or move its files away to repeat it."
+                f"{error.filename}; choose another session or data folder, or move its files away."
             ) from None
         for folder in (source, beh):
             _sync_folder(folder)
@@ -276,6 +278,10 @@ def _write_new(path: Path, text: str, *, made: list[Path]) -> None:
     made.append(path)
     try:
         _write_all(handle, text)
+    except OSError:
+        with suppress(OSError):
+            path.unlink()  # half a file would be taken for another study's
+        raise
     finally:
         os.close(handle)
 
@@ -298,7 +304,7 @@ def _sync_folder(folder: Path) -> None:
 
 
 def _store_error(error: OSError, path: Path, comfort: str) -> StoreError:
-    reason = error.strerror or str(error)
+    reason = reason_of(error)
     return StoreError(
         f"expected to write to {path}, got '{reason}' from the disk. {comfort}; "
         "make room or choose another data folder."

@@ -9,7 +9,7 @@ from pathlib import Path
 from sys import float_info
 from typing import Any
 
-from modeling.errors import InputError, shortened
+from modeling.errors import InputError, shortened, shown
 from modeling.files.reading import read_text
 
 _TOO_DEEP = "values nested too deeply"
@@ -50,12 +50,14 @@ def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> d
     """
     text = read_text(path, what)
     try:
-        values = json.loads(text)
+        values = json.loads(text, object_pairs_hook=_without_doubles)
         _check_values(values)
     except json.JSONDecodeError as error:
         got = f"something else at line {error.lineno}"
     except RecursionError:
         got = _TOO_DEEP
+    except _Double as error:
+        got = f"{shown(str(error))} twice"
     except ValueError:
         got = "a whole number too large for any calculation, or text that is no Unicode"
     else:
@@ -63,6 +65,18 @@ def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> d
             return values
         got = "a value that is no object"
     raise InputError(f"expected JSON in {path}, got {got}; {advice}.")
+
+
+class _Double(ValueError):
+    """A name that stands twice in one object."""
+
+
+def _without_doubles(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        names = [name for name, _ in pairs]
+        raise _Double(next(name for name in names if names.count(name) > 1))
+    return values
 
 
 def _check_values(values: object) -> None:

@@ -14,8 +14,10 @@ from modeling.files.places import behind_links, unfinished_file
 def file_stem(name: str) -> str:
     """A name as a file name: letters, digits and `-_.` stay, all else becomes `-`."""
     kept = "".join(c if c.isalnum() or c in "-_." else "-" for c in name)
-    # "", "." and ".." would not be a file in the folder but another folder.
-    return kept if kept.strip(".") else "-" * max(len(kept), 1)
+    # "", "." and ".." would not be a file in the folder but another folder; a first dot hides it.
+    if not kept.strip("."):
+        return "-" * max(len(kept), 1)
+    return f"-{kept[1:]}" if kept.startswith(".") else kept
 
 
 def write_text(path: str | Path, text: str) -> None:

@@ -101,7 +101,7 @@ def simplify(
     level_sd_db = DEVIATIONS_PER_LEVEL_SD[criterion] * model.level_sd_db.reshape(by_condition)
     flips = _flip_probabilities(distances + margin_db, level_sd_db)
     fills = own_peaks(model).fills
-    decided = _decide(distances + margin_db, flips, threshold, fills=fills)
+    decided = _decide(distances + margin_db, flips, threshold, fills=fills, margin_db=margin_db)
     _name_doubts(decided, model.unresolved.reshape(by_condition), assumed)
     verdicts = tuple(
         replace(
@@ -213,11 +213,16 @@ def _check_input(model: TextureModel, criterion: str, margin_db: float) -> None:
 
 
 def _decide(
-    distances: Floats, flips: Floats, threshold: Threshold, *, fills: Integers
+    distances: Floats,
+    flips: Floats,
+    threshold: Threshold,
+    *,
+    fills: Integers,
+    margin_db: float,
 ) -> list[tuple[bool, str]]:
     """(kept?, reason) per layer, from (conditions, m) distances that include the margin."""
     decided = [
-        _decide_alone(level, float(flip), threshold)
+        _decide_alone(level, float(flip), threshold, margin_db=margin_db)
         for level, flip in zip(distances.T, flips, strict=True)
     ]
     _keep_together(decided, fills)
@@ -231,10 +236,13 @@ def _decide(
     return decided
 
 
-def _decide_alone(level: Floats, flip: float, threshold: Threshold) -> tuple[bool, str]:
+def _decide_alone(
+    level: Floats, flip: float, threshold: Threshold, *, margin_db: float
+) -> tuple[bool, str]:
     if (level >= 0).any():
         above = int((level >= 0).sum())
-        return True, f"above threshold in {above} of {level.size} conditions"
+        what = f"not {margin_db:g} dB below threshold" if margin_db else "above threshold"
+        return True, f"{what} in {above} of {level.size} conditions"
     if np.isnan(level).any():
         outside = int(np.isnan(level).sum())
         known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
@@ -242,7 +250,8 @@ def _decide_alone(level: Floats, flip: float, threshold: Threshold) -> tuple[boo
         return True, f"no threshold known in {where} ({threshold.name} covers {known})"
     if flip >= HIGHEST_FLIP_PROBABILITY:
         return True, "below threshold, but the records are too short to be sure"
-    return False, "below threshold in every condition"
+    by = f"{margin_db:g} dB " if margin_db else ""
+    return False, f"{by}below threshold in every condition"
 
 
 def _keep_together(decided: list[tuple[bool, str]], fills: Integers) -> None:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 from modeling.checks import check_choice, check_keys, check_number, is_number
 from modeling.errors import InputError
 from modeling.files.documents import dump_json, read_json_object
+from modeling.files.hashes import sha256_of_values
 from modeling.files.writing import write_text
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold
@@ -134,6 +135,10 @@ class Simplification:
     __hash__ = None  # type: ignore[assignment]
 
     def _values(self) -> dict[str, Any]:
+        values = self._plain()
+        return {**values, "sha256": sha256_of_values(values)}
+
+    def _plain(self) -> dict[str, Any]:
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -180,7 +185,7 @@ def load_simplifications(folder: Path) -> dict[str, Simplification]:
 _NAMES = (
     *("format", "version", "texture", "simulated", "identical", "criterion", "margin_db"),
     *("hold_above", "full_sha256", "model_sha256", "threshold_sha256", "threshold", "layers"),
-    "model",
+    *("model", "sha256"),
 )
 # JSON knows no number that is not finite.
 _NUMBERS = ("distance_db", "flip_probability")
@@ -215,6 +220,7 @@ def _from_values(values: Mapping[str, Any], source: Path) -> Simplification:
     )
     again = made._values()
     changed = [name for name in _NAMES if again[name] != values[name]]
+    changed = [name for name in changed if name != "sha256"] or changed
     if changed:
         raise InputError(
             f"expected {', '.join(changed)} as tactileq simplify wrote it, got something else; "

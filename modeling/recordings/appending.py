@@ -10,6 +10,7 @@ from pathlib import Path
 
 from modeling.errors import InputError
 from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.reading import reason_of
 from modeling.files.tables import number, read_table, whole_number, write_table
 from modeling.files.writing import write_text
 from modeling.recordings.recording import Recording
@@ -83,7 +84,7 @@ def append(
     except OSError as error:
         where = f" at {error.filename}" if error.filename else ""
         raise InputError(
-            f"expected to add recordings to {target}, got {error.strerror or error}{where}, so it "
+            f"expected to add recordings to {target}, got {reason_of(error)}{where}, so it "
             "is as it was; check the path, its permissions and the space on the disk."
         ) from None
 

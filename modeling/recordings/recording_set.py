@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,14 @@ from modeling.errors import InputError, shortened, shown
 from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.reading import read_text
-from modeling.files.tables import is_number, number, read_table, whole_number, write_table
+from modeling.files.tables import (
+    check_columns,
+    is_number,
+    number,
+    read_table,
+    whole_number,
+    write_table,
+)
 from modeling.files.wav import full_scale, read_wav
 from modeling.recordings.recording import Recording
 
@@ -32,6 +40,7 @@ INDEX_COLUMNS = (
 )
 # What the index says of WAV files beside that; empty for CSV files.
 WAV_COLUMNS = ("g_per_fullscale", "channel")
+KNOWN_COLUMNS = INDEX_COLUMNS + WAV_COLUMNS
 
 
 class RecordingSet:
@@ -178,12 +187,30 @@ def listed(folder: Path) -> list[dict[str, str]]:
         )
     if (folder / INDEX_NAME).is_file():
         rows = read_table(folder / INDEX_NAME, ("file", "texture", "speed_mm_s", "force_n"))
+        _check_index(rows, folder / INDEX_NAME)
     elif not (rows := [_sidecar_row(path) for path in _sidecar_files(folder)]):
         raise InputError(
             f"expected {INDEX_NAME} (or WAV files with JSON sidecars) in {folder}, got neither; "
             "import the files first (tactileq import wav|csv)."
         )
     return [{**row, "texture": row.get("texture") or folder.name} for row in rows]
+
+
+def _check_index(rows: Sequence[Mapping[str, str]], index: Path) -> None:
+    """Refuse a column that is nearly one of ours, and a file that stands for two recordings.
+
+    Columns of somebody's own are let be.
+    """
+    columns = rows[0] if rows else ()
+    near = [name for name in columns if get_close_matches(name, KNOWN_COLUMNS, cutoff=0.7)]
+    check_columns(near, KNOWN_COLUMNS, index)
+    files = [(row["file"], row.get("channel", "")) for row in rows]
+    for place, (name, channel) in enumerate(files):
+        if (name, channel) in files[:place]:
+            raise InputError(
+                f"expected each file once in {index}, got {shown(name)} twice; remove the wrong "
+                "row."
+            )
 
 
 def _sidecar_files(folder: Path) -> list[Path]:

@@ -16,7 +16,7 @@ LONGEST_GAP = 2.5
 # A tool's vibration needs more; a rate below this means time in another unit than supposed.
 LOWEST_RATE_HZ = 20.0
 LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
-RATE_TOLERANCE = 0.02
+RATE_TOLERANCE = 0.005
 # Share of the power at the highest frequency of a model that jitter may turn into noise (-20 dB).
 TOLERATED_NOISE_SHARE = 0.01
 LOCAL_S = 0.1

@@ -15,6 +15,7 @@ import numpy as np
 from modeling import InputError, compensation_for
 from modeling.arrays import Floats
 from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.reading import reason_of
 from modeling.files.writing import file_stem
 from modeling.perception.sensation_level import sensation_level
 from modeling.seeds import noise_stream
@@ -154,7 +155,7 @@ def write_set(
     except OSError as error:
         where = "" if error.filename in (None, str(target)) else f" at {error.filename}"
         raise InputError(
-            f"expected to write a stimulus set to {target}, got {error.strerror or error}{where}; "
+            f"expected to write a stimulus set to {target}, got {reason_of(error)}{where}; "
             "check the path, its permissions and the space on the disk."
         ) from None
     return tuple(stimuli)

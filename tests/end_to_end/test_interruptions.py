@@ -137,11 +137,12 @@ def living(group: int) -> list[str]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All finished files below a folder."""
+    """All finished files below a folder, but for logs, whose times differ from run to run."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
         if path.is_file() and not any(part.startswith(".") for part in path.parts)
+        if not path.name.endswith("_log.tsv")
     }
 
 

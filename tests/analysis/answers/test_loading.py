@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
 from pathlib import Path
@@ -318,13 +319,49 @@ def _describe(folder, **values):
 
 
 def test_identical_models_are_known_by_their_hashes(study_folder, write_task, absolute_rows):
-    write_task("absolute", absolute_rows)
+    path = write_task("absolute", absolute_rows)
     assert load_responses(study_folder).identical == frozenset()
+    path.with_suffix(".json").write_text("{}")
     models = {"canvas": {"full": "0a", "simplified": "0a"}, "PVC": {"full": "1", "simplified": "2"}}
     _describe(study_folder, ModelsSHA256=models)
     responses = load_responses(study_folder)
     assert responses.models == models
     assert responses.identical == {"canvas"}
+
+
+def test_sessions_without_sidecar_or_answers_are_noticed(
+    study_folder, write_task, write_order, absolute_rows
+):
+    path = write_task("absolute", absolute_rows)
+    write_order("absolute", absolute_rows, participant="sub-02")
+    (told,) = load_responses(study_folder).warnings
+    assert told == "sub-02 absolute ses-01 has a stored order, but no answers."
+    _describe(study_folder, StudySHA256="00")
+    with pytest.raises(InputError, match="expected the sidecar") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path.with_suffix(".json"))
+
+
+def test_a_changed_order_or_design_is_refused(study_folder, write_task, write_order, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    order = write_order("absolute", absolute_rows)
+    sidecar = path.with_suffix(".json")
+    digest = hashlib.sha256(order.read_bytes()).hexdigest()
+    sidecar.write_text(json.dumps({"OrderSHA256": digest}))
+    assert load_responses(study_folder).warnings == ()
+    write_task("absolute", absolute_rows[:-2])
+    with pytest.raises(InputError, match="as it was stored before the session") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, order)
+    order.write_text(json.dumps(json.loads(order.read_text()) | {"study_sha256": "ff"}))
+    _describe(study_folder, StudySHA256="00")
+    with pytest.raises(InputError, match="of the data set's study") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, order)
+    described = _describe(study_folder, StudyDesign={"repeats": 3})
+    with pytest.raises(InputError, match="to have the StudySHA256") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, described)
 
 
 @pytest.mark.parametrize("models", [7, {"canvas": "0a"}, {"canvas": {"full": "0a"}}])

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
+from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.tables import read_table, write_table
 from modeling.files.writing import file_stem, write_text
@@ -189,3 +190,15 @@ def test_an_index_names_no_file_outside_its_folder(tmp_path: Path, name: str) ->
         assert listed_file(folder, own, index_name="index.tsv").read_text() == "1\n"
     with pytest.raises(InputError, match=r"within .* in its index.tsv, got .*, which lies outside"):
         listed_file(folder, name, index_name="index.tsv")
+
+
+@pytest.mark.parametrize("name", [".hid", "../evil", ".", "..", ""])
+def test_no_name_gives_a_hidden_file(name: str) -> None:
+    assert not file_stem(name).startswith(".")
+
+
+def test_a_name_twice_in_json_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "x.json"
+    path.write_text('{"rate_hz": 5000, "more": {"a": 1, "a": 2}}')
+    with pytest.raises(InputError, match="got 'a' twice; mend it"):
+        read_json_object(path, advice="mend it")

@@ -511,3 +511,13 @@ def test_simplify_chooses_signs_again(make_model: ModelMaker) -> None:
     simplified = simplify(make_model(0.02, ALTERNATING), high, criterion="paper-gain").model
     assert simplified.n_layers == 2
     assert (simplified.gains[:, :, 0] * simplified.gains[:, :, 1] < 0).all()
+
+
+def test_reasons_name_the_margin(make_model: ModelMaker) -> None:
+    model = make_model(0.01, at_db(3.0, -2.0, -20.0))
+    reasons = [layer.reason for layer in run(model, margin_db=6.0).layers]
+    assert reasons[:2] == ["not 6 dB below threshold in 4 of 4 conditions"] * 2
+    assert reasons[2] == "6 dB below threshold in every condition"
+    plain = [layer.reason for layer in run(model).layers]
+    assert plain[0] == "above threshold in 4 of 4 conditions"
+    assert plain[2] == "below threshold in every condition"

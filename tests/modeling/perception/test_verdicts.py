@@ -80,6 +80,7 @@ def test_hashes_are_those_of_the_saved_files(tmp_path: Path, polyester: Simplifi
         ({"identical": True}, "identical as tactileq simplify wrote it"),
         ({"texture": "silk"}, "texture as tactileq simplify wrote it"),
         ({"hold_above": "yes"}, "hold_above as tactileq simplify wrote it"),
+        ({"sha256": "00"}, "sha256 as tactileq simplify wrote it"),
         ({"layers": 7}, "expected the values of a tactileq.simplification"),
         ({"layers": [{}]}, "in a layer"),
         ({"threshold": {"name": "x"}}, "expected the values of a tactileq.simplification"),
@@ -97,6 +98,18 @@ def test_changed_files_are_refused(
         Simplification.load(path)
     assert str(path) in str(caught.value)
     assert str(caught.value).count("expected") == 1
+
+
+def test_edited_verdicts_are_refused(tmp_path: Path, polyester: Simplification) -> None:
+    path = tmp_path / "x.json"
+    polyester.save(path)
+    text = path.read_text()
+    path.write_text(text.replace('"verdict": "dropped"', '"verdict": "kept"'))
+    with pytest.raises(InputError, match="sha256 as tactileq simplify wrote it"):
+        Simplification.load(path)
+    path.write_text(text.replace('"margin_db": 1.5', '"margin_db": 6.0'))
+    with pytest.raises(InputError, match="sha256 as tactileq simplify wrote it"):
+        Simplification.load(path)
 
 
 def test_a_folder_of_them(tmp_path: Path, polyester: Simplification) -> None:

@@ -126,7 +126,7 @@ def test_a_full_disk_changes_nothing(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(target))
 
     monkeypatch.setattr(shutil, "copyfile", no_space)
-    with pytest.raises(InputError, match=r"got No space left on device at .*0.\.wav, so it is as"):
+    with pytest.raises(InputError, match=r"got a full disk at .*0.\.wav, so it is as"):
         append(folder, RecordingSet([recording(100), made]), [None, source])
     assert folder.is_dir() == exists
     assert (contents(folder) if exists else {}) == before

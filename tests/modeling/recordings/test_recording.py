@@ -237,7 +237,7 @@ def test_only_texture(make_recording: RecordingMaker) -> None:
 @st.composite
 def recording_sets(draw: st.DrawFn) -> RecordingSet:
     names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=6).filter(
-        lambda name: name.strip() and not set(name) & set("\t\r\n")
+        lambda name: name.strip() and name.isprintable()
     )
     recordings = []
     for number in range(draw(st.integers(1, 3))):
@@ -339,7 +339,11 @@ def test_csv_of_other_bytes_is_refused(folder: Path) -> None:
         ("0002.csv", "0003.csv", "0003.csv"),
         ("file\ttexture", "name\ttexture", "add file"),
         ("force_n", "force", "add force_n"),
-        ("rate_hz", "rate", "rate_hz of 0001.csv, got nothing"),
+        ("rate_hz", "rate", "got 'rate'; rename it to 'rate_hz'"),
+        ("simulated", "simulatd", "got 'simulatd'; rename it to 'simulated'"),
+        ("unit", "units", "got 'units'; rename it to 'unit'"),
+        ("rate_hz", "operator", "rate_hz of 0001.csv, got nothing"),
+        ("0002.csv", "0001.csv", "each file once in .*, got '0001.csv' twice"),
     ],
 )
 def test_damaged_index_is_refused(folder: Path, old: str, new: str, sentence: str) -> None:

@@ -338,7 +338,7 @@ def test_a_full_disk_leaves_the_old_set_untouched(
         return write_bytes(path, data)
 
     monkeypatch.setattr(Path, "write_bytes", full_after_two)
-    with pytest.raises(InputError, match="got No space left on device; check the path"):
+    with pytest.raises(InputError, match="got a full disk; check the path"):
         write_set(tmp_path / "set", recipe(seeds=(5,)))
     assert len(written) == 2
     monkeypatch.undo()
