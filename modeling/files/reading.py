@@ -17,6 +17,8 @@ _REASONS = {
     errno.EPERM: "no permission",
     errno.ENAMETOOLONG: "a name that is too long",
     errno.EISDIR: "a folder",
+    errno.EEXIST: "a file in the way",
+    errno.EFBIG: "a file that is larger than it may be",
     errno.ENOSPC: "a full disk",
     errno.EROFS: "a disk that takes nothing",
     errno.EIO: "a disk that fails",

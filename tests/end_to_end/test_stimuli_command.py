@@ -150,7 +150,7 @@ REFUSED = {
         "study/set.toml",
         "--out",
         "study/hand.csv/x",
-    ): "got File exists at study/hand.csv;",
+    ): "got a file in the way at study/hand.csv;",
     ("stimuli", "study/set.toml", "--out", "study"): "expected a new folder or a stimulus set",
 }
 
@@ -165,7 +165,7 @@ def test_what_is_refused(main, tmp_path: Path, study: Path) -> None:
         assert result.stderr.startswith("error: ")
         assert result.stderr.count("\n") == 1, result.stderr
         # Wrong input is refused before there is a progress bar; a place only when it is written.
-        assert ("Rendering" in result.stdout) == ("File exists" in sentence)
+        assert ("Rendering" in result.stdout) == ("in the way" in sentence)
     edit = (("0.3,400,2\n", "", "hand.csv"), ('name = "touch"', "speed = 1", "set.toml"))
     sentences = ("'hand', got 1 of them", "expected only name, rate_hz")
     for (old, new, file), sentence in zip(edit, sentences, strict=True):

@@ -186,7 +186,7 @@ def models(draw: st.DrawFn) -> TextureModel:
         return sorted(draw(values))
 
     return TextureModel(
-        texture=draw(text.filter(lambda t: t.strip() and not set(t) & set("\t\r\n"))),
+        texture=draw(text.filter(lambda t: t.strip() and t.isprintable())),
         rate_hz=5000.0,
         speeds_mm_s=axis(s),
         forces_n=axis(f),
