@@ -11,7 +11,7 @@ from modeling.errors import InputError, shortened, shown
 
 UNITS = ("g", "arbitrary")
 HIGHEST_RATE_HZ = 1e7  # above any accelerometer's; a second then holds 80 MB
-LARGEST_VALUE = 1e100  # of samples and gains, so that powers of them stay finite
+LARGEST_VALUE = 1e100  # of samples, so that powers of them stay finite
 HIGHEST_SPEED_MM_S = 1e5  # beyond any hand's, as the force
 HIGHEST_FORCE_N = 1e4
 MOST_SAMPLES = 10_000_000  # of one simulated record: 80 MB, and a set may have dozens

@@ -101,9 +101,12 @@ class SessionStore:
                 "ModelsSHA256": {texture: dict(kinds) for texture, kinds in models.items()},
             }
             _describe_data_set(root, plan.study, origin=origin)
-            fixed = origin | {"OrderSHA256": sha256_of(_order_text(plan))}
+            order = _order_text(plan)
+            fixed = origin | {"OrderSHA256": sha256_of(order)}
             sidecar = _sidecar_text(plan, columns, description=description, origin=fixed)
-            store = cls._make_files(root, plan, columns=tuple(columns), sidecar=sidecar, made=made)
+            store = cls._make_files(
+                root, plan, columns=tuple(columns), order=order, sidecar=sidecar, made=made
+            )
             _add_participant(root, plan.subject, simulated=simulated_participant)
             _sync_folder(root)
         except OSError as error:
@@ -121,6 +124,7 @@ class SessionStore:
         plan: SessionPlan,
         *,
         columns: tuple[str, ...],
+        order: str,
         sidecar: str,
         made: list[Path],
     ) -> SessionStore:
@@ -131,7 +135,7 @@ class SessionStore:
             folder.mkdir(parents=True, exist_ok=True)
         try:
             # The order file is the session's lock: only one process can make it.
-            _write_new(source / f"{stem}_order.json", _order_text(plan), made=made)
+            _write_new(source / f"{stem}_order.json", order, made=made)
             _write_new(beh / f"{stem}_beh.json", sidecar, made=made)
             log = _Rows.create(source / f"{stem}_log.tsv", LOG_COLUMNS, made=made)
             rows = _Rows.create(beh / f"{stem}_beh.tsv", columns, made=made)

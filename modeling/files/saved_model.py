@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
 from dataclasses import fields
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -41,7 +42,7 @@ class SavedModel(_Base):
         values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
         return {"format": self.FORMAT, "version": self.VERSION, **values}
 
-    @property
+    @cached_property
     def sha256(self) -> str:
         """SHA-256 of the file that `save` writes: equal exactly where models are equal."""
         return sha256_of(self.to_json())

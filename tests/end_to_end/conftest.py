@@ -11,7 +11,27 @@ import pytest
 
 from tactileq import app
 
+SMALL_STUDY = """
+name = "small"
+seed = 3
+textures = ["canvas", "MDF"]
+[absolute]
+participants = 2
+schedule = "interleaved"
+[relative]
+participants = 2
+schedule = "by-day"
+[trays]
+canvas = "A"
+MDF = "B"
+"""
 Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def small_study() -> str:
+    """A study file of two textures and two participants of either task."""
+    return SMALL_STUDY
 
 
 @pytest.fixture

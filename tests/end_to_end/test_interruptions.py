@@ -24,20 +24,6 @@ from modeling.perception.verdicts import ENDING
 from stimuli.planted.textures import planted_texture, record_texture
 
 MOMENTS = int(os.environ.get("TACTILEQ_MOMENTS", "0"))
-STUDY = """
-name = "small"
-seed = 3
-textures = ["canvas", "MDF"]
-[absolute]
-participants = 2
-schedule = "interleaved"
-[relative]
-participants = 2
-schedule = "by-day"
-[trays]
-canvas = "A"
-MDF = "B"
-"""
 SPEEDS = ("--speed", "100", "--speed", "300", "--force", "1", "--force", "3")
 
 
@@ -66,7 +52,7 @@ def words_of(name: str, which: int) -> list[str]:
 
 
 @pytest.fixture
-def place(tmp_path: Path, hatt_xml: Callable[..., str]) -> Path:
+def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Path:
     """Small inputs of every command."""
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     for name in ("canvas", "MDF"):
@@ -79,7 +65,7 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str]) -> Path:
         fewer.save(tmp_path / f"simplified/{name}{ENDING}")
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
-    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "study.toml").write_text(small_study)
     return tmp_path
 
 

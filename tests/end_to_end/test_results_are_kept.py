@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import shutil
-import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,21 +14,6 @@ import pytest
 from modeling import Recording, RecordingSet, TextureModel
 from modeling.files.provenance import provenance_of, seal_folder
 from stimuli.planted.textures import planted_texture, record_texture
-
-SMALL_STUDY = """
-name = "small"
-seed = 3
-textures = ["canvas", "MDF"]
-[absolute]
-participants = 2
-schedule = "interleaved"
-[relative]
-participants = 2
-schedule = "by-day"
-[trays]
-canvas = "A"
-MDF = "B"
-"""
 
 
 def grid(name: str) -> RecordingSet:
@@ -85,9 +68,9 @@ def test_full_and_simplified_models_do_not_replace_each_other(main, tmp_path: Pa
 
 
 @pytest.fixture
-def study(main, tmp_path: Path) -> Path:
+def study(main, tmp_path: Path, small_study: str) -> Path:
     """A small simulated study, from recordings to answers, in `tmp_path`."""
-    (tmp_path / "study.toml").write_text(SMALL_STUDY)
+    (tmp_path / "study.toml").write_text(small_study)
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / "recordings" / name)
         assert main("model", f"recordings/{name}", "--out", "models").returncode == 0
@@ -287,17 +270,13 @@ def test_exports_replace_their_own_files_alone(main, tmp_path: Path, model: Path
     assert not (tmp_path / "y.json").exists()
 
 
-def test_a_full_disk_leaves_no_part_of_a_model(main, tmp_path: Path, model: Path) -> None:
+def test_a_full_disk_leaves_no_part_of_a_model(
+    main, tmp_path: Path, model: Path, file_size_limit
+) -> None:
     assert main("simplify", model, "--out", "fewer").returncode == 0
     before = contents(tmp_path)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (3000, limits[1]))
-    try:
+    with file_size_limit(3000):
         refused = [main("simplify", model, "--out", out) for out in ("fewer", "new")]
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, handler)
     for out, done in zip(("fewer", "new"), refused, strict=True):
         assert done.returncode == 1
         assert done.stderr.startswith(f"error: expected to read or write {out}/canvas")

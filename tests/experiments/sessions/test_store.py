@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import resource
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,6 +27,7 @@ from modeling import InputError
 ROOT = Path(__file__).parents[3]
 COLUMNS = {"trial": {"Description": "number"}, "note": {"Description": "anything"}}
 MODELS = {"canvas": {"full": "0a", "simplified": "1b"}}
+FileSizeLimit = Callable[[int], AbstractContextManager[None]]
 Rows = Callable[[Path], list[dict[str, str]]]
 
 
@@ -225,20 +225,9 @@ def test_a_row_with_other_columns_is_refused(tmp_path: Path, study: Study) -> No
         store.append({"trial": 1})
 
 
-@contextmanager
-def file_size_limit(bytes_: int) -> Iterator[None]:
-    """No file may grow beyond this: the system cuts a write short, then refuses it (EFBIG)."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
-
-
-def test_a_refused_write_leaves_whole_rows_and_one_sentence(tmp_path: Path, study: Study) -> None:
+def test_a_refused_write_leaves_whole_rows_and_one_sentence(
+    tmp_path: Path, study: Study, file_size_limit: FileSizeLimit
+) -> None:
     with create(tmp_path, plan_of(study)) as store:
         store.append({"trial": 1, "note": "kept"})
         before = store.path.read_bytes()

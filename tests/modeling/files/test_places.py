@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import resource
 import signal
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
@@ -17,6 +16,7 @@ from modeling.files.places import clear_unfinished, locked, unfinished_folder
 from modeling.files.writing import write_bytes, write_files, write_text
 
 fork = multiprocessing.get_context("fork")
+FileSizeLimit = Callable[[int], AbstractContextManager[None]]
 
 
 def names(folder: Path) -> list[str]:
@@ -144,20 +144,9 @@ def test_a_fresh_folder_may_itself_be_replaced(tmp_path: Path) -> None:
     assert names(tmp_path) == ["set", "set/file"]
 
 
-@contextmanager
-def file_size_limit(bytes_: int) -> Iterator[None]:
-    """No file may grow beyond this: a full disk, as far as a program can see."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
-        signal.signal(signal.SIGXFSZ, handler)
-
-
-def test_files_of_a_group_are_written_all_or_none(tmp_path: Path) -> None:
+def test_files_of_a_group_are_written_all_or_none(
+    tmp_path: Path, file_size_limit: FileSizeLimit
+) -> None:
     first, second = tmp_path / "a.tsv", tmp_path / "b.json"
     write_files({first: b"old"})
     refused = None
@@ -178,7 +167,9 @@ def test_files_of_a_group_are_written_all_or_none(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("write", [write_bytes, Path.write_bytes])
 def test_a_full_disk_is_told_of_the_place_that_was_asked_for(
-    tmp_path: Path, write: Callable[[Path, bytes], object]
+    tmp_path: Path,
+    write: Callable[[Path, bytes], object],
+    file_size_limit: FileSizeLimit,
 ) -> None:
     refused = None
     with file_size_limit(1000):
