@@ -14,13 +14,18 @@ from modeling.files.writing import write_text
 
 def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a TSV with a header line; cells must not hold tabs or line ends."""
+    write_text(path, table_text(columns, rows))
+
+
+def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """The text of a TSV, as `write_table` writes it."""
     lines = ["\t".join(columns)]
     for row in rows:
         cells = [str(cell) for cell in row]
         if any(c in cell for cell in cells for c in "\t\r\n"):
             raise InputError(f"expected cells without tabs and line ends, got {cells}; rename.")
         lines.append("\t".join(cells))
-    write_text(path, "\n".join(lines) + "\n")
+    return "\n".join(lines) + "\n"
 
 
 def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]]:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from modeling.errors import InputError
 from modeling.files.folders import check_replaceable, replace_folder
 from modeling.files.reading import reason_of
-from modeling.files.tables import number, read_table, whole_number, write_table
-from modeling.files.writing import write_text
+from modeling.files.tables import number, read_table, table_text, whole_number
+from modeling.files.writing import write_files, write_text
 from modeling.recordings.recording import Recording
 from modeling.recordings.recording_set import (
     INDEX_COLUMNS,
@@ -48,7 +48,11 @@ class WavSource:
 
 
 def append(
-    folder: str | Path, recordings: RecordingSet, sources: Sequence[WavSource | None]
+    folder: str | Path,
+    recordings: RecordingSet,
+    sources: Sequence[WavSource | None],
+    *,
+    beside: Mapping[str, bytes] | None = None,
 ) -> int:
     """Add recordings to a folder's; a folder that is not there yet is made.
 
@@ -62,6 +66,8 @@ def append(
     recordings : RecordingSet
     sources : sequence of WavSource or None
         For each recording the file to copy into the set, or None: then it becomes a CSV file.
+    beside : mapping of name to contents, optional
+        Files that take their places together with the index, such as provenance.
 
     Returns
     -------
@@ -77,10 +83,10 @@ def append(
     target = Path(folder)
     try:
         if (target / INDEX_NAME).is_file():
-            return _extend(target, recordings, sources)
+            return _extend(target, recordings, sources, beside=beside or {})
         check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
         with replace_folder(target) as fresh:
-            return _extend(fresh, recordings, sources)
+            return _extend(fresh, recordings, sources, beside=beside or {})
     except OSError as error:
         where = f" at {error.filename}" if error.filename else ""
         raise InputError(
@@ -89,7 +95,13 @@ def append(
         ) from None
 
 
-def _extend(folder: Path, recordings: RecordingSet, sources: Sequence[WavSource | None]) -> int:
+def _extend(
+    folder: Path,
+    recordings: RecordingSet,
+    sources: Sequence[WavSource | None],
+    *,
+    beside: Mapping[str, bytes],
+) -> int:
     index = folder / INDEX_NAME
     known = listed(folder) if index.is_file() else []
     _check_conditions(known, recordings)
@@ -101,7 +113,9 @@ def _extend(folder: Path, recordings: RecordingSet, sources: Sequence[WavSource 
             _write(folder / name, recording, source)
             for name, recording, source in zip(names, recordings, sources, strict=True)
         ]
-        _write_index(index, added)
+        text = _index_text(index, added)
+        others = {folder / name: data for name, data in beside.items()}
+        write_files({**others, index: text.encode()})
     finally:
         _remove_unfinished(folder)
     return len(known) + len(added)
@@ -163,8 +177,8 @@ def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[s
     return row | dict(zip(WAV_COLUMNS, (scale, str(source.channel)), strict=True))
 
 
-def _write_index(index: Path, added: Sequence[dict[str, str]]) -> None:
+def _index_text(index: Path, added: Sequence[dict[str, str]]) -> str:
     """The rows that were there, as they were, and the new ones; columns are those of both."""
     rows = [*(read_table(index, ()) if index.is_file() else ()), *added]
     columns = list(dict.fromkeys(name for row in rows for name in row))
-    write_table(index, columns, [[row.get(name, "") for name in columns] for row in rows])
+    return table_text(columns, [[row.get(name, "") for name in columns] for row in rows])

@@ -184,7 +184,7 @@ def add_to_set(
     """
     from modeling import RecordingSet
     from modeling.files.places import locked
-    from modeling.files.provenance import write_provenance
+    from modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
     from modeling.recordings.appending import append
 
     records = RecordingSet(one.recording for one in new)
@@ -194,11 +194,12 @@ def add_to_set(
         print(f"warning: {sentence}", file=sys.stderr)
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
-    provenance = out / "provenance.json"
+    provenance = out / PROVENANCE_NAME
     with locked(out):  # another import must not add to what this one is adding to
         before = imports_before(provenance)
-        count = append(out, records, [one.source for one in new])
-        write_provenance(provenance, command, {**settings, "added to": before}, inputs=files)
+        origin = provenance_of(command, {**settings, "added to": before}, inputs=files)
+        beside = {PROVENANCE_NAME: provenance_text(origin).encode()}
+        count = append(out, records, [one.source for one in new], beside=beside)
     if any(record.unit == "arbitrary" for record in records):
         print(
             "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "

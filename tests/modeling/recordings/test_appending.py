@@ -144,7 +144,7 @@ def half(source, target):
     Path(target).write_bytes(Path(source).read_bytes()[:100])
     die()
 if step == "copying": shutil.copyfile = half
-if step == "before the index": appending.write_table = die
+if step == "before the index": appending.write_files = die
 if step == "after the index": appending._remove_unfinished = lambda f: (f / "0001.csv").exists() \\
     and (f / "0003.wav").exists() and die()
 records = RecordingSet.load(other)
