@@ -19,10 +19,11 @@ COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 
 
 def declarations(header: Path) -> str:
-    """Structures and functions of a header as cffi wants them: those that are not inline."""
+    """Structures and functions of a header as cffi wants them, but those of TQ_INLINE."""
     text = header.read_text(encoding="utf-8")
     structures = re.findall(r"^typedef struct \{.*?^\} \w+;$", text, re.DOTALL | re.MULTILINE)
-    calls = re.findall(r"^static (?!inline)[^;{}=]*?\([^)]*\)(?=\s*\{)", text, re.MULTILINE)
+    call = r"^static (?:inline )?([^;{}=]*?\([^)]*\))(?=\s*\{)"
+    calls = re.findall(call, text, re.MULTILINE)
     return "\n".join([*structures, *(f"{call};" for call in calls)])
 
 

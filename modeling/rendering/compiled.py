@@ -56,6 +56,8 @@ class CompiledEngine:
         counters = self._state.counters
         return RenderCounters(
             lift_offs=counters.lift_offs,
+            above_grid=counters.above_grid,
+            below_grid=counters.below_grid,
             clamped=counters.clamped,
             limited_peak=counters.peak,
             limited_rms=counters.rms,

@@ -1,11 +1,17 @@
 /* The rendering kernel: a texture under a moving hand, sample by sample.
    docs/method/rendering.md, docs/method/equalizer.md#recursion
 
-   C99, no allocation, no globals, no call of the mathematical library but one square root per layer
-   and parameter update (and one per sample that the RMS limit touches). Define TQ_REAL as float
-   before including it for single precision. Compile with -ffp-contract=off, never with -ffast-math:
-   then double precision equals the Python renderer bit for bit wherever double arithmetic is IEEE 754
-   without excess precision (not on x87).
+   C99 or C++17, no allocation, no globals, no call of the mathematical library but one square root
+   per layer and parameter update (and one per sample that the RMS limit touches). Compile with
+   -ffp-contract=off, never with -ffast-math: then double precision equals the Python renderer bit for
+   bit wherever double arithmetic is IEEE 754 without excess precision (not on x87). -fno-math-errno
+   makes the square root one instruction where the processor has it.
+
+   To be defined before including it, where needed:
+   TQ_REAL          float, for single precision; no double is computed then.
+   TQ_FREESTANDING  no library but memcpy, memmove and memset (GCC and Clang).
+   TQ_LANES         1, if two layers in one operation are no faster than one after the other.
+   TQ_SQRT(x)       another square root of a tq_real.
 
    Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, taps) reals; then call
    tq_render as often as you like, with blocks of any size.
@@ -15,9 +21,26 @@
 #ifndef TQ_KERNEL_H
 #define TQ_KERNEL_H
 
-#include <math.h>
+#include <stddef.h>
 #include <stdint.h>
+#ifdef TQ_FREESTANDING
+#ifdef __cplusplus
+extern "C" {
+#endif
+void *memcpy(void *, const void *, size_t);
+void *memmove(void *, const void *, size_t);
+void *memset(void *, int, size_t);
+#ifdef __cplusplus
+}
+#endif
+#define TQ_SQRT_SINGLE __builtin_sqrtf
+#define TQ_SQRT_DOUBLE __builtin_sqrt
+#else
+#include <math.h>
 #include <string.h>
+#define TQ_SQRT_SINGLE sqrtf
+#define TQ_SQRT_DOUBLE sqrt
+#endif
 
 #ifndef TQ_REAL
 #define TQ_REAL double
@@ -25,18 +48,38 @@
 
 typedef TQ_REAL tq_real;
 
+#ifndef TQ_SQRT
+#define TQ_SQRT(x)                                                        \
+    (sizeof(tq_real) == sizeof(float) ? (tq_real)TQ_SQRT_SINGLE((float)(x)) \
+                                      : (tq_real)TQ_SQRT_DOUBLE((double)(x)))
+#endif
+
 /* Where the compiler knows how: inlined whatever it thinks of it, since constant widths are what makes
-   the loops fast; and two layers in one operation. */
+   the loops fast; and two layers in one operation where the processor has one for it. */
 #ifdef __GNUC__
 #define TQ_INLINE static inline __attribute__((always_inline))
-#define TQ_LANES 2
-typedef tq_real tq_lanes __attribute__((vector_size(2 * sizeof(tq_real))));
-#define TQ_PACK(x) ((tq_lanes){(x)[0], (x)[1]}) /* of values just written, faster than tq_load */
+#define TQ_RESTRICT __restrict
 #else
 #define TQ_INLINE static inline
+#define TQ_RESTRICT
+#endif
+#ifndef TQ_LANES
+#if defined __GNUC__ && (defined __SSE2__ || defined __ARM_NEON || defined __wasm_simd128__)
+#define TQ_LANES 2
+#else
 #define TQ_LANES 1
+#endif
+#endif
+#if TQ_LANES == 1
 typedef tq_real tq_lanes;
 #define TQ_PACK(x) ((x)[0])
+#else
+typedef tq_real tq_lanes __attribute__((vector_size(2 * sizeof(tq_real))));
+#ifdef __cplusplus
+#define TQ_PACK(x) (tq_lanes{(x)[0], (x)[1]})
+#else
+#define TQ_PACK(x) ((tq_lanes){(x)[0], (x)[1]}) /* of values just written, faster than tq_load */
+#endif
 #endif
 
 #define TQ_CHUNK 64       /* samples that are filtered in one go */
@@ -81,16 +124,18 @@ typedef struct {
     tq_real p, q, r, b1, b2, tap;
 } tq_band;
 
-/* What was corrected: samples without a finite hand, parameter values moved into the legal range,
-   samples that each limit touched. */
+/* What was corrected: samples without a finite hand; samples while the hand, as last read, touched and
+   moved faster or pressed harder than the grid's highest, or else slower or more lightly than its
+   lowest; parameter values moved into the legal range; samples that each limit touched. */
 typedef struct {
-    uint64_t lift_offs, clamped, peak, rms, duration;
+    uint64_t lift_offs, above_grid, below_grid, clamped, peak, rms, duration;
 } tq_counters;
 
 typedef struct {
     uint64_t key, position;
     int since_update;
-    tq_real speed, force; /* as last read */
+    int above_grid, below_grid; /* whether the hand is, as last read */
+    tq_real speed, force;       /* as last read */
     tq_real speed_slope, force_slope; /* their change per update, smoothed */
     tq_real angle, per_sample, to_end; /* pi / rate; one sample and all but one of an update's time */
     tq_real floor_gain, floor_now, floor_step;
@@ -152,7 +197,7 @@ TQ_INLINE tq_lanes tq_root(tq_lanes x)
     int i;
     tq_store(each, x);
     for (i = 0; i < TQ_LANES; i++)
-        each[i] = (tq_real)sqrt(each[i]);
+        each[i] = TQ_SQRT(each[i]);
     return TQ_PACK(each);
 }
 
@@ -268,6 +313,14 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
         to[i] = tq_blend(hand, first + i);
 }
 
+/* Speeds (mm/s), forces (N) and their changes that are too small to matter count as 0: what dies away
+   exponentially would stay among the subnormal numbers for ever, which some processors compute at a
+   fraction of their speed. */
+TQ_INLINE tq_real tq_settled(tq_real x)
+{
+    return x < (tq_real)1e-9 && x > (tq_real)-1e-9 ? 0 : x;
+}
+
 /* The exponentially smoothed change of a reading from update to update, by which the hand is
    extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0 reset
    it. */
@@ -275,7 +328,7 @@ TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real fur
 {
     tq_real change = now - last;
     int goes_on = change <= furthest && change >= -furthest && now != 0;
-    return goes_on ? slope + share * (change - slope) : 0;
+    return goes_on ? tq_settled(slope + share * (change - slope)) : 0;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -329,31 +382,58 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
     }
 }
 
+/* Whether a hand that touches and moves is beyond the grid's highest speed or force, or else below
+   its lowest. */
+TQ_INLINE void tq_locate(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
+{
+    tq_real size = speed < 0 ? -speed : speed;
+    int strokes = (size > 0) & (force > 0) & (size - size == 0) & (force - force == 0);
+    int above = (size > t->speed_mm_s[t->speeds - 1]) | (force > t->force_n[t->forces - 1]);
+    int below = (size < t->speed_mm_s[0]) | (force < t->force_n[0]);
+    s->above_grid = strokes & above;
+    s->below_grid = strokes & below & !above;
+}
+
+/* The hand in the middle of the time to the next update, and just before it: linearly extrapolated. */
+TQ_INLINE void tq_follow(const tq_texture *t, tq_state *s, tq_real speed, tq_real force, tq_hand *amid,
+                         tq_hand *end)
+{
+    tq_real to_end = s->to_end;
+    if (s->position != 0 && to_end > 0) {
+        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share);
+        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share);
+    }
+    s->speed = speed = tq_settled(speed);
+    s->force = force = tq_settled(force);
+    tq_locate(t, s, speed, force);
+    *end = tq_hand_at(t, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
+    *amid = *end;
+    if (to_end > 0)
+        *amid = tq_hand_at(t, speed + s->speed_slope * (to_end / 2),
+                           force + s->force_slope * (to_end / 2));
+}
+
+/* The ramp of the noise gain until the next update. */
+TQ_INLINE void tq_update_floor(const tq_texture *t, tq_state *s, const tq_hand *end)
+{
+    int first = s->position == 0;
+    tq_real wanted = tq_blend(end, 0), next;
+    wanted = (wanted < 0 ? 0 : wanted) * end->ramp;
+    next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
+    s->floor_now = first ? next : s->floor_gain;
+    s->floor_step = (next - s->floor_now) * s->per_sample;
+    s->floor_gain = next;
+}
+
 /* Parameters for the linearly extrapolated hand: those for the hand as it is read would be late.
    Frequencies and bandwidths are set for the middle of the time to the next update; gains ramp linearly
    to those for its last sample, so that nothing clicks. The first update sets all at once. */
 static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
 {
-    int first = s->position == 0, i;
-    tq_real to_end = s->to_end, wanted, next;
     tq_hand amid, end;
-    if (!first && to_end > 0) {
-        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share);
-        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share);
-    }
-    s->speed = speed;
-    s->force = force;
-    end = tq_hand_at(t, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
-    amid = end;
-    if (to_end > 0)
-        amid = tq_hand_at(t, speed + s->speed_slope * (to_end / 2),
-                          force + s->force_slope * (to_end / 2));
-    wanted = tq_blend(&end, 0);
-    wanted = (wanted < 0 ? 0 : wanted) * end.ramp;
-    next = first ? wanted : tq_towards(s->floor_gain, wanted, t->slews[0]);
-    s->floor_now = first ? next : s->floor_gain;
-    s->floor_step = (next - s->floor_now) * s->per_sample;
-    s->floor_gain = next;
+    int i;
+    tq_follow(t, s, speed, force, &amid, &end);
+    tq_update_floor(t, s, &end);
     for (i = 0; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
         tq_update_layers(t, s, &amid, &end, i, TQ_SIDE_BY_SIDE);
     switch (t->layers - i) { /* a constant width lets the compiler unroll */
@@ -426,12 +506,38 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const 
     s->since_update += count;
 }
 
+/* What a FIR filter of `taps` weights makes of `taps` - 1 + `count` samples: several sums at a time in
+   registers, each in the order of the taps. */
+TQ_INLINE void tq_convolve(const tq_real *TQ_RESTRICT weights, int taps,
+                           const tq_real *TQ_RESTRICT wide, tq_real *TQ_RESTRICT out, int count)
+{
+    enum { SUMS = 4, SAMPLES = SUMS * TQ_LANES };
+    int tap, i;
+    for (; count >= SAMPLES; count -= SAMPLES, wide += SAMPLES, out += SAMPLES) {
+        tq_lanes sum[SUMS];
+        const tq_real *x = wide;
+        for (i = 0; i < SUMS; i++)
+            sum[i] = weights[0] * tq_load(x + i * TQ_LANES);
+        for (tap = 1, x++; tap < taps; tap++, x++)
+            for (i = 0; i < SUMS; i++)
+                sum[i] += weights[tap] * tq_load(x + i * TQ_LANES);
+        for (i = 0; i < SUMS; i++)
+            tq_store(out + i * TQ_LANES, sum[i]);
+    }
+    for (; count > 0; count--, wide++, out++) {
+        tq_real sum = 0;
+        for (tap = 0; tap < taps; tap++)
+            sum += weights[tap] * wide[tap];
+        *out = sum;
+    }
+}
+
 /* The next noise: for the bands, and for the noise branch low-passed with zero phase, which is
    possible because the noise to come is known. */
 static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor, int count)
 {
     tq_real *wide = tq_wide(t, s), *fresh = wide + t->taps - 1;
-    int half = t->taps / 2, n, tap;
+    int half = t->taps / 2, n;
     uint64_t ahead = s->position + (uint64_t)half;
     for (n = 0; n < count; n++)
         fresh[n] = t->noise_scale * tq_noise(s->key, ahead + (uint64_t)n);
@@ -439,11 +545,7 @@ static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor
         memcpy(floor, wide, (size_t)count * sizeof(tq_real));
         return wide;
     }
-    for (n = 0; n < count; n++)
-        floor[n] = 0;
-    for (tap = 0; tap < t->taps; tap++)
-        for (n = 0; n < count; n++)
-            floor[n] += t->lowpass[tap] * wide[tap + n];
+    tq_convolve(t->lowpass, t->taps, wide, floor, count);
     return wide + half;
 }
 
@@ -492,15 +594,17 @@ TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
         tq_real kept = (1 - t->mean_share) * s->mean_square;
         tq_real room = (t->mean_square - kept) / t->mean_share;
         if (!(y * y <= room)) {
-            y = y > 0 ? (tq_real)sqrt(room) : y < 0 ? -(tq_real)sqrt(room) : 0;
+            y = y > 0 ? TQ_SQRT(room) : y < 0 ? -TQ_SQRT(room) : 0;
             s->counters.rms++;
         }
         s->mean_square = kept + t->mean_share * (y * y);
+        if (s->mean_square < (tq_real)1e-20 * t->mean_square)
+            s->mean_square = 0; /* not left to die away among the smallest numbers */
     }
     return y;
 }
 
-/* --- The two calls ----------------------------------------------------------------------------- */
+/* --- The calls --------------------------------------------------------------------------------- */
 
 /* Silence at position 0 of a noise stream. `memory` holds TQ_MEMORY(layers, taps) reals and must
    live as long as the state. */
@@ -523,20 +627,37 @@ static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t
         s->notch = tq_band_of(s->angle * t->notch_hz, s->angle * t->notch_width_hz);
 }
 
+/* Counts samples without a finite hand. */
+TQ_INLINE void tq_count_lift_offs(tq_state *s, const tq_real *speed, const tq_real *force, int count)
+{
+    int lift_offs = 0, n;
+    for (n = 0; n < count; n++)
+        lift_offs += !((speed[n] - speed[n]) + (force[n] - force[n]) == 0);
+    s->counters.lift_offs += (uint64_t)lift_offs;
+}
+
+/* What comes behind the sum of all branches, and moves on to the next noise. */
+TQ_INLINE void tq_finish(const tq_texture *t, tq_state *s, tq_real *out, int count)
+{
+    int n;
+    if (t->notch_share != 0)
+        tq_compensate(t, s, out, count);
+    if (t->peak > 0 || t->mean_square > 0 || t->longest > 0)
+        for (n = 0; n < count; n++)
+            out[n] = tq_limit(t, s, out[n]);
+    if (t->taps > 1)
+        memmove(tq_wide(t, s), tq_wide(t, s) + count, (size_t)(t->taps - 1) * sizeof(tq_real));
+}
+
 /* The next `count` samples for a hand whose speed and force are given at each of them. */
 static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
                       tq_real *out, size_t count)
 {
-    int limited = t->peak > 0 || t->mean_square > 0 || t->longest > 0;
     while (count) {
         tq_real floor[TQ_CHUNK];
-        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0, n;
+        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0;
         const tq_real *w = tq_inputs(t, s, floor, chunk);
-        tq_real lost = 0; /* stays 0 while every reading is finite, else is not a number */
-        for (n = 0; n < chunk; n++)
-            lost += (speed[n] - speed[n]) + (force[n] - force[n]);
-        for (n = 0; lost != 0 && n < chunk; n++)
-            s->counters.lift_offs += !(speed[n] - speed[n] == 0 && force[n] - force[n] == 0);
+        tq_count_lift_offs(s, speed, force, chunk);
         while (done < chunk) {
             int left = t->update_samples - s->since_update, piece;
             if (s->position == 0 || left == 0) {
@@ -546,17 +667,27 @@ static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, co
             }
             piece = left < chunk - done ? left : chunk - done;
             tq_filter(t, s, w + done, floor + done, out + done, piece);
+            s->counters.above_grid += (uint64_t)(s->above_grid * piece);
+            s->counters.below_grid += (uint64_t)(s->below_grid * piece);
             s->position += (uint64_t)piece;
             done += piece;
         }
-        if (t->notch_share != 0)
-            tq_compensate(t, s, out, chunk);
-        if (limited)
-            for (n = 0; n < chunk; n++)
-                out[n] = tq_limit(t, s, out[n]);
-        if (t->taps > 1)
-            memmove(tq_wide(t, s), tq_wide(t, s) + chunk, (size_t)(t->taps - 1) * sizeof(tq_real));
+        tq_finish(t, s, out, chunk);
         speed += chunk, force += chunk, out += chunk, count -= (size_t)chunk;
+    }
+}
+
+/* The next `count` samples for a hand whose speed and force are held. */
+static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real speed, tq_real force,
+                                  tq_real *out, size_t count)
+{
+    tq_real speeds[TQ_CHUNK], forces[TQ_CHUNK];
+    size_t most = count < TQ_CHUNK ? count : TQ_CHUNK, n;
+    for (n = 0; n < most; n++)
+        speeds[n] = speed, forces[n] = force;
+    for (; count; count -= most, out += most) {
+        most = count < TQ_CHUNK ? count : TQ_CHUNK;
+        tq_render(t, s, speeds, forces, out, most);
     }
 }
 

@@ -55,11 +55,16 @@ class Notch(Protocol):
 class RenderCounters:
     """What a renderer had to correct so far.
 
-    `lift_offs`: samples with a speed or force that is not finite. `clamped`: parameter values
-    moved into the legal range. The rest: samples that each of the `Limits` touched.
+    `lift_offs`: samples with a speed or force that is not finite. `above_grid`: samples while the
+    hand, as last read, touched and moved faster or pressed harder than the highest condition of the
+    model's grid; `below_grid`: or else slower or more lightly than the lowest, but not at rest.
+    `clamped`: parameter values moved into the legal range. The rest: samples that each of the
+    `Limits` touched.
     """
 
     lift_offs: int = 0
+    above_grid: int = 0
+    below_grid: int = 0
     clamped: int = 0
     limited_peak: int = 0
     limited_rms: int = 0

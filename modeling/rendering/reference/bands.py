@@ -25,6 +25,7 @@ class BandFilter:
     def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
         self.clamped = 0
         self._table, self._plan = model.table, plan
+        self.axes = (self._table.speeds_mm_s, self._table.forces_n)
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
         self._extrapolate = Extrapolator(plan)

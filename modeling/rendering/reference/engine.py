@@ -15,6 +15,7 @@ from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.plan import RenderCounters, RenderPlan
 from modeling.rendering.reference.compensator import Compensator
+from modeling.rendering.reference.hand import settled
 from modeling.rendering.reference.limiter import Limiter
 
 
@@ -25,6 +26,7 @@ class StreamFilter(Protocol):
     """
 
     clamped: int
+    axes: tuple[Floats, Floats]  # speeds (mm/s) and forces (N) of the model's grid
 
     def settings(self, hand: Hand) -> list[Any]:
         """One setting for each of the n readings of the hand."""
@@ -46,13 +48,17 @@ class PythonEngine:
         self._filter, self._plan, self._key = stream_filter, plan, key
         self._position = 0
         self._lift_offs = 0
+        self._outside = (False, False)  # above and below the grid, as the hand was last read
+        self._samples_outside = [0, 0]
         self._limiter = Limiter(plan)
         self._compensator = Compensator(plan)
 
     @property
     def counters(self) -> RenderCounters:
         """What had to be corrected so far."""
-        return RenderCounters(self._lift_offs, self._filter.clamped, *self._limiter.touched)
+        return RenderCounters(
+            self._lift_offs, *self._samples_outside, self._filter.clamped, *self._limiter.touched
+        )
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""
@@ -62,10 +68,27 @@ class PythonEngine:
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))
         bounds = [*starts, count]
+        self._count_outside(bounds[0])
         output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
-        settings = self._filter.settings(Hand(speed_mm_s[starts], force_n[starts]))
-        for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
+        read = Hand(speed_mm_s[starts], force_n[starts])
+        settings, outside = self._filter.settings(read), _outside(read, *self._filter.axes)
+        for start, stop, setting, where in zip(starts, bounds[1:], settings, outside, strict=True):
             self._filter.update(setting)
+            self._outside = where
+            self._count_outside(stop - start)
             output += self._filter.filter(*(part[start:stop] for part in inputs))
         self._position += count
         return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
+
+    def _count_outside(self, samples: int) -> None:
+        for which, outside in enumerate(self._outside):
+            self._samples_outside[which] += samples * outside
+
+
+def _outside(hand: Hand, speeds: Floats, forces: Floats) -> list[tuple[bool, bool]]:
+    """Whether each reading of a hand that touches and moves is above the grid, or else below it."""
+    speed, force = settled(np.abs(hand.speed_mm_s)), settled(hand.force_n)
+    strokes = np.isfinite(speed) & np.isfinite(force) & (speed > 0) & (force > 0)
+    above = strokes & ((speed > speeds[-1]) | (force > forces[-1]))
+    below = strokes & ~above & ((speed < speeds[0]) | (force < forces[0]))
+    return list(zip(above.tolist(), below.tolist(), strict=True))

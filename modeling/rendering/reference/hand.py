@@ -13,6 +13,13 @@ from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.plan import RenderPlan
 
+_SMALLEST = 1e-9
+
+
+def settled(x: float | Floats) -> Floats:
+    """Speeds (mm/s), forces (N) or their changes, with what is too small to matter as 0."""
+    return np.where(np.abs(x) < _SMALLEST, 0.0, x)
+
 
 class Extrapolator:
     """Linear extrapolation of the hand by the exponentially smoothed slope of its readings.
@@ -31,6 +38,7 @@ class Extrapolator:
         """The hand in the middle of the time to the next readings, and just before them."""
         read = np.stack(hand)
         slopes = np.array([self._slopes_at(now) for now in read.T.tolist()]).reshape(-1, 2).T
+        read = settled(read)
         with np.errstate(over="ignore"):
             amid, end = read + slopes * (self._to_end / 2), read + slopes * self._to_end
         return Hand(*amid), Hand(*end)
@@ -40,13 +48,13 @@ class Extrapolator:
         if self._last:
             readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
             self._slopes = [self._slope(*reading) for reading in readings]
-        self._last = now
+        self._last = settled(np.array(now)).tolist()
         return self._slopes
 
     def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
         change = now - last
         goes_on = -furthest <= change <= furthest and now != 0
-        return slope + self._share * (change - slope) if goes_on else 0.0
+        return float(settled(slope + self._share * (change - slope))) if goes_on else 0.0
 
 
 class GainRamps:

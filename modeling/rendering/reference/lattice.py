@@ -35,6 +35,7 @@ class LatticeFilter:
             )
         self.clamped = 0
         self._model = model
+        self.axes = (model.speeds_mm_s, model.forces_n)
         self._state = [0.0] * model.order
         self._stages = [(0.0, 1.0)] * model.order
         self._extrapolate = Extrapolator(plan)

@@ -54,4 +54,6 @@ class Limiter:
             self.touched[1] += 1
             y = float(np.copysign(np.sqrt(room), y)) if y == y else 0.0
         self._mean_square = kept + self._share * (y * y)
+        if self._mean_square < 1e-20 * self._limits.mean_square:
+            self._mean_square = 0.0
         return y

@@ -49,7 +49,7 @@ PROGRAM = """
 #include <stdio.h>
 #include <stdlib.h>
 enum {{ LONGEST = 20000, MOST_MEMORY = 2000 }};
-static double hand[2 * LONGEST], result[LONGEST + 5];
+static double hand[2 * LONGEST], result[LONGEST + 7];
 static tq_real speed[LONGEST], force[LONGEST], out[LONGEST], memory[MOST_MEMORY];
 int main(int argc, char **argv)
 {{
@@ -72,11 +72,13 @@ int main(int argc, char **argv)
     for (n = 0; n < count; n++)
         result[n] = (double)out[n];
     result[count] = (double)state.counters.lift_offs;
-    result[count + 1] = (double)state.counters.clamped;
-    result[count + 2] = (double)state.counters.peak;
-    result[count + 3] = (double)state.counters.rms;
-    result[count + 4] = (double)state.counters.duration;
-    return fwrite(result, sizeof(double), count + 5, stdout) != count + 5;
+    result[count + 1] = (double)state.counters.above_grid;
+    result[count + 2] = (double)state.counters.below_grid;
+    result[count + 3] = (double)state.counters.clamped;
+    result[count + 4] = (double)state.counters.peak;
+    result[count + 5] = (double)state.counters.rms;
+    result[count + 6] = (double)state.counters.duration;
+    return fwrite(result, sizeof(double), count + 7, stdout) != count + 7;
 }}
 """
 
@@ -167,7 +169,7 @@ class Program:
             check=True,
         )
         values = np.frombuffer(done.stdout)
-        return values[:-5], values[-5:].tolist()
+        return values[:-7], values[-7:].tolist()
 
 
 @pytest.fixture(scope="module", params=[(p, r) for p in PRECISIONS for r in RATES_HZ], ids=str)
@@ -213,9 +215,10 @@ def test_the_header_renders_what_python_renders(
     if precision == "double":
         assert np.array_equal(samples, expected)
         assert counters == list(vars(renderer.counters).values())
-        assert (counters[1] > 0) == (texture == "beyond")
+        assert min(counters[1:3]) > 0
+        assert (counters[3] > 0) == (texture == "beyond")
         limited = [texture in LIMITS, texture == "limited in RMS", texture in LIMITS]
-        assert [count > 0 for count in counters[2:]] == limited
+        assert [count > 0 for count in counters[4:]] == limited
     elif texture == "limited in RMS":
         # The root of a small difference is not the same sample in single precision, but no louder.
         assert running_rms(samples, exported.rate_hz).max() == pytest.approx(0.1, rel=1e-5)
