@@ -1,5 +1,19 @@
 """The C parts, built by the ordinary install; without a compiler it goes on without them."""
 
-from setuptools import setup
+import numpy
+from setuptools import Extension, setup
 
-setup(cffi_modules=["tools/c_parts.py:kernel", "tools/c_parts.py:rivals"])
+PARTS = ("kernel", "kernel_single", "rivals")
+
+setup(
+    cffi_modules=[f"tools/c_parts.py:{part}" for part in PARTS],
+    ext_modules=[
+        Extension(
+            "modeling.rendering._call",
+            ["modeling/rendering/call.c"],
+            include_dirs=[numpy.get_include()],
+            extra_compile_args=["-std=c99", "-O2"],
+            optional=True,
+        )
+    ],
+)

@@ -1,7 +1,7 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
-`modeling.rendering._kernel` is the rendering kernel, `analysis.benches._rivals` what its bench
-compares it with.
+`modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
+`analysis.benches._rivals` what the bench compares it with.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ def declarations(header: Path) -> str:
     return "\n".join([*structures, *(f"{call};" for call in calls)])
 
 
-def binding(name: str, *headers: Path) -> FFI:
+def binding(name: str, *headers: Path, real: str = "double") -> FFI:
     """A builder of extension `name` over these headers, the last one including the others."""
     builder = FFI()
     builder.cdef(
-        "typedef double tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS;"
+        f"typedef {real} tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS;"
         + "\n".join(declarations(header) for header in headers)
     )
     builder.set_source(
@@ -39,7 +39,7 @@ def binding(name: str, *headers: Path) -> FFI:
         f'#include "{headers[-1].name}"',
         include_dirs=[str(header.parent) for header in headers],
         depends=[str(header) for header in headers],
-        define_macros=[("TQ_FLAGS", f'"{" ".join(COMPILER_ARGUMENTS)}"')],
+        define_macros=[("TQ_REAL", real), ("TQ_FLAGS", f'"{" ".join(COMPILER_ARGUMENTS)}"')],
         extra_compile_args=COMPILER_ARGUMENTS,
         optional=True,  # no compiler: the Python renderer does the same, slower
     )
@@ -47,4 +47,5 @@ def binding(name: str, *headers: Path) -> FFI:
 
 
 kernel = binding("modeling.rendering._kernel", KERNEL)
+kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
 rivals = binding("analysis.benches._rivals", KERNEL, RIVALS)

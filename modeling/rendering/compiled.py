@@ -1,9 +1,11 @@
-"""The compiled renderer: `kernel.h` by way of cffi."""
+"""The compiled renderer: `kernel.h` by way of cffi, called through `call.c`."""
 
 from __future__ import annotations
 
 import os
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +13,11 @@ from modeling.arrays import Floats
 from modeling.rendering.plan import LayeredModel, RenderCounters, RenderPlan
 
 try:
-    from modeling.rendering._kernel import ffi, lib
+    import modeling.rendering._kernel as _kernel
+    import modeling.rendering._kernel_single as _kernel_single
+    from modeling.rendering._call import Call
 except ImportError:  # no compiler at installation
-    lib = ffi = None
+    _kernel = _kernel_single = Call = None
 
 # Set to anything, renders in Python although the kernel is there.
 SWITCH = "TACTILEQ_NO_KERNEL"
@@ -21,34 +25,47 @@ SWITCH = "TACTILEQ_NO_KERNEL"
 
 def is_compiled() -> bool:
     """Whether the compiled kernel renders; where there is none, a warning says so once."""
-    if lib is None:
+    if Call is None:
         warnings.warn(
             "expected the compiled rendering kernel, got none; rendering goes on in Python with "
             "the same numbers, some hundred times slower: install a C compiler, then tactileq.",
             RuntimeWarning,
             stacklevel=1,  # from one place, so that Python tells it once
         )
-    return lib is not None and not os.environ.get(SWITCH)
+    return Call is not None and not os.environ.get(SWITCH)
 
 
 class CompiledEngine:
-    """Renders layered models; bit for bit the same as the `PythonEngine`."""
+    """Renders layered models; in double precision bit for bit the same as the `PythonEngine`."""
+
+    # What renders: (speed, force, samples, out), None for what is not given. Each of speed and
+    # force is a contiguous array of float64 or a float. None for an answer: it takes none of these.
+    call: Callable[..., Any]
 
     def __init__(self, model: LayeredModel, plan: RenderPlan, *, key: np.uint64) -> None:
+        module = _kernel_single if plan.single else _kernel
+        self._ffi, self._real = module.ffi, plan.precision
+        ffi, lib = module.ffi, module.lib
         self._texture = ffi.new("tq_texture *")
-        self._arrays = []  # which the structure only points at
+        arrays = []  # which the structure only points at
         for name, value in plan.texture(model).items():
             field = value
             if isinstance(value, np.ndarray):
-                self._arrays.append(np.ascontiguousarray(value, dtype=np.float64))
-                field = ffi.from_buffer("double[]", self._arrays[-1])
+                arrays.append(np.ascontiguousarray(value, dtype=self._real))
+                field = ffi.from_buffer("tq_real[]", arrays[-1])
             setattr(self._texture, name, field)
         layers, taps = self._texture.layers, self._texture.taps
         self._row = -(-layers // lib.TQ_LANES) * lib.TQ_LANES
         reals = lib.TQ_ROWS * self._row + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
-        self._memory = ffi.new("double[]", reals)
+        self._memory = ffi.new("tq_real[]", reals)
         self._state = ffi.new("tq_state *")
         lib.tq_start(self._texture, self._state, self._memory, int(key))
+        functions = ffi.addressof(lib, "tq_render"), ffi.addressof(lib, "tq_render_held")
+        addresses = [
+            int(ffi.cast("uintptr_t", at)) for at in (*functions, self._texture, self._state)
+        ]
+        owner = (self._texture, self._state, self._memory, arrays)
+        self.call = Call(owner, *addresses, plan.single)
 
     @property
     def counters(self) -> RenderCounters:
@@ -67,19 +84,11 @@ class CompiledEngine:
     @property
     def states(self) -> Floats:
         """The filters' states now, (m, 2)."""
-        memory = np.frombuffer(ffi.buffer(self._memory))
+        memory = np.frombuffer(self._ffi.buffer(self._memory), dtype=self._real)
         rows = memory[: 2 * self._row].reshape(2, -1)
         return rows[:, : self._texture.layers].T.copy()
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""
-        output = np.empty(speed_mm_s.size)
-        lib.tq_render(
-            self._texture,
-            self._state,
-            ffi.from_buffer("double[]", speed_mm_s),
-            ffi.from_buffer("double[]", force_n),
-            ffi.from_buffer("double[]", output),
-            output.size,
-        )
-        return output
+        rendered: Floats = self.call(speed_mm_s, force_n, None, None)
+        return rendered

@@ -532,20 +532,18 @@ TQ_INLINE void tq_convolve(const tq_real *TQ_RESTRICT weights, int taps,
     }
 }
 
-/* The next noise: for the bands, and for the noise branch low-passed with zero phase, which is
-   possible because the noise to come is known. */
-static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *floor, int count)
+/* The next noise for the bands. For the noise branch it is low-passed with zero phase, which is
+   possible because the noise to come is known; at the model's own rate there is nothing to take away,
+   and `lowpassed` stays as it is. */
+static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *lowpassed, int count)
 {
     tq_real *wide = tq_wide(t, s), *fresh = wide + t->taps - 1;
     int half = t->taps / 2, n;
     uint64_t ahead = s->position + (uint64_t)half;
     for (n = 0; n < count; n++)
         fresh[n] = t->noise_scale * tq_noise(s->key, ahead + (uint64_t)n);
-    if (t->taps == 1) { /* the model's own rate: nothing to take away */
-        memcpy(floor, wide, (size_t)count * sizeof(tq_real));
-        return wide;
-    }
-    tq_convolve(t->lowpass, t->taps, wide, floor, count);
+    if (t->taps > 1)
+        tq_convolve(t->lowpass, t->taps, wide, lowpassed, count);
     return wide + half;
 }
 
@@ -627,13 +625,23 @@ static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t
         s->notch = tq_band_of(s->angle * t->notch_hz, s->angle * t->notch_width_hz);
 }
 
-/* Counts samples without a finite hand. */
-TQ_INLINE void tq_count_lift_offs(tq_state *s, const tq_real *speed, const tq_real *force, int count)
+/* Of a hand that has `step` = 1 reading for each sample, or is held (0): samples without a finite one. */
+TQ_INLINE uint64_t tq_lift_offs(const tq_real *speed, const tq_real *force, size_t step, int count)
 {
-    int lift_offs = 0, n;
-    for (n = 0; n < count; n++)
-        lift_offs += !((speed[n] - speed[n]) + (force[n] - force[n]) == 0);
-    s->counters.lift_offs += (uint64_t)lift_offs;
+    enum { SUMS = 4 };
+    tq_real lost[SUMS] = {0, 0, 0, 0}; /* stay 0 while every reading is finite, else not a number */
+    uint64_t lift_offs = 0;
+    int samples = step ? count : 1, n = 0, i;
+    for (; n + SUMS <= samples; n += SUMS)
+        for (i = 0; i < SUMS; i++)
+            lost[i] += (speed[n + i] - speed[n + i]) + (force[n + i] - force[n + i]);
+    for (; n < samples; n++)
+        lost[0] += (speed[n] - speed[n]) + (force[n] - force[n]);
+    if ((lost[0] + lost[1]) + (lost[2] + lost[3]) == 0)
+        return 0;
+    for (n = 0; n < samples; n++)
+        lift_offs += !(speed[n] - speed[n] == 0 && force[n] - force[n] == 0);
+    return step ? lift_offs : lift_offs * (uint64_t)count;
 }
 
 /* What comes behind the sum of all branches, and moves on to the next noise. */
@@ -649,19 +657,19 @@ TQ_INLINE void tq_finish(const tq_texture *t, tq_state *s, tq_real *out, int cou
         memmove(tq_wide(t, s), tq_wide(t, s) + count, (size_t)(t->taps - 1) * sizeof(tq_real));
 }
 
-/* The next `count` samples for a hand whose speed and force are given at each of them. */
-static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
-                      tq_real *out, size_t count)
+/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
+TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *speed,
+                            const tq_real *force, size_t step, tq_real *out, size_t count)
 {
     while (count) {
-        tq_real floor[TQ_CHUNK];
+        tq_real lowpassed[TQ_CHUNK];
         int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0;
-        const tq_real *w = tq_inputs(t, s, floor, chunk);
-        tq_count_lift_offs(s, speed, force, chunk);
+        const tq_real *w = tq_inputs(t, s, lowpassed, chunk), *floor = t->taps > 1 ? lowpassed : w;
+        s->counters.lift_offs += tq_lift_offs(speed, force, step, chunk);
         while (done < chunk) {
             int left = t->update_samples - s->since_update, piece;
             if (s->position == 0 || left == 0) {
-                tq_update(t, s, speed[done], force[done]);
+                tq_update(t, s, speed[step * (size_t)done], force[step * (size_t)done]);
                 s->since_update = 0;
                 left = t->update_samples;
             }
@@ -673,22 +681,23 @@ static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, co
             done += piece;
         }
         tq_finish(t, s, out, chunk);
-        speed += chunk, force += chunk, out += chunk, count -= (size_t)chunk;
+        speed += step * (size_t)chunk, force += step * (size_t)chunk;
+        out += chunk, count -= (size_t)chunk;
     }
+}
+
+/* The next `count` samples for a hand whose speed and force are given at each of them. */
+static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
+                      tq_real *out, size_t count)
+{
+    tq_render_by(t, s, speed, force, 1, out, count);
 }
 
 /* The next `count` samples for a hand whose speed and force are held. */
 static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real speed, tq_real force,
                                   tq_real *out, size_t count)
 {
-    tq_real speeds[TQ_CHUNK], forces[TQ_CHUNK];
-    size_t most = count < TQ_CHUNK ? count : TQ_CHUNK, n;
-    for (n = 0; n < most; n++)
-        speeds[n] = speed, forces[n] = force;
-    for (; count; count -= most, out += most) {
-        most = count < TQ_CHUNK ? count : TQ_CHUNK;
-        tq_render(t, s, speeds, forces, out, most);
-    }
+    tq_render_by(t, s, &speed, &force, 0, out, count);
 }
 
 #endif

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modeling.arrays import Floats
 from modeling.checks import is_whole
@@ -84,6 +85,8 @@ class RenderPlan:
         None by default.
     compensation : Notch, optional
         At this rate.
+    single : bool
+        In single precision instead of double.
 
     Raises
     ------
@@ -95,6 +98,7 @@ class RenderPlan:
     update_samples: int
     limits: Limits = field(default_factory=Limits)
     compensation: Notch | None = None
+    single: bool = False
 
     def __post_init__(self) -> None:
         if not (is_whole(self.update_samples) and 1 <= self.update_samples <= _LONGEST_UPDATE):
@@ -108,6 +112,11 @@ class RenderPlan:
                 f"expected a vibrator compensation for {self.rate_hz:g} Hz, got one for "
                 f"{self.compensation.rate_hz:g} Hz; make it for the rate of rendering."
             )
+
+    @property
+    def precision(self) -> type[np.floating[Any]]:
+        """Of every number that is computed."""
+        return np.float32 if self.single else np.float64
 
     @property
     def hand_changes(self) -> tuple[float, float]:
@@ -134,8 +143,23 @@ class RenderPlan:
         share *= 1 + 1e-12  # five fifths are to be a whole, whatever they round to
         return largest_gains * share
 
-    def texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
-        """Everything that `tq_texture` in `kernel.h` holds, by name and in its order."""
+    def texture(self, model: LayeredModel) -> dict[str, Any]:
+        """Everything that `tq_texture` in `kernel.h` holds, by name and in its order.
+
+        In single precision the nearest such numbers.
+
+        Raises
+        ------
+        InputError
+            For numbers that single precision cannot hold or tell apart; for a rate below the
+            model's.
+        """
+        fields = self._texture(model)
+        if not self.single:
+            return fields
+        return {name: _in_single(name, value) for name, value in fields.items()}
+
+    def _texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
         table, lowpass = model.table, noise_lowpass(model.rate_hz, self.rate_hz)
         speed_change, force_change = self.hand_changes
         fields: dict[str, int | float | Floats] = {
@@ -179,6 +203,24 @@ class RenderPlan:
     def samples(self, seconds: float) -> int:
         """A limit's time in samples, at least 1; 0 stands for no limit."""
         return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))
+
+
+def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | NDArray[np.float32]:
+    """A member of `tq_texture` in single precision; counts stay as they are."""
+    if isinstance(value, int):
+        return value
+    with np.errstate(over="ignore"):
+        rounded = np.asarray(value, dtype=np.float32)
+    axis = member in ("speed_mm_s", "force_n")
+    told_apart = not axis or (np.diff(rounded, prepend=0) > 0).all()
+    # As a scalar 0 stands for none: a limit must not vanish.
+    vanished = np.ndim(value) == 0 and value != 0 and rounded == 0
+    if vanished or not (told_apart and np.isfinite(rounded).all()):
+        raise InputError(
+            f"expected numbers that single precision can hold and tell apart, got others in "
+            f"{member}; take double precision."
+        )
+    return rounded[()]  # a scalar where it was one
 
 
 def noise_lowpass(model_rate_hz: float, rate_hz: float) -> Floats:

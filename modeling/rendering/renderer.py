@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
@@ -17,6 +18,8 @@ from modeling.rendering.plan import UPDATE_S, LayeredModel, Notch, RenderCounter
 from modeling.rendering.reference.bands import BandFilter
 from modeling.rendering.reference.engine import PythonEngine
 from modeling.rendering.reference.lattice import LatticeFilter
+
+Real = TypeVar("Real", np.float64, np.float32)
 
 
 class Engine(Protocol):
@@ -62,12 +65,16 @@ class Renderer:
     compensation : Compensation, optional
         Undoes the resonance of the vibrator that will play the output (eq. 7), before the limits;
         made for this rate.
+    single : bool
+        Everything in single precision, as on a micro-controller (docs/method/rendering.md#kernel):
+        by the compiled kernel only.
 
     Raises
     ------
     InputError
         For a rate below the model's, or another one than an ARModel's; for a compensation made for
-        another rate; for `update_samples` out of range.
+        another rate; for `update_samples` out of range; for single precision of an ARModel, of
+        numbers that it cannot hold or tell apart, or without the compiled kernel.
     """
 
     def __init__(
@@ -80,6 +87,7 @@ class Renderer:
         update_samples: int | None = None,
         limits: Limits | None = None,
         compensation: Notch | None = None,
+        single: bool = False,
     ) -> None:
         self.model = model
         self.rate_hz = model.rate_hz if rate_hz is None else float(rate_hz)
@@ -92,13 +100,21 @@ class Renderer:
             update_samples=update_samples,
             limits=limits or Limits(),
             compensation=compensation,
+            single=single,
         )
         self.update_samples = plan.update_samples
         self._engine: Engine
-        if isinstance(model, ARModel):
+        self._call: Callable[..., Any] = _converted
+        if not isinstance(model, ARModel) and is_compiled():
+            self._engine = engine = CompiledEngine(model, plan, key=key)
+            self._call = engine.call
+        elif single:
+            raise InputError(
+                "expected a layered model and the compiled kernel for single precision, got an "
+                "autoregressive model or no kernel; take double precision."
+            )
+        elif isinstance(model, ARModel):
             self._engine = PythonEngine(LatticeFilter(model, plan), plan, key=key)
-        elif is_compiled():
-            self._engine = CompiledEngine(model, plan, key=key)
         else:
             self._engine = PythonEngine(BandFilter(model, plan), plan, key=key)
 
@@ -107,43 +123,96 @@ class Renderer:
         """What the renderer had to correct so far."""
         return self._engine.counters
 
+    @overload
     def render(
-        self, speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None = None
-    ) -> Floats:
+        self,
+        speed_mm_s: ArrayLike,
+        force_n: ArrayLike,
+        *,
+        samples: int | None = None,
+        out: None = None,
+    ) -> Floats: ...
+    @overload
+    def render(
+        self,
+        speed_mm_s: ArrayLike,
+        force_n: ArrayLike,
+        *,
+        samples: int | None = None,
+        out: NDArray[Real],
+    ) -> NDArray[Real]: ...
+    def render(
+        self,
+        speed_mm_s: ArrayLike,
+        force_n: ArrayLike,
+        *,
+        samples: int | None = None,
+        out: NDArray[Any] | None = None,
+    ) -> NDArray[Any]:
         """The next samples of the vibration.
+
+        A call is cheapest (docs/method/rendering.md#cost) with two floats or contiguous arrays of
+        float64, and with `out`.
 
         Parameters
         ----------
-        speed_mm_s, force_n : (n,) array_like, or two scalars with `samples`
+        speed_mm_s, force_n : (n,) array_like, or two scalars with `samples` or `out`
             Tangential speed (mm/s, either direction) and normal force (N) at each sample. NaN and
             infinite values count as lift-off and are counted.
         samples : int, optional
-            Number of samples where speed and force are scalars.
+            Number of samples where speed and force are scalars; by default the size of `out`.
+        out : (n,) ndarray of float64 or float32, optional
+            Where to render to: writable and contiguous. The caller's array may be used again for
+            the next call.
 
         Returns
         -------
         (n,) ndarray
-            Acceleration in the model's unit (g).
+            Acceleration in the model's unit (g): `out`, or a new array of float64.
 
         Raises
         ------
         InputError
-            For arrays of different lengths, or scalars without `samples`.
+            For arrays of different lengths, scalars without a number of samples, or another `out`.
         """
-        return self._engine.render(*_checked(speed_mm_s, force_n, samples))
+        rendered = self._call(speed_mm_s, force_n, samples, out)
+        if rendered is None:
+            count = samples if out is None or samples is not None else np.size(out)
+            speed, force = _checked(speed_mm_s, force_n, samples=samples, count=count)
+            if out is not None:
+                _check_out(out, speed.size)
+            rendered = self._engine.render(speed, force)
+            if out is not None:
+                out[:] = rendered
+                rendered = out
+        result: NDArray[Any] = rendered
+        return result
+
+
+def _converted(*arguments: object) -> None:
+    """In place of an engine's call that takes some arguments as they are."""
 
 
 def _checked(
-    speed_mm_s: ArrayLike, force_n: ArrayLike, samples: int | None
+    speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None, count: int | None
 ) -> tuple[Floats, Floats]:
-    # No `Hand`: making one costs a tenth of a call of 32 samples.
     speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
     force = np.asarray(force_n, dtype=np.float64, order="C")
-    if speed.ndim == force.ndim == 0 and samples is not None and samples >= 0:
-        return np.full(samples, float(speed)), np.full(samples, float(force))
+    if speed.ndim == force.ndim == 0 and count is not None and count >= 0:
+        return np.full(count, float(speed)), np.full(count, float(force))
     if speed.ndim != 1 or speed.shape != force.shape or samples is not None:
         raise InputError(
             "expected speed and force as two arrays of one length, or two scalars with samples=, "
             f"got shapes {speed.shape} and {force.shape} with samples={samples}; match them."
         )
     return speed, force
+
+
+def _check_out(out: NDArray[Any], count: int) -> None:
+    right = isinstance(out, np.ndarray) and out.dtype in (np.float64, np.float32)
+    if not (right and out.shape == (count,) and out.flags.carray):
+        got = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out)
+        raise InputError(
+            f"expected out as a writable, contiguous array of {count} float64 or float32, got "
+            f"{got}; allocate it by np.empty({count})."
+        )

@@ -7,6 +7,7 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -16,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modeling import Compensation, InputError, Limits, Renderer
-from modeling.arrays import Floats
 from modeling.files.writing import write_text
 from modeling.models.loading import AnyModel
 from modeling.rendering.noise import stream_key
@@ -101,11 +101,17 @@ def c_header(
     """NAME and the text of the header that `write_c_header` writes; refused as there."""
     layered = check_layered(model)
     name = c_identifier(layered.texture)
-    plan = _plan(layered, rate_hz, seed=seed, limits=limits, compensation=compensation)
+    _check_rate(rate_hz)
+    renderer = Renderer(
+        layered,
+        rate_hz=rate_hz,
+        seed=seed,
+        limits=limits,
+        compensation=compensation,
+    )
+    plan = replace(renderer.plan, single=single)
     members: Mapping[str, Any] = plan.texture(layered)
-    if single:
-        members = {member: _in_single(member, value) for member, value in members.items()}
-    _check_output(layered, plan, single=single)
+    _check_output(layered, plan)
     kernel = files("modeling.rendering").joinpath("kernel.h").read_text(encoding="utf-8")
     precision = "#ifndef TQ_REAL\n#define TQ_REAL float\n#endif\n\n" if single else ""
     tables = _tables(name, members)
@@ -117,28 +123,17 @@ def c_header(
     return name, "".join([comment, opening, precision, kernel, "\n", tables, key, closing])
 
 
-def _plan(
-    model: Layered,
-    rate_hz: float | None,
-    *,
-    seed: int,
-    limits: Limits | None,
-    compensation: Compensation | None,
-) -> RenderPlan:
-    """What a renderer with these arguments does."""
+def _check_rate(rate_hz: float | None) -> None:
     if rate_hz is not None and rate_hz > HIGHEST_RATE_HZ:
         raise InputError(
             f"expected an output rate of at most {HIGHEST_RATE_HZ} Hz, got {rate_hz:g}; no "
             "converter is faster, so lower it."
         )
-    renderer = Renderer(model, rate_hz=rate_hz, seed=seed, limits=limits, compensation=compensation)
-    return renderer.plan
 
 
-def _check_output(model: Layered, plan: RenderPlan, *, single: bool) -> None:
+def _check_output(model: Layered, plan: RenderPlan) -> None:
     """Refuse gains that let the program's numbers grow beyond its precision."""
-    precision: type[np.floating[Any]] = np.float32 if single else np.float64
-    highest = float(np.finfo(precision).max)
+    highest = float(np.finfo(plan.precision).max)
     if np.isfinite(plan.limits.rms):  # that limit squares samples
         highest = float(np.sqrt(highest))
     highest /= HEADROOM
@@ -147,7 +142,7 @@ def _check_output(model: Layered, plan: RenderPlan, *, single: bool) -> None:
     if not gain <= highest:
         raise InputError(
             f"expected gains that add up to at most {highest:.1g} {model.unit}, so that samples "
-            f"stay finite in {'single' if single else 'double'} precision, got {gain:.3g} "
+            f"stay finite in {'single' if plan.single else 'double'} precision, got {gain:.3g} "
             f"{model.unit}; correct the model."
         )
 
@@ -155,24 +150,6 @@ def _check_output(model: Layered, plan: RenderPlan, *, single: bool) -> None:
 def c_identifier(texture: str) -> str:
     """A texture's name as an identifier in C: texture_, letters, digits, _ for all else."""
     return "texture_" + re.sub("[^A-Za-z0-9]", "_", texture)
-
-
-def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | NDArray[np.float32]:
-    """A member of `tq_texture` in single precision; counts stay as they are."""
-    if isinstance(value, int):
-        return value
-    with np.errstate(over="ignore"):
-        rounded = np.asarray(value, dtype=np.float32)
-    axis = member in ("speed_mm_s", "force_n")
-    told_apart = not axis or (np.diff(rounded, prepend=0) > 0).all()
-    # As a scalar 0 stands for none: a limit must not vanish.
-    vanished = np.ndim(value) == 0 and value != 0 and rounded == 0
-    if vanished or not (told_apart and np.isfinite(rounded).all()):
-        raise InputError(
-            f"expected numbers that single precision can hold and tell apart, got others in "
-            f"{member}; export in double precision."
-        )
-    return rounded[()]  # a scalar where it was one
 
 
 def _tables(name: str, members: Mapping[str, Any]) -> str:

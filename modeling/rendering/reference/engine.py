@@ -56,8 +56,9 @@ class PythonEngine:
     @property
     def counters(self) -> RenderCounters:
         """What had to be corrected so far."""
+        above, below = self._samples_outside
         return RenderCounters(
-            self._lift_offs, *self._samples_outside, self._filter.clamped, *self._limiter.touched
+            self._lift_offs, above, below, self._filter.clamped, *self._limiter.touched
         )
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
