@@ -17,7 +17,8 @@ class RigReading:
     time_s : float
         Since the rig was opened.
     speed_mm_s : float
-        Tangential speed, ≥ 0.
+        Tangential speed without its direction, ≥ 0. A rig renders from the speed with its sign
+        (docs/method/rendering.md#extrapolation).
     force_n : float
         Normal force, ≥ 0; 0 off the surface.
     button : bool

@@ -93,7 +93,7 @@ class SimulatedRig:
         speed, force = _hand(np.array([time_s]))
         self._last_vibration = self._felt(time_s)
         pressed, self._button = self._button, False
-        return RigReading(time_s, float(speed[0]), float(force[0]), pressed, simulated=True)
+        return RigReading(time_s, abs(float(speed[0])), float(force[0]), pressed, simulated=True)
 
     def _felt(self, time_s: float) -> Floats:
         if self._renderer is None:
@@ -104,8 +104,6 @@ class SimulatedRig:
 
 
 def _hand(time_s: Floats) -> Hand:
-    """The stroking hand at (n,) moments."""
+    """The stroking hand at (n,) moments; the sign of its speed is the direction."""
     phase = 2 * np.pi * STROKE_HZ * time_s
-    return Hand(
-        PEAK_SPEED_MM_S * np.abs(np.sin(phase)), MEAN_FORCE_N + FORCE_SWING_N * np.cos(phase)
-    )
+    return Hand(PEAK_SPEED_MM_S * np.sin(phase), MEAN_FORCE_N + FORCE_SWING_N * np.cos(phase))

@@ -1,4 +1,4 @@
-"""How exact a rendering is while the hand moves: late parameters and levels."""
+"""How exact a rendering is while the hand moves: late parameters, levels, and where it turns."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from analysis.benches.stability import FORMS, OURS, STROKE_HZ, held_variances, m
 from modeling import Recording, Renderer, TextureModel, similarity
 from modeling.hand import Hand
 from modeling.models.parameter_table import Parameters
-from modeling.rendering.plan import RenderPlan
+from modeling.rendering.plan import SLOPE_S, RenderPlan
 from modeling.rendering.reference.hand import Extrapolator
 
 FASTEST_MM_S = 300.0
@@ -23,6 +23,10 @@ READINGS = (
     *((1000.0, noise) for noise in (0.0, 1.0, 2.0, 5.0, 10.0)),
     *((rate, 2.0) for rate in (500.0, 250.0, 125.0)),
 )
+# From one reading to the next, where the hand turns.
+PERIODS_SAMPLES = (5, 10, 20, 40)
+# Time constants of the smoothed slope after which a start from no slope is forgotten.
+SETTLED = 5
 
 
 def stroke(rate_hz: float, *, duration_s: float = 1.0) -> Hand:
@@ -63,6 +67,62 @@ def reading_rows(model: TextureModel) -> list[dict[str, object]]:
             row[f"error_db_{name}"] = update_error_db(model, hand, update, readings=readings)
         rows.append(row | {"simulated": True})
     return rows
+
+
+def turning_rows(model: TextureModel) -> list[dict[str, object]]:
+    """Errors of a stroke to and fro where speed is read with its sign, and where |v| is read.
+
+    The speeds at the end of each update, and the rendering (see `update_error_db`).
+    """
+    hand, rows = stroke(model.rate_hz), list[dict[str, object]]()
+    unsigned = Hand(np.abs(hand.speed_mm_s), hand.force_n)
+    for period in PERIODS_SAMPLES:
+        plan = RenderPlan(rate_hz=model.rate_hz, update_samples=period)
+        row: dict[str, object] = {"reading_hz": model.rate_hz / period, "update_samples": period}
+        for name, readings in (("signed", hand), ("unsigned", unsigned)):
+            errors = speed_errors(hand, readings, plan=plan)
+            row["speed_error_mm_s_as_read"] = errors.as_read
+            row[f"speed_error_mm_s_{name}"] = errors.extrapolated
+            row[f"error_db_{name}"] = update_error_db(model, hand, period, readings=readings)
+        rows.append(row | {"simulated": True})
+    return rows
+
+
+class SpeedErrors(NamedTuple):
+    """Largest error of |speed| at the end of an update (mm/s).
+
+    `as_read`: of the reading at its start; `extrapolated`: of what gains are set for.
+    """
+
+    as_read: float
+    extrapolated: float
+
+
+def speed_errors(hand: Hand, readings: Hand, *, plan: RenderPlan) -> SpeedErrors:
+    """Errors of |speed| over a stroke, whatever the sample at which the first reading comes.
+
+    Parameters
+    ----------
+    hand : Hand
+        As it is, at each of n samples.
+    readings : Hand
+        What a device would read at each of them; those at the plan's updates are used.
+    plan : RenderPlan
+
+    Notes
+    -----
+    The first updates, whose slope is not known yet, are left out.
+    """
+    period, count = plan.update_samples, hand.speed_mm_s.size
+    settled = SETTLED * SLOPE_S * plan.rate_hz
+    as_read, extrapolated = list[float](), list[float]()
+    for first in range(period):
+        at = np.arange(first, count - period + 1, period)
+        _, end = Extrapolator(plan)(Hand(*(reading[at] for reading in readings)))
+        wanted = np.abs(hand.speed_mm_s[at + period - 1])
+        for errors, speed in ((as_read, readings.speed_mm_s[at]), (extrapolated, end.speed_mm_s)):
+            errors.append(float(np.abs(np.abs(speed) - wanted)[at >= settled].max()))
+    return SpeedErrors(max(as_read), max(extrapolated))
 
 
 def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) -> Parameters:

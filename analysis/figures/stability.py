@@ -93,7 +93,7 @@ def figure_stability(
     shared_legend(figure, [axes["band"]], loc="outside lower center", ncols=3)
     figure.suptitle(
         "Simulated: how much louder or softer than they should be filters are while their\n"
-        "parameters move. Lines: lowest to highest; arrow: grows beyond all numbers",
+        "parameters move. Lines: lowest to highest; arrow: grows without bound",
         fontsize=11,
     )
     return figure

@@ -1,9 +1,10 @@
-"""How exact rendering stays while parameters move: excess variance, late updates, clicks.
+"""How exact rendering is: excess variance, late updates, clicks; other rates, crests of the noise.
 
 Simulated: moving parameters, strokes and steps of the hand are made up, the textures planted.
 
 Example: python docs/studies/rendering_study.py writes rendering_study_stability.tsv and .png,
-rendering_study_accuracy.tsv, _readings.tsv, rendering_study_clicks.tsv and .png beside this file.
+rendering_study_accuracy.tsv, _readings.tsv, _turning.tsv, rendering_study_clicks.tsv and .png,
+rendering_study_other_rates.tsv and _crests.tsv beside this file.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.benches.accuracy import accuracy_row, reading_rows
+from analysis.benches.accuracy import accuracy_row, reading_rows, turning_rows
 from analysis.benches.clicks import (
     STEPS,
     THIS_RENDERER,
@@ -21,6 +22,8 @@ from analysis.benches.clicks import (
     level_above_click_hz,
     step_signals,
 )
+from analysis.benches.crests import crest_table
+from analysis.benches.other_rates import RATES_HZ, rate_row
 from analysis.benches.stability import (
     FORMS,
     RATE_HZ,
@@ -67,6 +70,12 @@ def clicks(target: Path) -> pd.DataFrame:
     return pd.concat([click_table(signals) for signals in steps], ignore_index=True)
 
 
+def other_rates() -> pd.DataFrame:
+    """The table of levels at other rates than the model's."""
+    models = [planted_texture(name) for name in TEXTURES]
+    return pd.DataFrame([rate_row(m, rate_hz=rate_hz) for rate_hz in RATES_HZ for m in models])
+
+
 def main() -> None:
     """Run the study and write its tables and figures beside this file."""
     target = Path(__file__).with_suffix("")
@@ -74,11 +83,14 @@ def main() -> None:
         "stability": stability(target),
         "accuracy": pd.DataFrame([accuracy_row(planted_texture(name)) for name in TEXTURES]),
         "readings": pd.DataFrame(reading_rows(planted_texture("canvas"))),
+        "turning": pd.DataFrame(turning_rows(planted_texture("canvas"))),
         "clicks": clicks(target),
+        "other_rates": other_rates(),
+        "crests": crest_table(),
     }
     for name, table in tables.items():
         path = target.with_name(f"{target.name}_{name}.tsv")
-        table.to_csv(path, sep="\t", index=False, float_format="%.4g")
+        table.to_csv(path, sep="\t", index=False, float_format="%.4g", na_rep="n/a")
         print(table.to_string(index=False, float_format="%.4g"), end="\n\n")
 
 

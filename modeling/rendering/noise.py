@@ -2,7 +2,9 @@
 
 SplitMix64 (Steele, Lea and Flood 2014, "Fast splittable pseudorandom number generators") used as a
 counter-based generator: 64-bit integer arithmetic and one exact conversion, hence the same bits in
-numpy and in C, and any position is reached at once.
+numpy and in C, and any position is reached at once. Uniform, not Gaussian: the same spectrum, and
+nearly the same signal behind a narrow band, but broadband a crest factor of 4.8 dB
+(docs/method/rendering.md#noise).
 """
 
 from __future__ import annotations

@@ -50,8 +50,9 @@ class Renderer:
     rate_hz : float, optional
         Output rate, at least the model's (the default). Peaks and widths stay the same: w gets the
         variance rate/model rate and the noise branch ends at the model's Nyquist frequency. Skirts
-        that come close to that frequency do not, as the filter warps less: third octaves of the
-        planted textures differ by −0.7 to +3.2 dB at 48 kHz, their whole level by up to 0.15 dB.
+        that come close to that frequency do not, as the filter warps less: at 48 kHz third octaves
+        of the planted textures differ by −0.7 to +3.2 dB, their level below 2.5 kHz by up to
+        0.15 dB, and that of the whole band, with skirts above 2.5 kHz, by up to 0.24 dB.
         For the very spectrum render at the model's rate and resample, as stimulus sets do. An
         ARModel is rendered at its own rate only.
     seed, stream : int
@@ -157,8 +158,10 @@ class Renderer:
         Parameters
         ----------
         speed_mm_s, force_n : (n,) array_like, or two scalars with `samples` or `out`
-            Tangential speed (mm/s, either direction) and normal force (N) at each sample. NaN and
-            infinite values count as lift-off and are counted.
+            Tangential speed (mm/s; its sign is the direction) and normal force (N) at each sample.
+            Signed speed is better than |v|, which is extrapolated past its corner where the hand
+            turns (docs/method/rendering.md#extrapolation). NaN and infinite values count as
+            lift-off and are counted.
         samples : int, optional
             Number of samples where speed and force are scalars; by default the size of `out`.
         out : (n,) ndarray of float64 or float32, optional

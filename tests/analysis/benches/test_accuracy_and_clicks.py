@@ -7,13 +7,18 @@ import pandas as pd
 import pytest
 
 from analysis.benches.accuracy import (
+    FASTEST_MM_S,
+    PERIODS_SAMPLES,
     READINGS,
     Hand,
+    SpeedErrors,
     accuracy_row,
     held_gfc30,
     reading_rows,
     rendered_parameters,
+    speed_errors,
     stroke,
+    turning_rows,
 )
 from analysis.benches.clicks import (
     STEADY,
@@ -25,10 +30,11 @@ from analysis.benches.clicks import (
     level_above_click_hz,
     step_signals,
 )
-from analysis.benches.stability import FORMS, OURS, simulate
+from analysis.benches.stability import FORMS, OURS, STROKE_HZ, simulate
 from analysis.figures.stability import figure_clicks
 from modeling import Renderer
 from modeling.rendering.noise import stream_key, white_noise
+from modeling.rendering.plan import RenderPlan
 from stimuli.planted.textures import TEXTURES, planted_texture
 
 RATE_HZ = 5000.0
@@ -93,6 +99,48 @@ def test_readings_with_noise_or_seldom_are_no_worse_than_used_as_they_are() -> N
     assert clean["error_db_every_5"] < -50
     assert (rows["error_db_every_5"] <= rows["error_db_every_1"] + 1).all()
     assert (rows["error_db_as_read"] <= rows["error_db_every_5"] + 0.01).all()
+
+
+def turning_errors(*, beside_0: float) -> tuple[SpeedErrors, SpeedErrors]:
+    """Of |v| read with and without its sign, updates every 5 samples, 0.5 mm/s more each sample."""
+    speed = 0.5 * (np.arange(1000) - 500.0) + beside_0
+    force = np.full(speed.size, 2.0)
+    hand, plan = Hand(speed, force), RenderPlan(rate_hz=RATE_HZ, update_samples=5)
+    unsigned = Hand(np.abs(speed), force)
+    return speed_errors(hand, hand, plan=plan), speed_errors(hand, unsigned, plan=plan)
+
+
+def test_speed_without_its_sign_is_extrapolated_past_the_reversal() -> None:
+    """Speed changes by c each sample: the smoothed slope of |v| is −5c per update before the
+    reversal. j samples behind it the reading is cj and the slope −5c + cj/2, so the end of the
+    update is set to |1.4j − 4|·c instead of (j + 4)·c: off by 6.8c for j = 3.
+    """
+    signed, unsigned = turning_errors(beside_0=1e-6)
+    assert signed.as_read == pytest.approx(4 * 0.5, rel=1e-5)
+    assert unsigned.as_read == pytest.approx(4 * 0.5, rel=1e-5)
+    # Of the slope before the reversal 0.75^20 is not there yet where errors begin to count.
+    assert signed.extrapolated < 0.01 * signed.as_read
+    assert unsigned.extrapolated == pytest.approx(6.8 * 0.5, rel=1e-3)
+
+
+def test_a_reading_of_0_is_not_extrapolated_and_no_worse_than_as_read() -> None:
+    signed, unsigned = turning_errors(beside_0=0.0)
+    assert signed.extrapolated == pytest.approx(signed.as_read)
+    assert signed.extrapolated < 0.6 * unsigned.extrapolated
+
+
+def test_signed_readings_are_followed_where_the_hand_turns() -> None:
+    """docs/method/rendering.md#extrapolation"""
+    rows = pd.DataFrame(turning_rows(planted_texture("canvas")))
+    assert list(rows["update_samples"]) == list(PERIODS_SAMPLES)
+    assert rows["simulated"].all()
+    late_s = (rows["update_samples"] - 1) / RATE_HZ
+    as_read = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * late_s)
+    assert list(rows["speed_error_mm_s_as_read"]) == pytest.approx(list(as_read))
+    assert (rows["speed_error_mm_s_signed"] < 0.1 * as_read).all()
+    assert (rows["speed_error_mm_s_unsigned"] > 1.25 * as_read).all()
+    assert rows["speed_error_mm_s_unsigned"].iloc[0] == pytest.approx(5.1, abs=0.05)
+    assert (rows["error_db_unsigned"] > rows["error_db_signed"] + 3).all()
 
 
 @pytest.mark.parametrize("texture", TEXTURES)

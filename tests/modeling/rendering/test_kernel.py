@@ -21,7 +21,7 @@ from modeling.rendering.noise import stream_key, white_noise
 from stimuli.planted.textures import CATALOGUE, planted_texture
 
 pytestmark = pytest.mark.skipif(
-    modeling.rendering.compiled.lib is None, reason="no kernel was compiled"
+    modeling.rendering.compiled.Call is None, reason="no kernel was compiled"
 )
 
 
@@ -148,7 +148,9 @@ def test_bits_are_equal_with_compensation_and_limits() -> None:
 def test_coefficients_are_equal(frequency_hz: float, bandwidth_hz: float) -> None:
     python = band_coefficients(frequency_hz, bandwidth_hz, rate_hz=5000.0)
     angle = np.pi / 5000.0
-    band = modeling.rendering.compiled.lib.tq_band_of(angle * frequency_hz, angle * bandwidth_hz)
+    band = modeling.rendering.compiled._kernel.lib.tq_band_of(
+        angle * frequency_hz, angle * bandwidth_hz
+    )
     assert [float(value) for value in python] == [getattr(band, name) for name in python._fields]
 
 

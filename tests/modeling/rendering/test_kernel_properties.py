@@ -14,7 +14,7 @@ from scipy.optimize import elementwise
 
 from modeling import Limits, Renderer, TextureModel
 from modeling.arrays import Floats
-from modeling.rendering.compiled import is_compiled, lib
+from modeling.rendering.compiled import _kernel, is_compiled
 from modeling.rendering.noise import stream_key, white_noise
 from modeling.rendering.plan import FADE_S, noise_lowpass
 
@@ -254,7 +254,7 @@ def realised_bands(frequency_hz: Floats, bandwidth_hz: Floats, rate_hz: float) -
     """The kernel's own coefficients (p, q, r, b1, b2, tap) of n bands, (6, n)."""
     angle = np.pi / rate_hz
     pairs = zip(frequency_hz.tolist(), bandwidth_hz.tolist(), strict=True)
-    bands = [lib.tq_band_of(angle * f, angle * b) for f, b in pairs]
+    bands = [_kernel.lib.tq_band_of(angle * f, angle * b) for f, b in pairs]
     return np.array([[b.p, b.q, b.r, b.b1, b.b2, b.tap] for b in bands]).T
 
 
