@@ -12,6 +12,7 @@ from modeling.arrays import Floats
 from modeling.checks import is_whole
 from modeling.errors import InputError, shown
 from modeling.models.parameter_table import ParameterTable
+from modeling.rendering.cost import Cost, cost_of
 from modeling.rendering.limits import Limits
 
 UPDATE_S = 1e-3
@@ -142,6 +143,19 @@ class RenderPlan:
         share = min(1.0, self.update_samples / (FADE_S * self.rate_hz))
         share *= 1 + 1e-12  # five fifths are to be a whole, whatever they round to
         return largest_gains * share
+
+    def cost(self, model: LayeredModel) -> Cost:
+        """What rendering a model costs, in counted operations and bytes; refused as `texture`."""
+        fields = self.texture(model)
+        return cost_of(
+            layers=fields["layers"],
+            taps=fields["taps"],
+            update_samples=self.update_samples,
+            compensated=self.compensation is not None and self.compensation.band_share != 0,
+            rms_limited=bool(np.isfinite(self.limits.rms)),
+            numbers=sum(np.size(value) for value in fields.values() if np.ndim(value)),
+            real_bytes=np.dtype(self.precision).itemsize,
+        )
 
     def texture(self, model: LayeredModel) -> dict[str, Any]:
         """Everything that `tq_texture` in `kernel.h` holds, by name and in its order.
