@@ -24,20 +24,17 @@
 #include <stddef.h>
 #include <stdint.h>
 #ifdef TQ_FREESTANDING
-#ifdef __cplusplus
-extern "C" {
-#endif
-void *memcpy(void *, const void *, size_t);
-void *memmove(void *, const void *, size_t);
-void *memset(void *, int, size_t);
-#ifdef __cplusplus
-}
-#endif
+#define TQ_COPY __builtin_memcpy
+#define TQ_MOVE __builtin_memmove
+#define TQ_FILL __builtin_memset
 #define TQ_SQRT_SINGLE __builtin_sqrtf
 #define TQ_SQRT_DOUBLE __builtin_sqrt
 #else
 #include <math.h>
 #include <string.h>
+#define TQ_COPY memcpy
+#define TQ_MOVE memmove
+#define TQ_FILL memset
 #define TQ_SQRT_SINGLE sqrtf
 #define TQ_SQRT_DOUBLE sqrt
 #endif
@@ -182,13 +179,13 @@ TQ_INLINE tq_real tq_noise(uint64_t key, uint64_t position)
 TQ_INLINE tq_lanes tq_load(const tq_real *from)
 {
     tq_lanes lanes;
-    memcpy(&lanes, from, sizeof lanes);
+    TQ_COPY(&lanes, from, sizeof lanes);
     return lanes;
 }
 
 TQ_INLINE void tq_store(tq_real *to, tq_lanes lanes)
 {
-    memcpy(to, &lanes, sizeof lanes);
+    TQ_COPY(to, &lanes, sizeof lanes);
 }
 
 TQ_INLINE tq_lanes tq_root(tq_lanes x)
@@ -610,7 +607,7 @@ static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t
 {
     int n, half = t->taps / 2;
     tq_real *wide;
-    memset(s, 0, sizeof *s);
+    TQ_FILL(s, 0, sizeof *s);
     s->key = key;
     s->angle = (tq_real)3.141592653589793 / t->rate_hz;
     s->per_sample = 1 / (tq_real)t->update_samples;
@@ -654,7 +651,7 @@ TQ_INLINE void tq_finish(const tq_texture *t, tq_state *s, tq_real *out, int cou
         for (n = 0; n < count; n++)
             out[n] = tq_limit(t, s, out[n]);
     if (t->taps > 1)
-        memmove(tq_wide(t, s), tq_wide(t, s) + count, (size_t)(t->taps - 1) * sizeof(tq_real));
+        TQ_MOVE(tq_wide(t, s), tq_wide(t, s) + count, (size_t)(t->taps - 1) * sizeof(tq_real));
 }
 
 /* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
