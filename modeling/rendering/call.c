@@ -13,8 +13,9 @@
 
 #include <numpy/arrayobject.h>
 
-#define CHUNK 256        /* samples that are converted from one precision to the other at a time */
-#define WORTH_RELEASING 512 /* samples from which on other threads of Python may run meanwhile */
+#define CHUNK 256 /* samples that are converted from one precision to the other at a time */
+#define WORTH_RELEASING 512     /* samples from which on other threads of Python may run meanwhile */
+#define MOST_SAMPLES 2147483648 /* MOST_SAMPLES of modeling.rendering.renderer */
 
 typedef void render_call(const void *texture, void *state, const void *speed, const void *force,
                          void *out, size_t count);
@@ -86,7 +87,7 @@ static PyArrayObject *vector(PyObject *object, int type, int flags)
 {
     PyArrayObject *array = (PyArrayObject *)object;
     int fits = PyArray_CheckExact(object) && PyArray_NDIM(array) == 1 && PyArray_TYPE(array) == type &&
-               PyArray_CHKFLAGS(array, flags);
+               PyArray_CHKFLAGS(array, flags) && PyArray_ISNOTSWAPPED(array);
     return fits ? array : NULL;
 }
 
@@ -129,7 +130,7 @@ static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags
         if (!PyLong_CheckExact(samples))
             Py_RETURN_NONE;
         wanted = PyLong_AsSsize_t(samples);
-        if (wanted < 0) {
+        if (wanted < 0 || wanted > MOST_SAMPLES) {
             PyErr_Clear();
             Py_RETURN_NONE;
         }

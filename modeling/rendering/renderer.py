@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.checks import is_whole
+from modeling.errors import InputError, shown
 from modeling.models.ar_model import ARModel
 from modeling.rendering.compiled import CompiledEngine, is_compiled
 from modeling.rendering.limits import Limits
@@ -19,6 +20,7 @@ from modeling.rendering.reference.bands import BandFilter
 from modeling.rendering.reference.engine import PythonEngine
 from modeling.rendering.reference.lattice import LatticeFilter
 
+MOST_SAMPLES = 2**31  # of one call
 Real = TypeVar("Real", np.float64, np.float32)
 
 
@@ -180,7 +182,7 @@ class Renderer:
         """
         rendered = self._call(speed_mm_s, force_n, samples, out)
         if rendered is None:
-            count = samples if out is None or samples is not None else np.size(out)
+            count = np.size(out) if samples is None and out is not None else samples
             speed, force = _checked(speed_mm_s, force_n, samples=samples, count=count)
             if out is not None:
                 _check_out(out, speed.size)
@@ -199,9 +201,20 @@ def _converted(*arguments: object) -> None:
 def _checked(
     speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None, count: int | None
 ) -> tuple[Floats, Floats]:
-    speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
-    force = np.asarray(force_n, dtype=np.float64, order="C")
-    if speed.ndim == force.ndim == 0 and count is not None and count >= 0:
+    try:
+        speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
+        force = np.asarray(force_n, dtype=np.float64, order="C")
+    except (TypeError, ValueError):
+        raise InputError(
+            f"expected speed and force as numbers, got {shown(speed_mm_s)} and {shown(force_n)}; "
+            "give mm/s and N."
+        ) from None
+    if samples is not None and not (is_whole(samples) and 0 <= samples <= MOST_SAMPLES):
+        raise InputError(
+            f"expected samples as a whole number of 0 … {MOST_SAMPLES}, got {shown(samples)}; "
+            "render more in several calls."
+        )
+    if speed.ndim == force.ndim == 0 and count is not None:
         return np.full(count, float(speed)), np.full(count, float(force))
     if speed.ndim != 1 or speed.shape != force.shape or samples is not None:
         raise InputError(
@@ -214,7 +227,7 @@ def _checked(
 def _check_out(out: NDArray[Any], count: int) -> None:
     right = isinstance(out, np.ndarray) and out.dtype in (np.float64, np.float32)
     if not (right and out.shape == (count,) and out.flags.carray):
-        got = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else type(out)
+        got = f"{out.dtype} of shape {out.shape}" if isinstance(out, np.ndarray) else shown(out)
         raise InputError(
             f"expected out as a writable, contiguous array of {count} float64 or float32, got "
             f"{got}; allocate it by np.empty({count})."

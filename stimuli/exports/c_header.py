@@ -202,7 +202,8 @@ def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, see
 to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N.
    Model: SHA-256 {model.sha256}
 
-   cc -std=c99 -O2 -ffp-contract=off PROGRAM.c -lm, never with -ffast-math. A program:
+   cc -std=c99 -O2 -ffp-contract=off -fno-math-errno PROGRAM.c -lm, never with -ffast-math.
+   What else can be defined, and C++17, freestanding: below. A program:
 
        #include <stdio.h>
        #include {_quoted(file_name)}

@@ -225,6 +225,13 @@ def test_the_header_renders_what_python_renders(
     else:
         error = np.abs(samples - expected).max() / np.abs(expected).max()
         assert 0 < error < 1e-5
+    if precision == "float":
+        monkeypatch.delenv(SWITCH)
+        single = Renderer(
+            MODELS[texture], rate_hz=exported.rate_hz, seed=SEED, single=True, **options
+        )
+        assert np.array_equal(samples, single.render(speed, force))
+        assert counters == list(vars(single.counters).values())
     for block in (1, 7, 256):
         assert np.array_equal(exported.render(texture, block)[0], samples)
 

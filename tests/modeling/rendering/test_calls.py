@@ -1,0 +1,212 @@
+"""What `Renderer.render` takes and gives: arrays or numbers, new arrays or the caller's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from modeling import ARModel, InputError, Limits, Renderer
+from modeling.rendering.compiled import SWITCH, Call
+from stimuli.planted.textures import planted_texture
+
+CANVAS = planted_texture("canvas")
+compiled_only = pytest.mark.skipif(Call is None, reason="no kernel was compiled")
+Make = Callable[[], Renderer]
+COUNT = 700  # more than what is converted from one precision to the other at a time
+
+
+def stroke(count: int = COUNT) -> tuple[np.ndarray, np.ndarray]:
+    at = np.arange(count) / 5000
+    speed, force = 300 * np.sin(2 * np.pi * 5 * at), 1.5 + np.cos(2 * np.pi * 3 * at)
+    speed[50:60] = np.nan
+    return speed, force
+
+
+def oak() -> ARModel:
+    return ARModel(
+        texture="oak",
+        rate_hz=5000.0,
+        speeds_mm_s=[100.0, 200.0],
+        forces_n=[1.0, 2.0],
+        line_spectral_frequencies=np.full((2, 2, 2), [1.0, 2.0]),
+        gains=np.ones((2, 2)),
+        level_sd_db=np.zeros((2, 2)),
+    )
+
+
+@pytest.fixture(params=["compiled", "Python", "autoregressive"])
+def make(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Make:
+    """A renderer of each kind."""
+    if request.param == "Python":
+        monkeypatch.setenv(SWITCH, "1")
+    elif request.param == "compiled" and Call is None:
+        pytest.skip("no kernel was compiled")
+    return lambda: Renderer(oak() if request.param == "autoregressive" else CANVAS, seed=3)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_the_callers_array_gets_what_a_new_one_would(make: Make, dtype: type) -> None:
+    expected = make().render(*stroke())
+    out = np.full(COUNT, 7, dtype=dtype)
+    assert make().render(*stroke(), out=out) is out
+    assert np.array_equal(out, expected.astype(dtype))
+    assert expected.dtype == np.float64
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_two_numbers_are_a_hand_that_is_held(make: Make, dtype: type) -> None:
+    expected = make().render(np.full(COUNT, 120.0), np.full(COUNT, 1.1))
+    assert np.array_equal(make().render(120.0, 1.1, samples=COUNT), expected)
+    assert np.array_equal(make().render(np.float64(120), np.array(1.1), samples=COUNT), expected)
+    out = np.empty(COUNT, dtype=dtype)
+    assert make().render(120, 1.1, out=out) is out
+    assert np.array_equal(out, expected.astype(dtype))
+    assert make().render(120.0, 1.1, samples=COUNT, out=out) is out
+    assert np.array_equal(out, expected.astype(dtype))
+
+
+def test_hands_of_any_kind_of_number_are_converted(make: Make) -> None:
+    expected = make().render(np.full(40, 120.0), np.full(40, 1.0))
+    out = np.empty(40)
+    for speed, force in (
+        ([120] * 40, (1.0,) * 40),
+        (np.full(40, 120, dtype=np.int16), np.ones(40, dtype=np.float32)),
+        (np.full((40, 2), 120.0)[:, 0], np.ones(80)[::-2]),
+    ):
+        assert make().render(speed, force, out=out) is out
+        assert np.array_equal(out, expected)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 300), st.sampled_from("nsfdh")), max_size=6))
+def test_a_stream_goes_on_however_it_is_called(calls: list[tuple[int, str]]) -> None:
+    """New arrays, numbers, float32 and float64 of the caller's, in any order."""
+    total = sum(count for count, _ in calls)
+    expected = Renderer(CANVAS, seed=3).render(150.0, 1.5, samples=total)
+    renderer, done = Renderer(CANVAS, seed=3), 0
+    for count, how in calls:
+        hand = np.full(count, 150.0), np.full(count, 1.5)
+        if how == "n":
+            found = renderer.render(*hand)
+        elif how == "s":
+            found = renderer.render(150.0, 1.5, samples=count)
+        elif how == "h":
+            found = renderer.render(150.0, 1.5, out=np.empty(count))
+        else:
+            dtype = np.float32 if how == "f" else np.float64
+            found = renderer.render(*hand, out=np.empty(count, dtype=dtype))
+        wanted = expected[done : done + count]
+        assert np.array_equal(found, wanted.astype(found.dtype))
+        done += count
+
+
+READ_ONLY = np.zeros(5)
+READ_ONLY.flags.writeable = False
+REFUSED = {
+    "array of 5 float64 or float32, got int64 of shape": np.zeros(5, dtype=int),
+    r"array of 5 float64 or float32, got float64 of shape \(4,\)": np.zeros(4),
+    r"got float64 of shape \(5, 1\)": np.zeros((5, 1)),
+    r"got float64 of shape \(5,\)": np.zeros(10)[::2],
+    r"writable.*got float64 of shape \(5,\); allocate it by np.empty\(5\)": READ_ONLY,
+    "got >f8": np.zeros(5, dtype=">f8"),
+    r"got \[0.0, 0.0, 0.0, 0.0, 0.0\]": [0.0] * 5,
+}
+
+
+@pytest.mark.parametrize("sentence", REFUSED)
+def test_another_array_is_refused_and_nothing_rendered(make: Make, sentence: str) -> None:
+    renderer, out = make(), REFUSED[sentence]
+    with pytest.raises(InputError, match=sentence):
+        renderer.render(np.full(5, 120.0), np.full(5, 1.0), out=out)
+    with pytest.raises(InputError, match=sentence):
+        renderer.render(120.0, 1.0, samples=5, out=out)
+    assert np.array_equal(
+        renderer.render(120.0, 1.0, samples=50), make().render(120.0, 1.0, samples=50)
+    )
+
+
+@pytest.mark.parametrize("samples", [-1, 2.5, 10**30, "5"])
+def test_other_numbers_of_samples_are_refused(make: Make, samples: Any) -> None:
+    with pytest.raises(
+        InputError, match="expected samples as a whole number of 0 … 2147483648, got"
+    ):
+        make().render(120.0, 1.0, samples=samples)
+
+
+def test_a_hand_of_text_is_refused(make: Make) -> None:
+    with pytest.raises(InputError, match=r"expected speed and force as numbers, got 'fast'"):
+        make().render("fast", 1.0, samples=5)
+
+
+@compiled_only
+def test_streams_render_at_once_in_threads() -> None:
+    """Long calls let other threads run meanwhile."""
+    hand = stroke(50_000)
+    expected = [Renderer(CANVAS, seed=seed).render(*hand) for seed in range(6)]
+    with ThreadPoolExecutor(3) as pool:
+        found = pool.map(lambda seed: Renderer(CANVAS, seed=seed).render(*hand), range(6))
+        assert all(map(np.array_equal, found, expected))
+
+
+# --- Single precision
+
+
+@compiled_only
+@pytest.mark.parametrize("rate_hz", [5000.0, 48_000.0])
+def test_single_precision_differs_by_rounding_only(rate_hz: float) -> None:
+    hand = stroke()
+    double = Renderer(CANVAS, rate_hz=rate_hz, seed=3).render(*hand)
+    renderer = Renderer(CANVAS, rate_hz=rate_hz, seed=3, single=True)
+    found = renderer.render(*hand)
+    assert found.dtype == np.float64
+    assert np.array_equal(found, found.astype(np.float32))
+    assert 0 < np.abs(found - double).max() < 1e-5 * np.abs(double).max()
+    assert renderer.counters.lift_offs == 10
+
+
+@compiled_only
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.integers(0, 300), max_size=6))
+def test_single_precision_gives_the_same_bits_in_any_blocks(sizes: list[int]) -> None:
+    speed, force = stroke(sum(sizes))
+    limits = Limits(peak=0.3, rms=0.1, duration_s=0.05)
+    expected = Renderer(CANVAS, limits=limits, single=True).render(speed, force)
+    renderer, done = Renderer(CANVAS, limits=limits, single=True), 0
+    for number, size in enumerate(sizes):
+        out = np.empty(size, dtype=(np.float32, np.float64)[number % 2])
+        part = slice(done, done + size)
+        assert np.array_equal(renderer.render(speed[part], force[part], out=out), expected[part])
+        done += size
+
+
+@compiled_only
+def test_single_precision_holds_a_hand_as_arrays_do() -> None:
+    renderers = [Renderer(CANVAS, seed=1, single=True) for _ in range(2)]
+    by_number = renderers[0].render(123.4, 1.1, samples=COUNT)
+    assert np.array_equal(
+        by_number, renderers[1].render(np.full(COUNT, 123.4), np.full(COUNT, 1.1))
+    )
+
+
+def test_single_precision_is_refused_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    sentence = "expected a layered model and the compiled kernel for single precision"
+    with pytest.raises(InputError, match=sentence):
+        Renderer(oak(), single=True)
+    monkeypatch.setenv(SWITCH, "1")
+    with pytest.raises(InputError, match=sentence):
+        Renderer(CANVAS, single=True)
+
+
+@compiled_only
+def test_numbers_that_single_precision_cannot_hold_are_refused() -> None:
+    with pytest.raises(InputError, match="can hold and tell apart, got others in mean_square"):
+        Renderer(CANVAS, limits=Limits(rms=1e-30), single=True)
+    close = planted_texture("PVC", speeds_mm_s=np.array([100.0, 100.0 + 1e-9]))
+    with pytest.raises(InputError, match="can hold and tell apart, got others in speed_mm_s"):
+        Renderer(close, single=True)
