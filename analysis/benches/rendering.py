@@ -5,15 +5,17 @@ What came out: docs/method/rendering.md#cost.
 
 from __future__ import annotations
 
+import itertools
 import platform
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+import sysconfig
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -26,13 +28,16 @@ from analysis.benches.rivals import (
     KERNEL,
     RATE_HZ,
     CompiledStream,
+    LfilterStream,
     SosfiltStream,
     compiled_parts,
     layered_texture,
+    operations,
     predictor_of,
     tabled_predictor,
 )
 from modeling import Renderer
+from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import LayeredModel, RenderPlan
@@ -44,12 +49,16 @@ UPDATES = (1, 5, 32)
 BLOCKS = (32, 1024)
 SWEEP = (1, 2, 3, 4, 6, 8, 12, 16)
 SWEEP_UPDATE = 5
-SOSFILT, PYTHON = "sosfilt", "Python"
-# Ours in blocks: as users call it, the bare call of C for each block, and one call for all of them.
-RENDERER, CALLS, ONE_CALL = "Renderer", "kernel by block", "kernel in one call"
-BY_BLOCK = (SOSFILT, RENDERER, CALLS, ONE_CALL)
+SOUND_CARD_HZ, SOUND_CARD_UPDATE = 48_000.0, 48
+SOSFILT, LFILTER, PYTHON = "sosfilt", "lfilter", "Python"
+# As users call it: two numbers and an array of their own for each block.
+RENDERER = "Renderer"
+BY_BLOCK = (SOSFILT, LFILTER, RENDERER)
+# How a row was called: all samples in one call, one call of C for each parameter update, one call
+# from Python for each block, at the rate of a sound card.
+ONE_CALL, LIVE, FROM_PYTHON, SOUND_CARD = "one call", "live", "from Python", "48 kHz"
 # Timed parts: each pair of layers and updates, each pair of layers and blocks, the sweep, the rest.
-PARTS = len(LAYERS) * (len(UPDATES) + len(BLOCKS)) + 2
+PARTS = len(LAYERS) * (len(UPDATES) + len(BLOCKS)) + 3
 STROKE_HZ, FASTEST_MM_S, FORCE_N = 2.0, 300.0, (0.8, 2.4)
 _PYTHON_SAMPLES = 1000
 _IMPORT = (
@@ -88,19 +97,19 @@ class RenderingBench:
     Parameters
     ----------
     times : DataFrame
-        One row per measurement: filter, layers, update_samples, ns_per_sample (the best of all
-        turns, noise included).
+        One row per measurement: called (`ONE_CALL`, `LIVE`, `FROM_PYTHON` or `SOUND_CARD`), filter,
+        layers, update_samples, ns_per_sample (the best of all turns, noise included).
     sweep : DataFrame
-        The kernel over `SWEEP` layers, updates every `SWEEP_UPDATE` samples: layers,
-        ns_per_sample.
+        The kernel and AR(20) over `SWEEP` layers, updates every `SWEEP_UPDATE` samples: layers,
+        ns_per_sample, and ar_ns_per_sample, which is the same for any number of layers.
     line : Line
-        Through the sweep.
+        Through the kernel's sweep.
     memory_bytes : int
         Of one stream of three layers, beside the model's table.
     import_s : float
         Time to import `modeling`, median of processes of their own.
-    machine : str
-        Processor and compiler flags.
+    machine, compiler : str
+        Processor; compiler and flags.
     """
 
     times: pd.DataFrame
@@ -109,12 +118,20 @@ class RenderingBench:
     memory_bytes: int
     import_s: float
     machine: str
+    compiler: str
 
     @property
-    def filters(self) -> pd.DataFrame:
+    def throughput(self) -> pd.DataFrame:
         """Filters in C in one call: layers, update_samples, ns per filter, and ratios."""
-        in_one_call = self.times[self.times["filter"].isin(COMPILED)]
-        wide = _wide(in_one_call, "update_samples", COMPILED)
+        return self._filters(ONE_CALL)
+
+    @property
+    def live(self) -> pd.DataFrame:
+        """Filters in C, one call for each parameter update; columns as of `throughput`."""
+        return self._filters(LIVE)
+
+    def _filters(self, called: str) -> pd.DataFrame:
+        wide = self._wide(called, COMPILED)
         for name in FORMS:
             wide[f"{KERNEL} / {name}"] = wide[KERNEL] / wide[name]
         wide[f"{AR} / kernel"] = wide[AR] / wide[KERNEL]
@@ -122,12 +139,35 @@ class RenderingBench:
 
     @property
     def blocks(self) -> pd.DataFrame:
-        """By block, with one update each: layers, block_samples, ns, ratios to sosfilt."""
-        by_block = self.times[self.times["filter"].isin(BY_BLOCK)]
-        wide = _wide(by_block, "update_samples", BY_BLOCK)
-        for name in BY_BLOCK[1:]:
-            wide[f"{SOSFILT} / {name}"] = wide[SOSFILT] / wide[name]
+        """From Python by block, with one update each: layers, block_samples, ns, and ratios."""
+        wide = self._wide(FROM_PYTHON, BY_BLOCK)
+        for name in (SOSFILT, LFILTER):
+            wide[f"{name} / {RENDERER}"] = wide[name] / wide[RENDERER]
         return wide.rename(columns={"update_samples": "block_samples"})
+
+    def _wide(self, called: str, names: Sequence[str]) -> pd.DataFrame:
+        rows = self.times[(self.times["called"] == called) & self.times["filter"].isin(names)]
+        wide = rows.pivot_table(
+            index=["layers", "update_samples"], columns="filter", values="ns_per_sample"
+        )
+        return wide[list(names)].rename_axis(columns=None).reset_index()
+
+    @property
+    def operations(self) -> pd.DataFrame:
+        """What each form needs for a sample: filter, layers, products, sums."""
+        rows = [
+            {"filter": name, "layers": layers, **operations(name, layers)._asdict()}
+            for layers in LAYERS
+            for name in COMPILED
+        ]
+        return pd.DataFrame(rows)
+
+    @property
+    def ar_cheaper_from(self) -> int | None:
+        """The fewest layers of the sweep from which on AR(20) costs less than the kernel."""
+        dearer = self.sweep["ns_per_sample"] > self.sweep["ar_ns_per_sample"]
+        from_here_on = dearer[::-1].cummin()[::-1].astype(bool)
+        return int(self.sweep["layers"][from_here_on].min()) if from_here_on.any() else None
 
     @property
     def python_ns(self) -> float:
@@ -135,32 +175,38 @@ class RenderingBench:
         return float(self.times.loc[self.times["filter"] == PYTHON, "ns_per_sample"].iloc[0])
 
     @property
+    def sound_card_ns(self) -> float:
+        """ns per sample of the kernel at 48 kHz, 3 layers, an update each millisecond."""
+        return float(self.times.loc[self.times["called"] == SOUND_CARD, "ns_per_sample"].iloc[0])
+
+    @property
     def aims(self) -> pd.DataFrame:
-        """Every aim beside what was measured: what, where, aim, measured, met."""
+        """Every aim beside what was measured: what, where, aim, measured, met.
+
+        By the operations that each form needs (docs/method/rendering.md#cost).
+        """
         rows = [
-            _aim(f"{KERNEL} / {name}", at, row[f"{KERNEL} / {name}"], most=1.5)
+            _aim(f"{KERNEL} / {name}, {called}", at, row[f"{KERNEL} / {name}"], most=most)
+            for called, table, most in (
+                (ONE_CALL, self.throughput, 1.6),
+                (LIVE, self.live, 2.0),
+            )
             for name in FORMS
-            for at, row in _places(self.filters, "update_samples")
+            for at, row in _places(table, "update_samples")
         ]
         rows += [
-            _aim(f"{AR} / kernel", at, row[f"{AR} / kernel"], least=3.0)
-            for at, row in _places(self.filters, "update_samples")
+            _aim(f"{AR} / kernel, {ONE_CALL}", at, row[f"{AR} / kernel"], least=1.0)
+            for at, row in _places(self.throughput, "update_samples")
             if row["layers"] == 3
         ]
         for at, row in _places(self.blocks, "block_samples"):
             least = {32: 100.0, 1024: 5.0}[row["block_samples"]]
-            for name in BY_BLOCK[1:]:
-                what = f"{SOSFILT} / {name}"
-                rows.append(_aim(what, at, row[what], least=least))
+            what = f"{SOSFILT} / {RENDERER}"
+            rows.append(_aim(what, at, row[what], least=least))
         sweep = f"{SWEEP[0]} to {SWEEP[-1]} layers"
         rows.append(_aim("cost is linear in layers: R²", sweep, self.line.r_squared, least=0.99))
         rows.append(_aim("import modeling, s", "a process of its own", self.import_s, most=0.5))
         return pd.DataFrame(rows)
-
-
-def _wide(rows: pd.DataFrame, by: str, names: Sequence[str]) -> pd.DataFrame:
-    wide = rows.pivot_table(index=["layers", by], columns="filter", values="ns_per_sample")
-    return wide[list(names)].rename_axis(columns=None).reset_index()
 
 
 def _places(table: pd.DataFrame, by: str) -> list[tuple[str, dict[str, Any]]]:
@@ -181,16 +227,28 @@ def _aim(
 def stroke(samples: int, *, rate_hz: float) -> Hand:
     """A hand that moves to and fro under a slowly changing force."""
     time_s = np.arange(samples) / rate_hz
-    speed = FASTEST_MM_S * np.abs(np.sin(2 * np.pi * STROKE_HZ * time_s))
+    speed = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * time_s)
     low, high = FORCE_N
     force = low + (high - low) * (0.5 + 0.5 * np.cos(2 * np.pi * STROKE_HZ / 3 * time_s))
     return Hand(speed, force)
+
+
+class Turn(NamedTuple):
+    """What is timed as a whole in each turn: a call, how many samples it makes, how often."""
+
+    run: Callable[[], object]
+    samples: int
+    repeats: int = 1
 
 
 def bench_rendering(
     effort: Effort | None = None, *, progress: Callable[[str], None] = lambda part: None
 ) -> RenderingBench:
     """Time the kernel beside its rivals, everything in turn, so that no disturbance hits only one.
+
+    What is timed as a whole takes about as long for a fast filter as for a slow one (many samples
+    of a fast one, one block of a slow one): the longer it took, the more of other load it would
+    catch.
 
     Parameters
     ----------
@@ -213,7 +271,8 @@ def bench_rendering(
         for block in BLOCKS:
             rows += _by_block(layers, block, effort)
             progress(f"{layers} layers, blocks of {block}")
-    rows.append(_in_python(effort))
+    rows += [_in_python(effort), _at_sound_card(effort)]
+    progress("48 kHz")
     sweep = _sweep(effort)
     progress("layers")
     memory_bytes = _kernel_stream(3, SWEEP_UPDATE).kernel_bytes
@@ -225,7 +284,8 @@ def bench_rendering(
         line=_line_through(sweep),
         memory_bytes=memory_bytes,
         import_s=import_s,
-        machine=machine(),
+        machine=processor(),
+        compiler=compiler(),
     )
 
 
@@ -233,43 +293,56 @@ def _filters_in_c(layers: int, update: int, effort: Effort) -> list[dict[str, An
     texture = layered_texture(layers)
     models: dict[str, LayeredModel] = dict.fromkeys(COMPILED, texture)
     models[AR] = tabled_predictor(predictor_of(texture))
+    blocks = {ONE_CALL: effort.samples, LIVE: update}
     work = {
-        name: _in_one_call(CompiledStream(name, model, update_samples=update, seed=0), effort)
+        (called, name): _in_calls(
+            CompiledStream(name, model, update_samples=update, seed=0), effort, block=block
+        )
+        for called, block in blocks.items()
         for name, model in models.items()
     }
-    return _rows(work, effort, layers=layers, update=update)
+    best = _best_ns(work, effort.turns)
+    return [_row(called, name, layers, update=update, ns=ns) for (called, name), ns in best.items()]
 
 
 def _by_block(layers: int, block: int, effort: Effort) -> list[dict[str, Any]]:
     texture = layered_texture(layers)
-    speed, force = stroke(effort.samples, rate_hz=RATE_HZ)
-    renderer = Renderer(texture, update_samples=block)
-    sosfilt = SosfiltStream(texture, np.random.default_rng(0))
-    calls, one_call = (_kernel_stream(layers, block) for _ in range(2))
-    starts = range(0, effort.samples, block)
+    hand = stroke(effort.samples, rate_hz=RATE_HZ)
+    readings = [(float(v), float(f)) for v, f in zip(*(x[::block] for x in hand), strict=True)]
+    renderer, out = Renderer(texture, update_samples=block), np.empty(block)
+    work = {RENDERER: Turn(_rendering(renderer, readings, out), len(readings) * block)}
+    for name, kind in ((SOSFILT, SosfiltStream), (LFILTER, LfilterStream)):
+        stream, at = kind(texture, np.random.default_rng(0)), itertools.cycle(readings)
+        one_block = partial(_next_block, stream, at, block)
+        work[name] = Turn(one_block, block, repeats=len(readings))
+    best = _best_ns(work, effort.turns)
+    return [_row(FROM_PYTHON, name, layers, update=block, ns=ns) for name, ns in best.items()]
 
+
+def _rendering(
+    renderer: Renderer, readings: list[tuple[float, float]], out: Floats
+) -> Callable[[], None]:
     def render() -> None:
-        for start in starts:
-            renderer.render(speed[start : start + block], force[start : start + block])
+        for speed, force in readings:
+            renderer.render(speed, force, out=out)
 
-    def filter_sections() -> None:
-        for start in starts:
-            sosfilt.render(speed[start], force[start], block)
+    return render
 
-    work = {
-        SOSFILT: filter_sections,
-        RENDERER: render,
-        CALLS: calls.calls(speed, force, np.empty(effort.samples), block=block),
-        ONE_CALL: _in_one_call(one_call, effort),
-    }
-    return _rows(work, effort, layers=layers, update=block)
+
+def _next_block(
+    stream: SosfiltStream, readings: Iterator[tuple[float, float]], block: int
+) -> Floats:
+    return stream.render(*next(readings), block)
 
 
 def _sweep(effort: Effort) -> pd.DataFrame:
-    work = {m: _in_one_call(_kernel_stream(m, SWEEP_UPDATE), effort) for m in SWEEP}
-    best = _best_seconds(work, effort.turns)
-    ns = [1e9 * seconds / effort.samples for seconds in best.values()]
-    return pd.DataFrame({"layers": list(best), "ns_per_sample": ns})
+    work = {m: _in_calls(_kernel_stream(m, SWEEP_UPDATE), effort) for m in SWEEP}
+    predictor = tabled_predictor(predictor_of(layered_texture(3)))
+    rival = CompiledStream(AR, predictor, update_samples=SWEEP_UPDATE, seed=0)
+    best = _best_ns({**work, AR: _in_calls(rival, effort)}, effort.turns)
+    ar_ns = best.pop(AR)
+    columns = {"layers": list(best), "ns_per_sample": list(best.values())}
+    return pd.DataFrame({**columns, "ar_ns_per_sample": ar_ns})
 
 
 def _in_python(effort: Effort) -> dict[str, Any]:
@@ -278,46 +351,49 @@ def _in_python(effort: Effort) -> dict[str, Any]:
     plan = RenderPlan(rate_hz=texture.rate_hz, update_samples=SWEEP_UPDATE)
     engine = PythonEngine(BandFilter(texture, plan), plan, key=stream_key(0))
     hand = stroke(_PYTHON_SAMPLES, rate_hz=RATE_HZ)
-    best = _best_seconds({PYTHON: partial(engine.render, *hand)}, min(effort.turns, 5))
-    ns = 1e9 * best[PYTHON] / _PYTHON_SAMPLES
-    return _row(PYTHON, 3, update=SWEEP_UPDATE, ns=ns)
+    work = {PYTHON: Turn(partial(engine.render, *hand), _PYTHON_SAMPLES)}
+    ns = _best_ns(work, min(effort.turns, 5))[PYTHON]
+    return _row(ONE_CALL, PYTHON, 3, update=SWEEP_UPDATE, ns=ns)
+
+
+def _at_sound_card(effort: Effort) -> dict[str, Any]:
+    stream = CompiledStream(
+        KERNEL,
+        layered_texture(3),
+        update_samples=SOUND_CARD_UPDATE,
+        seed=0,
+        rate_hz=SOUND_CARD_HZ,
+    )
+    ns = _best_ns({KERNEL: _in_calls(stream, effort)}, effort.turns)[KERNEL]
+    return _row(SOUND_CARD, KERNEL, 3, update=SOUND_CARD_UPDATE, ns=ns)
 
 
 def _kernel_stream(layers: int, update: int) -> CompiledStream:
     return CompiledStream(KERNEL, layered_texture(layers), update_samples=update, seed=0)
 
 
-def _in_one_call(stream: CompiledStream, effort: Effort) -> Callable[[], None]:
-    hand = stroke(effort.samples, rate_hz=RATE_HZ)
-    return stream.calls(*hand, np.empty(effort.samples), block=effort.samples)
+def _in_calls(stream: CompiledStream, effort: Effort, *, block: int | None = None) -> Turn:
+    """All samples, in calls of so many; in one by default."""
+    count = effort.samples
+    hand = stroke(count, rate_hz=RATE_HZ)
+    return Turn(stream.calls(*hand, np.empty(count), block=block or count), count)
 
 
-def _best_seconds(work: Mapping[Name, Callable[[], object]], turns: int) -> dict[Name, float]:
+def _best_ns(work: Mapping[Name, Turn], turns: int) -> dict[Name, float]:
+    """ns per sample, the best of all."""
     best = dict.fromkeys(work, np.inf)
     for _ in range(turns):
-        for name, run in work.items():
-            start = perf_counter()
-            run()
-            best[name] = min(best[name], perf_counter() - start)
-    return best
+        for name, turn in work.items():
+            for _ in range(turn.repeats):
+                start = perf_counter()
+                turn.run()
+                best[name] = min(best[name], (perf_counter() - start) / turn.samples)
+    return {name: 1e9 * seconds for name, seconds in best.items()}
 
 
-def _rows(
-    work: Mapping[str, Callable[[], object]],
-    effort: Effort,
-    *,
-    layers: int,
-    update: int,
-) -> list[dict[str, Any]]:
-    best = _best_seconds(work, effort.turns)
-    return [
-        _row(name, layers, update=update, ns=1e9 * seconds / effort.samples)
-        for name, seconds in best.items()
-    ]
-
-
-def _row(name: str, layers: int, *, update: int, ns: float) -> dict[str, Any]:
+def _row(called: str, name: str, layers: int, *, update: int, ns: float) -> dict[str, Any]:
     return {
+        "called": called,
         "filter": name,
         "layers": layers,
         "update_samples": update,
@@ -338,11 +414,18 @@ def _import_s(starts: int) -> float:
     return float(np.median([float(run.stdout) for run in runs]))
 
 
-def machine() -> str:
-    """Processor and compiler flags; no name of the computer."""
-    ffi, lib = compiled_parts("analysis.benches._rivals")
-    flags = ffi.string(lib.tq_build()).decode()
+def processor() -> str:
+    """Its name; none of the computer."""
     information = Path("/proc/cpuinfo")
     lines = information.read_text().splitlines() if information.is_file() else []
     named = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return f"{(named or [platform.processor() or platform.machine()])[0]}, {flags}"
+    return (named or [platform.processor() or platform.machine()])[0]
+
+
+def compiler() -> str:
+    """What compiled the C parts, and all its flags: those of Python come first."""
+    ffi, lib = compiled_parts("analysis.benches._rivals")
+    name, flags = ffi.string(lib.tq_build()).decode().rsplit(", ", 1)
+    words = f"{sysconfig.get_config_var('CFLAGS') or ''} {flags}".split()
+    # Paths are of the computer on which Python was built, and say nothing of speed.
+    return f"{name}: {' '.join(word for word in words if '/' not in word)}"

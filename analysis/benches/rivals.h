@@ -338,10 +338,34 @@ static void tq_rival_render(const tq_texture *t, tq_rival *s, const tq_real *spe
     }
 }
 
-/* How this file and the kernel were compiled. */
+/* The same in calls of `block` samples each, as a device makes them that reads the hand so often. */
+static void tq_rival_calls(const tq_texture *t, tq_rival *s, const tq_real *speed,
+                           const tq_real *force, tq_real *out, size_t count, size_t block)
+{
+    size_t n;
+    for (n = 0; n < count; n += block)
+        tq_rival_render(t, s, speed + n, force + n, out + n, block < count - n ? block : count - n);
+}
+
+/* The kernel in such calls. */
+static void tq_kernel_calls(const tq_texture *t, tq_state *s, const tq_real *speed,
+                            const tq_real *force, tq_real *out, size_t count, size_t block)
+{
+    size_t n;
+    for (n = 0; n < count; n += block)
+        tq_render(t, s, speed + n, force + n, out + n, block < count - n ? block : count - n);
+}
+
+/* How this file and the kernel were compiled, beside the flags of Python. */
 static const char *tq_build(void)
 {
-    return TQ_FLAGS;
+#if defined __clang__
+    return "Clang " __clang_version__ ", " TQ_FLAGS;
+#elif defined __GNUC__
+    return "GCC " __VERSION__ ", " TQ_FLAGS;
+#else
+    return "another compiler, " TQ_FLAGS;
+#endif
 }
 
 #endif

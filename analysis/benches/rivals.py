@@ -1,14 +1,15 @@
-"""What the render bench compares: the kernel, its rivals in C (`rivals.h`), and scipy's sosfilt."""
+"""What the render bench compares: the kernel, its rivals in C (`rivals.h`), and scipy's filters."""
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import sosfilt
+from scipy.signal import lfilter, sosfilt
 
 from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.arrays import Floats
@@ -117,6 +118,22 @@ def tabled_predictor(model: ARModel) -> Tabled:
     return Tabled(model.rate_hz, table)
 
 
+class Operations(NamedTuple):
+    """What a form needs for each sample, beside the noise: its products and its sums."""
+
+    products: int
+    sums: int
+
+
+def operations(name: str, layers: int) -> Operations:
+    """Of one of `COMPILED` with so many layers and the noise branch (`kernel.h`, `rivals.h`)."""
+    if name == AR:
+        return Operations(ORDER + 1, ORDER)
+    products, sums = {KERNEL: (7, 9), DIRECT: (3, 3), TRANSPOSED: (3, 4), TPT: (5, 6)}[name]
+    of_branch = {KERNEL: (1, 1), DIRECT: (1, 1)}.get(name, (1, 0))  # a gain's ramp; x - x''
+    return Operations(products * layers + of_branch[0], sums * layers + of_branch[1])
+
+
 class CompiledStream:
     """The kernel or one of its rivals in C, called without anything of Python around it.
 
@@ -125,34 +142,47 @@ class CompiledStream:
     name : str
         One of `COMPILED`.
     model : LayeredModel
-        At most 20 layers, rendered at its own rate; a `tabled_predictor` for the autoregressive
-        rival.
+        At most 20 layers, rendered at its own rate (the kernel: at any); a `tabled_predictor` for
+        the autoregressive rival.
     update_samples : int
     seed : int
         Of the noise.
+    rate_hz : float, optional
+        The model's by default.
     """
 
-    def __init__(self, name: str, model: LayeredModel, *, update_samples: int, seed: int) -> None:
-        ffi, lib = compiled_parts("modeling.rendering._kernel")
+    def __init__(
+        self,
+        name: str,
+        model: LayeredModel,
+        *,
+        update_samples: int,
+        seed: int,
+        rate_hz: float | None = None,
+    ) -> None:
+        self._ffi, lib = compiled_parts("analysis.benches._rivals")
         key = stream_key(seed)
-        plan = RenderPlan(rate_hz=model.rate_hz, update_samples=update_samples)
+        plan = RenderPlan(rate_hz=rate_hz or model.rate_hz, update_samples=update_samples)
         # Kept, because it owns what the texture points at.
         self._engine = CompiledEngine(model, plan, key=key)
-        self._ffi, self._call = ffi, lib.tq_render
-        self._texture, self._state = self._engine._texture, self._engine._state
-        if name != KERNEL:
-            self._ffi, lib = compiled_parts("analysis.benches._rivals")
-            # Another cffi module; the structure is the same, from the same header.
-            address = int(ffi.cast("uintptr_t", self._texture))
-            self._texture = self._ffi.cast("tq_texture *", address)
+        # Of another cffi module; the structures are the same, from the same header.
+        self._texture = self._of_engine("tq_texture *", self._engine._texture)
+        if name == KERNEL:
+            self._state = self._of_engine("tq_state *", self._engine._state)
+            self._call = lib.tq_kernel_calls
+        else:
             self._state = self._ffi.new("tq_rival *", {"kind": _KINDS[name], "key": int(key)})
-            self._call = lib.tq_rival_render
+            self._call = lib.tq_rival_calls
+
+    def _of_engine(self, kind: str, pointer: Any) -> Any:
+        return self._ffi.cast(kind, int(self._engine._ffi.cast("uintptr_t", pointer)))
 
     @property
     def kernel_bytes(self) -> int:
         """What one stream of the kernel needs beside the model's table."""
-        engine, (ffi, _) = self._engine, compiled_parts("modeling.rendering._kernel")
-        return sum(map(ffi.sizeof, (engine._texture[0], engine._state[0], engine._memory)))
+        engine = self._engine
+        sizes = map(engine._ffi.sizeof, (engine._texture[0], engine._state[0], engine._memory))
+        return sum(sizes)
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces, both float64."""
@@ -163,18 +193,14 @@ class CompiledStream:
     def calls(
         self, speed_mm_s: Floats, force_n: Floats, output: Floats, *, block: int
     ) -> Callable[[], None]:
-        """What renders into `output`, (n,), one call of C for each `block` samples."""
+        """What renders into `output`, (n,), by a call within C for each `block` samples."""
         speed, force, out = (
             self._ffi.from_buffer("double[]", array) for array in (speed_mm_s, force_n, output)
         )
-        count = output.size
+        calls = partial(self._call, self._texture, self._state, speed, force, out)
 
-        def run() -> None:
-            for start in range(0, count, block):
-                samples = min(block, count - start)
-                self._call(
-                    self._texture, self._state, speed + start, force + start, out + start, samples
-                )
+        def run(stream: CompiledStream = self) -> None:  # keeps what the pointers point at
+            calls(output.size, max(block, 1))
 
         return run
 
@@ -197,9 +223,9 @@ class SosfiltStream:
         table = model.table
         self._values, self._angle, self._rng = table.values, np.pi / model.rate_hz, rng
         self._speeds, self._forces = table.speeds_mm_s.tolist(), table.forces_n.tolist()
-        self._sections = np.zeros((table.n_layers, 1, 6))
-        self._sections[:, 0, 3] = 1.0
-        self._states = np.zeros((table.n_layers, 1, 2))
+        self._sections = np.zeros((table.n_layers, 6))
+        self._sections[:, 3] = 1.0
+        self._states = np.zeros((table.n_layers, 2))
 
     def render(self, speed_mm_s: float, force_n: float, count: int) -> Floats:
         """The next block: uniform noise of unit variance through the bands."""
@@ -214,16 +240,22 @@ class SosfiltStream:
         frequency, bandwidth, gain = values[1:].reshape(3, -1)
         k = np.tan(self._angle * bandwidth)
         share = 1 / (1 + k)
-        sections = self._sections[:, 0]
+        sections = self._sections
         sections[:, 0] = gain * k * share
         sections[:, 2] = -sections[:, 0]
         sections[:, 4] = -2 * np.cos(2 * self._angle * frequency) * share
         sections[:, 5] = (1 - k) * share
         output: Floats = values[0] * noise
-        for layer, section in enumerate(self._sections):
-            band, self._states[layer] = sosfilt(section, noise, zi=self._states[layer])
-            output += band
+        for layer in range(len(sections)):
+            output += self._band(layer, noise)
         return output
+
+    def _band(self, layer: int, noise: Floats) -> Floats:
+        sections = self._sections[layer : layer + 1]
+        state = self._states[layer : layer + 1]
+        band: Floats
+        band, self._states[layer] = sosfilt(sections, noise, zi=state)
+        return band
 
     def _at(self, speed: float, force: float) -> Floats:
         """Noise gain, frequencies, bandwidths and gains for this hand.
@@ -238,6 +270,16 @@ class SosfiltStream:
         values[0] *= ramp
         values[1 + 2 * len(self._sections) :] *= ramp
         return values
+
+
+class LfilterStream(SosfiltStream):
+    """The same by `scipy.signal.lfilter`, whose call costs less."""
+
+    def _band(self, layer: int, noise: Floats) -> Floats:
+        section, state = self._sections[layer], self._states[layer]
+        band: Floats
+        band, self._states[layer] = lfilter(section[:3], section[3:], noise, zi=state)
+        return band
 
 
 def _cell(axis: list[float], at: float) -> tuple[int, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,8 +12,7 @@ from matplotlib.figure import Figure
 
 from analysis.benches.rendering import (
     BLOCKS,
-    CALLS,
-    ONE_CALL,
+    LFILTER,
     RENDERER,
     SOSFILT,
     SWEEP_UPDATE,
@@ -41,27 +41,30 @@ FILTER_COLOURS = {
     TPT: GREEN,
     AR: PURPLE,
 }
-BLOCK_COLOURS = {ONE_CALL: BLUE, CALLS: BLACK, RENDERER: SKY_BLUE, SOSFILT: VERMILLION}
+BLOCK_COLOURS = {RENDERER: SKY_BLUE, LFILTER: BLACK, SOSFILT: VERMILLION}
 _BARS_SHARE = 0.84
 
 
 def figure_rendering(bench: RenderingBench) -> Figure:
-    """Cost per sample: filters in C by updates, blocks beside sosfilt, and by number of layers."""
-    figure = Figure(figsize=(12, 7.5), layout="constrained")
-    panels = figure.subplots(2, 3)
-    for update, ax in zip(UPDATES, panels[0], strict=True):
-        rows = bench.filters[bench.filters["update_samples"] == update]
-        plot_costs(rows, FILTER_COLOURS, ax=ax)
-        ax.set_title(f"updates every {update} sample{'s' if update > 1 else ''}", fontsize=10)
-        ax.set_ylim(1, 300)
-    for block, ax in zip(BLOCKS, panels[1], strict=False):
+    """Cost per sample: filters in C by updates, called once or live, from Python, and by layers."""
+    figure = Figure(figsize=(12, 10.5), layout="constrained")
+    panels = figure.subplots(3, 3)
+    for number, update in enumerate(UPDATES):
+        every = f"updates every {update} sample{'s' if update > 1 else ''}"
+        for row, (table, called) in enumerate(
+            ((bench.throughput, "one call"), (bench.live, "a call per update"))
+        ):
+            ax = panels[row, number]
+            plot_costs(table[table["update_samples"] == update], FILTER_COLOURS, ax=ax)
+            ax.set_title(f"in C, {called}, {every}", fontsize=10)
+    for block, ax in zip(BLOCKS, panels[2], strict=False):
         rows = bench.blocks[bench.blocks["block_samples"] == block]
         plot_costs(rows, BLOCK_COLOURS, ax=ax)
         ax.set_title(f"from Python, an update every block of {block}", fontsize=10)
-        ax.set_ylim(1, 20000)
-    plot_sweep(bench, ax=panels[1, 2])
-    shared_legend(figure, [panels[0, 0], panels[1, 0]], ncols=9)
-    figure.supxlabel(f"noise included; {bench.machine}", fontsize=9, color=GREY)
+    plot_sweep(bench, ax=panels[2, 2])
+    shared_legend(figure, [panels[0, 0], panels[2, 0]], ncols=8)
+    told = textwrap.fill(f"{bench.machine}; {bench.compiler}", 170)
+    figure.supxlabel(f"noise included; {told}", fontsize=7.5, color=GREY)
     return figure
 
 
@@ -84,6 +87,8 @@ def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None =
         shown = [f"{ns:.0f}" if ns >= 10 else f"{ns:.1f}" for ns in rows[name]]
         ax.bar_label(bars, shown, fontsize=6.5, padding=1)
     ax.set_yscale("log")
+    heights = rows[list(colours)].to_numpy()
+    ax.set_ylim(heights.min() / 2, heights.max() * 2)  # a label's room above
     ax.set_xticks(groups, [f"{layers:.0f}" for layers in rows["layers"]])
     ax.set_xlabel("layers")
     ax.set_ylabel("time per sample (ns)")
@@ -92,15 +97,18 @@ def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None =
 
 
 def plot_sweep(bench: RenderingBench, ax: Axes | None = None) -> Axes:
-    """The kernel's cost against the number of layers, with its straight line."""
+    """Cost against the number of layers: the kernel's with its straight line, and AR(20)'s."""
     ax = axes_or_new(ax)
     line, sweep = bench.line, bench.sweep
     ends = np.array([0, sweep["layers"].max()])
-    ax.plot(ends, line.ns_at_none + line.ns_per_layer * ends, color=GREY, linewidth=1)
+    ax.plot(ends, line.ns_at_none + line.ns_per_layer * ends, color=BLUE, linewidth=1)
     ax.plot(sweep["layers"], sweep["ns_per_sample"], "o", color=BLUE)
-    ax.set_title(f"kernel, updates every {SWEEP_UPDATE} samples", fontsize=10)
-    fitted = f"{line.ns_per_layer:.2g} ns per layer, R² = {line.r_squared:.4f}"
-    ax.text(0.04, 0.92, fitted, transform=ax.transAxes, color=GREY, backgroundcolor="white")
+    ar_ns = sweep["ar_ns_per_sample"].iloc[0]
+    ax.axhline(ar_ns, color=FILTER_COLOURS[AR], linewidth=1.5)
+    ax.text(ends[1], ar_ns, AR, color=FILTER_COLOURS[AR], ha="right", va="bottom")
+    ax.set_title(f"in C, one call, updates every {SWEEP_UPDATE} samples", fontsize=10)
+    fitted = f"kernel: {line.ns_per_layer:.2g} ns per layer, R² = {line.r_squared:.4f}"
+    ax.text(0.04, 0.92, fitted, transform=ax.transAxes, color=BLUE, backgroundcolor="white")
     ax.set_xticks(sweep["layers"])
     ax.set_xlim(left=0)
     ax.set_ylim(bottom=0)

@@ -7,7 +7,14 @@ from pathlib import Path
 
 import pandas as pd
 
-CONTENTS = {"times.tsv", "layers.tsv", "aims.tsv", "rendering.png", "provenance.json"}
+CONTENTS = {
+    "times.tsv",
+    "layers.tsv",
+    "operations.tsv",
+    "aims.tsv",
+    "rendering.png",
+    "provenance.json",
+}
 
 
 def test_bench_render_prints_and_writes_its_tables(run, tmp_path: Path) -> None:
