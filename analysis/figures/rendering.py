@@ -50,16 +50,16 @@ def figure_rendering(bench: RenderingBench) -> Figure:
     figure = Figure(figsize=(12, 10.5), layout="constrained")
     panels = figure.subplots(3, 3)
     for number, update in enumerate(UPDATES):
-        every = f"updates every {update} sample{'s' if update > 1 else ''}"
+        every = f"update every {f'{update} samples' if update > 1 else 'sample'}"
         for row, (table, called) in enumerate(
-            ((bench.throughput, "one call"), (bench.live, "a call per update"))
+            ((bench.throughput, "one call"), (bench.live, "a call each"))
         ):
             ax = panels[row, number]
             plot_costs(table[table["update_samples"] == update], FILTER_COLOURS, ax=ax)
-            ax.set_title(f"in C, {called}, {every}", fontsize=10)
+            ax.set_title(f"in C, {called}: {every}", fontsize=10)
     for block, ax in zip(BLOCKS, panels[2], strict=False):
         rows = bench.blocks[bench.blocks["block_samples"] == block]
-        plot_costs(rows, BLOCK_COLOURS, ax=ax)
+        plot_costs(rows, BLOCK_COLOURS, logarithmic=True, ax=ax)
         ax.set_title(f"from Python, an update every block of {block}", fontsize=10)
     plot_sweep(bench, ax=panels[2, 2])
     shared_legend(figure, [panels[0, 0], panels[2, 0]], ncols=8)
@@ -68,8 +68,14 @@ def figure_rendering(bench: RenderingBench) -> Figure:
     return figure
 
 
-def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None = None) -> Axes:
-    """Bars of ns per sample on a logarithmic axis, one group for each number of layers.
+def plot_costs(
+    rows: pd.DataFrame,
+    colours: Mapping[str, str],
+    *,
+    logarithmic: bool = False,
+    ax: Axes | None = None,
+) -> Axes:
+    """Bars of ns per sample, one group for each number of layers.
 
     Parameters
     ----------
@@ -77,6 +83,8 @@ def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None =
         layers, and one column of ns per sample for each name in `colours`.
     colours : mapping of str to str
         Column to colour, in the order of the bars.
+    logarithmic : bool
+        Where costs differ by orders of magnitude; by default the axis begins at 0.
     ax : Axes, optional
     """
     ax = axes_or_new(ax)
@@ -86,9 +94,13 @@ def plot_costs(rows: pd.DataFrame, colours: Mapping[str, str], ax: Axes | None =
         bars = ax.bar(at, rows[name], width=width, color=colour, label=name)
         shown = [f"{ns:.0f}" if ns >= 10 else f"{ns:.1f}" for ns in rows[name]]
         ax.bar_label(bars, shown, fontsize=6.5, padding=1)
-    ax.set_yscale("log")
     heights = rows[list(colours)].to_numpy()
-    ax.set_ylim(heights.min() / 2, heights.max() * 2)  # a label's room above
+    if logarithmic:
+        ax.set_yscale("log")
+        ax.yaxis.set_major_formatter("{x:g}")
+        ax.set_ylim(heights.min() / 2, heights.max() * 2)  # room for the numbers above
+    else:
+        ax.set_ylim(0, heights.max() * 1.1)
     ax.set_xticks(groups, [f"{layers:.0f}" for layers in rows["layers"]])
     ax.set_xlabel("layers")
     ax.set_ylabel("time per sample (ns)")

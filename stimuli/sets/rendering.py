@@ -66,10 +66,10 @@ def at_rate(
 ) -> Floats:
     """A stroke with its margins, resampled to a file's rate, cut to its duration and faded.
 
-    By FFT over a length that the ratio of the rates divides: exact up to the model's Nyquist
-    frequency, and nothing above it (docs/method/recordings.md#preparation: a usual polyphase filter
-    bends the top band by −1.05 dB). Faded in and out over 10 ms, in files shorter than 40 ms over a
-    quarter of them.
+    By FFT over a length that the ratio of the rates divides, with zeros up to one of small prime
+    factors: exact up to the model's Nyquist frequency, and nothing above it
+    (docs/method/recordings.md#preparation: a usual polyphase filter bends the top band by −1.05
+    dB). Faded in and out over 10 ms, in files shorter than 40 ms over a quarter of them.
 
     Parameters
     ----------
@@ -85,25 +85,45 @@ def at_rate(
     -------
     (round(duration_s·rate_hz),) ndarray
     """
-    from scipy.signal import resample  # late: slow to load
-
     margin = margin_samples(model_rate_hz)
     before = start_sample(model_rate_hz, settling_s=settling_s)
     ratio = Fraction(rate_hz / model_rate_hz).limit_denominator(LARGEST_DENOMINATOR)
     step = ratio.denominator
     pad = -before % step
-    circle = np.pad(with_margins, (pad, -(pad + with_margins.size) % step))
+    end = pad + with_margins.size
+    periods = end if ratio == 1 else _fast_length(ceil(end / step))
+    circle = np.pad(with_margins, (pad, periods * step - end))
     ends = _ramp(margin)
     circle[pad : pad + margin] *= ends
-    end = pad + with_margins.size
     circle[end - margin : end] *= ends[::-1]
     if ratio != 1:
-        circle = resample(circle, circle.size // step * ratio.numerator)
+        circle = _upsampled(circle, periods * ratio.numerator)
     if compensation is not None:
         circle = compensation.apply(circle)
     start = (pad + before) // step * ratio.numerator
     vibration: Floats = circle[start : start + round(duration_s * rate_hz)]
     return _faded(vibration, rate_hz)
+
+
+def _fast_length(samples: int) -> int:
+    """The next length without large prime factors, with which an FFT takes up to ten times longer.
+
+    The numbers of an exact ratio of rates are small already.
+    """
+    from scipy.fft import next_fast_len  # late: slow to load
+
+    return int(next_fast_len(samples, real=True))
+
+
+def _upsampled(circle: Floats, samples: int) -> Floats:
+    """One period of a signal in more samples: its spectrum with nothing above."""
+    from scipy.fft import irfft, rfft  # late: slow to load; scipy.signal, for resample, slower yet
+
+    spectrum = rfft(circle) * (samples / circle.size)
+    if circle.size % 2 == 0:
+        spectrum[-1] /= 2  # what lies at Nyquist is shared with its mirror image
+    upsampled: Floats = irfft(spectrum, n=samples)
+    return upsampled
 
 
 def fade_samples(samples: int, rate_hz: float) -> int:

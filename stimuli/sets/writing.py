@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from math import ceil, floor, log10
@@ -12,12 +13,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling import InputError, compensation_for
+from modeling import InputError, Threshold, compensation_for
 from modeling.arrays import Floats
 from modeling.files.folders import check_replaceable, replace_folder
 from modeling.files.reading import reason_of
 from modeling.files.writing import file_stem
-from modeling.perception.sensation_level import sensation_level
+from modeling.perception.sensation_level import SensationLevel, sensation_level
 from modeling.seeds import noise_stream
 from stimuli.sets.manifest import (
     COLUMNS_FILE,
@@ -48,6 +49,7 @@ from stimuli.sets.sources import (
     load_sources,
     recipe_of_copies,
 )
+from stimuli.sets.threads import in_order, thread_count
 from stimuli.sets.trajectories import Trajectory
 
 CONTACT_SHEET = "spectra.png"
@@ -138,10 +140,9 @@ def write_set(
     target = Path(folder)
     check_place(target)
     sources = sources or load_sources(recipe)
-    files = rendered(recipe, sources)
     stimuli = []
     try:
-        with replace_folder(target) as fresh:
+        with replace_folder(target) as fresh, closing(rendered(recipe, sources)) as files:
             copy_sources(recipe, sources, folder=fresh)
             for stimulus, data in files:
                 _write_new(fresh / stimulus.file, data)
@@ -191,10 +192,11 @@ def stimulus_count(recipe: Recipe, sources: Sources) -> int:
     return takes * len(recipe.rates_hz)
 
 
-def rendered(recipe: Recipe, sources: Sources) -> Iterator[tuple[Stimulus, bytes]]:
+def rendered(recipe: Recipe, sources: Sources) -> Generator[tuple[Stimulus, bytes]]:
     """Every stimulus of a recipe: its row of the manifest and its WAV file.
 
-    Gains are found at once, files rendered one by one as they are asked for.
+    Gains are found before the first, files rendered as they are asked for, by threads that keep a
+    little ahead; until it is exhausted, close the generator to end them.
 
     Raises
     ------
@@ -205,8 +207,17 @@ def rendered(recipe: Recipe, sources: Sources) -> Iterator[tuple[Stimulus, bytes
     gains = _gains(takes, recipe, sources)
     text = recipe_of_copies(recipe, sources)[0].to_toml()
     maker = _FileMaker(recipe, sources, hashlib.sha256(text.encode()).hexdigest())
-    pairs = zip(takes, gains, strict=True)
-    return (made for take, gain in pairs for made in maker.files(take, gain))
+    pairs = list(zip(takes, gains, strict=True))
+    threads = _threads_for(takes, sum(recipe.rates_hz))
+    with closing(in_order(lambda pair: maker.files(*pair), pairs, threads=threads)) as made:
+        for of_one_take in made:
+            yield from of_one_take
+
+
+def _threads_for(takes: Iterable[_Take], rate_hz: float) -> int:
+    """How many threads work on takes at a rate, or at several that add up to it."""
+    longest_s = max(take.trajectory.duration_s + take.settling_s for take in takes)
+    return thread_count(ceil(longest_s * rate_hz))
 
 
 def _takes(recipe: Recipe, sources: Sources) -> Iterator[_Take]:
@@ -223,12 +234,18 @@ def _gains(takes: Sequence[_Take], recipe: Recipe, sources: Sources) -> list[_Ga
     """One gain for each take. Rendered for this alone: keeping all takes would fill the memory."""
     if recipe.level.mode == "as modelled":
         return [_Gain() for _ in takes]
+    threads = _threads_for(takes, max(take.source.model.rate_hz for take in takes))
     if recipe.level.rms_db is not None:
-        return [_Gain(recipe.level.rms_db - _audible_level_db(take)) for take in takes]
-    return _loudness_gains(takes, sources, wanted_db=recipe.level.sensation_level_db)
+        wanted_db = recipe.level.rms_db
+        return [_Gain(wanted_db - own) for own in in_order(_level_db, takes, threads=threads)]
+    assert sources.threshold is not None  # a recipe that matches loudness names one
+    loudness = partial(_sensation_level, threshold=sources.threshold)
+    found = list(in_order(loudness, takes, threads=threads))
+    return _loudness_gains(found, wanted_db=recipe.level.sensation_level_db)
 
 
-def _audible_level_db(take: _Take) -> float:
+def _level_db(take: _Take) -> float:
+    """Refused for silence, which no gain brings to a level."""
     level = level_db(float(np.sqrt(np.mean(take.steady() ** 2))))
     if level == -np.inf:
         raise InputError(
@@ -238,18 +255,15 @@ def _audible_level_db(take: _Take) -> float:
     return level
 
 
-def _loudness_gains(
-    takes: Sequence[_Take], sources: Sources, *, wanted_db: float | None
-) -> list[_Gain]:
+def _sensation_level(take: _Take, *, threshold: Threshold) -> SensationLevel:
+    try:
+        return sensation_level(take.steady(), take.source.model.rate_hz, threshold=threshold)
+    except InputError as error:
+        raise InputError(f"{take.name}: {error}") from None
+
+
+def _loudness_gains(found: Sequence[SensationLevel], *, wanted_db: float | None) -> list[_Gain]:
     """All takes to one sensation level: the wanted one, or the median of what they have."""
-    assert sources.threshold is not None  # a recipe that matches loudness names one
-    found = []
-    for take in takes:
-        rate_hz = take.source.model.rate_hz
-        try:
-            found.append(sensation_level(take.steady(), rate_hz, threshold=sources.threshold))
-        except InputError as error:
-            raise InputError(f"{take.name}: {error}") from None
     if wanted_db is None:
         wanted_db = float(np.median([sensation.level_db for sensation in found]))
     return [_Gain(wanted_db - s.level_db, wanted_db, s.share_without_threshold) for s in found]
@@ -263,7 +277,7 @@ class _FileMaker:
     sources: Sources
     recipe_sha256: str
 
-    def files(self, take: _Take, gain: _Gain) -> Iterator[tuple[Stimulus, bytes]]:
+    def files(self, take: _Take, gain: _Gain) -> list[tuple[Stimulus, bytes]]:
         """The files of one take, one per rate, each with its row of the manifest."""
         with_margins = take.render() * 10 ** (gain.gain_db / 20)
         resampled = partial(
@@ -273,6 +287,7 @@ class _FileMaker:
             duration_s=take.trajectory.duration_s,
             settling_s=take.settling_s,
         )
+        made = []
         for rate_hz in self.recipe.rates_hz:
             vibration = resampled(rate_hz=rate_hz)
             written = vibration
@@ -291,7 +306,8 @@ class _FileMaker:
                 **measured(vibration, rate_hz, written=written),
                 **self._description(take),
             )
-            yield stimulus, data
+            made.append((stimulus, data))
+        return made
 
     def _file_name(self, take: _Take, rate_hz: int) -> str:
         """Seed and rate stand in the name only where there are several."""

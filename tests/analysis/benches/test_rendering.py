@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,23 +12,45 @@ import pytest
 from analysis.benches.rendering import (
     BLOCKS,
     BY_BLOCK,
-    CALLS,
+    FROM_PYTHON,
     LAYERS,
+    LFILTER,
+    LIVE,
     ONE_CALL,
     PARTS,
     PYTHON,
     RENDERER,
     SOSFILT,
+    SOUND_CARD,
     SWEEP,
     UPDATES,
     Effort,
     Line,
     RenderingBench,
+    Turn,
+    _best_ns,
     bench_rendering,
     stroke,
 )
-from analysis.benches.rivals import AR, COMPILED, DIRECT, FORMS, KERNEL, RATE_HZ, TRANSPOSED
-from analysis.figures.rendering import figure_rendering, plot_costs, plot_sweep
+from analysis.benches.rivals import (
+    AR,
+    COMPILED,
+    DIRECT,
+    FORMS,
+    KERNEL,
+    RATE_HZ,
+    TRANSPOSED,
+    layered_texture,
+    operations,
+)
+from analysis.figures.rendering import (
+    BLOCK_COLOURS,
+    FILTER_COLOURS,
+    figure_rendering,
+    plot_costs,
+    plot_sweep,
+)
+from modeling.rendering.plan import RenderPlan
 
 PARTS_TOLD: list[str] = []
 
@@ -40,23 +63,34 @@ def bench() -> RenderingBench:
 
 
 def planted() -> RenderingBench:
-    """A bench of known times: kernel 3 ns a layer, direct forms 2.5 and 1.5, AR 18, sosfilt 600."""
+    """A bench of known times: kernel 3 ns a layer, direct forms 2.5 and 1.5, AR 18, sosfilt 600.
+
+    Twice as much live.
+    """
     ns = {KERNEL: 3.0, DIRECT: 2.5, TRANSPOSED: 1.5, "TPT": 2.7, AR: 18.0}
     rows = [
-        (name, m, update, ns[name] * (1 if name == AR else m))
-        for name, m, update in product(COMPILED, LAYERS, UPDATES)
+        (called, name, m, update, factor * ns[name] * (1 if name == AR else m))
+        for (called, factor), name, m, update in product(
+            ((ONE_CALL, 1), (LIVE, 2)), COMPILED, LAYERS, UPDATES
+        )
     ]
-    by_block = {SOSFILT: 600.0, RENDERER: 12.0, CALLS: 5.0, ONE_CALL: 4.0}
-    rows += [(n, m, b, ns) for (n, ns), m, b in product(by_block.items(), LAYERS, BLOCKS)]
-    rows.append((PYTHON, 3, 5, 1500.0))
-    columns = ["filter", "layers", "update_samples", "ns_per_sample"]
+    by_block = {SOSFILT: 600.0, LFILTER: 120.0, RENDERER: 12.0}
+    rows += [
+        (FROM_PYTHON, n, m, b, ns) for (n, ns), m, b in product(by_block.items(), LAYERS, BLOCKS)
+    ]
+    rows.append((ONE_CALL, PYTHON, 3, 5, 1500.0))
+    rows.append((SOUND_CARD, KERNEL, 3, 48, 40.0))
+    columns = ["called", "filter", "layers", "update_samples", "ns_per_sample"]
     return RenderingBench(
         times=pd.DataFrame(rows, columns=columns),
-        sweep=pd.DataFrame({"layers": SWEEP, "ns_per_sample": 3.0 * np.array(SWEEP)}),
+        sweep=pd.DataFrame(
+            {"layers": SWEEP, "ns_per_sample": 3.0 * np.array(SWEEP), "ar_ns_per_sample": 18.0}
+        ),
         line=Line(3.0, 0.0, 1.0),
         memory_bytes=1000,
         import_s=0.6,
-        machine="a processor, -O3",
+        machine="a processor",
+        compiler="a compiler: -O3",
     )
 
 
@@ -64,58 +98,104 @@ def test_every_combination_is_measured(bench: RenderingBench) -> None:
     times = bench.times
     assert np.isfinite(times["ns_per_sample"]).all()
     assert (times["ns_per_sample"] > 0).all()
-    measured = set(zip(times["filter"], times["layers"], times["update_samples"], strict=True))
-    wanted = set(product(COMPILED, LAYERS, UPDATES))
-    wanted |= set(product(BY_BLOCK, LAYERS, BLOCKS))
-    assert measured == wanted | {(PYTHON, 3, 5)}
+    keys = ["called", "filter", "layers", "update_samples"]
+    measured = set(times[keys].itertuples(index=False, name=None))
+    wanted = set(product((ONE_CALL, LIVE), COMPILED, LAYERS, UPDATES))
+    wanted |= set(product([FROM_PYTHON], BY_BLOCK, LAYERS, BLOCKS))
+    wanted |= {(ONE_CALL, PYTHON, 3, 5), (SOUND_CARD, KERNEL, 3, 48)}
+    assert measured == wanted
     assert len(times) == len(measured)
     assert tuple(bench.sweep["layers"]) == SWEEP
-    assert (bench.sweep["ns_per_sample"] > 0).all()
+    assert (bench.sweep[["ns_per_sample", "ar_ns_per_sample"]] > 0).all(axis=None)
     assert 0 < bench.import_s < np.inf
     assert bench.memory_bytes > 0
-    assert "-std=c99 -O3" in bench.machine
     assert len(PARTS_TOLD) == PARTS
 
 
+def test_it_says_what_compiled_it_and_how(bench: RenderingBench) -> None:
+    assert bench.compiler.startswith(("GCC ", "Clang ", "another compiler"))
+    assert "-std=c99 -O3 -ffp-contract=off" in bench.compiler
+    assert "/" not in bench.compiler.split(": ", 1)[1]
+    assert bench.machine
+
+
 def test_tables_and_aims_cover_every_combination(bench: RenderingBench) -> None:
-    filters, blocks = bench.filters, bench.blocks
-    assert list(zip(filters["layers"], filters["update_samples"], strict=True)) == list(
-        product(LAYERS, UPDATES)
-    )
+    blocks = bench.blocks
+    for filters in (bench.throughput, bench.live):
+        assert list(zip(filters["layers"], filters["update_samples"], strict=True)) == list(
+            product(LAYERS, UPDATES)
+        )
+        assert np.isfinite(filters.to_numpy()).all()
     assert list(zip(blocks["layers"], blocks["block_samples"], strict=True)) == list(
         product(LAYERS, BLOCKS)
     )
-    assert np.isfinite(filters.to_numpy()).all()
     assert np.isfinite(blocks.to_numpy()).all()
     counts = bench.aims["what"].value_counts()
-    for name in FORMS:
-        assert counts[f"kernel / {name}"] == len(LAYERS) * len(UPDATES)
-    assert counts["AR(20) / kernel"] == len(UPDATES)
-    for name in (RENDERER, CALLS, ONE_CALL):
-        assert counts[f"sosfilt / {name}"] == len(LAYERS) * len(BLOCKS)
+    for name, called in product(FORMS, (ONE_CALL, LIVE)):
+        assert counts[f"kernel / {name}, {called}"] == len(LAYERS) * len(UPDATES)
+    assert counts["AR(20) / kernel, one call"] == len(UPDATES)
+    assert counts["sosfilt / Renderer"] == len(LAYERS) * len(BLOCKS)
 
 
 def test_ratios_and_verdicts_of_known_times() -> None:
     bench = planted()
-    assert bench.filters["kernel / direct form I"].to_numpy() == pytest.approx(1.2)
-    assert bench.filters["kernel / direct form II"].to_numpy() == pytest.approx(2.0)
-    assert bench.filters["AR(20) / kernel"].to_numpy() == pytest.approx(
-        np.repeat([6.0, 2.0, 0.75], 3)
-    )
+    for table in (bench.throughput, bench.live):
+        assert table["kernel / direct form I"].to_numpy() == pytest.approx(1.2)
+        assert table["kernel / direct form II"].to_numpy() == pytest.approx(2.0)
+        assert table["AR(20) / kernel"].to_numpy() == pytest.approx(np.repeat([6.0, 2.0, 0.75], 3))
+    assert bench.live[KERNEL].to_numpy() == pytest.approx(2 * bench.throughput[KERNEL].to_numpy())
     assert bench.blocks["sosfilt / Renderer"].to_numpy() == pytest.approx(50.0)
-    assert bench.blocks["sosfilt / kernel by block"].to_numpy() == pytest.approx(120.0)
-    assert bench.blocks["sosfilt / kernel in one call"].to_numpy() == pytest.approx(150.0)
+    assert bench.blocks["lfilter / Renderer"].to_numpy() == pytest.approx(10.0)
     assert bench.python_ns == 1500.0
+    assert bench.sound_card_ns == 40.0
+    assert bench.ar_cheaper_from == 8  # at six layers both take 18 ns
     verdicts = bench.aims.set_index(["what", "where"])["met"]
-    assert verdicts["kernel / direct form I"].all()
-    assert not verdicts["kernel / direct form II"].any()
-    assert not verdicts["AR(20) / kernel"].any()
+    assert verdicts["kernel / direct form I, one call"].all()
+    assert not verdicts["kernel / direct form II, one call"].any()
+    assert verdicts["kernel / direct form II, live"].all()
+    assert verdicts["AR(20) / kernel, one call"].all()
     for layers in LAYERS:
         assert not verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 32"]
         assert verdicts["sosfilt / Renderer", f"layers {layers}, blocks of 1024"]
-    assert verdicts["sosfilt / kernel by block"].all()
     assert verdicts["cost is linear in layers: R²"].all()
     assert not verdicts["import modeling, s"].any()
+
+
+@pytest.mark.parametrize(
+    ("kernel_ns", "layers"), [([1.0] * 8, None), ([30.0] * 8, 1), ([30.0] + [1.0] * 6 + [30.0], 16)]
+)
+def test_from_which_number_of_layers_on_the_rival_is_cheaper(
+    kernel_ns: list[float], layers: int | None
+) -> None:
+    bench = planted()
+    assert replace(bench, sweep=bench.sweep.assign(ns_per_sample=kernel_ns)).ar_cheaper_from == (
+        layers
+    )
+
+
+def test_turns_are_timed_one_by_one_and_the_best_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five blocks of a slow filter are five measurements, not one of five times the length."""
+    taken = iter([3.0, 2.0, 4.0, 10.0] * 2)  # seconds that each run takes
+    now = [0.0]
+    monkeypatch.setattr("analysis.benches.rendering.perf_counter", lambda: now[0])
+
+    def run() -> None:
+        now[0] += next(taken)
+
+    found = _best_ns({"slow": Turn(run, 2, repeats=3), "fast": Turn(run, 100)}, turns=2)
+    assert found == {"slow": pytest.approx(1e9), "fast": pytest.approx(1e8)}
+
+
+@pytest.mark.parametrize("layers", LAYERS)
+def test_operations_of_the_kernel_are_those_of_its_plan(layers: int) -> None:
+    """But for the noise and the readings of the hand, which every form has."""
+    cost = RenderPlan(rate_hz=RATE_HZ, update_samples=5).cost(layered_texture(layers))
+    shared = RenderPlan(rate_hz=RATE_HZ, update_samples=5).cost(layered_texture(1).with_layers([]))
+    found = operations(KERNEL, layers)
+    branch = operations(KERNEL, 0)
+    products = cost.per_sample.multiplications - shared.per_sample.multiplications
+    sums = cost.per_sample.additions - shared.per_sample.additions
+    assert found == (products + branch.products, sums + branch.sums)
 
 
 def test_the_line_runs_through_the_sweep(bench: RenderingBench) -> None:
@@ -127,9 +207,9 @@ def test_the_line_runs_through_the_sweep(bench: RenderingBench) -> None:
 
 def test_the_hand_strokes_to_and_fro_over_the_whole_grid() -> None:
     speed, force = stroke(20480, rate_hz=RATE_HZ)
-    assert speed.min() == 0.0
     assert speed.max() == pytest.approx(300.0, rel=1e-3)
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(speed))) > 0)
+    assert speed.min() == pytest.approx(-300.0, rel=1e-3)
+    turns = np.flatnonzero(np.diff(np.sign(speed[1:])))
     assert np.diff(turns) == pytest.approx(RATE_HZ / 4, abs=2)  # 2 Hz: two reversals a period
     assert force.min() >= 0.5
     assert force.max() - force.min() > 1.0
@@ -138,25 +218,35 @@ def test_the_hand_strokes_to_and_fro_over_the_whole_grid() -> None:
 def test_the_figure_shows_what_was_measured() -> None:
     bench = planted()
     figure = figure_rendering(bench)
-    assert len(figure.axes) == 6
+    assert len(figure.axes) == 9
     assert bench.machine in figure.get_supxlabel()
-    for ax in figure.axes[:5]:
-        assert ax.get_yscale() == "log"
+    assert bench.compiler in figure.get_supxlabel()
+    for ax in figure.axes[:8]:
         assert ax.get_ylabel() == "time per sample (ns)"
         assert ax.get_xlabel() == "layers"
         low, high = ax.get_ylim()
         assert all(low < bar.get_height() < high for bar in ax.patches)
-    heights = [bar.get_height() for bar in figure.axes[0].patches]
-    wanted = bench.filters[bench.filters["update_samples"] == 1]
-    assert heights == pytest.approx([ns for name in COMPILED for ns in wanted[name]])
+    for panel, table in ((0, bench.throughput), (3, bench.live)):
+        heights = [bar.get_height() for bar in figure.axes[panel].patches]
+        wanted = table[table["update_samples"] == 1]
+        assert heights == pytest.approx([ns for name in COMPILED for ns in wanted[name]])
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend == [*COMPILED, ONE_CALL, CALLS, RENDERER, SOSFILT]
+    assert legend == [*COMPILED, RENDERER, LFILTER, SOSFILT]
+
+
+def test_no_two_series_have_one_colour() -> None:
+    colours = [*FILTER_COLOURS.values(), *BLOCK_COLOURS.values()]
+    assert len(set(colours)) == len(colours)
 
 
 def test_panels_stand_alone() -> None:
     bench = planted()
     ax = plot_sweep(bench)
-    assert "3 ns per layer" in ax.texts[0].get_text()
+    assert {text.get_text() for text in ax.texts} == {AR, "kernel: 3 ns per layer, R² = 1.0000"}
     assert ax.lines[0].get_ydata() == pytest.approx([0.0, 48.0])
+    assert ax.lines[2].get_ydata() == pytest.approx([18.0, 18.0])
     rows = bench.blocks[bench.blocks["block_samples"] == 32]
-    assert len(plot_costs(rows, {SOSFILT: "black"}).patches) == len(LAYERS)
+    panel = plot_costs(rows, {SOSFILT: "black"}, logarithmic=True)
+    assert len(panel.patches) == len(LAYERS)
+    assert panel.get_yscale() == "log"
+    assert plot_costs(rows, {SOSFILT: "black"}).get_ylim()[0] == 0

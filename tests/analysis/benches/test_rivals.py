@@ -19,6 +19,7 @@ from analysis.benches.rivals import (
     TPT,
     TRANSPOSED,
     CompiledStream,
+    LfilterStream,
     SosfiltStream,
     compiled_parts,
     layered_texture,
@@ -71,13 +72,14 @@ def test_all_layered_filters_agree_while_the_hand_is_held(
     for name in (*FORMS, TPT):
         found = stream(name, texture, update).render(*hand)
         assert np.abs(found - expected).max() <= 1e-9 * scale
-    sosfilt = SosfiltStream(texture, np.random.default_rng(0))
     noise = white_noise(KEY, 0, SAMPLES)
-    blocks = [
-        sosfilt.filter(noise[start : start + 32], speed, force_n=force)
-        for start in range(0, SAMPLES, 32)
-    ]
-    assert np.abs(np.concatenate(blocks) - expected).max() <= 1e-9 * scale
+    for kind in (SosfiltStream, LfilterStream):
+        filters = kind(texture, np.random.default_rng(0))
+        blocks = [
+            filters.filter(noise[start : start + 32], speed, force_n=force)
+            for start in range(0, SAMPLES, 32)
+        ]
+        assert np.abs(np.concatenate(blocks) - expected).max() <= 1e-9 * scale
 
 
 def at_updates(texture: TextureModel, update: int):

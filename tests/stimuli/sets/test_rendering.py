@@ -7,11 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy.fft
 import soundfile
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import wavfile
-from scipy.signal import iirpeak, lfilter
+from scipy.signal import firwin, iirpeak, lfilter, resample
 
 from modeling import Compensation, Renderer, TextureModel, fit_ar, regressed
 from modeling.models.loading import AnyModel
@@ -108,6 +109,73 @@ def test_a_sinusoid_stays_one_up_to_the_ends() -> None:
         expected = np.sin(2 * np.pi * 2200 * np.arange(rate_hz) / rate_hz)
         error = steady_part(found - expected, rate_hz)
         assert 20 * np.log10(np.abs(error).max()) < -110
+
+
+def circle_of(with_margins: np.ndarray, step: int) -> np.ndarray:
+    """5 kHz with faded margins of 0.1 s, and no more zeros than the ratio of the rates needs."""
+    ends = 0.5 - 0.5 * np.cos(np.pi * (np.arange(500) + 0.5) / 500)
+    faded = with_margins.copy()
+    faded[:500] *= ends
+    faded[-500:] *= ends[::-1]
+    return np.pad(faded, (0, -faded.size % step))
+
+
+@pytest.mark.parametrize(("rate_hz", "ratio"), [(44_100, (441, 50)), (48_000, (48, 5))])
+@pytest.mark.parametrize("duration_s", [1.0, 1.6846, 1.3131])
+def test_more_zeros_change_only_what_lies_at_nyquist(
+    rate_hz: int, ratio: tuple[int, int], duration_s: float
+) -> None:
+    """White noise as by SciPy on the shortest circle, but at the model's Nyquist frequency itself,
+    where a sampled signal says too little; and one band up to 2.2 kHz everywhere."""
+    faster, step = ratio
+    count = round(duration_s * 5000) + 1000
+    white = np.random.default_rng(1).standard_normal(count + 1000)
+    lowpass = firwin(1001, 2200.0, fs=5000, window=("kaiser", 20))
+    for noise, largest in ((white, 1e-2), (np.convolve(white, lowpass, "same"), 1e-7)):
+        with_margins = noise[500:-500]
+        found = at_rate(
+            with_margins, 5000.0, rate_hz=rate_hz, duration_s=duration_s, settling_s=0.0
+        )
+        circle = circle_of(with_margins, step)
+        whole = resample(circle, circle.size // step * faster)
+        expected = steady_part(whole[faster * 500 // step :][: found.size], rate_hz)
+        error = steady_part(found, rate_hz) - expected
+        assert np.abs(error).max() < largest * np.abs(expected).max()
+        lines = np.abs(np.fft.rfft(error * np.blackman(error.size))) ** 2
+        near = np.abs(np.fft.rfftfreq(error.size, 1 / rate_hz) - 2500.0) <= 10.0
+        assert lines[~near].sum() <= 1e-4 * lines.sum()
+    if circle.size == 7000:  # fast already
+        assert np.abs(error).max() < 1e-12
+
+
+@pytest.mark.parametrize("samples", [5000, 7919, 28_537])
+@pytest.mark.parametrize("rate_hz", [6000, 44_100, 48_000])
+def test_ffts_have_lengths_without_large_prime_factors(
+    monkeypatch: pytest.MonkeyPatch, samples: int, rate_hz: int
+) -> None:
+    """Forth and back, whatever the duration; a length like 10 × 5707 takes ten times as long."""
+    lengths = []
+    rfft, irfft = scipy.fft.rfft, scipy.fft.irfft
+
+    def forth(values: np.ndarray) -> np.ndarray:
+        lengths.append(values.size)
+        return rfft(values)
+
+    def back(spectrum: np.ndarray, n: int) -> np.ndarray:
+        lengths.append(n)
+        return irfft(spectrum, n)
+
+    monkeypatch.setattr(scipy.fft, "rfft", forth)
+    monkeypatch.setattr(scipy.fft, "irfft", back)
+    at_rate(
+        np.ones(samples + 1000), 5000.0, rate_hz=rate_hz, duration_s=samples / 5000, settling_s=0.0
+    )
+    assert len(lengths) == 2
+    for length in lengths:
+        for prime in (2, 3, 5, 7):
+            while length % prime == 0:
+                length //= prime
+        assert length == 1
 
 
 def test_odd_model_rates_keep_their_frequencies() -> None:

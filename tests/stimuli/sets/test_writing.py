@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ import soundfile
 from modeling import InputError, TextureModel, Threshold, fit_ar, regressed
 from modeling.perception.sensation_level import sensation_level
 from stimuli.planted.textures import planted_texture, record_texture
+from stimuli.sets import writing
 from stimuli.sets.manifest import COLUMNS, Stimulus
 from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.rendering import fade_samples
@@ -146,6 +148,72 @@ def test_set_is_reproducible_to_the_bit_from_its_own_recipe(
     write_set(tmp_path / "moved", Recipe.load(tmp_path / "moved/recipe.toml"))
     assert contents(tmp_path / "moved") == first
     assert len(first) == 2 * 2 * 2 + 3 + 4
+
+
+LEVELS = {
+    "as modelled": {},
+    "rms": {"level": Level(mode="rms", rms_db=-20.0)},
+    "loudness": {"level": Level(mode="loudness", full_scale_g=4.0), "format": "pcm24"},
+}
+
+
+@pytest.mark.parametrize("mode", LEVELS)
+def test_threads_change_nothing(
+    tmp_path: Path, recipe: MakeRecipe, monkeypatch: pytest.MonkeyPatch, mode: str
+) -> None:
+    """One thread and four: the same files, rows and progress, told and written by the caller."""
+    made = recipe(rates_hz=(5000, 44_100), seeds=tuple(range(8)), **LEVELS[mode])
+    told: dict[int, list[str]] = {1: [], 4: []}
+    callers, writers = set(), set()
+    write_bytes = Path.write_bytes
+
+    def noted(path: Path, data: bytes) -> int:
+        writers.add(threading.current_thread())
+        return write_bytes(path, data)
+
+    monkeypatch.setattr(Path, "write_bytes", noted)
+    for threads, names in told.items():
+        monkeypatch.setattr(writing, "thread_count", lambda _, threads=threads: threads)
+
+        def tell(name: str, names: list[str] = names) -> None:
+            names.append(name)
+            callers.add(threading.current_thread())
+
+        write_set(tmp_path / str(threads), made, progress=tell)
+    assert contents(tmp_path / "1") == contents(tmp_path / "4")
+    assert told[1] == told[4] == [row["file"] for row in manifest(tmp_path / "4")]
+    assert len(told[4]) == 64
+    assert callers == writers == {threading.current_thread()}
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt, SystemExit, InputError])
+def test_an_end_before_the_end_leaves_no_thread_and_the_old_set(
+    tmp_path: Path, recipe: MakeRecipe, monkeypatch: pytest.MonkeyPatch, ending: type[BaseException]
+) -> None:
+    """A signal to the caller between two files, and a file in the middle that is refused."""
+    write_set(tmp_path / "set", recipe())
+    before, alive = contents(tmp_path), threading.active_count()
+    monkeypatch.setattr(writing, "thread_count", lambda _: 4)
+    check_finite, checked, told = writing._check_finite, [], []
+
+    def refuse_some(samples: np.ndarray, file: str, sample_format: str) -> None:
+        checked.append(file)
+        if ending is InputError and file.endswith(("seed9.wav", "seed11.wav")):
+            raise InputError(file)
+        check_finite(samples, file, sample_format)
+
+    def end_after_nine(file: str) -> None:
+        told.append(file)
+        if ending is not InputError and len(told) == 9:
+            raise ending(file)
+
+    monkeypatch.setattr(writing, "_check_finite", refuse_some)
+    with pytest.raises(ending, match=r"wall-paper_full_100mms_1N_seed[89]\.wav"):
+        write_set(tmp_path / "set", recipe(seeds=tuple(range(100))), progress=end_after_nine)
+    assert len(told) == 9
+    assert len(checked) <= 9 + 2 * 4
+    assert threading.active_count() == alive
+    assert contents(tmp_path) == before
 
 
 def test_seeds_and_streams(tmp_path: Path, recipe: MakeRecipe) -> None:

@@ -1,0 +1,49 @@
+"""Work in several threads: NumPy, the rendering kernel and hashes let go of Python's lock."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+# All threads together work on this many samples, in at most 0.1 kB each.
+SAMPLES_AT_ONCE = 2**24
+
+
+def thread_count(samples: int) -> int:
+    """How many threads for pieces of work on this many samples each: the usable cores at most.
+
+    One for long pieces, which fill the memory.
+    """
+    from joblib import cpu_count  # late: slow to load
+
+    cores: int = cpu_count()
+    return max(1, min(cores, SAMPLES_AT_ONCE // max(samples, 1)))
+
+
+def in_order(
+    work: Callable[[Item], Result], items: Sequence[Item], *, threads: int
+) -> Generator[Result]:
+    """The work on each item, in the order of the items; with one thread in the caller's.
+
+    Not far ahead of who takes the results, so that few of them are held. An exception comes where
+    the result would have come. When the generator is closed, or ends, no thread goes on.
+    """
+    if threads == 1 or len(items) < 2:
+        yield from map(work, items)
+        return
+    pool = ThreadPoolExecutor(threads)
+    begun: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            begun.append(pool.submit(work, item))
+            if len(begun) == 2 * threads:
+                yield begun.popleft().result()
+        while begun:
+            yield begun.popleft().result()
+    finally:
+        pool.shutdown(cancel_futures=True)
