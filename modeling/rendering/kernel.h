@@ -14,7 +14,7 @@
    TQ_SQRT(x)       another square root of a tq_real.
 
    Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, taps) reals; then call
-   tq_render as often as you like, with blocks of any size.
+   tq_render or tq_render_held as often as you like, with blocks of any size.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -683,14 +683,15 @@ TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *spe
     }
 }
 
-/* The next `count` samples for a hand whose speed and force are given at each of them. */
+/* The next `count` samples for a hand whose speed (mm/s, signed: without its sign the hand would be
+   extrapolated past its reversals) and force (N) are given at each of them. */
 static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
                       tq_real *out, size_t count)
 {
     tq_render_by(t, s, speed, force, 1, out, count);
 }
 
-/* The next `count` samples for a hand whose speed and force are held. */
+/* The next `count` samples for a hand whose speed and force are held, as where one is read a block. */
 static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real speed, tq_real force,
                                   tq_real *out, size_t count)
 {
