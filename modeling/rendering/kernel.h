@@ -685,8 +685,8 @@ TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *spe
 
 /* The next `count` samples for a hand whose speed (mm/s, signed: without its sign the hand would be
    extrapolated past its reversals) and force (N) are given at each of them. */
-static void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed, const tq_real *force,
-                      tq_real *out, size_t count)
+static inline void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed,
+                             const tq_real *force, tq_real *out, size_t count)
 {
     tq_render_by(t, s, speed, force, 1, out, count);
 }
