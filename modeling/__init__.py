@@ -28,6 +28,7 @@ HOMES = {
     "vibrators.compensation": "Compensation compensation_for flat_band",
     "vibrators.identification": "identify_vibrator",
     "rendering.limits": "Limits",
+    "rendering.many": "render_many",
     "rendering.renderer": "Renderer",
     "similarity": "",
 }
@@ -58,6 +59,7 @@ if TYPE_CHECKING:
     from modeling.recordings.spectrum import spectrum as spectrum
     from modeling.regression.driving import regressed as regressed
     from modeling.rendering.limits import Limits as Limits
+    from modeling.rendering.many import render_many as render_many
     from modeling.rendering.renderer import Renderer as Renderer
     from modeling.vibrators.compensation import Compensation as Compensation
     from modeling.vibrators.compensation import compensation_for as compensation_for

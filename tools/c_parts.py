@@ -1,7 +1,7 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
 `modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
-`analysis.benches._rivals` what the bench compares it with.
+`_many` renders many streams side by side, `analysis.benches._rivals` is what the bench compares.
 """
 
 from __future__ import annotations
@@ -13,9 +13,13 @@ from cffi import FFI
 
 ROOT = Path(__file__).resolve().parent.parent
 KERNEL = ROOT / "modeling" / "rendering" / "kernel.h"
+MANY = ROOT / "modeling" / "rendering" / "many.h"
+MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
 RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
+# No result changes, but both ways of a choice may be computed, which vectors do.
+VECTOR_ARGUMENTS = [*COMPILER_ARGUMENTS, "-fno-trapping-math"]
 
 
 def declarations(header: Path) -> str:
@@ -27,20 +31,27 @@ def declarations(header: Path) -> str:
     return "\n".join([*structures, *(f"{call};" for call in calls)])
 
 
-def binding(name: str, *headers: Path, real: str = "double") -> FFI:
+def binding(
+    name: str,
+    *headers: Path,
+    real: str = "double",
+    constants: str = "TQ_CHUNK, TQ_LANES, TQ_ROWS",
+    included: tuple[Path, ...] = (),
+    arguments: list[str] = COMPILER_ARGUMENTS,
+) -> FFI:
     """A builder of extension `name` over these headers, the last one including the others."""
     builder = FFI()
     builder.cdef(
-        f"typedef {real} tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS;"
+        f"typedef {real} tq_real; static const int {constants};"
         + "\n".join(declarations(header) for header in headers)
     )
     builder.set_source(
         name,
         f'#include "{headers[-1].name}"',
         include_dirs=[str(header.parent) for header in headers],
-        depends=[str(header) for header in headers],
-        define_macros=[("TQ_REAL", real), ("TQ_FLAGS", f'"{" ".join(COMPILER_ARGUMENTS)}"')],
-        extra_compile_args=COMPILER_ARGUMENTS,
+        depends=[str(header) for header in (*headers, *included)],
+        define_macros=[("TQ_REAL", real), ("TQ_FLAGS", f'"{" ".join(arguments)}"')],
+        extra_compile_args=arguments,
         optional=True,  # no compiler: the Python renderer does the same, slower
     )
     return builder
@@ -49,3 +60,11 @@ def binding(name: str, *headers: Path, real: str = "double") -> FFI:
 kernel = binding("modeling.rendering._kernel", KERNEL)
 kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
 rivals = binding("analysis.benches._rivals", KERNEL, RIVALS)
+many = binding(
+    "modeling.rendering._many",
+    KERNEL,
+    MANY,
+    constants="TQ_BLOCK, TQ_STREAMS",
+    included=(MANY_LANES,),
+    arguments=VECTOR_ARGUMENTS,
+)

@@ -9,7 +9,7 @@ import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
 from analysis.benches.stability import FORMS, simulate
-from modeling import Renderer, TextureModel
+from modeling import TextureModel, render_many
 from modeling.arrays import Floats
 from modeling.equalizer.bands import band_rms
 from modeling.hand import Hand
@@ -98,7 +98,10 @@ def step_signals(step: str, *, streams: int = STREAMS) -> StepSignals:
 
 
 def _rendered(model: TextureModel, hand: Hand, streams: int) -> Floats:
-    return np.stack([Renderer(model, stream=i).render(*hand) for i in range(streams)])
+    each = range(streams)
+    return np.stack(
+        render_many([model] * streams, [hand] * streams, seeds=[0] * streams, streams=each)
+    )
 
 
 def above_click_hz(signals: Floats, *, rate_hz: float = 5000.0) -> Floats:

@@ -35,6 +35,32 @@ def is_compiled() -> bool:
     return Call is not None and not os.environ.get(SWITCH)
 
 
+def filled_texture(ffi: Any, fields: dict[str, Any], real: type) -> tuple[Any, list[Any]]:
+    """A `tq_texture` of these fields, and the arrays that it only points at."""
+    texture = ffi.new("tq_texture *")
+    arrays: list[Any] = []
+    for name, value in fields.items():
+        field = value
+        if isinstance(value, np.ndarray):
+            arrays.append(np.ascontiguousarray(value, dtype=real))
+            field = ffi.from_buffer("tq_real[]", arrays[-1])
+        setattr(texture, name, field)
+    return texture, arrays
+
+
+def render_counters(counters: Any) -> RenderCounters:
+    """A `tq_counters`."""
+    return RenderCounters(
+        lift_offs=counters.lift_offs,
+        above_grid=counters.above_grid,
+        below_grid=counters.below_grid,
+        clamped=counters.clamped,
+        limited_peak=counters.peak,
+        limited_rms=counters.rms,
+        limited_duration=counters.duration,
+    )
+
+
 class CompiledEngine:
     """Renders layered models; in double precision bit for bit the same as the `PythonEngine`."""
 
@@ -46,14 +72,7 @@ class CompiledEngine:
         module = _kernel_single if plan.single else _kernel
         self._ffi, self._real = module.ffi, plan.precision
         ffi, lib = module.ffi, module.lib
-        self._texture = ffi.new("tq_texture *")
-        arrays = []  # which the structure only points at
-        for name, value in plan.texture(model).items():
-            field = value
-            if isinstance(value, np.ndarray):
-                arrays.append(np.ascontiguousarray(value, dtype=self._real))
-                field = ffi.from_buffer("tq_real[]", arrays[-1])
-            setattr(self._texture, name, field)
+        self._texture, arrays = filled_texture(ffi, plan.texture(model), self._real)
         layers, taps = self._texture.layers, self._texture.taps
         self._row = -(-layers // lib.TQ_LANES) * lib.TQ_LANES
         reals = lib.TQ_ROWS * self._row + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
@@ -70,16 +89,7 @@ class CompiledEngine:
     @property
     def counters(self) -> RenderCounters:
         """What had to be corrected so far."""
-        counters = self._state.counters
-        return RenderCounters(
-            lift_offs=counters.lift_offs,
-            above_grid=counters.above_grid,
-            below_grid=counters.below_grid,
-            clamped=counters.clamped,
-            limited_peak=counters.peak,
-            limited_rms=counters.rms,
-            limited_duration=counters.duration,
-        )
+        return render_counters(self._state.counters)
 
     @property
     def states(self) -> Floats:

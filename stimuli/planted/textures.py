@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import InputError, Recording, RecordingSet, Renderer, TextureModel
+from modeling import InputError, Recording, RecordingSet, TextureModel, render_many
 from modeling.arrays import Floats
 from modeling.checks import check_duration
 from modeling.equalizer.bands import band_rms
@@ -243,17 +243,22 @@ def record_texture(
     check_duration(duration_s, rate_hz)
     at_rate = truth.at_rate(rate_hz)
     settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
-    records = []
-    # Two textures under one seed must not share their noise.
-    texture_seed = noise_seed(seed, truth.texture)
     conditions = [(v, f) for v in truth.speeds_mm_s.tolist() for f in truth.forces_n.tolist()]
-    for stream, (speed, force) in enumerate(conditions):
-        renderer = Renderer(at_rate, seed=texture_seed, stream=stream)
-        vibration = renderer.render(speed, force, samples=settling + samples)[settling:]
-        records.append(
-            Recording(sensed(vibration), rate_hz, speed, force, truth.texture, simulated=True)
-        )
-    return RecordingSet(records)
+    count = len(conditions)
+    held = {value: np.full(settling + samples, value) for each in conditions for value in each}
+    vibrations = render_many(
+        [at_rate] * count,
+        [(held[speed], held[force]) for speed, force in conditions],
+        # Two textures under one seed must not share their noise.
+        seeds=[noise_seed(seed, truth.texture)] * count,
+        streams=range(count),
+    )
+    return RecordingSet(
+        [
+            Recording(sensed(g[settling:]), rate_hz, *condition, truth.texture, simulated=True)
+            for g, condition in zip(vibrations, conditions, strict=True)
+        ]
+    )
 
 
 def sensed(acceleration_g: Floats) -> Floats:

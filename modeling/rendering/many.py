@@ -1,0 +1,221 @@
+"""Many streams side by side: `many.h` by way of cffi, on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from modeling.arrays import Floats
+from modeling.errors import InputError
+from modeling.hand import Hand
+from modeling.models.ar_model import ARModel
+from modeling.models.parameter_table import ParameterTable
+from modeling.rendering.compiled import filled_texture, is_compiled, render_counters
+from modeling.rendering.limits import Limits
+from modeling.rendering.noise import stream_key
+from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, RenderPlan
+from modeling.rendering.renderer import Renderer
+
+try:
+    from modeling.rendering._many import ffi, lib
+except ImportError:  # no compiler at installation, or one without vectors
+    lib = ffi = None
+
+WIDTHS = (2, 4, 8)  # streams in one vector
+CACHE_LINE = 8  # numbers
+
+
+def render_many(
+    models: Sequence[LayeredModel | ARModel],
+    hands: Sequence[tuple[ArrayLike, ArrayLike]],
+    *,
+    seeds: Sequence[int],
+    streams: Sequence[int] | None = None,
+    rate_hz: float | None = None,
+    update_samples: int | None = None,
+    limits: Limits | None = None,
+    compensation: Notch | None = None,
+) -> list[Floats]:
+    """Vibrations of k models under k hands, each from its start.
+
+    The same bits as `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
+    one after the other, but side by side in the processor's vectors and on all cores that this
+    process may use (docs/method/rendering.md#many-streams). What shares a number of layers and
+    rates runs together; an ARModel is rendered alone.
+
+    Parameters
+    ----------
+    models : (k,) sequence of TextureModel, RegressedModel or ARModel
+        What to render; one model may come many times.
+    hands : (k,) sequence of pairs of (n_i,) array_like
+        Tangential speed (mm/s, either direction) and normal force (N) at each sample, each pair of
+        its own length. NaN and infinite values count as lift-off.
+    seeds, streams : (k,) sequences of int
+        Which noise, 0 … 2⁶⁴ − 1; streams are 0 by default.
+    rate_hz, update_samples, limits, compensation : optional
+        As for `Renderer`, the same for all.
+
+    Returns
+    -------
+    list of (n_i,) ndarray
+        Acceleration in the models' units (g).
+
+    Raises
+    ------
+    InputError
+        For sequences of different lengths, for a hand that is not two arrays of one length, and
+        where `Renderer` refuses a model or an option.
+    """
+    streams = [0] * len(models) if streams is None else streams
+    if not len(models) == len(hands) == len(seeds) == len(streams):
+        raise InputError(
+            "expected as many hands, seeds and streams as models, got "
+            f"{len(models)} models, {len(hands)} hands, {len(seeds)} seeds and {len(streams)} "
+            "streams; give one of each for every signal."
+        )
+    options = {
+        "rate_hz": rate_hz,
+        "update_samples": update_samples,
+        "limits": limits,
+        "compensation": compensation,
+    }
+    checked = [_checked(number, hand) for number, hand in enumerate(hands)]
+    noise = list(zip(seeds, streams, strict=True))
+    return [signal for signal, _ in rendered(models, checked, noise, options=options)]
+
+
+def rendered(
+    models: Sequence[LayeredModel | ARModel],
+    hands: Sequence[Hand],
+    noise: Sequence[tuple[int, int]],
+    *,
+    options: dict[str, Any],
+    lanes: int | None = None,
+) -> list[tuple[Floats, RenderCounters]]:
+    """Each signal, and what had to be corrected in it.
+
+    `noise` is seed and stream of each; `options` are those of `Renderer`; `lanes` is how many
+    streams go into one vector, by default as many as the processor can take.
+    """
+    if lib is None or not is_compiled():
+        return [_alone(*each, options) for each in zip(models, hands, noise, strict=True)]
+    results: dict[int, tuple[Floats, RenderCounters]] = {}
+    textures: dict[int, _Texture] = {}
+    alike: dict[tuple[float, ...], list[_Stream]] = defaultdict(list)
+    for number, (model, hand, which) in enumerate(zip(models, hands, noise, strict=True)):
+        if isinstance(model, ARModel):
+            results[number] = _alone(model, hand, which, options)
+            continue
+        if id(model) not in textures:
+            textures[id(model)] = _Texture(model, Renderer(model, **options).plan)
+        texture = textures[id(model)]
+        alike[texture.kind].append(_Stream(number, texture, stream_key(*which), hand))
+    tasks = list(_tasks(alike.values(), lanes or lib.tq_widest()))
+    for task, corrected in zip(tasks, _on_all_cores(tasks), strict=True):
+        for stream, counters in zip(task.streams, corrected, strict=True):
+            results[stream.number] = stream.signal, counters
+    return [results[number] for number in range(len(models))]
+
+
+def _alone(
+    model: LayeredModel | ARModel, hand: Hand, noise: tuple[int, int], options: dict[str, Any]
+) -> tuple[Floats, RenderCounters]:
+    renderer = Renderer(model, seed=noise[0], stream=noise[1], **options)
+    return renderer.render(*hand), renderer.counters
+
+
+class _Texture:
+    """A layered model as `many.h` reads it, filled once for all its streams."""
+
+    def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
+        fields = plan.texture(model) | {"values": _rows(model.table)}
+        self.filled, self._arrays = filled_texture(ffi, fields, np.float64)
+        # What all streams of one vector have in common.
+        self.kind = (self.filled.layers, model.rate_hz, plan.rate_hz)
+
+
+def _rows(table: ParameterTable) -> Floats:
+    """The values of a table in rows as `many.h` wants them."""
+    layers, gains_at = table.n_layers, lib.tq_gains_at(table.n_layers)
+    values = table.values.reshape(-1, 1 + 3 * layers)
+    shape = values.shape[0], lib.tq_table_row(layers)
+    spare = np.zeros(shape[0] * shape[1] + CACHE_LINE)
+    start = -spare.ctypes.data % (8 * CACHE_LINE) // 8  # no load of a vector crosses a cache line
+    rows = spare[start : start + shape[0] * shape[1]].reshape(shape)
+    rows[:, 0 : 2 * layers : 2] = values[:, 1 : 1 + layers]
+    rows[:, 1 : 2 * layers : 2] = values[:, 1 + layers : 1 + 2 * layers]
+    rows[:, gains_at] = values[:, 0]
+    rows[:, gains_at + 1 : gains_at + 1 + layers] = values[:, 1 + 2 * layers :]
+    return rows
+
+
+class _Stream:
+    """One stream: where it belongs, what it renders, its noise and hand, and what comes of it."""
+
+    def __init__(self, number: int, texture: _Texture, key: np.uint64, hand: Hand) -> None:
+        self.number, self.texture, self.key, self.hand = number, texture, key, hand
+        self.signal = np.empty(hand.speed_mm_s.size)
+
+
+class _Task(NamedTuple):
+    """Streams that are rendered together, in vectors of `lanes`; at most so many."""
+
+    streams: list[_Stream]
+    lanes: int
+
+    def run(self) -> list[RenderCounters]:
+        """Renders them; what had to be corrected in each."""
+        filled = ffi.new("tq_stream[]", self.lanes)
+        for lane in range(self.lanes):  # a lane without a stream has a count of 0
+            stream = self.streams[min(lane, len(self.streams) - 1)]
+            filled[lane].texture = stream.texture.filled[0]
+        for lane, stream in enumerate(self.streams):
+            filled[lane].key = int(stream.key)
+            filled[lane].speed = ffi.from_buffer("double[]", stream.hand.speed_mm_s)
+            filled[lane].force = ffi.from_buffer("double[]", stream.hand.force_n)
+            filled[lane].out = ffi.from_buffer("double[]", stream.signal)
+            filled[lane].count = stream.signal.size
+        texture = filled[0].texture
+        memory = np.empty(lib.tq_many_memory(texture.layers, texture.taps))
+        lib.tq_render_many(filled, ffi.from_buffer("double[]", memory), self.lanes)
+        return [render_counters(filled[lane].counters) for lane in range(len(self.streams))]
+
+
+def _tasks(kinds: Iterable[list[_Stream]], lanes: int) -> Iterator[_Task]:
+    """Streams of each kind by length, so that those of one vector end at about the same time.
+
+    The last ones go into the narrowest vector that holds them.
+    """
+    for streams in kinds:
+        longest_first = sorted(streams, key=lambda stream: -stream.signal.size)
+        for start in range(0, len(streams), lanes):
+            together = longest_first[start : start + lanes]
+            narrowest = next(width for width in WIDTHS if width >= len(together))
+            yield _Task(together, narrowest)
+
+
+def _on_all_cores(tasks: list[_Task]) -> list[list[RenderCounters]]:
+    """What came of each task. The calls of C let other threads run."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    workers = min(len(tasks), cores or 1)
+    if workers < 2:
+        return [task.run() for task in tasks]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(_Task.run, tasks))
+
+
+def _checked(number: int, hand: tuple[ArrayLike, ArrayLike]) -> Hand:
+    arrays = [np.asarray(values, dtype=np.float64, order="C") for values in hand]
+    shapes = [array.shape for array in arrays]
+    if len(shapes) != 2 or shapes[0] != shapes[1] or len(shapes[0]) != 1:
+        raise InputError(
+            f"expected speed and force as two arrays of one length for signal {number}, got "
+            f"shapes {', '.join(map(str, shapes))}; match them."
+        )
+    return Hand(*arrays)
