@@ -31,6 +31,7 @@ typedef struct {
     uintptr_t render, held;
     void *texture, *state;
     int single;
+    int busy; /* rendering, perhaps while other threads of Python run */
 } Call;
 
 /* A hand: an array of doubles each, or two numbers where the arrays are NULL. */
@@ -112,9 +113,19 @@ static int hand_of(PyObject *speed, PyObject *force, Hand *hand, Py_ssize_t *len
     return 1;
 }
 
+/* Whether rendering into `out` would overwrite a hand that is still to be read. */
+static int overlaps(const Hand *hand, size_t length, PyArrayObject *out)
+{
+    uintptr_t start = (uintptr_t)PyArray_DATA(out), end = start + (size_t)PyArray_NBYTES(out);
+    uintptr_t speeds = (uintptr_t)hand->speeds, forces = (uintptr_t)hand->forces;
+    size_t size = length * sizeof(double);
+    return hand->speeds && ((speeds < end && start < speeds + size) ||
+                            (forces < end && start < forces + size));
+}
+
 static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags, PyObject *names)
 {
-    const Call *c = (const Call *)self;
+    Call *c = (Call *)self;
     PyObject *samples, *out;
     PyArrayObject *array = NULL;
     Py_ssize_t count, wanted = -1;
@@ -147,6 +158,14 @@ static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags
         Py_RETURN_NONE;
     if (!hand.speeds)
         count = wanted;
+    if (array && overlaps(&hand, (size_t)count, array))
+        Py_RETURN_NONE;
+    if (c->busy) {
+        PyErr_SetString(PyExc_RuntimeError,
+                        "expected one call of a renderer at a time, got two from different threads; "
+                        "make a renderer for each thread.");
+        return NULL;
+    }
     if (array)
         Py_INCREF(out);
     else {
@@ -157,9 +176,11 @@ static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags
         array = (PyArrayObject *)out;
     }
     if (count >= WORTH_RELEASING) {
+        c->busy = 1;
         Py_BEGIN_ALLOW_THREADS
         render(c, &hand, PyArray_DATA(array), PyArray_TYPE(array) == NPY_FLOAT, (size_t)count);
         Py_END_ALLOW_THREADS
+        c->busy = 0;
     } else
         render(c, &hand, PyArray_DATA(array), PyArray_TYPE(array) == NPY_FLOAT, (size_t)count);
     return out;

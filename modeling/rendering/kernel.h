@@ -588,6 +588,7 @@ TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
     if (t->mean_square > 0) {
         tq_real kept = (1 - t->mean_share) * s->mean_square;
         tq_real room = (t->mean_square - kept) / t->mean_share;
+        room = room > 0 ? room : 0; /* kept is rounded: of a long window perhaps above the limit */
         if (!(y * y <= room)) {
             y = y > 0 ? TQ_SQRT(room) : y < 0 ? -TQ_SQRT(room) : 0;
             s->counters.rms++;

@@ -168,7 +168,7 @@ class Renderer:
             Number of samples where speed and force are scalars; by default the size of `out`.
         out : (n,) ndarray of float64 or float32, optional
             Where to render to: writable and contiguous. The caller's array may be used again for
-            the next call.
+            the next call, and may be that of the speeds or forces.
 
         Returns
         -------
@@ -179,6 +179,8 @@ class Renderer:
         ------
         InputError
             For arrays of different lengths, scalars without a number of samples, or another `out`.
+        RuntimeError
+            For a call while another thread renders with the same compiled renderer.
         """
         rendered = self._call(speed_mm_s, force_n, samples, out)
         if rendered is None:
@@ -204,7 +206,7 @@ def _checked(
     try:
         speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
         force = np.asarray(force_n, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(
             f"expected speed and force as numbers, got {shown(speed_mm_s)} and {shown(force_n)}; "
             "give mm/s and N."

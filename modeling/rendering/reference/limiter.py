@@ -49,7 +49,7 @@ class Limiter:
 
     def _within_rms(self, y: float) -> float:
         kept = (1 - self._share) * self._mean_square
-        room = (self._limits.mean_square - kept) / self._share
+        room = max(0.0, (self._limits.mean_square - kept) / self._share)
         if not y * y <= room:
             self.touched[1] += 1
             y = float(np.copysign(np.sqrt(room), y)) if y == y else 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -139,9 +140,27 @@ def test_other_numbers_of_samples_are_refused(make: Make, samples: Any) -> None:
         make().render(120.0, 1.0, samples=samples)
 
 
-def test_a_hand_of_text_is_refused(make: Make) -> None:
-    with pytest.raises(InputError, match=r"expected speed and force as numbers, got 'fast'"):
-        make().render("fast", 1.0, samples=5)
+@pytest.mark.parametrize("speed", ["fast", 10**400], ids=["text", "too large"])
+def test_a_hand_of_text_or_beyond_any_number_is_refused(make: Make, speed: Any) -> None:
+    with pytest.raises(InputError, match=r"expected speed and force as numbers, got ('fast'|1000)"):
+        make().render(speed, 1.0, samples=5)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("which", [0, 1])
+@pytest.mark.parametrize("ahead", [-3, 0, 3, 70])
+def test_a_hand_is_read_before_it_is_overwritten(
+    make: Make, dtype: type, which: int, ahead: int
+) -> None:
+    """The caller's array may be that of the speeds or forces, or part of it."""
+    hand = list(stroke())
+    expected = make().render(*hand).astype(dtype)
+    memory = np.zeros(COUNT + 100)
+    shared = memory[10 : 10 + COUNT]
+    shared[:] = hand[which]
+    hand[which] = shared
+    out = memory[10 + ahead :].view(dtype)[:COUNT]
+    assert np.array_equal(make().render(*hand, out=out), expected)
 
 
 @compiled_only
@@ -152,6 +171,30 @@ def test_streams_render_at_once_in_threads() -> None:
     with ThreadPoolExecutor(3) as pool:
         found = pool.map(lambda seed: Renderer(CANVAS, seed=seed).render(*hand), range(6))
         assert all(map(np.array_equal, found, expected))
+
+
+@compiled_only
+def test_one_renderer_in_two_threads_at_once_is_refused() -> None:
+    """Both would write to one state, and beyond the caller's arrays."""
+    renderer, refused = Renderer(CANVAS), Event()
+
+    def long_calls() -> None:
+        while not refused.is_set():
+            renderer.render(150.0, 1.5, samples=200_000)
+
+    def short_calls() -> None:
+        while not other.done():
+            renderer.render(150.0, 1.5, samples=1)
+
+    with ThreadPoolExecutor(1) as pool:
+        other = pool.submit(long_calls)
+        try:
+            with pytest.raises(RuntimeError, match="expected one call of a renderer at a time"):
+                short_calls()
+        finally:
+            refused.set()
+        other.result()
+    assert renderer.render(150.0, 1.5, samples=1).shape == (1,)
 
 
 # --- Single precision
@@ -192,6 +235,18 @@ def test_single_precision_holds_a_hand_as_arrays_do() -> None:
     assert np.array_equal(
         by_number, renderers[1].render(np.full(COUNT, 123.4), np.full(COUNT, 1.1))
     )
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    ("rms", "window_s"), [(1e-3, 1.0), (9.238642740866005e-07, 2686.451376051806), (1e-6, 1e6)]
+)
+def test_single_precision_stays_a_number_in_a_long_window(rms: float, window_s: float) -> None:
+    """Where rounding lifts the running mean square above its limit."""
+    limits = Limits(rms=rms, rms_window_s=window_s)
+    rendered = Renderer(CANVAS, limits=limits, single=True).render(300.0, 3.0, samples=5000)
+    assert np.isfinite(rendered).all()
+    assert rendered.any()
 
 
 def test_single_precision_is_refused_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:

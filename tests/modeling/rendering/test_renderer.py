@@ -333,7 +333,6 @@ def test_rates_below_the_models_are_refused(rate_hz: float) -> None:
     ("speed", "force", "samples"),
     [
         (1.0, 1.0, None),
-        (1.0, 1.0, -1),
         ([1.0, 2.0], [1.0], None),
         ([1.0], 1.0, None),
         ([1.0], [1.0], 1),
