@@ -13,6 +13,7 @@ from modeling.hand import Hand
 from modeling.models.parameter_table import Parameters
 from modeling.rendering.plan import SLOPE_S, RenderPlan
 from modeling.rendering.reference.hand import Extrapolator
+from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 FASTEST_MM_S = 300.0
 FORCE_N = 2.0
@@ -23,6 +24,7 @@ READINGS = (
     *((1000.0, noise) for noise in (0.0, 1.0, 2.0, 5.0, 10.0)),
     *((rate, 2.0) for rate in (500.0, 250.0, 125.0)),
 )
+
 # From one reading to the next, where the hand turns.
 PERIODS_SAMPLES = (5, 10, 20, 40)
 # Time constants of the smoothed slope after which a start from no slope is forgotten.
@@ -115,10 +117,11 @@ def speed_errors(hand: Hand, readings: Hand, *, plan: RenderPlan) -> SpeedErrors
     """
     period, count = plan.update_samples, hand.speed_mm_s.size
     settled = SETTLED * SLOPE_S * plan.rate_hz
+    axes = (SPEEDS_MM_S, FORCES_N)  # of any grid: only what is tiny beside it matters
     as_read, extrapolated = list[float](), list[float]()
     for first in range(period):
         at = np.arange(first, count - period + 1, period)
-        _, end = Extrapolator(plan)(Hand(*(reading[at] for reading in readings)))
+        _, end = Extrapolator(plan, axes)(Hand(*(reading[at] for reading in readings)))
         wanted = np.abs(hand.speed_mm_s[at + period - 1])
         for errors, speed in ((as_read, readings.speed_mm_s[at]), (extrapolated, end.speed_mm_s)):
             errors.append(float(np.abs(np.abs(speed) - wanted)[at >= settled].max()))
@@ -134,7 +137,8 @@ def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) ->
     """
     plan = RenderPlan(rate_hz=model.rate_hz, update_samples=update_samples)
     readings = (reading[::update_samples] for reading in hand)
-    amid, end = (model.parameters(*at) for at in Extrapolator(plan)(Hand(*readings)))
+    axes = (model.table.speeds_mm_s, model.table.forces_n)
+    amid, end = (model.parameters(*at) for at in Extrapolator(plan, axes)(Hand(*readings)))
     gains = np.column_stack([end.noise_gain, end.gains])
     reached = [gains[0], *gains]
     for n in range(1, len(reached)):

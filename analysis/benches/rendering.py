@@ -12,7 +12,7 @@ import sys
 import sysconfig
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple, TypeVar
@@ -292,7 +292,7 @@ def bench_rendering(
 def _filters_in_c(layers: int, update: int, effort: Effort) -> list[dict[str, Any]]:
     texture = layered_texture(layers)
     models: dict[str, LayeredModel] = dict.fromkeys(COMPILED, texture)
-    models[AR] = tabled_predictor(predictor_of(texture))
+    models[AR] = _predictor(layers)
     blocks = {ONE_CALL: effort.samples, LIVE: update}
     work = {
         (called, name): _in_calls(
@@ -303,6 +303,11 @@ def _filters_in_c(layers: int, update: int, effort: Effort) -> list[dict[str, An
     }
     best = _best_ns(work, effort.turns)
     return [_row(called, name, layers, update=update, ns=ns) for (called, name), ns in best.items()]
+
+
+@cache
+def _predictor(layers: int) -> LayeredModel:
+    return tabled_predictor(predictor_of(layered_texture(layers)))
 
 
 def _by_block(layers: int, block: int, effort: Effort) -> list[dict[str, Any]]:
@@ -337,8 +342,7 @@ def _next_block(
 
 def _sweep(effort: Effort) -> pd.DataFrame:
     work = {m: _in_calls(_kernel_stream(m, SWEEP_UPDATE), effort) for m in SWEEP}
-    predictor = tabled_predictor(predictor_of(layered_texture(3)))
-    rival = CompiledStream(AR, predictor, update_samples=SWEEP_UPDATE, seed=0)
+    rival = CompiledStream(AR, _predictor(3), update_samples=SWEEP_UPDATE, seed=0)
     best = _best_ns({**work, AR: _in_calls(rival, effort)}, effort.turns)
     ar_ns = best.pop(AR)
     columns = {"layers": list(best), "ns_per_sample": list(best.values())}

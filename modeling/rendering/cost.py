@@ -98,7 +98,7 @@ def cost_of(
     )
     per_update = Operations(
         additions=18 + 43 * layers + 14 * extrapolated,
-        multiplications=10 + 73 * layers + 2 * groups + 4 * extrapolated,
+        multiplications=12 + 73 * layers + 2 * groups + 6 * extrapolated,
         divisions=2 + 3 * layers + 4 * extrapolated,
         square_roots=layers,
     )

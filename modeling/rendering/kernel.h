@@ -310,22 +310,24 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
         to[i] = tq_blend(hand, first + i);
 }
 
-/* Speeds (mm/s), forces (N) and their changes that are too small to matter count as 0: what dies away
+/* Speeds, forces and their changes below a billionth of the grid's lowest count as 0: what dies away
    exponentially would stay among the subnormal numbers for ever, which some processors compute at a
    fraction of their speed. */
-TQ_INLINE tq_real tq_settled(tq_real x)
+TQ_INLINE tq_real tq_settled(tq_real x, tq_real lowest)
 {
-    return x < (tq_real)1e-9 && x > (tq_real)-1e-9 ? 0 : x;
+    tq_real least = (tq_real)1e-9 * lowest;
+    return x < least && x > -least ? 0 : x;
 }
 
 /* The exponentially smoothed change of a reading from update to update, by which the hand is
    extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0 reset
    it. */
-TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real furthest, tq_real share)
+TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real furthest, tq_real share,
+                           tq_real lowest)
 {
     tq_real change = now - last;
     int goes_on = change <= furthest && change >= -furthest && now != 0;
-    return goes_on ? tq_settled(slope + share * (change - slope)) : 0;
+    return goes_on ? tq_settled(slope + share * (change - slope), lowest) : 0;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -395,13 +397,13 @@ TQ_INLINE void tq_locate(const tq_texture *t, tq_state *s, tq_real speed, tq_rea
 TQ_INLINE void tq_follow(const tq_texture *t, tq_state *s, tq_real speed, tq_real force, tq_hand *amid,
                          tq_hand *end)
 {
-    tq_real to_end = s->to_end;
+    tq_real to_end = s->to_end, v = t->speed_mm_s[0], f = t->force_n[0];
     if (s->position != 0 && to_end > 0) {
-        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share);
-        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share);
+        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share, v);
+        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share, f);
     }
-    s->speed = speed = tq_settled(speed);
-    s->force = force = tq_settled(force);
+    s->speed = speed = tq_settled(speed, v);
+    s->force = force = tq_settled(force, f);
     tq_locate(t, s, speed, force);
     *end = tq_hand_at(t, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
     *amid = *end;

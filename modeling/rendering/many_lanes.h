@@ -112,16 +112,16 @@ TQ_WIDE V TQ_(tq_sizes)(V x)
     return (V)((M)x & INT64_MAX);
 }
 
-TQ_WIDE V TQ_(tq_all_settled)(V x)
+TQ_WIDE V TQ_(tq_all_settled)(V x, V lowest)
 {
-    return (V)(~(TQ_(tq_sizes)(x) < (tq_real)1e-9) & (M)x);
+    return (V)(~(TQ_(tq_sizes)(x) < (tq_real)1e-9 * lowest) & (M)x);
 }
 
-TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, tq_real furthest, tq_real share)
+TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, tq_real furthest, tq_real share, V lowest)
 {
     V change = now - last;
     M goes_on = (TQ_(tq_sizes)(change) <= furthest) & (now != 0);
-    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change - slope)));
+    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change - slope), lowest));
 }
 
 TQ_WIDE V TQ_(tq_all_towards)(V gain, V wanted, V slew)
@@ -243,11 +243,13 @@ TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
     TQ_COPY(&force, read[1], sizeof force);
     if (s->position != 0 && to_end > 0) {
         tq_real share = t->slope_share;
-        s->speed_slope = TQ_(tq_all_slopes)(s->speed_slope, s->speed, speed, t->speed_change, share);
-        s->force_slope = TQ_(tq_all_slopes)(s->force_slope, s->force, force, t->force_change, share);
+        s->speed_slope = TQ_(tq_all_slopes)(s->speed_slope, s->speed, speed, t->speed_change, share,
+                                            s->lowest_speed);
+        s->force_slope = TQ_(tq_all_slopes)(s->force_slope, s->force, force, t->force_change, share,
+                                            s->lowest_force);
     }
-    speed = TQ_(tq_all_settled)(speed);
-    force = TQ_(tq_all_settled)(force);
+    speed = TQ_(tq_all_settled)(speed, s->lowest_speed);
+    force = TQ_(tq_all_settled)(force, s->lowest_force);
     held = (speed == s->speed) & (force == s->force) & (speed_slope == s->speed_slope) &
            (force_slope == s->force_slope);
     if (s->position != 0 && !TQ_WIDE_ANY(~held))

@@ -25,6 +25,7 @@ FASTEST_FORCE_CHANGE_N_S = 200.0
 _EDGE_SHARE = 0.2
 _LONGEST_UPDATE = 1_000_000
 _FOR_EVER = 2**62
+_LARGEST_EXCESS = 0.05  # of a mean square in single precision
 
 
 class LayeredModel(Protocol):
@@ -206,13 +207,32 @@ class RenderPlan:
         if np.isfinite(self.limits.peak):
             fields["peak"] = self.limits.peak
         if np.isfinite(self.limits.rms):
-            fields["mean_square"] = self.limits.mean_square
+            fields["mean_square"] = self.limits.mean_square * self._kept_by_rounding
             fields["mean_share"] = self.mean_share
         if np.isfinite(self.limits.duration_s):
             fields["longest"] = self.samples(self.limits.duration_s)
             fields["pause"] = self.samples(self.limits.pause_s)
             fields["silence"] = self.limits.silence
         return fields
+
+    @property
+    def _kept_by_rounding(self) -> float:
+        """By which factor to lower a limit of the mean square, so that rounding does not exceed it.
+
+        At each sample single precision rounds the running mean square by up to two of its epsilons,
+        and 1/`mean_share` samples count; in double precision that is below any tolerance.
+        """
+        if not self.single:
+            return 1.0
+        excess = 2 * float(np.finfo(np.float32).eps) / self.mean_share
+        if excess > _LARGEST_EXCESS:
+            longest = self.limits.rms_window_s * _LARGEST_EXCESS / excess
+            raise InputError(
+                f"expected a window of the RMS limit of at most {longest:.3g} s for single "
+                f"precision at {self.rate_hz:g} Hz, got {self.limits.rms_window_s:g}; shorten it "
+                "or take double precision."
+            )
+        return 1 - excess
 
     def samples(self, seconds: float) -> int:
         """A limit's time in samples, at least 1; 0 stands for no limit."""

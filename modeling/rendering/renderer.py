@@ -184,7 +184,7 @@ class Renderer:
         """
         rendered = self._call(speed_mm_s, force_n, samples, out)
         if rendered is None:
-            count = np.size(out) if samples is None and out is not None else samples
+            count = out.size if samples is None and isinstance(out, np.ndarray) else samples
             speed, force = _checked(speed_mm_s, force_n, samples=samples, count=count)
             if out is not None:
                 _check_out(out, speed.size)

@@ -28,7 +28,7 @@ class BandFilter:
         self.axes = (self._table.speeds_mm_s, self._table.forces_n)
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
-        self._extrapolate = Extrapolator(plan)
+        self._extrapolate = Extrapolator(plan, self.axes)
         self._gains = GainRamps(plan, self._table.largest_gains)
         self._bands = [(0.0,) * 5] * self._table.n_layers
         self._state = [(0.0, 0.0)] * self._table.n_layers

@@ -88,7 +88,7 @@ class PythonEngine:
 
 def _outside(hand: Hand, speeds: Floats, forces: Floats) -> list[tuple[bool, bool]]:
     """Whether each reading of a hand that touches and moves is above the grid, or else below it."""
-    speed, force = settled(np.abs(hand.speed_mm_s)), settled(hand.force_n)
+    speed, force = settled(np.abs(hand.speed_mm_s), speeds[0]), settled(hand.force_n, forces[0])
     strokes = np.isfinite(speed) & np.isfinite(force) & (speed > 0) & (force > 0)
     above = strokes & ((speed > speeds[-1]) | (force > forces[-1]))
     below = strokes & ~above & ((speed < speeds[0]) | (force < forces[0]))

@@ -13,12 +13,12 @@ from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.plan import RenderPlan
 
-_SMALLEST = 1e-9
+_SMALLEST_SHARE = 1e-9
 
 
-def settled(x: float | Floats) -> Floats:
-    """Speeds (mm/s), forces (N) or their changes, with what is too small to matter as 0."""
-    return np.where(np.abs(x) < _SMALLEST, 0.0, x)
+def settled(x: float | Floats, lowest: float | Floats) -> Floats:
+    """Speeds, forces or their changes, with those below a billionth of the grid's lowest as 0."""
+    return np.where(np.abs(x) < _SMALLEST_SHARE * lowest, 0.0, x)
 
 
 class Extrapolator:
@@ -28,8 +28,9 @@ class Extrapolator:
     is extrapolated.
     """
 
-    def __init__(self, plan: RenderPlan) -> None:
+    def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats]) -> None:
         self._furthest, self._share = plan.hand_changes, plan.slope_share
+        self._lowest = np.array([axis[0] for axis in axes])
         self._to_end = (plan.update_samples - 1) / plan.update_samples
         self._last: list[float] = []
         self._slopes = [0.0, 0.0]
@@ -38,7 +39,7 @@ class Extrapolator:
         """The hand in the middle of the time to the next readings, and just before them."""
         read = np.stack(hand)
         slopes = np.array([self._slopes_at(now) for now in read.T.tolist()]).reshape(-1, 2).T
-        read = settled(read)
+        read = settled(read, self._lowest[:, None])
         with np.errstate(over="ignore"):
             amid, end = read + slopes * (self._to_end / 2), read + slopes * self._to_end
         return Hand(*amid), Hand(*end)
@@ -47,14 +48,15 @@ class Extrapolator:
         """The smoothed changes per update of speed and force with the next reading."""
         if self._last:
             readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
-            self._slopes = [self._slope(*reading) for reading in readings]
-        self._last = settled(np.array(now)).tolist()
+            slopes = [self._slope(*reading) for reading in readings]
+            self._slopes = settled(np.array(slopes), self._lowest).tolist()
+        self._last = settled(np.array(now), self._lowest).tolist()
         return self._slopes
 
     def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
         change = now - last
         goes_on = -furthest <= change <= furthest and now != 0
-        return float(settled(slope + self._share * (change - slope))) if goes_on else 0.0
+        return slope + self._share * (change - slope) if goes_on else 0.0
 
 
 class GainRamps:

@@ -38,7 +38,7 @@ class LatticeFilter:
         self.axes = (model.speeds_mm_s, model.forces_n)
         self._state = [0.0] * model.order
         self._stages = [(0.0, 1.0)] * model.order
-        self._extrapolate = Extrapolator(plan)
+        self._extrapolate = Extrapolator(plan, self.axes)
         self._gain = GainRamps(plan, np.array([model.gains.max()]))
 
     def settings(self, hand: Hand) -> list[Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from threading import Event
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 from modeling import ARModel, InputError, Limits, Renderer
 from modeling.rendering.compiled import SWITCH, Call
@@ -239,7 +241,7 @@ def test_single_precision_holds_a_hand_as_arrays_do() -> None:
 
 @compiled_only
 @pytest.mark.parametrize(
-    ("rms", "window_s"), [(1e-3, 1.0), (9.238642740866005e-07, 2686.451376051806), (1e-6, 1e6)]
+    ("rms", "window_s"), [(1e-3, 1.0), (9.238642740866005e-07, 40.0), (1e-6, 10.0)]
 )
 def test_single_precision_stays_a_number_in_a_long_window(rms: float, window_s: float) -> None:
     """Where rounding lifts the running mean square above its limit."""
@@ -265,3 +267,44 @@ def test_numbers_that_single_precision_cannot_hold_are_refused() -> None:
     close = planted_texture("PVC", speeds_mm_s=np.array([100.0, 100.0 + 1e-9]))
     with pytest.raises(InputError, match="can hold and tell apart, got others in speed_mm_s"):
         Renderer(close, single=True)
+
+
+def weighted_rms(samples: np.ndarray, window_s: float, rate_hz: float) -> np.ndarray:
+    """At each sample, weighted by exp(−age/window)."""
+    share = -np.expm1(-1 / (window_s * rate_hz))
+    return np.sqrt(lfilter([share], [1, share - 1], samples**2))
+
+
+@compiled_only
+@pytest.mark.parametrize("window_s", [0.01, 1.0, 10.0, 40.0])
+def test_single_precision_keeps_the_limit_of_the_rms(window_s: float) -> None:
+    """Nor does it stay further below than the rounding of the window's samples calls for."""
+    rms = 0.03
+    limits = Limits(rms=rms, rms_window_s=window_s)
+    renderer = Renderer(CANVAS, seed=1, limits=limits, single=True)
+    seconds = 3 * max(window_s, 1.0)
+    samples = renderer.render(200.0, 2.0, samples=round(5000 * seconds))
+    found = weighted_rms(samples, window_s, 5000.0).max()
+    assert renderer.counters.limited_rms > 0
+    assert rms * (1 - 1e-4 - 2.5e-7 * 5000 * window_s) < found <= rms
+
+
+@compiled_only
+@pytest.mark.parametrize("rate_hz", [5000.0, 48_000.0])
+def test_single_precision_refuses_a_window_that_it_cannot_keep(rate_hz: float) -> None:
+    limits = Limits(rms=0.1, rms_window_s=60.0)
+    longest = {5000.0: "41.9", 48_000.0: "4.37"}[rate_hz]
+    with pytest.raises(InputError, match=f"RMS limit of at most {longest} s for single precision"):
+        Renderer(CANVAS, rate_hz=rate_hz, limits=limits, single=True)
+    Renderer(CANVAS, rate_hz=rate_hz, limits=limits)
+
+
+@pytest.mark.parametrize("scale", [1e-10, 1.0, 1e4])
+def test_grids_of_any_size_sound_the_same(make: Make, scale: float) -> None:
+    """Nothing counts as rest that is on the grid, in whatever unit."""
+    scaled = replace(CANVAS, forces_n=CANVAS.forces_n * scale)
+    speed, force = stroke()
+    found = Renderer(scaled, seed=3).render(speed, force * scale)
+    assert found.std() > 0.01
+    if scale < 1:  # steps of a hand are a fixed number of newtons
+        assert found == pytest.approx(Renderer(CANVAS, seed=3).render(speed, force), abs=1e-9)

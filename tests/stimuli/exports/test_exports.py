@@ -221,7 +221,8 @@ def test_the_header_renders_what_python_renders(
         assert [count > 0 for count in counters[4:]] == limited
     elif texture == "limited in RMS":
         # The root of a small difference is not the same sample in single precision, but no louder.
-        assert running_rms(samples, exported.rate_hz).max() == pytest.approx(0.1, rel=1e-5)
+        rounding = 2.4e-7 * 0.05 * exported.rate_hz  # by which the limit's square is set lower
+        assert 0.1 * (1 - 1e-5 - rounding) < running_rms(samples, exported.rate_hz).max() <= 0.1
     else:
         error = np.abs(samples - expected).max() / np.abs(expected).max()
         assert 0 < error < 1e-5
