@@ -57,10 +57,9 @@ BY_BLOCK = (SOSFILT, LFILTER, RENDERER)
 # How a row was called: all samples in one call, one call of C for each parameter update, one call
 # from Python for each block, at the rate of a sound card.
 ONE_CALL, LIVE, FROM_PYTHON, SOUND_CARD = "one call", "live", "from Python", "48 kHz"
-# Timed parts: each pair of layers and updates, each pair of layers and blocks, the sweep, the rest.
-PARTS = len(LAYERS) * (len(UPDATES) + len(BLOCKS)) + 3
 STROKE_HZ, FASTEST_MM_S, FORCE_N = 2.0, 300.0, (0.8, 2.4)
 _PYTHON_SAMPLES = 1000
+_SHARE_OF_BLOCKS = 8  # one of so many blocks of a turn is rendered by scipy, each timed by itself
 _IMPORT = (
     "from time import perf_counter; start = perf_counter(); import modeling; "
     "print(perf_counter() - start)"
@@ -74,8 +73,13 @@ class Effort:
     """How long to measure: samples per turn, turns of everything, starts of Python."""
 
     samples: int = 20480
-    turns: int = 15
+    turns: int = 40
     starts: int = 5
+
+    @property
+    def parts(self) -> int:
+        """Parts of which progress is told: the turns, and the starts."""
+        return self.turns + 1
 
 
 QUICK = Effort(samples=2048, turns=2, starts=1)
@@ -99,11 +103,6 @@ class RenderingBench:
     times : DataFrame
         One row per measurement: called (`ONE_CALL`, `LIVE`, `FROM_PYTHON` or `SOUND_CARD`), filter,
         layers, update_samples, ns_per_sample (the best of all turns, noise included).
-    sweep : DataFrame
-        The kernel and AR(20) over `SWEEP` layers, updates every `SWEEP_UPDATE` samples: layers,
-        ns_per_sample, and ar_ns_per_sample, which is the same for any number of layers.
-    line : Line
-        Through the kernel's sweep.
     memory_bytes : int
         Of one stream of three layers, beside the model's table.
     import_s : float
@@ -113,8 +112,6 @@ class RenderingBench:
     """
 
     times: pd.DataFrame
-    sweep: pd.DataFrame
-    line: Line
     memory_bytes: int
     import_s: float
     machine: str
@@ -146,11 +143,32 @@ class RenderingBench:
         return wide.rename(columns={"update_samples": "block_samples"})
 
     def _wide(self, called: str, names: Sequence[str]) -> pd.DataFrame:
-        rows = self.times[(self.times["called"] == called) & self.times["filter"].isin(names)]
+        here = (self.times["called"] == called) & self.times["layers"].isin(LAYERS)
+        rows = self.times[here & self.times["filter"].isin(names)]
         wide = rows.pivot_table(
             index=["layers", "update_samples"], columns="filter", values="ns_per_sample"
         )
         return wide[list(names)].rename_axis(columns=None).reset_index()
+
+    @property
+    def sweep(self) -> pd.DataFrame:
+        """The kernel and AR(20) in one call over `SWEEP` layers, updates every `SWEEP_UPDATE`.
+
+        layers, ns_per_sample, and ar_ns_per_sample, which is the same for any number of layers.
+        """
+        here = (self.times["called"] == ONE_CALL) & (self.times["update_samples"] == SWEEP_UPDATE)
+        by_filter = {
+            name: self.times[here & (self.times["filter"] == name)] for name in (KERNEL, AR)
+        }
+        swept = by_filter[KERNEL].sort_values("layers")[["layers", "ns_per_sample"]]
+        ar_ns = by_filter[AR].loc[by_filter[AR]["layers"] == 3, "ns_per_sample"].iloc[0]
+        return swept.assign(ar_ns_per_sample=ar_ns).reset_index(drop=True)
+
+    @property
+    def line(self) -> Line:
+        """Through the kernel's sweep."""
+        fit = linregress(self.sweep["layers"], self.sweep["ns_per_sample"])
+        return Line(float(fit.slope), float(fit.intercept), float(fit.rvalue) ** 2)
 
     @property
     def operations(self) -> pd.DataFrame:
@@ -233,6 +251,15 @@ def stroke(samples: int, *, rate_hz: float) -> Hand:
     return Hand(speed, force)
 
 
+class Setting(NamedTuple):
+    """What a row of the times is about."""
+
+    called: str
+    filter: str
+    layers: int
+    update_samples: int
+
+
 class Turn(NamedTuple):
     """What is timed as a whole in each turn: a call, how many samples it makes, how often."""
 
@@ -248,14 +275,14 @@ def bench_rendering(
 
     What is timed as a whole takes about as long for a fast filter as for a slow one (many samples
     of a fast one, one block of a slow one): the longer it took, the more of other load it would
-    catch.
+    catch. Of all turns the best counts.
 
     Parameters
     ----------
     effort : Effort, optional
         How long to measure; the default takes about half a minute.
     progress : callable
-        Told each of the `PARTS` that is done.
+        Told each of the effort's `parts` that is done.
 
     Raises
     ------
@@ -263,46 +290,40 @@ def bench_rendering(
         Where the parts in C were not compiled at installation.
     """
     effort = effort or Effort()
-    rows = []
+    work = _in_python() | _at_sound_card(effort) | _sweep(effort)
     for layers in LAYERS:
         for update in UPDATES:
-            rows += _filters_in_c(layers, update, effort)
-            progress(f"{layers} layers, updates every {update}")
+            work |= _filters_in_c(layers, update, effort)
         for block in BLOCKS:
-            rows += _by_block(layers, block, effort)
-            progress(f"{layers} layers, blocks of {block}")
-    rows += [_in_python(effort), _at_sound_card(effort)]
-    progress("48 kHz")
-    sweep = _sweep(effort)
-    progress("layers")
-    memory_bytes = _kernel_stream(3, SWEEP_UPDATE).kernel_bytes
+            work |= _by_block(layers, block, effort)
+    best = dict.fromkeys(work, np.inf)
+    for turn in range(effort.turns):
+        for setting, ns in _turn_ns(work).items():
+            best[setting] = min(best[setting], ns)
+        progress(f"turn {turn + 1} of {effort.turns}")
     import_s = _import_s(effort.starts)
     progress("start")
     return RenderingBench(
-        times=pd.DataFrame(rows),
-        sweep=sweep,
-        line=_line_through(sweep),
-        memory_bytes=memory_bytes,
+        times=pd.DataFrame([{**key._asdict(), "ns_per_sample": ns} for key, ns in best.items()]),
+        memory_bytes=_kernel_stream(3, SWEEP_UPDATE).kernel_bytes,
         import_s=import_s,
         machine=processor(),
         compiler=compiler(),
     )
 
 
-def _filters_in_c(layers: int, update: int, effort: Effort) -> list[dict[str, Any]]:
+def _filters_in_c(layers: int, update: int, effort: Effort) -> dict[Setting, Turn]:
     texture = layered_texture(layers)
     models: dict[str, LayeredModel] = dict.fromkeys(COMPILED, texture)
     models[AR] = _predictor(layers)
     blocks = {ONE_CALL: effort.samples, LIVE: update}
-    work = {
-        (called, name): _in_calls(
+    return {
+        Setting(called, name, layers, update): _in_calls(
             CompiledStream(name, model, update_samples=update, seed=0), effort, block=block
         )
         for called, block in blocks.items()
         for name, model in models.items()
     }
-    best = _best_ns(work, effort.turns)
-    return [_row(called, name, layers, update=update, ns=ns) for (called, name), ns in best.items()]
 
 
 @cache
@@ -310,18 +331,17 @@ def _predictor(layers: int) -> LayeredModel:
     return tabled_predictor(predictor_of(layered_texture(layers)))
 
 
-def _by_block(layers: int, block: int, effort: Effort) -> list[dict[str, Any]]:
+def _by_block(layers: int, block: int, effort: Effort) -> dict[Setting, Turn]:
     texture = layered_texture(layers)
     hand = stroke(effort.samples, rate_hz=RATE_HZ)
     readings = [(float(v), float(f)) for v, f in zip(*(x[::block] for x in hand), strict=True)]
     renderer, out = Renderer(texture, update_samples=block), np.empty(block)
-    work = {RENDERER: Turn(_rendering(renderer, readings, out), len(readings) * block)}
+    turns = {RENDERER: Turn(_rendering(renderer, readings, out), len(readings) * block)}
     for name, kind in ((SOSFILT, SosfiltStream), (LFILTER, LfilterStream)):
         stream, at = kind(texture, np.random.default_rng(0)), itertools.cycle(readings)
         one_block = partial(_next_block, stream, at, block)
-        work[name] = Turn(one_block, block, repeats=len(readings))
-    best = _best_ns(work, effort.turns)
-    return [_row(FROM_PYTHON, name, layers, update=block, ns=ns) for name, ns in best.items()]
+        turns[name] = Turn(one_block, block, repeats=-(-len(readings) // _SHARE_OF_BLOCKS))
+    return {Setting(FROM_PYTHON, name, layers, block): turn for name, turn in turns.items()}
 
 
 def _rendering(
@@ -340,27 +360,27 @@ def _next_block(
     return stream.render(*next(readings), block)
 
 
-def _sweep(effort: Effort) -> pd.DataFrame:
-    work = {m: _in_calls(_kernel_stream(m, SWEEP_UPDATE), effort) for m in SWEEP}
-    rival = CompiledStream(AR, _predictor(3), update_samples=SWEEP_UPDATE, seed=0)
-    best = _best_ns({**work, AR: _in_calls(rival, effort)}, effort.turns)
-    ar_ns = best.pop(AR)
-    columns = {"layers": list(best), "ns_per_sample": list(best.values())}
-    return pd.DataFrame({**columns, "ar_ns_per_sample": ar_ns})
+def _sweep(effort: Effort) -> dict[Setting, Turn]:
+    """Numbers of layers beside those that are compared with other filters."""
+    return {
+        Setting(ONE_CALL, KERNEL, layers, SWEEP_UPDATE): _in_calls(
+            _kernel_stream(layers, SWEEP_UPDATE), effort
+        )
+        for layers in set(SWEEP) - set(LAYERS)
+    }
 
 
-def _in_python(effort: Effort) -> dict[str, Any]:
+def _in_python() -> dict[Setting, Turn]:
     """What renders where nothing was compiled."""
     texture = layered_texture(3)
     plan = RenderPlan(rate_hz=texture.rate_hz, update_samples=SWEEP_UPDATE)
     engine = PythonEngine(BandFilter(texture, plan), plan, key=stream_key(0))
     hand = stroke(_PYTHON_SAMPLES, rate_hz=RATE_HZ)
-    work = {PYTHON: Turn(partial(engine.render, *hand), _PYTHON_SAMPLES)}
-    ns = _best_ns(work, min(effort.turns, 5))[PYTHON]
-    return _row(ONE_CALL, PYTHON, 3, update=SWEEP_UPDATE, ns=ns)
+    turn = Turn(partial(engine.render, *hand), _PYTHON_SAMPLES)
+    return {Setting(ONE_CALL, PYTHON, 3, SWEEP_UPDATE): turn}
 
 
-def _at_sound_card(effort: Effort) -> dict[str, Any]:
+def _at_sound_card(effort: Effort) -> dict[Setting, Turn]:
     stream = CompiledStream(
         KERNEL,
         layered_texture(3),
@@ -368,8 +388,7 @@ def _at_sound_card(effort: Effort) -> dict[str, Any]:
         seed=0,
         rate_hz=SOUND_CARD_HZ,
     )
-    ns = _best_ns({KERNEL: _in_calls(stream, effort)}, effort.turns)[KERNEL]
-    return _row(SOUND_CARD, KERNEL, 3, update=SOUND_CARD_UPDATE, ns=ns)
+    return {Setting(SOUND_CARD, KERNEL, 3, SOUND_CARD_UPDATE): _in_calls(stream, effort)}
 
 
 def _kernel_stream(layers: int, update: int) -> CompiledStream:
@@ -383,31 +402,15 @@ def _in_calls(stream: CompiledStream, effort: Effort, *, block: int | None = Non
     return Turn(stream.calls(*hand, np.empty(count), block=block or count), count)
 
 
-def _best_ns(work: Mapping[Name, Turn], turns: int) -> dict[Name, float]:
-    """ns per sample, the best of all."""
+def _turn_ns(work: Mapping[Name, Turn]) -> dict[Name, float]:
+    """One turn of everything: ns per sample, of what is repeated the best."""
     best = dict.fromkeys(work, np.inf)
-    for _ in range(turns):
-        for name, turn in work.items():
-            for _ in range(turn.repeats):
-                start = perf_counter()
-                turn.run()
-                best[name] = min(best[name], (perf_counter() - start) / turn.samples)
-    return {name: 1e9 * seconds for name, seconds in best.items()}
-
-
-def _row(called: str, name: str, layers: int, *, update: int, ns: float) -> dict[str, Any]:
-    return {
-        "called": called,
-        "filter": name,
-        "layers": layers,
-        "update_samples": update,
-        "ns_per_sample": ns,
-    }
-
-
-def _line_through(sweep: pd.DataFrame) -> Line:
-    fit = linregress(sweep["layers"], sweep["ns_per_sample"])
-    return Line(float(fit.slope), float(fit.intercept), float(fit.rvalue) ** 2)
+    for name, turn in work.items():
+        for _ in range(turn.repeats):
+            start = perf_counter()
+            turn.run()
+            best[name] = min(best[name], 1e9 * (perf_counter() - start) / turn.samples)
+    return best
 
 
 def _import_s(starts: int) -> float:

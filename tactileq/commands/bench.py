@@ -39,15 +39,16 @@ def bench_render(
 
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer beside its rivals, print and write what was measured."""
-    from analysis.benches.rendering import PARTS, QUICK, bench_rendering
+    from analysis.benches.rendering import QUICK, Effort, bench_rendering
     from analysis.figures.rendering import figure_rendering
     from analysis.report.findings import DOTS_PER_INCH
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 
     check_own_results(out, "bench render")
-    with progress("Timing", PARTS) as advance:
-        timed = bench_rendering(QUICK if quick else None, progress=advance)
+    effort = QUICK if quick else Effort()
+    with progress("Timing", effort.parts) as advance:
+        timed = bench_rendering(effort, progress=advance)
     with replace_folder(out) as fresh:
         tables = {"times": timed.times, "layers": timed.sweep, "aims": timed.aims}
         for name, table in {**tables, "operations": timed.operations}.items():

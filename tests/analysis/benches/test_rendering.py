@@ -17,18 +17,17 @@ from analysis.benches.rendering import (
     LFILTER,
     LIVE,
     ONE_CALL,
-    PARTS,
     PYTHON,
     RENDERER,
     SOSFILT,
     SOUND_CARD,
     SWEEP,
+    SWEEP_UPDATE,
     UPDATES,
     Effort,
-    Line,
     RenderingBench,
     Turn,
-    _best_ns,
+    _turn_ns,
     bench_rendering,
     stroke,
 )
@@ -53,13 +52,12 @@ from analysis.figures.rendering import (
 from modeling.rendering.plan import RenderPlan
 
 PARTS_TOLD: list[str] = []
+EFFORT = Effort(samples=1024, turns=2, starts=1)
 
 
 @pytest.fixture(scope="module")
 def bench() -> RenderingBench:
-    return bench_rendering(
-        Effort(samples=1024, turns=1, starts=1), progress=lambda part: PARTS_TOLD.append(part)
-    )
+    return bench_rendering(EFFORT, progress=lambda part: PARTS_TOLD.append(part))
 
 
 def planted() -> RenderingBench:
@@ -78,15 +76,12 @@ def planted() -> RenderingBench:
     rows += [
         (FROM_PYTHON, n, m, b, ns) for (n, ns), m, b in product(by_block.items(), LAYERS, BLOCKS)
     ]
+    rows += [(ONE_CALL, KERNEL, m, SWEEP_UPDATE, 3.0 * m) for m in SWEEP if m not in LAYERS]
     rows.append((ONE_CALL, PYTHON, 3, 5, 1500.0))
     rows.append((SOUND_CARD, KERNEL, 3, 48, 40.0))
     columns = ["called", "filter", "layers", "update_samples", "ns_per_sample"]
     return RenderingBench(
         times=pd.DataFrame(rows, columns=columns),
-        sweep=pd.DataFrame(
-            {"layers": SWEEP, "ns_per_sample": 3.0 * np.array(SWEEP), "ar_ns_per_sample": 18.0}
-        ),
-        line=Line(3.0, 0.0, 1.0),
         memory_bytes=1000,
         import_s=0.6,
         machine="a processor",
@@ -103,13 +98,14 @@ def test_every_combination_is_measured(bench: RenderingBench) -> None:
     wanted = set(product((ONE_CALL, LIVE), COMPILED, LAYERS, UPDATES))
     wanted |= set(product([FROM_PYTHON], BY_BLOCK, LAYERS, BLOCKS))
     wanted |= {(ONE_CALL, PYTHON, 3, 5), (SOUND_CARD, KERNEL, 3, 48)}
+    wanted |= set(product([ONE_CALL], [KERNEL], SWEEP, [SWEEP_UPDATE]))
     assert measured == wanted
     assert len(times) == len(measured)
     assert tuple(bench.sweep["layers"]) == SWEEP
     assert (bench.sweep[["ns_per_sample", "ar_ns_per_sample"]] > 0).all(axis=None)
     assert 0 < bench.import_s < np.inf
     assert bench.memory_bytes > 0
-    assert len(PARTS_TOLD) == PARTS
+    assert len(PARTS_TOLD) == EFFORT.parts
 
 
 def test_it_says_what_compiled_it_and_how(bench: RenderingBench) -> None:
@@ -167,10 +163,14 @@ def test_ratios_and_verdicts_of_known_times() -> None:
 def test_from_which_number_of_layers_on_the_rival_is_cheaper(
     kernel_ns: list[float], layers: int | None
 ) -> None:
-    bench = planted()
-    assert replace(bench, sweep=bench.sweep.assign(ns_per_sample=kernel_ns)).ar_cheaper_from == (
-        layers
-    )
+    times = planted().times
+    swept = (times["filter"] == KERNEL) & (times["called"] == ONE_CALL)
+    swept &= times["update_samples"] == SWEEP_UPDATE
+    at = dict(zip(SWEEP, kernel_ns, strict=True))
+    changed = times["ns_per_sample"].mask(swept, times["layers"].map(at))
+    bench = replace(planted(), times=times.assign(ns_per_sample=changed))
+    assert bench.sweep["ns_per_sample"].tolist() == kernel_ns
+    assert bench.ar_cheaper_from == layers
 
 
 def test_turns_are_timed_one_by_one_and_the_best_counts(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -182,8 +182,9 @@ def test_turns_are_timed_one_by_one_and_the_best_counts(monkeypatch: pytest.Monk
     def run() -> None:
         now[0] += next(taken)
 
-    found = _best_ns({"slow": Turn(run, 2, repeats=3), "fast": Turn(run, 100)}, turns=2)
-    assert found == {"slow": pytest.approx(1e9), "fast": pytest.approx(1e8)}
+    for _ in range(2):
+        found = _turn_ns({"slow": Turn(run, 2, repeats=3), "fast": Turn(run, 100)})
+        assert found == {"slow": pytest.approx(1e9), "fast": pytest.approx(1e8)}
 
 
 @pytest.mark.parametrize("layers", LAYERS)
