@@ -64,8 +64,8 @@ TQ_INLINE tq_real tq_blend_at(const tq_hand *hand, size_t i)
 TQ_INLINE void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *denominator)
 {
     tq_real half = angle * (tq_real)0.5, z = half * half;
-    *numerator = half * (34459425 + z * (-4729725 + z * (135135 + z * (-990 + z))));
-    *denominator = 34459425 + z * (-16216200 + z * (945945 + z * (-13860 + z * 45)));
+    *numerator = TQ_TANGENT_NUMERATOR(half, z);
+    *denominator = TQ_TANGENT_DENOMINATOR(z);
 }
 
 /* --- Direct form ------------------------------------------------------------------------------- */

@@ -198,14 +198,21 @@ TQ_INLINE tq_lanes tq_root(tq_lanes x)
     return TQ_PACK(each);
 }
 
-/* tan(angle / 2) = numerator / denominator, the [9/8] Pade approximant: 0 <= angle <= 0.49 pi. */
+/* tan(half) = numerator / denominator, the [9/8] Pade approximant, with z = half^2, of reals or vectors of
+   them: 0 <= half <= 0.245 pi. */
+#define TQ_TANGENT_NUMERATOR(half, z) \
+    ((half) * (TQ_K(34459425) + (z) * (TQ_K(-4729725) + (z) * (TQ_K(135135) + (z) * (TQ_K(-990) + (z))))))
+#define TQ_TANGENT_DENOMINATOR(z) \
+    (TQ_K(34459425) + \
+     (z) * (TQ_K(-16216200) + (z) * (TQ_K(945945) + (z) * (TQ_K(-13860) + (z) * TQ_K(45)))))
+#define TQ_K(constant) ((tq_real)(constant))
+
+/* tan(angle / 2). */
 TQ_INLINE void tq_half_tangent(tq_lanes angle, tq_lanes *numerator, tq_lanes *denominator)
 {
-    const tq_real n[] = {(tq_real)34459425, -4729725, 135135, -990};
-    const tq_real d[] = {(tq_real)34459425, -16216200, 945945, -13860, 45};
     tq_lanes half = angle * (tq_real)0.5, z = half * half;
-    *numerator = half * (n[0] + z * (n[1] + z * (n[2] + z * (n[3] + z))));
-    *denominator = d[0] + z * (d[1] + z * (d[2] + z * (d[3] + z * d[4])));
+    *numerator = TQ_TANGENT_NUMERATOR(half, z);
+    *denominator = TQ_TANGENT_DENOMINATOR(z);
 }
 
 /* Bands of peak frequency f and -3 dB width B, from angles pi f / rate and pi B / rate: p, q, r, b1,
@@ -644,8 +651,8 @@ TQ_INLINE uint64_t tq_lift_offs(const tq_real *speed, const tq_real *force, size
     return step ? lift_offs : lift_offs * (uint64_t)count;
 }
 
-/* What comes behind the sum of all branches, and moves on to the next noise. */
-TQ_INLINE void tq_finish(const tq_texture *t, tq_state *s, tq_real *out, int count)
+/* What comes behind the sum of all branches. */
+TQ_INLINE void tq_restrain(const tq_texture *t, tq_state *s, tq_real *out, int count)
 {
     int n;
     if (t->notch_share != 0)
@@ -653,8 +660,6 @@ TQ_INLINE void tq_finish(const tq_texture *t, tq_state *s, tq_real *out, int cou
     if (t->peak > 0 || t->mean_square > 0 || t->longest > 0)
         for (n = 0; n < count; n++)
             out[n] = tq_limit(t, s, out[n]);
-    if (t->taps > 1)
-        TQ_MOVE(tq_wide(t, s), tq_wide(t, s) + count, (size_t)(t->taps - 1) * sizeof(tq_real));
 }
 
 /* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
@@ -680,7 +685,9 @@ TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *spe
             s->position += (uint64_t)piece;
             done += piece;
         }
-        tq_finish(t, s, out, chunk);
+        tq_restrain(t, s, out, chunk);
+        if (t->taps > 1) /* on to the next noise */
+            TQ_MOVE(tq_wide(t, s), tq_wide(t, s) + chunk, (size_t)(t->taps - 1) * sizeof(tq_real));
         speed += step * (size_t)chunk, force += step * (size_t)chunk;
         out += chunk, count -= (size_t)chunk;
     }

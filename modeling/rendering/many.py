@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +17,9 @@ from modeling.models.parameter_table import ParameterTable
 from modeling.rendering.compiled import filled_texture, is_compiled, render_counters
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, RenderPlan
-from modeling.rendering.renderer import Renderer
+from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, RenderPlan, plan_for
+from modeling.rendering.renderer import Renderer, as_floats
+from modeling.threads import in_order, usable_cores
 
 try:
     from modeling.rendering._many import ffi, lib
@@ -113,11 +112,13 @@ def rendered(
             results[number] = _alone(model, hand, which, options)
             continue
         if id(model) not in textures:
-            textures[id(model)] = _Texture(model, Renderer(model, **options).plan)
+            textures[id(model)] = _Texture(model, plan_for(model.rate_hz, **options))
         texture = textures[id(model)]
         alike[texture.kind].append(_Stream(number, texture, stream_key(*which), hand))
     tasks = list(_tasks(alike.values(), lanes or lib.tq_widest()))
-    for task, corrected in zip(tasks, _on_all_cores(tasks), strict=True):
+    # The calls of C let other threads run.
+    done = in_order(_Task.run, tasks, threads=usable_cores())
+    for task, corrected in zip(tasks, done, strict=True):
         for stream, counters in zip(task.streams, corrected, strict=True):
             results[stream.number] = stream.signal, counters
     return [results[number] for number in range(len(models))]
@@ -200,22 +201,14 @@ def _tasks(kinds: Iterable[list[_Stream]], lanes: int) -> Iterator[_Task]:
             yield _Task(together, narrowest)
 
 
-def _on_all_cores(tasks: list[_Task]) -> list[list[RenderCounters]]:
-    """What came of each task. The calls of C let other threads run."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    workers = min(len(tasks), cores or 1)
-    if workers < 2:
-        return [task.run() for task in tasks]
-    with ThreadPoolExecutor(workers) as pool:
-        return list(pool.map(_Task.run, tasks))
-
-
 def _checked(number: int, hand: tuple[ArrayLike, ArrayLike]) -> Hand:
-    arrays = [np.asarray(values, dtype=np.float64, order="C") for values in hand]
-    shapes = [array.shape for array in arrays]
-    if len(shapes) != 2 or shapes[0] != shapes[1] or len(shapes[0]) != 1:
-        raise InputError(
-            f"expected speed and force as two arrays of one length for signal {number}, got "
-            f"shapes {', '.join(map(str, shapes))}; match them."
-        )
-    return Hand(*arrays)
+    got = f"{len(hand)} of them"
+    if len(hand) == 2:
+        speed, force = as_floats(*hand)
+        if speed.ndim == 1 and speed.shape == force.shape:
+            return Hand(speed, force)
+        got = f"shapes {speed.shape}, {force.shape}"
+    raise InputError(
+        f"expected speed and force as two arrays of one length for signal {number}, got {got}; "
+        "match them."
+    )

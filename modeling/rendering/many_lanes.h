@@ -133,11 +133,9 @@ TQ_WIDE V TQ_(tq_all_towards)(V gain, V wanted, V slew)
 
 TQ_WIDE void TQ_(tq_all_half_tangents)(V angle, V *numerator, V *denominator)
 {
-    const tq_real n[] = {(tq_real)34459425, -4729725, 135135, -990};
-    const tq_real d[] = {(tq_real)34459425, -16216200, 945945, -13860, 45};
     V half = angle * (tq_real)0.5, z = half * half;
-    *numerator = half * (n[0] + z * (n[1] + z * (n[2] + z * (n[3] + z))));
-    *denominator = d[0] + z * (d[1] + z * (d[2] + z * (d[3] + z * d[4])));
+    *numerator = TQ_TANGENT_NUMERATOR(half, z);
+    *denominator = TQ_TANGENT_DENOMINATOR(z);
 }
 
 TQ_WIDE void TQ_(tq_all_bands)(V frequency, V bandwidth, V band[6])
@@ -487,11 +485,11 @@ TQ_WIDE void TQ_(tq_hand_out)(const TQ_(tq_many) *s, V *out, size_t from, size_t
                 s->streams[l].out[from + n] = out[n][l];
 }
 
-/* tq_finish for every stream, one after the other. */
+/* Hands every stream out, behind tq_restrain, and moves on to the next noise. */
 TQ_WIDE void TQ_(tq_finish_all)(TQ_(tq_many) *s, V *out, size_t from, size_t count)
 {
     const tq_texture *t = &s->streams->texture;
-    int limits = t->peak > 0 || t->mean_square > 0 || t->longest > 0, l, i;
+    int l, i;
     TQ_(tq_hand_out)(s, out, from, count);
     for TQ_EACH(l) {
         tq_stream *stream = s->streams + l;
@@ -501,10 +499,7 @@ TQ_WIDE void TQ_(tq_finish_all)(TQ_(tq_many) *s, V *out, size_t from, size_t cou
             continue;
         s->limited[l].counters.lift_offs +=
             tq_lift_offs(stream->speed + from, stream->force + from, 1, mine);
-        if (t->notch_share != 0)
-            tq_compensate(t, s->limited + l, stream->out + from, mine);
-        for (i = 0; limits && i < mine; i++)
-            stream->out[from + (size_t)i] = tq_limit(t, s->limited + l, stream->out[from + (size_t)i]);
+        tq_restrain(t, s->limited + l, stream->out + from, mine);
     }
     for (i = 0; i < t->taps - 1; i++)
         s->wide[i] = s->wide[(size_t)i + count];

@@ -239,6 +239,28 @@ class RenderPlan:
         return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))
 
 
+def plan_for(
+    model_rate_hz: float,
+    *,
+    rate_hz: float | None = None,
+    update_samples: int | None = None,
+    limits: Limits | None = None,
+    compensation: Notch | None = None,
+    single: bool = False,
+) -> RenderPlan:
+    """The plan of a `Renderer` with these arguments, of a model at this rate; refused as there."""
+    rate_hz = model_rate_hz if rate_hz is None else float(rate_hz)
+    if update_samples is None:
+        update_samples = max(1, round(UPDATE_S * rate_hz)) if np.isfinite(rate_hz) else 1
+    return RenderPlan(
+        rate_hz=rate_hz,
+        update_samples=update_samples,
+        limits=limits or Limits(),
+        compensation=compensation,
+        single=single,
+    )
+
+
 def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | NDArray[np.float32]:
     """A member of `tq_texture` in single precision; counts stay as they are."""
     if isinstance(value, int):

@@ -169,8 +169,6 @@ TQ_INLINE void tq_player_remind(const tq_player *p, tq_voice *v)
     tq_state *s = &v->state;
     s->mean_square = p->mean_square * tq_power(1 - t->mean_share, p->idle);
     s->mean_square = tq_within(s->mean_square, 0, t->mean_square);
-    if (s->mean_square < (tq_real)1e-20 * t->mean_square)
-        s->mean_square = 0;
     s->silent = p->silent + p->idle;
     s->sounding = s->silent >= t->pause || !p->sounding ? 0 : p->sounding + p->idle;
 }

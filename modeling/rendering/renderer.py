@@ -15,7 +15,7 @@ from modeling.models.ar_model import ARModel
 from modeling.rendering.compiled import CompiledEngine, is_compiled
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import UPDATE_S, LayeredModel, Notch, RenderCounters, RenderPlan
+from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, plan_for
 from modeling.rendering.reference.bands import BandFilter
 from modeling.rendering.reference.engine import PythonEngine
 from modeling.rendering.reference.lattice import LatticeFilter
@@ -93,19 +93,16 @@ class Renderer:
         single: bool = False,
     ) -> None:
         self.model = model
-        self.rate_hz = model.rate_hz if rate_hz is None else float(rate_hz)
         key = stream_key(seed, stream)
-        if update_samples is None:
-            finite = np.isfinite(self.rate_hz)
-            update_samples = max(1, round(UPDATE_S * self.rate_hz)) if finite else 1
-        self.plan = plan = RenderPlan(
-            rate_hz=self.rate_hz,
+        self.plan = plan = plan_for(
+            model.rate_hz,
+            rate_hz=rate_hz,
             update_samples=update_samples,
-            limits=limits or Limits(),
+            limits=limits,
             compensation=compensation,
             single=single,
         )
-        self.update_samples = plan.update_samples
+        self.rate_hz, self.update_samples = plan.rate_hz, plan.update_samples
         self._engine: Engine
         self._call: Callable[..., Any] = _converted
         if not isinstance(model, ARModel) and is_compiled():
@@ -182,27 +179,24 @@ class Renderer:
         RuntimeError
             For a call while another thread renders with the same compiled renderer.
         """
-        rendered = self._call(speed_mm_s, force_n, samples, out)
-        if rendered is None:
-            count = out.size if samples is None and isinstance(out, np.ndarray) else samples
-            speed, force = _checked(speed_mm_s, force_n, samples=samples, count=count)
-            if out is not None:
-                _check_out(out, speed.size)
-            rendered = self._engine.render(speed, force)
-            if out is not None:
-                out[:] = rendered
-                rendered = out
-        result: NDArray[Any] = rendered
-        return result
+        rendered: NDArray[Any] | None = self._call(speed_mm_s, force_n, samples, out)
+        if rendered is not None:
+            return rendered
+        count = out.size if samples is None and isinstance(out, np.ndarray) else samples
+        speed, force = _checked(speed_mm_s, force_n, samples=samples, count=count)
+        if out is None:
+            return self._engine.render(speed, force)
+        _check_out(out, speed.size)
+        out[:] = self._engine.render(speed, force)
+        return out
 
 
 def _converted(*arguments: object) -> None:
     """In place of an engine's call that takes some arguments as they are."""
 
 
-def _checked(
-    speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None, count: int | None
-) -> tuple[Floats, Floats]:
+def as_floats(speed_mm_s: ArrayLike, force_n: ArrayLike) -> tuple[Floats, Floats]:
+    """Speed and force as arrays of float64; InputError for what is no numbers."""
     try:
         speed = np.asarray(speed_mm_s, dtype=np.float64, order="C")
         force = np.asarray(force_n, dtype=np.float64, order="C")
@@ -211,6 +205,13 @@ def _checked(
             f"expected speed and force as numbers, got {shown(speed_mm_s)} and {shown(force_n)}; "
             "give mm/s and N."
         ) from None
+    return speed, force
+
+
+def _checked(
+    speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None, count: int | None
+) -> tuple[Floats, Floats]:
+    speed, force = as_floats(speed_mm_s, force_n)
     if samples is not None and not (is_whole(samples) and 0 <= samples <= MOST_SAMPLES):
         raise InputError(
             f"expected samples as a whole number of 0 … {MOST_SAMPLES}, got {shown(samples)}; "

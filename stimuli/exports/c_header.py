@@ -7,7 +7,6 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
@@ -16,11 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from modeling import Compensation, InputError, Limits, Renderer
+from modeling import Compensation, InputError, Limits
 from modeling.files.writing import write_text
 from modeling.models.loading import AnyModel
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderPlan
+from modeling.rendering.plan import RenderPlan, plan_for
 from stimuli.exports.layered import Layered, check_layered
 from stimuli.sets.recipe import HIGHEST_RATE_HZ
 
@@ -102,14 +101,13 @@ def c_header(
     layered = check_layered(model)
     name = c_identifier(layered.texture)
     _check_rate(rate_hz)
-    renderer = Renderer(
-        layered,
+    plan = plan_for(
+        layered.rate_hz,
         rate_hz=rate_hz,
-        seed=seed,
         limits=limits,
         compensation=compensation,
+        single=single,
     )
-    plan = replace(renderer.plan, single=single)
     members: Mapping[str, Any] = plan.texture(layered)
     _check_output(layered, plan)
     kernel = files("modeling.rendering").joinpath("kernel.h").read_text(encoding="utf-8")

@@ -85,6 +85,8 @@ def at_rate(
     -------
     (round(duration_s·rate_hz),) ndarray
     """
+    from scipy.signal import resample  # late: slow to load
+
     margin = margin_samples(model_rate_hz)
     before = start_sample(model_rate_hz, settling_s=settling_s)
     ratio = Fraction(rate_hz / model_rate_hz).limit_denominator(LARGEST_DENOMINATOR)
@@ -97,7 +99,7 @@ def at_rate(
     circle[pad : pad + margin] *= ends
     circle[end - margin : end] *= ends[::-1]
     if ratio != 1:
-        circle = _upsampled(circle, periods * ratio.numerator)
+        circle = resample(circle, periods * ratio.numerator)
     if compensation is not None:
         circle = compensation.apply(circle)
     start = (pad + before) // step * ratio.numerator
@@ -113,17 +115,6 @@ def _fast_length(samples: int) -> int:
     from scipy.fft import next_fast_len  # late: slow to load
 
     return int(next_fast_len(samples, real=True))
-
-
-def _upsampled(circle: Floats, samples: int) -> Floats:
-    """One period of a signal in more samples: its spectrum with nothing above."""
-    from scipy.fft import irfft, rfft  # late: slow to load; scipy.signal, for resample, slower yet
-
-    spectrum = rfft(circle) * (samples / circle.size)
-    if circle.size % 2 == 0:
-        spectrum[-1] /= 2  # what lies at Nyquist is shared with its mirror image
-    upsampled: Floats = irfft(spectrum, n=samples)
-    return upsampled
 
 
 def fade_samples(samples: int, rate_hz: float) -> int:

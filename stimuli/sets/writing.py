@@ -20,6 +20,7 @@ from modeling.files.reading import reason_of
 from modeling.files.writing import file_stem
 from modeling.perception.sensation_level import SensationLevel, sensation_level
 from modeling.seeds import noise_stream
+from modeling.threads import in_order, usable_cores
 from stimuli.sets.manifest import (
     COLUMNS_FILE,
     COMPENSATED,
@@ -49,11 +50,11 @@ from stimuli.sets.sources import (
     load_sources,
     recipe_of_copies,
 )
-from stimuli.sets.threads import in_order, thread_count
 from stimuli.sets.trajectories import Trajectory
 
 CONTACT_SHEET = "spectra.png"
-# 48 bits: few enough that a spreadsheet keeps them all.
+# All threads together work on this many samples, in at most 0.1 kB each.
+SAMPLES_AT_ONCE = 2**24
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +219,14 @@ def _threads_for(takes: Iterable[_Take], rate_hz: float) -> int:
     """How many threads work on takes at a rate, or at several that add up to it."""
     longest_s = max(take.trajectory.duration_s + take.settling_s for take in takes)
     return thread_count(ceil(longest_s * rate_hz))
+
+
+def thread_count(samples: int) -> int:
+    """How many threads for pieces of work on this many samples each: the usable cores at most.
+
+    One for long pieces, which fill the memory.
+    """
+    return max(1, min(usable_cores(), SAMPLES_AT_ONCE // max(samples, 1)))
 
 
 def _takes(recipe: Recipe, sources: Sources) -> Iterator[_Take]:

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pytest_benchmark.fixture import BenchmarkFixture
-from scipy.signal import resample
 
 from modeling import simplify
 from modeling.perception.thresholds import Threshold
@@ -15,7 +14,6 @@ from stimuli.planted.textures import TEXTURES, planted_texture
 from stimuli.sets import rendering, writing
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.sources import load_sources
-from stimuli.sets.threads import thread_count
 
 # A recorded hand ends when it ends, not after a round number of samples.
 HANDS_S = (1.8702, 2.3174)
@@ -43,7 +41,7 @@ def recipe(timed: bool, tmp_path_factory: pytest.TempPathFactory) -> Recipe:
 
 
 def all_cores(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(writing, "thread_count", thread_count)
+    """As it is."""
 
 
 def one_thread_only(patch: pytest.MonkeyPatch) -> None:
@@ -54,7 +52,6 @@ def as_scipy_resamples(patch: pytest.MonkeyPatch) -> None:
     """Over the shortest length that the ratio of the rates divides, one after the other."""
     one_thread_only(patch)
     patch.setattr(rendering, "_fast_length", int)
-    patch.setattr(rendering, "_upsampled", resample)
 
 
 WAYS = {

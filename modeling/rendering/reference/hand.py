@@ -31,32 +31,37 @@ class Extrapolator:
     def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats]) -> None:
         self._furthest, self._share = plan.hand_changes, plan.slope_share
         self._lowest = np.array([axis[0] for axis in axes])
+        self._least = (_SMALLEST_SHARE * self._lowest).tolist()
         self._to_end = (plan.update_samples - 1) / plan.update_samples
         self._last: list[float] = []
         self._slopes = [0.0, 0.0]
 
     def __call__(self, hand: Hand) -> tuple[Hand, Hand]:
         """The hand in the middle of the time to the next readings, and just before them."""
-        read = np.stack(hand)
-        slopes = np.array([self._slopes_at(now) for now in read.T.tolist()]).reshape(-1, 2).T
-        read = settled(read, self._lowest[:, None])
+        raw = np.stack(hand)
+        read = settled(raw, self._lowest[:, None])
+        pairs = zip(raw.T.tolist(), read.T.tolist(), strict=True)
+        slopes = np.array([self._slopes_at(*pair) for pair in pairs]).reshape(-1, 2).T
         with np.errstate(over="ignore"):
             amid, end = read + slopes * (self._to_end / 2), read + slopes * self._to_end
         return Hand(*amid), Hand(*end)
 
-    def _slopes_at(self, now: list[float]) -> list[float]:
-        """The smoothed changes per update of speed and force with the next reading."""
+    def _slopes_at(self, now: list[float], kept: list[float]) -> list[float]:
+        """The smoothed changes per update of speed and force with the next reading.
+
+        `kept` is what the next change is counted from: the reading, settled.
+        """
         if self._last:
-            readings = zip(self._slopes, self._last, now, self._furthest, strict=True)
-            slopes = [self._slope(*reading) for reading in readings]
-            self._slopes = settled(np.array(slopes), self._lowest).tolist()
-        self._last = settled(np.array(now), self._lowest).tolist()
+            readings = zip(self._slopes, self._last, now, self._furthest, self._least, strict=True)
+            self._slopes = [self._slope(*reading) for reading in readings]
+        self._last = kept
         return self._slopes
 
-    def _slope(self, slope: float, last: float, now: float, furthest: float) -> float:
+    def _slope(self, slope: float, last: float, now: float, furthest: float, least: float) -> float:
         change = now - last
         goes_on = -furthest <= change <= furthest and now != 0
-        return slope + self._share * (change - slope) if goes_on else 0.0
+        smoothed = slope + self._share * (change - slope)
+        return smoothed if goes_on and abs(smoothed) >= least else 0.0
 
 
 class GainRamps:

@@ -136,7 +136,7 @@ def test_a_freestanding_kernel_goes_with_the_library_headers(
         source = tmp_path / f"{number}.c"
         source.write_text(text, encoding="utf-8")
         options = ["-Wpedantic", *STRICT, "-DTQ_FREESTANDING", f"-I{KERNEL_FOLDER}", f"-I{HERE}"]
-        compiled_by([*compiler, *options, "-fsyntax-only", str(source)])
+        assert compiled_by([*compiler, *options, "-fsyntax-only", str(source)]) == ""
 
 
 PEAK, RATE_HZ = 0.1, 48_000.0

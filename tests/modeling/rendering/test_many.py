@@ -192,7 +192,7 @@ def test_lists_integers_and_views_are_hands() -> None:
 
 @pytest.mark.parametrize("cores", [1, 2])
 def test_number_of_cores_does_not_matter(cores: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("os.sched_getaffinity", lambda _: set(range(cores)), raising=False)
+    monkeypatch.setattr(modeling.rendering.many, "usable_cores", lambda: cores)
     models, hands = [wild_model(3)] * 40, strokes([300] * 40)
     found = render_many(models, hands, seeds=range(40))
     for seed in (0, 17, 39):
@@ -241,6 +241,7 @@ HAND: tuple[Floats, Floats] = (np.zeros(3), np.zeros(3))
         ({"hands": [HAND, (np.zeros(3), np.zeros(4))]}, r"for signal 1, got shapes \(3,\), \(4,\)"),
         ({"hands": [HAND, (1.0, 1.0)]}, r"for signal 1, got shapes \(\), \(\); match"),
         ({"hands": [(*HAND, np.zeros(3)), HAND]}, "two arrays of one length for signal 0"),
+        ({"hands": [HAND, (["fast"] * 3, np.zeros(3))]}, "expected speed and force as numbers"),
         ({"seeds": [0, -1]}, "expected a seed of 0"),
         ({"streams": [0, 0.5]}, "expected a stream of 0"),
         ({"rate_hz": 1000.0}, "expected a rendering rate of at least"),

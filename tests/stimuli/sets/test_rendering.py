@@ -161,9 +161,9 @@ def test_ffts_have_lengths_without_large_prime_factors(
         lengths.append(values.size)
         return rfft(values)
 
-    def back(spectrum: np.ndarray, n: int) -> np.ndarray:
+    def back(spectrum: np.ndarray, n: int, **options: bool) -> np.ndarray:
         lengths.append(n)
-        return irfft(spectrum, n)
+        return irfft(spectrum, n, **options)
 
     monkeypatch.setattr(scipy.fft, "rfft", forth)
     monkeypatch.setattr(scipy.fft, "irfft", back)

@@ -455,3 +455,12 @@ def test_names_cannot_leave_the_folder(
         assert not set("/ ") & set(stimulus.file)
         assert stimulus.texture == "../up/a b"
     assert [p.name for p in (tmp_path / "deep").iterdir()] == ["set"]
+
+
+def test_long_work_is_not_done_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All cores for ordinary files; one thread for what fills the memory by itself."""
+    monkeypatch.setattr(writing, "usable_cores", lambda: 8)
+    count, at_once = writing.thread_count, writing.SAMPLES_AT_ONCE
+    assert count(1) == count(480_000) == count(at_once // 8) == 8
+    assert count(at_once // 3) == 3
+    assert count(at_once) == count(100 * at_once) == 1

@@ -10,19 +10,13 @@ from typing import TypeVar
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-# All threads together work on this many samples, in at most 0.1 kB each.
-SAMPLES_AT_ONCE = 2**24
 
-
-def thread_count(samples: int) -> int:
-    """How many threads for pieces of work on this many samples each: the usable cores at most.
-
-    One for long pieces, which fill the memory.
-    """
+def usable_cores() -> int:
+    """How many cores this process may use."""
     from joblib import cpu_count  # late: slow to load
 
     cores: int = cpu_count()
-    return max(1, min(cores, SAMPLES_AT_ONCE // max(samples, 1)))
+    return cores
 
 
 def in_order(

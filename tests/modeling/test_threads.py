@@ -5,10 +5,9 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 
-import joblib
 import pytest
 
-from stimuli.sets.threads import SAMPLES_AT_ONCE, in_order, thread_count
+from modeling.threads import in_order
 
 PATIENCE_S = 20.0
 
@@ -71,11 +70,3 @@ def test_an_exception_comes_where_its_result_would_have(threads: int) -> None:
     assert max(begun) <= 5 + 2 * threads
     with pytest.raises(StopIteration):
         next(results)
-
-
-def test_long_work_is_not_done_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All cores for ordinary files; one thread for what fills the memory by itself."""
-    monkeypatch.setattr(joblib, "cpu_count", lambda: 8)
-    assert thread_count(1) == thread_count(480_000) == thread_count(SAMPLES_AT_ONCE // 8) == 8
-    assert thread_count(SAMPLES_AT_ONCE // 3) == 3
-    assert thread_count(SAMPLES_AT_ONCE) == thread_count(100 * SAMPLES_AT_ONCE) == 1
