@@ -1,0 +1,119 @@
+"""A case of the atlas: a method, what makes it difficult, and what tells that it fails.
+
+How to read what comes out: docs/stability.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+
+Verdict = Literal["holds", "degrades", "fails"]
+HOLDS: Verdict = "holds"
+DEGRADES: Verdict = "degrades"
+FAILS: Verdict = "fails"
+VERDICTS: tuple[Verdict, ...] = (HOLDS, DEGRADES, FAILS)
+ALONE = {"": np.nan}
+
+
+class Measure(Protocol):
+    """A run of a case: the figure that tells how bad it is; larger is worse, inf is worst.
+
+    `value` is on the case's axis, `column` one of its columns' numbers (NaN where there is one
+    column alone). `full`: with all the repeats of the full atlas, not the few of the reduced one.
+    Same arguments, same figure: what is random is seeded within.
+    """
+
+    def __call__(self, value: float, column: float, *, full: bool) -> float: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Axis:
+    """What is varied, from where a case is easy (`mild`) to where it is hard (`severe`).
+
+    Parameters
+    ----------
+    name, unit : str
+        As on the axis of a picture: "speed of modulation", "Hz"; unit "" for a bare number.
+    mild, severe : float
+        Ends of the range, in either order; above 0 on a logarithmic axis.
+    default : float, optional
+        Where the program or its usual user is; None where there is no such value.
+    logarithmic : bool
+    """
+
+    name: str
+    unit: str
+    mild: float
+    severe: float
+    default: float | None = None
+    logarithmic: bool = True
+
+    def at(self, share: float) -> float:
+        """The value that lies this share (0–1) of the way from mild to severe."""
+        if not self.logarithmic:
+            return self.mild + share * (self.severe - self.mild)
+        return float(self.mild * (self.severe / self.mild) ** share)
+
+    def margin(self, edge: float) -> float:
+        """By which factor an edge is more severe than the default; NaN where there is no factor."""
+        if self.default is None or not (self.default > 0 and edge > 0):
+            return float("nan")
+        return edge / self.default if self.severe > self.mild else self.default / edge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One method in one kind of difficulty.
+
+    Parameters
+    ----------
+    family : str
+        Cases that are drawn together: "filters", "peak finding", …
+    method : str
+        Whose edge it is: "direct form", "unit covariance", …
+    ours : bool
+        Whether it is what the program does by default.
+    axis : Axis
+        Along which the edges are sought.
+    figure, unit : str
+        What `measure` gives, in words, and its unit.
+    holds, degrades : float
+        The largest figure with which the method holds; with which it has not failed yet.
+    measure : Measure
+        A function of a module (it is sent to other processes).
+    across : str
+        What the columns are, in words.
+    columns : mapping of str to float
+        Names and values of a second quantity, each with edges of its own.
+    theory : callable, optional
+        From a column's value to the edge (on the axis) from which the method should no longer
+        hold; `source` says by which formula.
+    source : str
+    exception : str
+        Why the default may be nearer than a factor of 2 to the nearest edge; "" where it may not.
+    """
+
+    family: str
+    method: str
+    ours: bool
+    axis: Axis
+    figure: str
+    unit: str
+    holds: float
+    degrades: float
+    measure: Measure
+    across: str = ""
+    columns: Mapping[str, float] = field(default_factory=lambda: dict(ALONE))
+    theory: Callable[[float], float] | None = None
+    source: str = ""
+    exception: str = ""
+
+    def verdict(self, figure: float) -> Verdict:
+        """What a figure says of the method; one that is not a number has failed."""
+        if figure <= self.holds:
+            return HOLDS
+        return DEGRADES if figure <= self.degrades else FAILS

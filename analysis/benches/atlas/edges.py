@@ -1,0 +1,119 @@
+"""Where a method stops to hold: a few runs along the axis, then bisection between two of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from analysis.benches.atlas.case import FAILS, HOLDS, Case, Verdict
+
+CELLS = {False: 3, True: 5}
+BISECTIONS = {False: 3, True: 6}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run: where on the axis, and what came out."""
+
+    value: float
+    figure: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Examined:
+    """One column of a case.
+
+    Parameters
+    ----------
+    cells : tuple of Cell
+        Evenly along the axis, from mild to severe.
+    at_default : Cell or None
+        The run where the default lies.
+    holds_to : float
+        The most severe value, from the mild end on, with which the method holds; NaN where it does
+        not even hold there. The severe end of the axis where it holds throughout.
+    fails_from : float
+        The value from which on it fails; NaN where it does not within the axis.
+    returns : bool
+        Whether it holds again at some cell beyond `holds_to`: the edge is then not the only one.
+    runs : int
+        How often the case was run.
+    """
+
+    case: Case
+    column: str
+    cells: tuple[Cell, ...]
+    at_default: Cell | None
+    holds_to: float
+    fails_from: float
+    returns: bool
+    runs: int
+
+    @property
+    def holds_throughout(self) -> bool:
+        """Whether no edge lies within the axis."""
+        return all(cell.verdict == HOLDS for cell in self.cells)
+
+
+def examine(case: Case, column: str, *, full: bool) -> Examined:
+    """Cells and edges of one column of a case.
+
+    Between the first cell that holds no more and the one before it the edge is bisected, so that it
+    is known to 1/256 of the axis (1/16 in the reduced atlas); likewise for failure. An edge is the
+    value before which the runs were right: at most that much too mild.
+    """
+    probe = _Probe(case, column, full=full)
+    count = CELLS[full]
+    shares = [i / (count - 1) for i in range(count)]
+    cells = tuple(probe(share) for share in shares)
+
+    def edge(is_past: Callable[[Verdict], bool]) -> tuple[float, float] | None:
+        past = next((i for i, cell in enumerate(cells) if is_past(cell.verdict)), None)
+        if past is None:
+            return None
+        if past == 0:
+            return float("nan"), 0.0
+        low, high = shares[past - 1], shares[past]
+        for _ in range(BISECTIONS[full]):
+            middle = (low + high) / 2
+            if is_past(probe(middle).verdict):
+                high = middle
+            else:
+                low = middle
+        return low, high
+
+    not_held, failed = edge(lambda v: v != HOLDS), edge(lambda v: v == FAILS)
+    first = next((i for i, cell in enumerate(cells) if cell.verdict != HOLDS), count)
+    default = case.axis.default
+    return Examined(
+        case=case,
+        column=column,
+        cells=cells,
+        at_default=None if default is None else probe.at_value(default),
+        holds_to=case.axis.severe if not_held is None else case.axis.at(not_held[0]),
+        fails_from=float("nan") if failed is None else case.axis.at(failed[1]),
+        returns=any(cell.verdict == HOLDS for cell in cells[first:]),
+        runs=probe.runs,
+    )
+
+
+class _Probe:
+    """Runs of one column; none is done twice."""
+
+    def __init__(self, case: Case, column: str, *, full: bool) -> None:
+        self._case, self._column, self._full = case, case.columns[column], full
+        self._done: dict[float, Cell] = {}
+
+    @property
+    def runs(self) -> int:
+        return len(self._done)
+
+    def __call__(self, share: float) -> Cell:
+        return self.at_value(self._case.axis.at(share))
+
+    def at_value(self, value: float) -> Cell:
+        if value not in self._done:
+            figure = float(self._case.measure(value, self._column, full=self._full))
+            self._done[value] = Cell(value, figure, self._case.verdict(figure))
+        return self._done[value]
