@@ -15,7 +15,7 @@
 #define TQ_FLAGS "flags unknown"
 #endif
 
-#define TQ_ORDER 20 /* of the autoregressive rival; even */
+#define TQ_MOST_ORDER 40 /* of the autoregressive rival, whose order is even and at least 4 */
 
 /* The rivals. */
 enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_PREDICTOR };
@@ -25,11 +25,11 @@ enum { TQ_GROUPS = TQ_SIDE_BY_SIDE / TQ_LANES };
 
 /* The state of any rival; all zeros, but for kind and key, is silence at position 0. */
 typedef struct {
-    int kind, since_update;
+    int kind, order, since_update; /* the order of the autoregressive rival; 0 for the others */
     uint64_t key, position;
     tq_real floor;       /* the noise gain now; the gain of the autoregressive rival */
     tq_real before[2];   /* the last two samples of noise */
-    tq_real rows[6][20]; /* filter states and coefficients, one value per layer or lag */
+    tq_real rows[6][40]; /* filter states and coefficients, one value per layer or lag */
 } tq_rival;
 
 typedef void tq_rival_layers(tq_rival *s, int first, int width, const tq_real *w, tq_real *out,
@@ -74,7 +74,7 @@ TQ_INLINE void tq_tangent_parts(tq_real angle, tq_real *numerator, tq_real *deno
    a1 = -2 cos(2 pi f / rate) / (1 + k), a2 = (1 - k) / (1 + k); the gain is part of b. */
 enum { TQ_Y1, TQ_Y2, TQ_A1, TQ_A2, TQ_B };
 
-TQ_INLINE void tq_direct_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_direct_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, const tq_hand *hand)
 {
     size_t m = (size_t)t->layers, i;
     tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
@@ -160,7 +160,7 @@ TQ_INLINE void tq_transposed_layers(tq_rival *s, int first, int width, const tq_
    s1' = (2 a1 - 1) s1 + 2 a2 e, s2' = s2 + 2 a2 s1 + 2 a3 e, band = K (s1 + s1') / 2. */
 enum { TQ_T1, TQ_T2, TQ_TURN, TQ_CROSS, TQ_FEED, TQ_TAP };
 
-TQ_INLINE void tq_tpt_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_tpt_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, const tq_hand *hand)
 {
     size_t m = (size_t)t->layers, i;
     tq_real angle = (tq_real)3.141592653589793 / t->rate_hz;
@@ -215,7 +215,7 @@ TQ_INLINE void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w
 
 /* --- Autoregressive, by line spectral frequencies ---------------------------------------------- */
 
-/* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + TQ_ORDER columns, the gain and the
+/* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + order columns, the gain and the
    line spectral frequencies (radians per sample), then anything. */
 enum { TQ_PAST, TQ_WEIGHTS };
 
@@ -233,16 +233,16 @@ TQ_INLINE tq_real tq_cosine(tq_real angle)
 
 /* A(z) from half of the coefficients of its symmetric and its antisymmetric part, each the product
    of factors 1 - 2 cos(w) / z + 1 / z^2; the two products run side by side. */
-TQ_INLINE void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_predictor_order_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand, int order)
 {
-    tq_real middle[TQ_ORDER], half[TQ_ORDER / 2 + 1][2], *a = s->rows[TQ_WEIGHTS];
+    tq_real middle[TQ_MOST_ORDER], half[TQ_MOST_ORDER / 2 + 1][2], *a = s->rows[TQ_WEIGHTS];
     int i, j, k;
     s->floor = tq_blend(hand, 0) * hand->ramp;
-    for (i = 0; i < TQ_ORDER; i++)
+    for (i = 0; i < order; i++)
         middle[i] = -2 * tq_cosine(tq_blend_at(hand, 1 + i));
     for (k = 0; k < 2; k++)
         half[0][k] = 1, half[1][k] = middle[k];
-    for (i = 2; i <= TQ_ORDER / 2; i++) {
+    for (i = 2; i <= order / 2; i++) {
         const tq_real *b = middle + 2 * (i - 1);
         for (k = 0; k < 2; k++)
             half[i][k] = b[k] * half[i - 1][k] + 2 * half[i - 2][k];
@@ -252,25 +252,26 @@ TQ_INLINE void tq_predictor_update(tq_rival *restrict s, const tq_hand *hand)
         for (k = 0; k < 2; k++)
             half[1][k] += b[k];
     }
-    for (i = 1; i <= TQ_ORDER / 2; i++) {
+    for (i = 1; i <= order / 2; i++) {
         tq_real symmetric = half[i][0] + half[i - 1][0], anti = half[i][1] - half[i - 1][1];
-        a[i - 1] = (symmetric + anti) / 2;
-        a[TQ_ORDER - i] = (symmetric - anti) / 2;
+        a[i - 1] = (tq_real)0.5 * (symmetric + anti);
+        a[order - i] = (tq_real)0.5 * (symmetric - anti);
     }
 }
 
 /* Four samples at once as far as the past goes, then one after the other. */
-TQ_INLINE void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real *out, int count,
+                                         int order)
 {
-    tq_real past[TQ_ORDER + TQ_CHUNK], a[TQ_ORDER + 1], *y = past + TQ_ORDER;
+    tq_real past[TQ_MOST_ORDER + TQ_CHUNK], a[TQ_MOST_ORDER + 1], *y = past + order;
     int n = 0, i, lag;
-    memcpy(past, s->rows[TQ_PAST], TQ_ORDER * sizeof(tq_real));
-    memcpy(a + 1, s->rows[TQ_WEIGHTS], TQ_ORDER * sizeof(tq_real));
+    memcpy(past, s->rows[TQ_PAST], (size_t)order * sizeof(tq_real));
+    memcpy(a + 1, s->rows[TQ_WEIGHTS], (size_t)order * sizeof(tq_real));
     for (; n + 4 <= count; n += 4) {
         tq_real sum[4];
         for (i = 0; i < 4; i++)
             sum[i] = s->floor * w[n + i];
-        for (lag = TQ_ORDER; lag > 3; lag--)
+        for (lag = order; lag > 3; lag--)
             for (i = 0; i < 4; i++)
                 sum[i] -= a[lag] * y[n + i - lag];
         for (i = 0; i < 4; i++)
@@ -278,17 +279,37 @@ TQ_INLINE void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, 
     }
     for (; n < count; n++) {
         tq_real sum = s->floor * w[n];
-        for (lag = TQ_ORDER; lag > 0; lag--)
+        for (lag = order; lag > 0; lag--)
             sum -= a[lag] * y[n - lag];
         y[n] = sum;
     }
     memcpy(out, y, (size_t)count * sizeof(tq_real));
-    memcpy(s->rows[TQ_PAST], y + count - TQ_ORDER, TQ_ORDER * sizeof(tq_real));
+    memcpy(s->rows[TQ_PAST], y + count - order, (size_t)order * sizeof(tq_real));
+}
+
+/* A constant order lets the compiler unroll. */
+#define TQ_BY_ORDER(work, s, ...)                          \
+    switch ((s)->order) {                                  \
+    case 6: work((s), __VA_ARGS__, 6); break;              \
+    case 12: work((s), __VA_ARGS__, 12); break;            \
+    case 20: work((s), __VA_ARGS__, 20); break;            \
+    case 40: work((s), __VA_ARGS__, 40); break;            \
+    default: work((s), __VA_ARGS__, (s)->order); break;    \
+    }
+
+static void tq_predictor_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand)
+{
+    TQ_BY_ORDER(tq_predictor_order_update, s, hand)
+}
+
+static void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+{
+    TQ_BY_ORDER(tq_predictor_order_filter, s, w, out, count)
 }
 
 /* --- The call ---------------------------------------------------------------------------------- */
 
-TQ_INLINE void tq_rival_update(const tq_texture *t, tq_rival *restrict s, const tq_hand *hand)
+TQ_INLINE void tq_rival_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, const tq_hand *hand)
 {
     switch (s->kind) {
     case TQ_DIRECT:

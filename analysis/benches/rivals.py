@@ -27,7 +27,8 @@ KERNEL, DIRECT, TRANSPOSED = "kernel", "direct form I", "direct form II"
 TPT, AR = "TPT", f"AR({ORDER})"
 FORMS = (DIRECT, TRANSPOSED)
 COMPILED = (KERNEL, DIRECT, TRANSPOSED, TPT, AR)
-_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3}
+_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2}
+_PREDICTOR = 3
 _SPECTRUM_SAMPLES = 5000
 
 
@@ -134,15 +135,20 @@ def operations(name: str, layers: int) -> Operations:
     return Operations(products * layers + of_branch[0], sums * layers + of_branch[1])
 
 
+def order_of(name: str) -> int:
+    """The order of an autoregressive rival, `AR(20)`; 0 of the others."""
+    return int(name[3:-1]) if name.startswith("AR(") else 0
+
+
 class CompiledStream:
     """The kernel or one of its rivals in C, called without anything of Python around it.
 
     Parameters
     ----------
     name : str
-        One of `COMPILED`.
+        One of `COMPILED`, or "AR(p)" with another even order p, 4 … 40.
     model : LayeredModel
-        At most 20 layers, rendered at its own rate (the kernel: at any); a `tabled_predictor` for
+        At most 40 layers, rendered at its own rate (the kernel: at any); a `tabled_predictor` for
         the autoregressive rival.
     update_samples : int
     seed : int
@@ -171,7 +177,9 @@ class CompiledStream:
             self._state = self._of_engine("tq_state *", self._engine._state)
             self._call = lib.tq_kernel_calls
         else:
-            self._state = self._ffi.new("tq_rival *", {"kind": _KINDS[name], "key": int(key)})
+            kind, order = _KINDS.get(name, _PREDICTOR), order_of(name)
+            state = {"kind": kind, "order": order, "key": int(key)}
+            self._state = self._ffi.new("tq_rival *", state)
             self._call = lib.tq_rival_calls
 
     def _of_engine(self, kind: str, pointer: Any) -> Any:
