@@ -297,12 +297,12 @@ TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real 
     default: work((s), __VA_ARGS__, (s)->order); break;    \
     }
 
-static void tq_predictor_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand)
+TQ_INLINE void tq_predictor_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand)
 {
     TQ_BY_ORDER(tq_predictor_order_update, s, hand)
 }
 
-static void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+TQ_INLINE void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
 {
     TQ_BY_ORDER(tq_predictor_order_filter, s, w, out, count)
 }
