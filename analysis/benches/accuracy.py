@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.benches.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
-from modeling import Recording, Renderer, TextureModel, similarity
+from modeling import Recording, RegressedModel, Renderer, TextureModel, similarity
 from modeling.hand import Hand
 from modeling.models.parameter_table import Parameters
 from modeling.rendering.plan import SLOPE_S, RenderPlan
@@ -17,6 +17,7 @@ from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 FASTEST_MM_S = 300.0
 FORCE_N = 2.0
+PRESSING_HZ = 1.3
 HELD_MM_S = 200.0
 UPDATES_SAMPLES = (1, 5, 32)
 # How often the speed is read (Hz), and the noise of a reading (mm/s).
@@ -31,11 +32,11 @@ PERIODS_SAMPLES = (5, 10, 20, 40)
 SETTLED = 5
 
 
-def stroke(rate_hz: float, *, duration_s: float = 1.0) -> Hand:
-    """A hand that goes to and fro at 2 Hz, up to 300 mm/s, pressing with 2 N."""
+def stroke(rate_hz: float, *, duration_s: float = 1.0, pressing_n: float = 0.0) -> Hand:
+    """A hand that goes to and fro at 2 Hz, up to 300 mm/s, pressing with 2 N ± `pressing_n`."""
     time_s = np.arange(round(duration_s * rate_hz)) / rate_hz
     speed = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * time_s)
-    return Hand(speed, np.full(speed.size, FORCE_N))
+    return Hand(speed, FORCE_N + pressing_n * np.sin(2 * np.pi * PRESSING_HZ * time_s))
 
 
 def update_error_db(
@@ -128,7 +129,9 @@ def speed_errors(hand: Hand, readings: Hand, *, plan: RenderPlan) -> SpeedErrors
     return SpeedErrors(max(as_read), max(extrapolated))
 
 
-def rendered_parameters(model: TextureModel, hand: Hand, update_samples: int) -> Parameters:
+def rendered_parameters(
+    model: TextureModel | RegressedModel, hand: Hand, update_samples: int
+) -> Parameters:
     """The parameters that a renderer at the model's rate applies at each sample.
 
     docs/method/rendering.md#moving-parameters

@@ -6,7 +6,7 @@ the others.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence, Set
 from itertools import pairwise
 from typing import Protocol
 
@@ -22,7 +22,7 @@ from modeling.estimation.likelihood import is_silent
 from modeling.fitting.autoregressive import fit_ar_spectra
 from modeling.fitting.conditions import spectra_by_condition
 from modeling.fitting.texture import fit_spectra
-from modeling.models.grid import Condition
+from modeling.models.grid import Condition, grid_axes
 from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
 from modeling.similarity import SpectralFilter
 from stimuli.planted.textures import PlantedSurface
@@ -158,7 +158,7 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
     measured = _heard(measured)
     tables = []
     for colour in (1, 0):
-        out = _squares(measured, colour)
+        out = chessboard({recording.condition for recording, _ in measured}, colour=colour)
         rest = [pair for pair in measured if pair[0].condition not in out]
         if not out or not rest:
             continue
@@ -173,11 +173,9 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
     return table.sort_values(["speed_mm_s", "force_n"], ignore_index=True)
 
 
-def _squares(measured: Measured, colour: int) -> set[Condition]:
-    """The conditions of one colour of the chessboard, without the corners of the grid."""
-    conditions = {recording.condition for recording, _ in measured}
-    speeds = sorted({speed for speed, _ in conditions})
-    forces = sorted({force for _, force in conditions})
+def chessboard(conditions: Set[Condition], *, colour: int) -> set[Condition]:
+    """The conditions on squares of one colour (0, 1) of the grid, without its corners."""
+    speeds, forces = grid_axes(conditions)
     ends = {(v, f) for v in (speeds[0], speeds[-1]) for f in (forces[0], forces[-1])}
     return {
         (speed, force)

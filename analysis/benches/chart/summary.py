@@ -1,0 +1,283 @@
+"""From the rows of all textures to the chart: medians, fronts, and who dominates whom."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from scipy.stats import ttest_1samp
+
+from analysis.benches.chart.judging import BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
+from analysis.benches.chart.measures import SUMMARIES
+from analysis.benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
+from modeling.arrays import Bools, Floats
+from modeling.models.texture_model import BLENDINGS
+
+VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_ms", "precision"]
+COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers")
+MEASURES = tuple(f"{place}_{name}" for place in PLACES for name in SUMMARIES)
+CONFIDENCE = 0.95
+FEWEST_SURFACES = 3
+
+
+def summarised(rows: pd.DataFrame) -> pd.DataFrame:
+    """One row per kind of surface and variant: medians over the surfaces, and their spread.
+
+    Parameters
+    ----------
+    rows : DataFrame
+        From `judging.judge`, of all textures.
+
+    Returns
+    -------
+    DataFrame
+        The columns of `VARIANT`; of each cost and measure the median and, with _25 and _75, the
+        quartiles; _worst of the distances (the largest); single_error_db (the largest); surfaces,
+        simulated.
+    """
+    grouped = rows.groupby(VARIANT, sort=False, dropna=False)
+    values = [*COSTS, *MEASURES]
+    parts: list[pd.DataFrame | pd.Series[Any]] = [grouped[values].median()]
+    parts += [grouped[values].quantile(q).add_suffix(f"_{q:.0%}"[:-1]) for q in (0.25, 0.75)]
+    distances = [f"{place}_distance_db" for place in PLACES]
+    parts.append(grouped[distances].max().add_suffix("_worst"))
+    if "single_error_db" in rows:
+        parts.append(grouped[["single_error_db"]].max())
+    parts.append(grouped["surface"].nunique().rename("surfaces"))
+    parts.append(grouped["simulated"].any())
+    return pd.concat(parts, axis=1).reset_index()
+
+
+def on_front(cost: Floats, error: Floats) -> Bools:
+    """Which of n points no other one beats: cheaper or equal, nearer or equal, and one of them so.
+
+    Points with a NaN are never on the front.
+    """
+    known = np.isfinite(cost) & np.isfinite(error)
+    beaten = np.array(
+        [
+            bool(((cost <= c) & (error <= e) & ((cost < c) | (error < e)) & known).any())
+            for c, e in zip(cost, error, strict=True)
+        ],
+        dtype=np.bool_,
+    )
+    return known & ~beaten
+
+
+class Ratio(NamedTuple):
+    """A geometric mean of ratios over surfaces with its 95 % interval (NaN of too few)."""
+
+    mean: float
+    low: float
+    high: float
+
+    @property
+    def is_known(self) -> bool:
+        return bool(np.isfinite(self.low))
+
+    def text(self) -> str:
+        """`1.8 (1.6–2.1)`."""
+        between = f" ({self.low:.2g}–{self.high:.2g})" if self.is_known else ""
+        return f"{self.mean:.2g}{between}"
+
+
+def ratio_over_surfaces(numerator: Floats, denominator: Floats) -> Ratio:
+    """Of paired (n,) values > 0; the interval is Student's t for the mean of the logarithms."""
+    logs = np.log(numerator / denominator)
+    logs = logs[np.isfinite(logs)]
+    mean = float(np.exp(logs.mean())) if logs.size else float("nan")
+    if logs.size < FEWEST_SURFACES:
+        return Ratio(mean, float("nan"), float("nan"))
+    if np.ptp(logs) < 1e-12:
+        return Ratio(mean, mean, mean)
+    found = ttest_1samp(logs, 0.0).confidence_interval(CONFIDENCE)
+    return Ratio(mean, float(np.exp(found.low)), float(np.exp(found.high)))
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A method with its blending and update interval, in double precision."""
+
+    method: str
+    blending: str
+    update_ms: float
+
+    def text(self) -> str:
+        """`joint, 2 layers (logarithmic, every 4 ms)`."""
+        blended = f"{self.blending}, " * (self.blending in BLENDINGS)
+        return f"{self.method} ({blended}every {self.update_ms:g} ms)"
+
+
+@dataclass(frozen=True)
+class Dominating:
+    """A variant that takes no more operations and is nearer, beyond the doubt of the interval."""
+
+    variant: Variant
+    operations: Ratio
+    distance: Ratio
+
+    def text(self) -> str:
+        """What it is, and by which factors."""
+        return (
+            f"{self.variant.text()}, {self.operations.text()} times the operations and "
+            f"{self.distance.text()} times the distance"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """Our default against one rival, on one kind of surface.
+
+    Parameters
+    ----------
+    operations, numbers : Ratio
+        The rival's over ours.
+    between, stroking : Ratio
+        The rival's distance from the truth over ours.
+    surfaces : int
+    dominated_by : Dominating or None
+        The nearest of our variants that dominates the rival.
+    dominates_by : Dominating or None
+        The nearest of the rival's variants that dominates our default.
+    """
+
+    kind: str
+    rival: str
+    operations: Ratio
+    numbers: Ratio
+    between: Ratio
+    stroking: Ratio
+    surfaces: int
+    dominated_by: Dominating | None
+    dominates_by: Dominating | None
+
+    @property
+    def verdict(self) -> str:
+        """Who dominates whom: with no more operations nearer, beyond the doubt of the interval."""
+        if self.dominates_by is not None:
+            return f"{self.rival} dominates joint as {self.dominates_by.text()}"
+        if self.dominated_by is not None:
+            return f"it is dominated by {self.dominated_by.text()}"
+        if self.surfaces < FEWEST_SURFACES:
+            return f"too few surfaces to say who dominates, {FEWEST_SURFACES} are needed"
+        return "neither dominates the other"
+
+    @property
+    def sentence(self) -> str:
+        """The comparison in words."""
+        farther = (
+            f"{self.rival} is {self.between.text()} times as far from the truth as joint between "
+            "the conditions"
+        )
+        if np.isfinite(self.stroking.mean):
+            farther += f" and {self.stroking.text()} times while stroking"
+        return (
+            f"{farther}, for {self.operations.text()} times the operations and "
+            f"{self.numbers.text()} times the numbers; {self.verdict}."
+        )
+
+
+def comparisons(rows: pd.DataFrame) -> list[Comparison]:
+    """Our default against every rival, surface by surface, for each kind of surface."""
+    found = []
+    for kind, of_kind in rows[rows["precision"] == DOUBLE].groupby("kind", sort=False):
+        default = default_rows(of_kind)
+        mine = default[default["method"] == OURS].set_index("surface")
+        for rival in RIVALS:
+            other = default[default["method"] == rival].set_index("surface")
+            if not len(mine.index.intersection(other.index)):
+                continue
+            pair = _paired(other, mine)
+            found.append(
+                Comparison(
+                    kind=str(kind),
+                    rival=rival,
+                    operations=_ratio("operations", *pair),
+                    numbers=_ratio("numbers", *pair),
+                    between=_ratio(f"{BETWEEN}_distance_db", *pair),
+                    stroking=_ratio(f"{STROKING}_distance_db", *pair),
+                    surfaces=len(pair[0]),
+                    dominated_by=_dominating(of_kind[of_kind["family"].isin(OUR_FAMILIES)], other),
+                    dominates_by=_dominating(of_kind[of_kind["method"] == rival], mine),
+                )
+            )
+    return found
+
+
+def _dominating(variants: pd.DataFrame, target: pd.DataFrame) -> Dominating | None:
+    """The nearest of some variants that dominates a target, whose index are surfaces.
+
+    While stroking, where that is known, since there the update interval counts; else between.
+    """
+    moving = target[f"{STROKING}_distance_db"].notna().all()
+    column = f"{STROKING if moving else BETWEEN}_distance_db"
+    found = []
+    for _, rows in variants.groupby(["method", "blending", "update_ms"], sort=False):
+        pair = _paired(rows.set_index("surface"), target)
+        operations, distance = _ratio("operations", *pair), _ratio(column, *pair)
+        if operations.high <= 1 and distance.high < 1:
+            first = rows.iloc[0]
+            variant = Variant(first["method"], first["blending"], float(first["update_ms"]))
+            found.append(Dominating(variant, operations, distance))
+    return min(found, key=lambda one: one.distance.mean, default=None)
+
+
+def _paired(first: pd.DataFrame, second: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The rows of the surfaces that both have."""
+    both = first.index.intersection(second.index)
+    return first.loc[both], second.loc[both]
+
+
+def _ratio(column: str, numerator: pd.DataFrame, denominator: pd.DataFrame) -> Ratio:
+    above, below = (table[column].to_numpy(dtype=float) for table in (numerator, denominator))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return ratio_over_surfaces(above, below)
+
+
+def default_rows(rows: pd.DataFrame) -> pd.DataFrame:
+    """The rows of each method as the program renders it: its own blending, 1 ms, double.
+
+    FFT-shaped noise at its own interval.
+    """
+    own_interval = ~rows["update_ms"].isin(UPDATES_MS)
+    usual = (rows["update_ms"] == UPDATES_MS[0]) | own_interval
+    return rows[rows["default_blending"] & usual & (rows["precision"] == DOUBLE)]
+
+
+def front_table(summary: pd.DataFrame) -> pd.DataFrame:
+    """For each kind and place the variants on the front of operations against distance.
+
+    At and between the conditions the hand rests, and a method is taken at its usual interval; while
+    stroking all intervals compete. Of points that coincide the first method's is named.
+
+    Returns
+    -------
+    DataFrame
+        kind, place, method, blending, update_ms, precision, operations, distance_db, simulated;
+        cheapest first.
+    """
+    rows = []
+    for _, of_kind in summary[summary["precision"] == DOUBLE].groupby("kind", sort=False):
+        for place in PLACES:
+            rivals = of_kind if place == STROKING else default_rows(of_kind)
+            named = rivals.assign(place=place, distance_db=rivals[f"{place}_distance_db"])
+            front = named[on_front(named["operations"].to_numpy(), named["distance_db"].to_numpy())]
+            unique = front.drop_duplicates(["operations", "distance_db"])
+            rows.append(unique.sort_values("operations"))
+    names = ["kind", "place", "method", "blending", "update_ms", "precision", "operations"]
+    return pd.concat(rows, ignore_index=True)[[*names, "distance_db", "simulated"]]
+
+
+def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
+    """The comparisons as a table: ratios with their intervals, and the sentence."""
+    rows = []
+    for one in found:
+        row: dict[str, object] = {"kind": one.kind, "rival": one.rival, "surfaces": one.surfaces}
+        for name in ("operations", "numbers", BETWEEN, STROKING):
+            ratio: Ratio = getattr(one, name)
+            row |= {name: ratio.mean, f"{name}_low": ratio.low, f"{name}_high": ratio.high}
+        rows.append(row | {"verdict": one.verdict, "sentence": one.sentence})
+    return pd.DataFrame(rows)

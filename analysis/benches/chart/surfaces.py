@@ -1,0 +1,217 @@
+"""Textures for the chart: what methods are fitted to, and what they are judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from analysis.benches.accuracy import stroke
+from analysis.textures.between import Measured, Truth, chessboard, halfway
+from modeling import InputError, RecordingSet
+from modeling.arrays import Floats
+from modeling.fitting.conditions import recording_spectra
+from modeling.hand import Hand
+from modeling.models.grid import Condition, grid_axes
+from modeling.recordings.recording_set import load_usable
+from rig.importing.hatt import HattTexture, load_hatt
+from stimuli.planted.drawn import draw_surface
+from stimuli.planted.textures import (
+    FORCES_N,
+    SPEEDS_MM_S,
+    PlantedSurface,
+    planted_texture,
+    record_texture,
+)
+
+Kind = Literal["drawn", "planted", "toolkit", "recorded"]
+KINDS: dict[Kind, str] = {
+    "drawn": "surfaces drawn from the statistics of 100 real ones (simulated)",
+    "planted": "planted textures (simulated)",
+    "toolkit": "models of the Penn Haptic Texture Toolkit (simulated recordings)",
+    "recorded": "recordings, conditions held out",
+}
+FIRST_SURFACE = 1000  # surfaces that no constant of the estimator was chosen by
+RECORD_S = 1.0
+
+# A stroke over half of which filters are judged; it starts from rest, where no slope is known.
+STROKE_S, JUDGED_FROM_S = 0.75, 0.25
+PRESSING_N = 1.0
+PLACES = 24
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a texture comes from; small, so that it can be sent to another process.
+
+    Parameters
+    ----------
+    kind : {"drawn", "planted", "toolkit", "recorded"}
+    name : str
+        Of the surface; of recordings the texture's.
+    seed : int
+        Of what is simulated: for drawn surfaces also which one it is.
+    path : Path, optional
+        The toolkit's file, or the folder of recordings.
+    fold : int
+        Which half of the recorded conditions is held out, 0 or 1.
+    models : tuple of (str, Path)
+        Models that were made elsewhere, with their names; for recordings.
+    """
+
+    kind: Kind
+    name: str
+    seed: int = 0
+    path: Path | None = None
+    fold: int = 1
+    models: tuple[tuple[str, Path], ...] = ()
+
+    @property
+    def simulated(self) -> bool:
+        return self.kind != "recorded"
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """One texture, ready to be fitted and judged.
+
+    Parameters
+    ----------
+    measured : sequence of (Recording, Spectrum)
+        What methods are fitted to.
+    truth : Truth or None
+        None for recordings, where what was held out stands for it.
+    at, between : list of (speed, force)
+        Where they are judged: recorded, and not recorded (half-way, or held out).
+    hidden : sequence of (Recording, Spectrum)
+        What was held out.
+    rate_hz : float
+        Of the spectra.
+    prepare_s : float
+        Processor time that the spectra took.
+    simulated : bool
+    warnings : tuple of str
+        What could not be used.
+    """
+
+    measured: Measured
+    truth: Truth | None
+    at: list[Condition]
+    between: list[Condition]
+    hidden: Measured
+    rate_hz: float
+    prepare_s: float
+    simulated: bool
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _ToolkitTruth:
+    """A toolkit's filters, blended as its own renderer does."""
+
+    texture: HattTexture
+
+    def magnitude(self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float) -> Floats:
+        return self.texture.filter(speed_mm_s, force_n).response(frequency_hz)
+
+
+def load_material(source: Source) -> Material:
+    """The texture of a source.
+
+    Raises
+    ------
+    InputError
+        For files that cannot be read; for recordings too few to hold any out.
+    """
+    if source.kind == "recorded":
+        return _recorded(source)
+    return _known(*_truth_and_records(source))
+
+
+def _truth_and_records(source: Source) -> tuple[Truth, RecordingSet]:
+    if source.kind == "drawn":
+        surface = draw_surface(source.seed)
+        return surface, surface.record(duration_s=RECORD_S, seed=source.seed)
+    if source.kind == "planted":
+        planted = planted_texture(source.name)
+        records = record_texture(planted, duration_s=RECORD_S, seed=source.seed)
+        return PlantedSurface(source.name), records
+    assert source.path is not None, "a toolkit's texture is read from its file"
+    toolkit = load_hatt(source.path)
+    records = toolkit.recordings(
+        SPEEDS_MM_S.tolist(), FORCES_N.tolist(), duration_s=RECORD_S, seed=source.seed
+    )
+    return _ToolkitTruth(toolkit), records
+
+
+def _known(truth: Truth, records: RecordingSet) -> Material:
+    from time import process_time
+
+    start = process_time()
+    measured = recording_spectra(records)
+    prepare_s = process_time() - start
+    at = sorted({recording.condition for recording, _ in measured})
+    between = halfway(*grid_axes(at))
+    if isinstance(truth, _ToolkitTruth):
+        between = truth.texture.conditions_inside(between)
+    return Material(measured, truth, at, between, [], measured[0][1].rate_hz, prepare_s, True)
+
+
+def _recorded(source: Source) -> Material:
+    from time import process_time
+
+    assert source.path is not None, "recordings are read from a folder"
+    records, unusable = load_usable(source.path, texture=source.name)
+    start = process_time()
+    measured = recording_spectra(records)
+    prepare_s = process_time() - start
+    out = chessboard({recording.condition for recording, _ in measured}, colour=source.fold)
+    kept = [pair for pair in measured if pair[0].condition not in out]
+    hidden = [pair for pair in measured if pair[0].condition in out]
+    if not out or len({recording.condition for recording, _ in kept}) < 4:
+        speeds, forces = grid_axes({recording.condition for recording, _ in measured})
+        raise InputError(
+            f"{source.name}: expected recordings at 3 speeds × 3 forces or more, so that some can "
+            f"be held out, got {len(speeds)} × {len(forces)}; record more conditions."
+        )
+    return Material(
+        kept,
+        None,
+        sorted({recording.condition for recording, _ in kept}),
+        sorted(out),
+        hidden,
+        measured[0][1].rate_hz,
+        prepare_s,
+        any(recording.simulated for recording, _ in measured),
+        unusable,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """A hand to and fro, and at which of its samples filters are judged."""
+
+    hand: Hand
+    places: list[int]
+
+
+def judged_stroke(rate_hz: float) -> Stroke:
+    """2 Hz at up to 300 mm/s, pressing with 1 … 3 N; judged where it is on the usual grid."""
+    hand = stroke(rate_hz, duration_s=STROKE_S, pressing_n=PRESSING_N)
+    on_grid = np.abs(hand.speed_mm_s) >= SPEEDS_MM_S[0]
+    on_grid[: round(JUDGED_FROM_S * rate_hz)] = False
+    places = np.flatnonzero(on_grid)
+    chosen = places[np.linspace(0, places.size - 1, PLACES).round().astype(int)]
+    return Stroke(hand, chosen.tolist())
+
+
+def drawn_and_planted(*, drawn: int, planted: Mapping[str, int]) -> list[Source]:
+    """So many drawn surfaces, and planted textures with their seeds."""
+    surfaces = [
+        Source("drawn", f"drawn {FIRST_SURFACE + n}", FIRST_SURFACE + n) for n in range(drawn)
+    ]
+    return surfaces + [Source("planted", name, seed) for name, seed in planted.items()]
