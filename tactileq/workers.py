@@ -7,40 +7,76 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from typing import TypeVar
+from contextlib import contextmanager, nullcontext
+from typing import Any, TypeVar
+
+from modeling.errors import shown
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+ANSWER_S = 10.0  # within which a scheduler must answer
 LOOK_S = 0.1  # how often a worker looks whether its parent is still there
 
 
 @contextmanager
 def working(
-    work: Callable[[Item], Result], items: Sequence[Item], *, jobs: int | None
+    work: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: int | None,
+    dask: str | None = None,
 ) -> Iterator[Iterator[tuple[int, Result]]]:
     """The work on each item, `jobs` at a time, as they are done: number of the item, and result.
 
     Processes of their own where there are several items and jobs (as many jobs as cores without a
-    number). After an exception in the block no worker goes on.
+    number). After an exception in the block no worker goes on. With the address of a Dask scheduler
+    its workers do the same work instead.
+
+    Raises
+    ------
+    ValueError
+        Where Dask is not installed, or nobody answers at its address.
     """
-    if len(items) < 2 or jobs == 1:
+    if dask is None and (len(items) < 2 or jobs == 1):
         yield enumerate(map(work, items))
         return
     from joblib import Parallel, cpu_count, delayed
 
-    parallel = Parallel(
-        n_jobs=min(jobs or cpu_count(), len(items)),
-        return_as="generator_unordered",
-        initializer=_end_with,
-        initargs=(os.getpid(),),
-    )
-    results = parallel(delayed(_numbered)(work, *numbered) for numbered in enumerate(items))
+    with _dask(dask) if dask else nullcontext():
+        most = len(items) if dask else min(jobs or cpu_count(), len(items))
+        ending: dict[str, Any] = (
+            {} if dask else {"initializer": _end_with, "initargs": (os.getpid(),)}
+        )
+        parallel = Parallel(n_jobs=most, return_as="generator_unordered", **ending)
+        results = parallel(delayed(_numbered)(work, *numbered) for numbered in enumerate(items))
+        try:
+            yield results
+        finally:
+            results.close()
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[None]:
+    """Joblib's work goes to this Dask scheduler."""
     try:
-        yield results
-    finally:
-        results.close()
+        from distributed import Client
+    except ImportError as error:
+        raise ValueError(
+            "expected Dask for --dask, got none installed; install it with "
+            "pip install 'tactileq[dask]'."
+        ) from error
+    from joblib import parallel_config
+
+    try:
+        client = Client(address, timeout=ANSWER_S)
+    except (OSError, ValueError) as error:  # a timeout is an OSError
+        raise ValueError(
+            f"expected a Dask scheduler at {shown(address)}, got no answer; start one with dask "
+            "scheduler, and give the address that it prints."
+        ) from error
+    with client, parallel_config(backend="dask"):
+        yield
 
 
 def _numbered(work: Callable[[Item], Result], number: int, item: Item) -> tuple[int, Result]:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,8 +13,11 @@ import typer
 from tactileq.keeping import check_own_results
 from tactileq.options import Out
 from tactileq.telling import progress
+from tactileq.workers import working
 
 if TYPE_CHECKING:
+    from analysis.benches.chart.chart import Chart
+    from analysis.benches.chart.surfaces import Source
     from analysis.benches.rendering import RenderingBench
 
 bench = typer.Typer(
@@ -35,6 +41,134 @@ def bench_render(
     Example: tactileq bench render --plot
     """
     bench_rendering_into(out, quick=quick, plot=plot)
+
+
+@bench.command("chart")
+def bench_chart(
+    out: Out = Path("bench-chart"),
+    recordings: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder of recordings, some held out; instead of simulated surfaces."),
+    ] = None,
+    toolkit: Annotated[
+        list[Path] | None,
+        typer.Option(help="Toolkit file (Models_….xml); instead of simulated surfaces."),
+    ] = None,
+    models: Annotated[
+        list[Path] | None,
+        typer.Option(help="Folder of models of these recordings, to be judged beside the others."),
+    ] = None,
+    method: Annotated[
+        list[str] | None, typer.Option(help="A method, such as AR(20); all without it.")
+    ] = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="40 drawn surfaces, all planted ones; both halves out.")
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers do it.")
+    ] = None,
+) -> None:
+    """Chart speed against accuracy: every way to model and render a texture, ours and others'.
+
+    Costs are counted operations, numbers, bytes, and times; accuracy is that at the conditions,
+    between them and while a hand strokes. Writes chart.html, chart_KIND.png, and the tables
+    rows.tsv, summary.tsv, fronts.tsv and comparisons.tsv. --method, --recordings, --toolkit and
+    --models may be given several times.
+
+    Example: tactileq bench chart --recordings recordings/cork --out chart
+    """
+    from analysis.benches.chart.methods import chosen_methods
+
+    check_own_results(out, "bench chart")
+    methods = chosen_methods(method or [])
+    sources = chart_sources(recordings or [], toolkit or [], models or [], full=full)
+    chart = charted(sources, methods, jobs=jobs, dask=dask)
+    settings = {
+        "methods": methods,
+        "surfaces": [f"{source.kind}: {source.name}" for source in sources],
+        "full": full,
+        "machine": chart.machine,
+    }
+    _write_chart(chart, out, settings)
+    for warning in chart.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    for comparison in chart.comparisons:
+        print(f"{comparison.kind}: {comparison.sentence}")
+    print((out / "chart.html").resolve())
+
+
+def chart_sources(
+    recordings: Sequence[Path], toolkit: Sequence[Path], models: Sequence[Path], *, full: bool
+) -> list[Source]:
+    """Which textures are charted.
+
+    Raises
+    ------
+    ValueError
+        For models without recordings, and a texture of which a folder holds no model.
+    """
+    from analysis.benches.chart.surfaces import (
+        FULL,
+        USUAL,
+        recorded_sources,
+        simulated_sources,
+        toolkit_sources,
+    )
+
+    if models and not recordings:
+        raise ValueError(
+            "expected --recordings for the models that --models names, got none; give both."
+        )
+    given = recorded_sources(recordings, models, both_halves=full) + toolkit_sources(toolkit)
+    return given or simulated_sources(FULL if full else USUAL)
+
+
+def charted(
+    sources: Sequence[Source],
+    methods: Sequence[str],
+    *,
+    jobs: int | None = None,
+    dask: str | None = None,
+) -> Chart:
+    """Judge all textures, some at a time, then time rendering alone."""
+    from analysis.benches.chart.chart import chart_of
+    from analysis.benches.chart.judging import Judged, judge
+
+    made = dict[int, Judged]()
+    with progress("Modeling and judging", len(sources)) as advance:
+        work = partial(judge, methods=methods)
+        with working(work, sources, jobs=jobs, dask=dask) as done:
+            for number, judged in done:
+                made[number] = judged
+                advance(judged.source.name)
+    return chart_of([made[number] for number in sorted(made)])
+
+
+def _write_chart(chart: Chart, out: Path, settings: dict[str, object]) -> None:
+    from analysis.benches.chart.summary import comparison_table
+    from analysis.figures.chart import figure_chart
+    from analysis.report.chart_page import chart_page
+    from analysis.report.findings import DOTS_PER_INCH
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import provenance_of, seal_folder
+    from modeling.files.writing import write_text
+
+    tables = {
+        "rows": chart.rows,
+        "summary": chart.summary,
+        "fronts": chart.fronts,
+        "comparisons": comparison_table(chart.comparisons),
+    }
+    with replace_folder(out) as fresh:
+        for name, table in tables.items():
+            table.to_csv(fresh / f"{name}.tsv", sep="\t", index=False, na_rep="n/a")
+        for kind in chart.kinds:
+            figure_chart(chart, kind).savefig(fresh / f"chart_{kind}.png", dpi=DOTS_PER_INCH)
+        write_text(fresh / "chart.html", chart_page(chart))
+        seal_folder(fresh, provenance_of("bench chart", settings))
 
 
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:

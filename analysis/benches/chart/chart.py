@@ -5,7 +5,6 @@ How to read it, and what it says: docs/chart.md.
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,7 +17,9 @@ from analysis.benches.chart.summary import (
     front_table,
     summarised,
 )
+from analysis.benches.chart.surfaces import Kind
 from analysis.benches.chart.timing import KEY, TURNS, Key, Run, stream_of, time_table
+from analysis.benches.rendering import processor
 from modeling import InputError
 
 
@@ -48,7 +49,7 @@ class Chart:
     machine: str
 
     @property
-    def kinds(self) -> list[str]:
+    def kinds(self) -> list[Kind]:
         """Kinds of surfaces, in the order in which they were judged."""
         return list(self.rows["kind"].unique())
 
@@ -82,7 +83,7 @@ def chart_of(judged: Sequence[Judged], *, turns: int = TURNS) -> Chart:
         fronts=front_table(summary),
         comparisons=tuple(comparisons(rows)),
         warnings=(*warnings, *untimed),
-        machine=platform.processor() or platform.machine(),
+        machine=processor(),
     )
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from time import process_time
 from typing import Literal
 
 import numpy as np
@@ -14,15 +15,18 @@ from analysis.benches.accuracy import stroke
 from analysis.textures.between import Measured, Truth, chessboard, halfway
 from modeling import InputError, RecordingSet
 from modeling.arrays import Floats
+from modeling.errors import shown
 from modeling.fitting.conditions import recording_spectra
 from modeling.hand import Hand
 from modeling.models.grid import Condition, grid_axes
-from modeling.recordings.recording_set import load_usable
+from modeling.models.loading import load_model, models_in
+from modeling.recordings.recording_set import load_usable, textures_in
 from rig.importing.hatt import HattTexture, load_hatt
 from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import (
     FORCES_N,
     SPEEDS_MM_S,
+    TEXTURES,
     PlantedSurface,
     planted_texture,
     record_texture,
@@ -149,8 +153,6 @@ def _truth_and_records(source: Source) -> tuple[Truth, RecordingSet]:
 
 
 def _known(truth: Truth, records: RecordingSet) -> Material:
-    from time import process_time
-
     start = process_time()
     measured = recording_spectra(records)
     prepare_s = process_time() - start
@@ -162,8 +164,6 @@ def _known(truth: Truth, records: RecordingSet) -> Material:
 
 
 def _recorded(source: Source) -> Material:
-    from time import process_time
-
     assert source.path is not None, "recordings are read from a folder"
     records, unusable = load_usable(source.path, texture=source.name)
     start = process_time()
@@ -209,9 +209,64 @@ def judged_stroke(rate_hz: float) -> Stroke:
     return Stroke(hand, chosen.tolist())
 
 
-def drawn_and_planted(*, drawn: int, planted: Mapping[str, int]) -> list[Source]:
-    """So many drawn surfaces, and planted textures with their seeds."""
-    surfaces = [
-        Source("drawn", f"drawn {FIRST_SURFACE + n}", FIRST_SURFACE + n) for n in range(drawn)
+@dataclass(frozen=True)
+class Simulated:
+    """How many surfaces are drawn, and which planted textures are recorded."""
+
+    drawn: int
+    planted: tuple[str, ...]
+
+
+USUAL = Simulated(6, ("canvas", "leather", "PVC"))
+FULL = Simulated(40, TEXTURES)
+FEW = Simulated(3, ())
+
+
+def simulated_sources(which: Simulated) -> list[Source]:
+    """Drawn surfaces and planted textures, each with noise of its own."""
+    numbers = range(FIRST_SURFACE, FIRST_SURFACE + which.drawn)
+    drawn = [Source("drawn", f"drawn {number}", number) for number in numbers]
+    return drawn + [Source("planted", name, seed) for seed, name in enumerate(which.planted)]
+
+
+def recorded_sources(
+    folders: Sequence[Path], models: Sequence[Path], *, both_halves: bool
+) -> list[Source]:
+    """The textures of some folders, each with the models that were given for it.
+
+    Raises
+    ------
+    InputError
+        For a folder without recordings, and a texture that one of the models' folders lacks.
+    """
+    sources = []
+    by_folder = {folder: _models_by_texture(folder) for folder in models}
+    for path in folders:
+        for name in textures_in(path):
+            given = tuple(
+                (f"models of {folder}", _model_of(name, found, folder))
+                for folder, found in by_folder.items()
+            )
+            for fold in (1, 0) if both_halves else (1,):
+                sources.append(Source("recorded", name, path=path, fold=fold, models=given))
+    return sources
+
+
+def _models_by_texture(folder: Path) -> dict[str, Path]:
+    return {load_model(path).texture: path for path in models_in(folder)[0]}
+
+
+def _model_of(texture: str, models: Mapping[str, Path], folder: Path) -> Path:
+    if texture not in models:
+        raise InputError(
+            f"expected a model of {shown(texture)} in {folder}, got models of "
+            f"{', '.join(map(shown, models))}; model it, or leave its recordings out."
+        )
+    return models[texture]
+
+
+def toolkit_sources(paths: Sequence[Path]) -> list[Source]:
+    """Textures of toolkit files; refused as `load_hatt` refuses them."""
+    return [
+        Source("toolkit", load_hatt(path).material, seed, path) for seed, path in enumerate(paths)
     ]
-    return surfaces + [Source("planted", name, seed) for name, seed in planted.items()]

@@ -1,0 +1,239 @@
+"""The page of the speed–accuracy chart: sentences, an interactive chart, pictures and tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from html import escape
+from importlib import resources
+
+import pandas as pd
+from plotly.offline import get_plotlyjs
+
+from analysis.benches.chart.chart import Chart
+from analysis.benches.chart.judging import PLACES
+from analysis.benches.chart.summary import comparison_table, default_rows
+from analysis.benches.chart.surfaces import KINDS
+from analysis.columns import Column, Columns
+from analysis.figures.chart import STYLES, figure_chart
+from analysis.figures.saving import png_of
+from analysis.report.page import (
+    PICTURE_DPI,
+    Picture,
+    Table,
+    bullets,
+    grouped,
+    page,
+    picture_html,
+    table_html,
+)
+from analysis.report.sections import Section
+
+COSTS = (
+    ("operations", "operations per sample at 5 kHz"),
+    ("most_operations", "most operations of one sample"),
+    ("ns", "time per rendered sample (ns)"),
+    ("numbers", "numbers stored"),
+    ("bytes", "bytes of table and state"),
+    ("fit_ms", "fitting time per record (ms)"),
+)
+_PLACE_NAMES = dict(
+    zip(PLACES, ("at the conditions", "between them", "while stroking"), strict=True)
+)
+_MEASURE_NAMES = {
+    "distance_db": "log-spectral distance (dB)",
+    "bands_db": "error in nine bands (dB)",
+    "level_db": "level error (dB)",
+    "worst_level_db": "worst level error (dB)",
+    "gfc30": "GFC30",
+    "gfc5": "GFC5",
+}
+MEASURES = tuple(
+    (f"{place}_{measure}", f"{label} {place_name}")
+    for place, place_name in _PLACE_NAMES.items()
+    for measure, label in _MEASURE_NAMES.items()
+)
+_SYMBOLS = {
+    "*": "star",
+    "o": "circle",
+    "D": "diamond",
+    "P": "cross",
+    "X": "x",
+    "s": "square",
+    "^": "triangle-up",
+    "v": "triangle-down",
+    "_": "line-ew",
+    "h": "hexagon",
+}
+FIRST_MEASURE = "stroking_distance_db"
+
+COMPARISON_COLUMNS: Columns = (
+    Column("kind", "surfaces", is_name=True),
+    Column("rival", is_name=True),
+    Column("surfaces", "number"),
+    Column("operations", "operations, times ours"),
+    Column("numbers", "numbers stored, times ours"),
+    Column("between", "distance between, times ours"),
+    Column("between_low", "95% from"),
+    Column("between_high", "to"),
+    Column("stroking", "while stroking, times ours"),
+    Column("stroking_low", "95% from"),
+    Column("stroking_high", "to"),
+)
+METHOD_COLUMNS: Columns = (
+    Column("kind", "surfaces", is_name=True),
+    Column("method", is_name=True),
+    Column("layers"),
+    Column("numbers", "numbers stored"),
+    Column("operations", "operations per sample"),
+    Column("most_operations", "at most"),
+    Column("bytes"),
+    Column("ns", "time per sample", "ns"),
+    Column("fit_ms", "fitting per record", "ms"),
+    Column("at_gfc30", "GFC30 at", format=".4f"),
+    Column("at_distance_db", "distance at", "dB"),
+    Column("between_distance_db", "between", "dB"),
+    Column("between_distance_db_worst", "between, worst surface", "dB"),
+    Column("stroking_distance_db", "while stroking", "dB"),
+    Column("between_worst_level_db", "worst level between", "dB"),
+    Column("single_error_db", "single precision", "dB"),
+)
+METHODS_NOTE = (
+    "Medians over the surfaces, as the program renders by default: each method's own blending, "
+    "updates each millisecond (FFT-shaped noise by blocks), double precision. Operations are "
+    "counted at 5 kHz, updates included; at most: of a sample with an update. Layers: −1 where "
+    "there are none to count. Distances are log-spectral, from the known truth, or smoothed from "
+    "recordings; while stroking as the hand goes to and fro. Time: rendering alone, all methods in "
+    "turn in one process; FFT-shaped noise in NumPy."
+)
+COMPARISON_NOTE = (
+    "The rival over joint, geometric means over surfaces, with Student's t intervals (95%) of the "
+    "logarithms. Dominated is what another takes no more operations than on any count and is "
+    "nearer to the truth, its interval being below 1."
+)
+
+
+def chart_tables(chart: Chart) -> tuple[Table, Table]:
+    """The methods by default, and our default against every rival."""
+    simulated = bool(chart.summary["simulated"].any())
+    usual = chart.summary.loc[default_rows(chart.summary).index]
+    single = chart.summary.dropna(subset=["single_error_db"])
+    largest = single.groupby(["kind", "method"])["single_error_db"].max()
+    worst = usual.drop(columns="single_error_db").join(largest, on=["kind", "method"])
+    return (
+        Table(
+            "chart_comparisons",
+            "Who dominates whom",
+            COMPARISON_NOTE,
+            comparison_table(chart.comparisons),
+            COMPARISON_COLUMNS,
+            simulated,
+        ),
+        Table("chart_methods", "All methods", METHODS_NOTE, worst, METHOD_COLUMNS, simulated),
+    )
+
+
+def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
+    """A picture for each kind of surface."""
+    return tuple(
+        Picture(
+            f"chart_{kind}",
+            f"Speed against accuracy: {KINDS[kind]}",
+            "To the left is cheaper, below is nearer to the truth. The black line joins what no "
+            "other variant beats in both; how to read it: docs/chart.md.",
+            figure_chart(chart, kind),
+            bool(chart.summary["simulated"].any()),
+        )
+        for kind in chart.kinds
+    )
+
+
+def chart_section(chart: Chart) -> Section:
+    """The section of the report: what the whole page says, without the interactive chart."""
+    return Section(
+        "chart",
+        "Speed against accuracy",
+        (*chart_pictures(chart), *chart_tables(chart)),
+        done=(
+            f"{_counted(chart)} were modelled by {chart.rows['method'].nunique()} methods, each "
+            "rendered in several ways and held against the truth.",
+        ),
+    )
+
+
+def _counted(chart: Chart) -> str:
+    surfaces = chart.rows.groupby("kind", sort=False)["surface"].nunique()
+    return ", ".join(f"{surfaces[kind]} {KINDS[kind]}" for kind in chart.kinds)
+
+
+def chart_page(chart: Chart) -> str:
+    """The page as HTML, which needs nothing but itself."""
+    comparison, methods = chart_tables(chart)
+    pictures = "".join(
+        picture_html(picture, png_of(picture.figure, dpi=PICTURE_DPI)[0])
+        for picture in chart_pictures(chart)
+    )
+    told = grouped(
+        {
+            f"On {KINDS[kind]}": [c.sentence for c in chart.comparisons if c.kind == kind]
+            for kind in chart.kinds
+        }
+    )
+    simulated = chart.rows.groupby("kind", sort=False)["simulated"].any()
+    which = ", ".join(str(kind) for kind, is_so in simulated.items() if is_so)
+    return page(
+        title="Speed against accuracy",
+        answer=f"{_counted(chart)}: what each way to model and render a texture costs, and how "
+        "near it comes to the truth.",
+        lead=f"Counted operations do not depend on the machine; times are of {chart.machine}.",
+        banner=f"SIMULATED: recordings of {which} surfaces come from no rig." if which else "",
+        sections=[
+            ("says", "Who dominates whom", told + table_html(comparison)),
+            ("interactive", "Choose the axes", _interactive(chart)),
+            ("pictures", "The charts", pictures),
+            ("methods", "All methods", table_html(methods) + bullets(chart.warnings)),
+        ],
+    )
+
+
+def _interactive(chart: Chart) -> str:
+    kinds = [(kind, KINDS[kind]) for kind in chart.kinds]
+    data = json.dumps(_data(chart), allow_nan=False).replace("</", "<\\/")
+    script = resources.files("analysis.report").joinpath("chart_page.js")
+    return (
+        "<p>"
+        + _select("kind", "Surfaces", kinds)
+        + _select("cost", "Cost", COSTS)
+        + _select("measure", "Measure", MEASURES, chosen=FIRST_MEASURE)
+        + '<label><input type="checkbox" id="chart-variants" checked> all updates, blendings and '
+        "precisions</label></p>"
+        '<div id="chart-plot"></div>'
+        f'<script type="application/json" id="chart-data">{data}</script>'
+        f"<script>{get_plotlyjs()}</script>"
+        f"<script>{script.read_text(encoding='utf-8')}</script>"
+    )
+
+
+def _select(name: str, label: str, options: Iterable[tuple[str, str]], *, chosen: str = "") -> str:
+    listed = "".join(
+        f'<option value="{escape(value)}"{" selected" * (value == chosen)}>{escape(text)}</option>'
+        for value, text in options
+    )
+    return f'<label>{label} <select id="chart-{name}">{listed}</select></label> '
+
+
+def _data(chart: Chart) -> dict[str, object]:
+    """What the script draws, with null for what is not known."""
+    summary = chart.summary
+    usual = summary.index.isin(default_rows(summary).index)
+    names = ["kind", "method", "family", "blending", "update_ms", "precision"]
+    values = [name for name, _ in (*COSTS, *MEASURES)]
+    rows = summary[[*names, *values]].assign(usual=usual).astype(object)
+    known: pd.DataFrame = rows.where(rows.notna(), None)
+    return {
+        "rows": known.to_dict(orient="records"),
+        "costs": COSTS,
+        "measures": MEASURES,
+        "styles": {f: (colour, _SYMBOLS[marker]) for f, (colour, marker, _) in STYLES.items()},
+        "simulated": sorted(set(summary.loc[summary["simulated"], "kind"])),
+    }
