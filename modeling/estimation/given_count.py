@@ -23,18 +23,17 @@ _NOISE_DB = (0.0, -20.0)
 _ROUNDS = 2
 
 
-def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False) -> PEQ:
+def fit_layer_count(spectrum: Spectrum, count: int) -> PEQ:
     """The PEQ of exactly `count` layers that is likeliest behind a spectrum.
 
-    Coherent layers are fitted from several starts by Whittle's likelihood; no layer is dropped.
+    Coherent layers are fitted from several starts by Whittle's likelihood, with the likeliest of
+    all signs equal and the two alternations; no layer is dropped.
 
     Parameters
     ----------
     spectrum : Spectrum
     count : int
         m ≥ 1.
-    equal_signs : bool
-        All gains positive; else the likeliest of all equal and the two alternations.
 
     Raises
     ------
@@ -45,7 +44,7 @@ def fit_layer_count(spectrum: Spectrum, count: int, *, equal_signs: bool = False
     if power is None or count < 1:
         got = f"{count} layers" if power is not None else "silence"
         raise InputError(f"expected a spectrum with power and a layer or more, got {got}; fix it.")
-    patterns = sign_patterns(np.arange(float(count)))[: 1 if equal_signs else None]
+    patterns = sign_patterns(np.arange(float(count)))
     fitted = _likeliest(power, starts_of(power, count), patterns)
     noise, frequency, bandwidth, gain = split(fitted.theta, count)
     order = np.argsort(frequency)

@@ -273,11 +273,10 @@ def front_table(summary: pd.DataFrame) -> pd.DataFrame:
 
 def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
     """The comparisons as a table: ratios with their intervals, and the sentence."""
+    ratios = ("operations", "numbers", BETWEEN, STROKING)
+    names = [f"{name}{end}" for name in ratios for end in ("", "_low", "_high")]
     rows = []
     for one in found:
-        row: dict[str, object] = {"kind": one.kind, "rival": one.rival, "surfaces": one.surfaces}
-        for name in ("operations", "numbers", BETWEEN, STROKING):
-            ratio: Ratio = getattr(one, name)
-            row |= {name: ratio.mean, f"{name}_low": ratio.low, f"{name}_high": ratio.high}
-        rows.append(row | {"verdict": one.verdict, "sentence": one.sentence})
-    return pd.DataFrame(rows)
+        values = [value for name in ratios for value in getattr(one, name)]
+        rows.append((one.kind, one.rival, one.surfaces, *values, one.verdict, one.sentence))
+    return pd.DataFrame(rows, columns=["kind", "rival", "surfaces", *names, "verdict", "sentence"])
