@@ -80,7 +80,7 @@ def judge(source: Source, *, methods: Sequence[str]) -> Judged:
             try:
                 fits.append(fit_method(name, subject))
             except InputError as error:
-                warnings.append(f"{source.name}: no {name}: {error}")
+                warnings.append(f"no {name}: {error}")
         fits += _loaded(source)
         for fit in fits:
             rows += judging.rows(fit)
@@ -147,8 +147,11 @@ class _Judging:
                 single = precision == SINGLE
                 row = {"update_ms": interval_ms, "precision": precision, **stroking}
                 row |= _costs(fitted, interval_ms, single=single)
-                if single and isinstance(fitted, Layered):
-                    row["single_error_db"] = fitted.single_error_db(self._stroke.hand, period)
+                row["single_error_db"] = (
+                    fitted.single_error_db(self._stroke.hand, period)
+                    if single and isinstance(fitted, Layered)
+                    else np.nan
+                )
                 rows.append(row)
         return rows
 

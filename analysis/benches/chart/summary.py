@@ -44,8 +44,7 @@ def summarised(rows: pd.DataFrame) -> pd.DataFrame:
     parts += [grouped[values].quantile(q).add_suffix(f"_{q:.0%}"[:-1]) for q in (0.25, 0.75)]
     distances = [f"{place}_distance_db" for place in PLACES]
     parts.append(grouped[distances].max().add_suffix("_worst"))
-    if "single_error_db" in rows:
-        parts.append(grouped[["single_error_db"]].max())
+    parts.append(grouped[["single_error_db"]].max())
     parts.append(grouped["surface"].nunique().rename("surfaces"))
     parts.append(grouped["simulated"].any())
     return pd.concat(parts, axis=1).reset_index()
