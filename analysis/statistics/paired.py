@@ -78,7 +78,7 @@ def paired_test(full: ArrayLike, simplified: ArrayLike) -> PairedTest:
     undefined = why_undefined(differences)
     t, p, low, high = (np.nan,) * 4 if undefined else t_test(differences)
     d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, differences.size)
-    wilcoxon_w, wilcoxon_p = _wilcoxon(differences)
+    wilcoxon_w, wilcoxon_p = wilcoxon(differences)
     return PairedTest(
         n=before.size,
         mean_full=mean(before),
@@ -252,16 +252,34 @@ def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
 
 def t_test(differences: Floats) -> tuple[float, float, float, float]:
     """t, two-sided p and the confidence limits of the mean."""
-    result = stats.ttest_1samp(differences, 0.0)
+    t, p, low, high = (float(values[0]) for values in t_tests(differences[None, :]))
+    return t, p, low, high
+
+
+def t_tests(differences: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+    """The same of each row of (k, n) differences, (k,) each."""
+    result = stats.ttest_1samp(differences, 0.0, axis=1)
     interval = result.confidence_interval(CONFIDENCE)
-    return float(result.statistic), float(result.pvalue), float(interval.low), float(interval.high)
+    t, p, low, high = np.array([result.statistic, result.pvalue, interval.low, interval.high])
+    return t, p, low, high
 
 
-def _wilcoxon(differences: Floats) -> tuple[float, float]:
-    if not differences.any():
-        return float("nan"), float("nan")
-    result = stats.wilcoxon(differences)
-    return float(result.statistic), float(result.pvalue)
+def wilcoxon(differences: Floats) -> tuple[float, float]:
+    """W and two-sided p of the signed-rank test; NaN where there is no difference."""
+    w, p = (float(values[0]) for values in wilcoxon_tests(differences[None, :]))
+    return w, p
+
+
+def wilcoxon_tests(differences: Floats) -> tuple[Floats, Floats]:
+    """The same of each row of (k, n) differences, (k,) each."""
+    w, p = np.full((2, len(differences)), np.nan)
+    zeros = (differences == 0).sum(axis=1)
+    # SciPy takes one distribution for all rows, and another one where a difference is 0.
+    for whole in (True, False):
+        rows = ((zeros == 0) == whole) & (zeros < differences.shape[1])
+        if rows.any():
+            w[rows], p[rows] = stats.wilcoxon(differences[rows], axis=1)
+    return w, p
 
 
 def _shapiro(differences: Floats) -> float:

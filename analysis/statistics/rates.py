@@ -117,7 +117,7 @@ def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) ->
     against_chance = without_rounding_noise(rates - chance)
     undefined = why_undefined(against_chance)
     t, p = (np.nan, np.nan) if undefined else t_test(against_chance)[:2]
-    low, high = (np.nan, np.nan) if undefined else _bootstrap_interval(rates, rng)
+    low, high = (np.nan, np.nan) if undefined else bootstrap_interval(rates, rng)
     return {
         "participants": rates.size,
         "trials": int(cell["correct"].notna().sum()),
@@ -132,13 +132,21 @@ def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) ->
     }
 
 
-def _bootstrap_interval(rates: Floats, rng: np.random.Generator) -> tuple[float, float]:
+def bootstrap_interval(rates: Floats, rng: np.random.Generator) -> tuple[float, float]:
+    """95 % interval of the mean of (n,) rates, not all equal, over resampled participants."""
+    low, high = bootstrap_intervals(rates[None, :], rng)
+    return float(low[0]), float(high[0])
+
+
+def bootstrap_intervals(rates: Floats, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """The same of each row of (k, n) rates, (k,) each."""
     interval = stats.bootstrap(
         (rates,),
         np.mean,
+        axis=1,
         n_resamples=BOOTSTRAP_RESAMPLES,
         confidence_level=CONFIDENCE,
         method="BCa",
         rng=rng,
     ).confidence_interval
-    return float(interval.low), float(interval.high)
+    return np.asarray(interval.low), np.asarray(interval.high)

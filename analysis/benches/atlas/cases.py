@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from analysis.benches.atlas import answers, peaks, tracking, verdicts
 from analysis.benches.atlas.case import Case
 
-CASES: tuple[Case, ...] = ()
+CASES: tuple[Case, ...] = (
+    *peaks.CASES,
+    *tracking.CASES,
+    *verdicts.CASES,
+    *answers.CASES,
+)
 # Families that come with what they are about, so that the atlas says what it does not know yet.
 TO_COME = {
     "observers": "force and disturbance observers come with the cable device",
