@@ -28,6 +28,7 @@ COMMANDS = {
     "import": "imports",
     "export": "exports",
     "bench": "bench",
+    "stability": "stability",
 }
 
 app = typer.Typer(

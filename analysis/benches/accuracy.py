@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from analysis.benches.stability import FORMS, OURS, STROKE_HZ, held_variances, moving_variances
-from modeling import Recording, RegressedModel, Renderer, TextureModel, similarity
+from modeling import RegressedModel, Renderer, TextureModel
 from modeling.hand import Hand
 from modeling.models.parameter_table import Parameters
 from modeling.rendering.plan import SLOPE_S, RenderPlan
@@ -18,16 +18,6 @@ from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 FASTEST_MM_S = 300.0
 FORCE_N = 2.0
 PRESSING_HZ = 1.3
-HELD_MM_S = 200.0
-UPDATES_SAMPLES = (1, 5, 32)
-# How often the speed is read (Hz), and the noise of a reading (mm/s).
-READINGS = (
-    *((1000.0, noise) for noise in (0.0, 1.0, 2.0, 5.0, 10.0)),
-    *((rate, 2.0) for rate in (500.0, 250.0, 125.0)),
-)
-
-# From one reading to the next, where the hand turns.
-PERIODS_SAMPLES = (5, 10, 20, 40)
 # Time constants of the smoothed slope after which a start from no slope is forgotten.
 SETTLED = 5
 
@@ -54,41 +44,6 @@ def update_error_db(
     rendered = Renderer(model, seed=seed, update_samples=update_samples).render(*(readings or hand))
     exact = Renderer(model, seed=seed, update_samples=1).render(*hand)
     return float(10 * np.log10(np.mean((rendered - exact) ** 2) / np.mean(exact**2)))
-
-
-def reading_rows(model: TextureModel) -> list[dict[str, object]]:
-    """Errors where the speed is read with noise, or seldom, with updates every 1 and 5 samples."""
-    hand, rows = stroke(model.rate_hz), list[dict[str, object]]()
-    noise = np.random.default_rng(0).normal(0, 1, hand.speed_mm_s.size)
-    at = np.arange(noise.size)
-    for reading_hz, noise_mm_s in READINGS:
-        period = round(model.rate_hz / reading_hz)
-        speed = (hand.speed_mm_s + noise_mm_s * noise)[at // period * period]
-        readings = Hand(speed, hand.force_n)
-        row: dict[str, object] = {"reading_hz": reading_hz, "noise_mm_s": noise_mm_s}
-        for name, update in (("every_1", 1), ("every_5", 5), ("as_read", period)):
-            row[f"error_db_{name}"] = update_error_db(model, hand, update, readings=readings)
-        rows.append(row | {"simulated": True})
-    return rows
-
-
-def turning_rows(model: TextureModel) -> list[dict[str, object]]:
-    """Errors of a stroke to and fro where speed is read with its sign, and where |v| is read.
-
-    The speeds at the end of each update, and the rendering (see `update_error_db`).
-    """
-    hand, rows = stroke(model.rate_hz), list[dict[str, object]]()
-    unsigned = Hand(np.abs(hand.speed_mm_s), hand.force_n)
-    for period in PERIODS_SAMPLES:
-        plan = RenderPlan(rate_hz=model.rate_hz, update_samples=period)
-        row: dict[str, object] = {"reading_hz": model.rate_hz / period, "update_samples": period}
-        for name, readings in (("signed", hand), ("unsigned", unsigned)):
-            errors = speed_errors(hand, readings, plan=plan)
-            row["speed_error_mm_s_as_read"] = errors.as_read
-            row[f"speed_error_mm_s_{name}"] = errors.extrapolated
-            row[f"error_db_{name}"] = update_error_db(model, hand, period, readings=readings)
-        rows.append(row | {"simulated": True})
-    return rows
 
 
 class SpeedErrors(NamedTuple):
@@ -191,27 +146,3 @@ def level_errors(model: TextureModel, hand: Hand, update_samples: int) -> LevelE
         float(np.abs(20 * np.log10(level[~below] / wanted[~below])).max()),
         float(np.abs(level - wanted)[below].max(initial=0.0) / at_edge),
     )
-
-
-def held_gfc30(model: TextureModel, speed_mm_s: float, *, seed: int = 0) -> tuple[float, float]:
-    """GFC30 of the second after a stroke in which the speed is held, and its expected value."""
-    renderer = Renderer(model, seed=seed)
-    renderer.render(*stroke(model.rate_hz, duration_s=0.6))
-    held = renderer.render(speed_mm_s, FORCE_N, samples=round(model.rate_hz))
-    recording = Recording(held, model.rate_hz, speed_mm_s, FORCE_N, model.texture, simulated=True)
-    report = similarity.report(recording, model)
-    return report.gfc30, report.expected_gfc30
-
-
-def accuracy_row(model: TextureModel) -> dict[str, object]:
-    """All measures of one texture along a 2 Hz stroke, with updates every 1, 5 and 32 samples."""
-    hand = stroke(model.rate_hz)
-    row: dict[str, object] = {"texture": model.texture}
-    for period in UPDATES_SAMPLES:
-        errors = level_errors(model, hand, period)
-        row[f"level_error_db_every_{period}"] = errors.within_grid_db
-        row[f"level_error_below_grid_every_{period}"] = errors.below_grid
-        if period > 1:
-            row[f"error_db_every_{period}"] = update_error_db(model, hand, period)
-    gfc30, expected = held_gfc30(model, HELD_MM_S)
-    return row | {"gfc30": gfc30, "expected_gfc30": expected, "simulated": True}

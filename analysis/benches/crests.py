@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 
 from modeling.arrays import Floats
 from modeling.equalizer.bands import band_response
 from modeling.rendering.noise import stream_key, white_noise
 
 RATE_HZ = 5000.0
-DURATIONS_S = (1.0, 10.0)
-STREAMS = 100
 CENTRE_HZ = 300.0
-WIDTHS_HZ = (10.0, 30.0, 100.0, 300.0)
 
 
 def crest_db(signals: Floats) -> Floats:
@@ -23,33 +19,20 @@ def crest_db(signals: Floats) -> Floats:
     return crest
 
 
-def crest_table(*, streams: int = STREAMS, seed: int = 0) -> pd.DataFrame:
-    """Mean crest factors of the noise that is rendered (uniform) and of Gaussian noise.
+def crest_difference_db(
+    width_hz: float, *, duration_s: float, streams: int, seed: int = 0
+) -> float:
+    """By how much the noise that is rendered, uniform, is less peaky than Gaussian noise (dB).
 
-    Both are white and of unit variance, so their power spectra are equal, also behind a filter.
-
-    Returns
-    -------
-    DataFrame
-        One row per duration and signal: duration_s, width_hz (NaN: the broadband noise branch),
-        uniform_db and gaussian_db, means over the streams; `simulated` is True.
+    Mean crest factors behind a band of this width (NaN: of the broadband noise itself). Both noises
+    are white and of unit variance, so their power spectra are equal, also behind a filter.
     """
-    longest = round(max(DURATIONS_S) * RATE_HZ)
-    keys = [stream_key(seed, stream) for stream in range(streams)]
-    noises = {
-        "uniform_db": np.stack([white_noise(key, 0, longest) for key in keys]),
-        "gaussian_db": np.random.default_rng(seed).standard_normal((streams, longest)),
-    }
-    rows = []
-    for duration_s in DURATIONS_S:
-        count = round(duration_s * RATE_HZ)
-        for width_hz in (np.nan, *WIDTHS_HZ):
-            row = {"duration_s": duration_s, "width_hz": width_hz}
-            for name, noise in noises.items():
-                signals = through_band(noise[:, :count], width_hz=width_hz)
-                row[name] = float(crest_db(signals).mean())
-            rows.append(row | {"simulated": True})
-    return pd.DataFrame(rows)
+    count = round(duration_s * RATE_HZ)
+    uniform = np.stack([white_noise(stream_key(seed, i), 0, count) for i in range(streams)])
+    gaussian = np.random.default_rng(seed).standard_normal((streams, count))
+    crests = (crest_db(through_band(noise, width_hz=width_hz)) for noise in (gaussian, uniform))
+    peaky, flat = (float(crest.mean()) for crest in crests)
+    return peaky - flat
 
 
 def through_band(noise: Floats, *, width_hz: float) -> Floats:

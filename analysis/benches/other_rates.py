@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
-from modeling import PEQ, TextureModel
+from modeling import PEQ
 from modeling.arrays import Floats
 from modeling.rendering.plan import noise_lowpass
 
-RATES_HZ = (44_100, 48_000)
 # Midpoints of intervals: far below the width of any layer; above the model's band there are skirts.
 STEP_HZ = 0.5
 STEP_ABOVE_HZ = 2.5
@@ -88,13 +86,3 @@ def _rendered_power(
     )
     pairs = zip(conditions, bands, strict=True)
     return np.array([np.abs(peq.noise_gain * passed + band) ** 2 for peq, band in pairs])
-
-
-def rate_row(model: TextureModel, *, rate_hz: int) -> dict[str, object]:
-    """Lowest and highest of all errors over the conditions of a texture's grid."""
-    grid = [model.peq(*at) for at in product(model.speeds_mm_s, model.forces_n)]
-    errors = rate_errors(grid, model_rate_hz=model.rate_hz, rate_hz=rate_hz)
-    row: dict[str, object] = {"texture": model.texture, "rate_hz": rate_hz}
-    for name, values in errors._asdict().items():
-        row[f"{name}_lowest"], row[f"{name}_highest"] = values.min(), values.max()
-    return row | {"simulated": True}

@@ -7,28 +7,16 @@ each band and of their sum at each sample, for any realisation of the bands.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import pandas as pd
 
 from modeling.arrays import Floats
-from modeling.equalizer.bands import (
-    HIGHEST_BANDWIDTH_SHARE,
-    HIGHEST_FREQUENCY_SHARE,
-    LOWEST_BANDWIDTH_HZ,
-    LOWEST_FREQUENCY_HZ,
-    band_coefficients,
-    band_rms,
-)
+from modeling.equalizer.bands import band_coefficients
 from modeling.models.parameter_table import Parameters
-from stimuli.planted.textures import planted_texture
 
 RATE_HZ = 5000.0
-SAMPLES = 5000
 STROKE_HZ = 2.0
-STEP_S = 0.05
 CENTRES_HZ = (80.0, 300.0, 900.0)
 WIDTHS_HZ = (25.0, 40.0, 120.0)
 
@@ -94,11 +82,11 @@ def direct_form(frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float) -
     )
 
 
-OURS = "unit covariance"
+OURS, PLAIN, DIRECT = "unit covariance", "plain state-variable", "direct form"
 FORMS: dict[str, Form] = {
     OURS: unit_covariance_form,
-    "plain state-variable": state_variable_form,
-    "direct form": direct_form,
+    PLAIN: state_variable_form,
+    DIRECT: direct_form,
 }
 
 
@@ -202,86 +190,3 @@ def simulate(at: Parameters, form: Form, noise: Floats, *, rate_hz: float) -> Fl
         state = np.einsum("iab,...ib->...ia", bands.matrix[n], state)
         state += bands.drive[n] * w[..., None]
     return output
-
-
-# --- Motions of docs/method/equalizer.md#stability
-
-
-def motions(
-    rng: np.random.Generator, *, rate_hz: float = RATE_HZ, samples: int = SAMPLES
-) -> dict[str, Parameters]:
-    """The trajectories of docs/method/equalizer.md#stability by name: parameters at each sample.
-
-    Strokes are those of a planted texture. All others move three bands of equal level and
-    alternating sign over a floor 10 dB below each of them.
-
-    Parameters
-    ----------
-    rng : Generator
-        Draws jitter (log-normal, standard deviation 30 % of f and of B), steps (every 50 ms) and
-        jumps (every sample); steps and jumps go anywhere in the legal range, evenly in octaves.
-    rate_hz : float
-        5 kHz or above.
-    samples : int
-    """
-    odd = (np.arange(samples) % 2 == 1)[:, None]
-    jumping = np.where(odd, [20.0, 1500.0, 300.0], [1500.0, 20.0, 300.0])
-    jitter = np.exp(0.3 * rng.standard_normal((2, samples, 3)))
-    held = np.arange(samples) // round(STEP_S * rate_hz)
-    steps = _anywhere(rng, rate_hz, count=1 + int(held[-1]))
-    moved = {
-        "jumping 20 ↔ 1500 Hz": (jumping, np.full((samples, 3), 50.0)),
-        "30 % jitter": (np.array(CENTRES_HZ) * jitter[0], np.array(WIDTHS_HZ) * jitter[1]),
-        "steps": (steps[0][held], steps[1][held]),
-        "random jumps": _anywhere(rng, rate_hz, count=samples),
-    }
-    time_s = np.arange(samples) / rate_hz
-    speed = 200 + 150 * np.sin(2 * np.pi * STROKE_HZ * time_s)
-    strokes = planted_texture("polyester").at_rate(rate_hz).parameters(speed, np.full(samples, 2.0))
-    return {
-        "smooth strokes": strokes,
-        **{name: _equally_loud(*bands, rate_hz=rate_hz) for name, bands in moved.items()},
-    }
-
-
-def _anywhere(rng: np.random.Generator, rate_hz: float, *, count: int) -> tuple[Floats, Floats]:
-    """(count, 3) frequencies and widths all over the legal range."""
-    edges = (
-        (LOWEST_FREQUENCY_HZ, HIGHEST_FREQUENCY_SHARE * rate_hz),
-        (LOWEST_BANDWIDTH_HZ, HIGHEST_BANDWIDTH_SHARE * rate_hz),
-    )
-    octaves = [rng.uniform(np.log(low), np.log(high), (count, 3)) for low, high in edges]
-    return np.exp(octaves[0]), np.exp(octaves[1])
-
-
-def _equally_loud(frequency_hz: Floats, bandwidth_hz: Floats, *, rate_hz: float) -> Parameters:
-    gains = np.array([1.0, -1.0, 1.0]) / band_rms(1.0, bandwidth_hz, rate_hz=rate_hz)
-    return Parameters(np.full(len(gains), 10**-0.5), frequency_hz, bandwidth_hz, gains)
-
-
-def stability_table(moved: Mapping[str, Parameters], *, rate_hz: float = RATE_HZ) -> pd.DataFrame:
-    """Excess variance of every form on every motion: highest and lowest, in dB.
-
-    Returns
-    -------
-    DataFrame
-        One row per motion and form: band_highest_db and band_lowest_db over all bands and samples,
-        sum_highest_db and sum_lowest_db; infinite where a form has overflowed. `simulated` is
-        True: the variances are exact, the motions are made up.
-    """
-    rows = []
-    for motion, at in moved.items():
-        for name, form in FORMS.items():
-            held = held_variances(at, form, rate_hz=rate_hz)
-            excess = excess_db(moving_variances(at, form, rate_hz=rate_hz), held)
-            row = {
-                "motion": motion,
-                "form": name,
-                "band_highest_db": excess.bands.max(),
-                "band_lowest_db": excess.bands.min(),
-                "sum_highest_db": excess.total.max(),
-                "sum_lowest_db": excess.total.min(),
-                "simulated": True,
-            }
-            rows.append(row)
-    return pd.DataFrame(rows)

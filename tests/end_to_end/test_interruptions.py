@@ -30,7 +30,8 @@ SPEEDS = ("--speed", "100", "--speed", "300", "--force", "1", "--force", "3")
 Files = dict[str, bytes]
 
 FOLDERS = ("--recordings", "recordings", "--models", "models", "--simplified", "simplified")
-# Each writes to `out`; `{}` stands for what differs between an earlier run and the interrupted one.
+# Each writes to `out`; `{}` stands for what differs between an earlier run and the interrupted one:
+# their number, or `{one|other}`.
 LONG = {
     "import": ("import", "hatt", "{}.xml", *SPEEDS, "--duration", "2"),
     "model": ("model", "recordings", "--jobs", "2", "--layers", "{}"),
@@ -39,6 +40,7 @@ LONG = {
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
     "demo": ("demo", "--seed", "{}"),
+    "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
 QUICK = ("import", "record")
 NEW_PLACES = ("record", "simulate")  # these refuse what is there
@@ -47,7 +49,10 @@ NEW_PLACES = ("record", "simulate")  # these refuse what is there
 def words_of(name: str, which: int) -> list[str]:
     """The command line of an earlier run (1) or a later one (2)."""
     out = () if name in NEW_PLACES else ("--out", "out")
-    words = [word.replace("{}", str(which)) for word in (*LONG[name], *out)]
+    words = [
+        word[1:-1].split("|")[which - 1] if "|" in word else word.replace("{}", str(which))
+        for word in (*LONG[name], *out)
+    ]
     return [sys.executable, "-m", "tactileq", *words]
 
 

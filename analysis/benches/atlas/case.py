@@ -5,6 +5,7 @@ How to read what comes out: docs/stability.md.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
@@ -58,9 +59,25 @@ class Axis:
             return self.mild + share * (self.severe - self.mild)
         return float(self.mild * (self.severe / self.mild) ** share)
 
+    def farther(self, factor: float) -> float:
+        """The value that is by this factor more severe than the default, as `margin` says."""
+        assert self.default is not None
+        harder = 1 if self.severe > self.mild else -1
+        if self.unit == "dB":
+            return self.default + harder * 20 * math.log10(factor)
+        return float(self.default * factor**harder)
+
     def margin(self, edge: float) -> float:
-        """By which factor an edge is more severe than the default; NaN where there is no factor."""
-        if self.default is None or not (self.default > 0 and edge > 0):
+        """By which factor an edge is more severe than the default; NaN where there is no factor.
+
+        In decibels: of the amplitude.
+        """
+        if self.default is None:
+            return float("nan")
+        if self.unit == "dB":
+            farther_db = edge - self.default if self.severe > self.mild else self.default - edge
+            return float(10 ** (farther_db / 20))
+        if not (self.default > 0 and edge > 0):
             return float("nan")
         return edge / self.default if self.severe > self.mild else self.default / edge
 
@@ -91,7 +108,8 @@ class Case:
         Names and values of a second quantity, each with edges of its own.
     theory : callable, optional
         From a column's value to the edge (on the axis) from which the method should no longer
-        hold; `source` says by which formula.
+        hold; at or beyond the severe end where it should hold throughout, NaN where no formula
+        says. `source` says which formula that is.
     source : str
     exception : str
         Why the default may be nearer than a factor of 2 to the nearest edge; "" where it may not.
@@ -111,6 +129,11 @@ class Case:
     theory: Callable[[float], float] | None = None
     source: str = ""
     exception: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        """By what it is known: family, method, what is varied, and what is measured."""
+        return self.family, self.method, self.axis.name, self.figure
 
     def verdict(self, figure: float) -> Verdict:
         """What a figure says of the method; one that is not a number has failed."""

@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from analysis.benches.atlas import answers, peaks, tracking, verdicts
+from analysis.benches.atlas import (
+    answers,
+    blending,
+    filters,
+    hands,
+    peaks,
+    tracking,
+    verdicts,
+    vibrators,
+)
 from analysis.benches.atlas.case import Case
 
 CASES: tuple[Case, ...] = (
+    *filters.CASES,
+    *blending.CASES,
+    *hands.CASES,
     *peaks.CASES,
     *tracking.CASES,
     *verdicts.CASES,
+    *vibrators.CASES,
     *answers.CASES,
 )
 # Families that come with what they are about, so that the atlas says what it does not know yet.

@@ -3,52 +3,33 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from analysis.benches.accuracy import (
     FASTEST_MM_S,
-    PERIODS_SAMPLES,
-    READINGS,
-    Hand,
+    FORCE_N,
     SpeedErrors,
-    accuracy_row,
-    held_gfc30,
-    reading_rows,
+    level_errors,
     rendered_parameters,
     speed_errors,
     stroke,
-    turning_rows,
+    update_error_db,
 )
 from analysis.benches.clicks import (
-    STEADY,
-    STEPS,
-    THIS_RENDERER,
-    StepSignals,
-    click_table,
     hum,
-    level_above_click_hz,
-    step_signals,
+    loudest_above_click_hz_db,
+    switched,
+    this_renderer,
+    times_s,
 )
-from analysis.benches.stability import FORMS, OURS, STROKE_HZ, simulate
-from analysis.figures.stability import figure_clicks
-from modeling import Renderer
+from analysis.benches.stability import FORMS, OURS, PLAIN, STROKE_HZ, simulate
+from modeling import Recording, Renderer, TextureModel, similarity
+from modeling.hand import Hand
 from modeling.rendering.noise import stream_key, white_noise
 from modeling.rendering.plan import RenderPlan
 from stimuli.planted.textures import TEXTURES, planted_texture
 
 RATE_HZ = 5000.0
-
-
-@pytest.fixture(scope="module")
-def accuracy() -> pd.DataFrame:
-    rows = [accuracy_row(planted_texture(name)) for name in TEXTURES]
-    return pd.DataFrame(rows).set_index("texture")
-
-
-@pytest.fixture(scope="module", params=list(STEPS))
-def signals(request: pytest.FixtureRequest) -> StepSignals:
-    return step_signals(request.param)
 
 
 def jerky_hand(count: int) -> Hand:
@@ -73,32 +54,37 @@ def test_rendered_parameters_are_those_of_the_renderer(update_samples: int) -> N
 
 
 @pytest.mark.parametrize("texture", TEXTURES)
-def test_updates_each_millisecond_are_40_db_below_the_signal(
-    accuracy: pd.DataFrame, texture: str
-) -> None:
-    every_5, every_32 = accuracy.loc[texture, ["error_db_every_5", "error_db_every_32"]]
+def test_updates_each_millisecond_are_40_db_below_the_signal(texture: str) -> None:
+    model, hand = planted_texture(texture), stroke(RATE_HZ)
+    every_5, every_32 = (update_error_db(model, hand, every) for every in (5, 32))
     assert every_5 <= -40
     assert every_5 + 10 < every_32 < -25  # −26 dB in docs/method/rendering.md#accuracy
 
 
 @pytest.mark.parametrize("texture", TEXTURES)
-def test_level_is_the_models_own_at_every_speed_of_the_stroke(
-    accuracy: pd.DataFrame, texture: str
-) -> None:
-    assert accuracy.loc[texture, "level_error_db_every_5"] <= 0.5
-    assert accuracy.loc[texture, "level_error_db_every_1"] <= 0.01
+def test_level_is_the_models_own_at_every_speed_of_the_stroke(texture: str) -> None:
+    model, hand = planted_texture(texture), stroke(RATE_HZ)
+    every_5, every_1 = (level_errors(model, hand, every) for every in (5, 1))
+    assert every_5.within_grid_db <= 0.5
+    assert every_1.within_grid_db <= 0.01
     # Towards rest: of the level at the lowest speed; a millisecond of this stroke is 8 % of it.
-    assert accuracy.loc[texture, "level_error_below_grid_every_5"] <= 0.1
+    assert every_5.below_grid <= 0.1
 
 
-def test_readings_with_noise_or_seldom_are_no_worse_than_used_as_they_are() -> None:
-    rows = pd.DataFrame(reading_rows(planted_texture("canvas")))
-    assert rows["simulated"].all()
-    assert list(zip(rows["reading_hz"], rows["noise_mm_s"], strict=True)) == list(READINGS)
-    clean = rows.iloc[0]
-    assert clean["error_db_every_5"] < -50
-    assert (rows["error_db_every_5"] <= rows["error_db_every_1"] + 1).all()
-    assert (rows["error_db_as_read"] <= rows["error_db_every_5"] + 0.01).all()
+@pytest.mark.parametrize("reading_hz", [1000.0, 125.0])
+@pytest.mark.parametrize("noise_mm_s", [0.0, 2.0, 10.0])
+def test_readings_with_noise_or_seldom_are_no_worse_than_used_as_they_are(
+    reading_hz: float, noise_mm_s: float
+) -> None:
+    model, hand, period = planted_texture("canvas"), stroke(RATE_HZ), round(RATE_HZ / reading_hz)
+    noise = np.random.default_rng(0).normal(0, noise_mm_s, hand.speed_mm_s.size)
+    held = np.arange(noise.size) // period * period
+    readings = Hand((hand.speed_mm_s + noise)[held], hand.force_n)
+    every_1, every_5, as_read = (
+        update_error_db(model, hand, every, readings=readings) for every in (1, 5, period)
+    )
+    assert every_5 <= every_1 + 1
+    assert as_read <= every_5 + 0.01
 
 
 def turning_errors(*, beside_0: float) -> tuple[SpeedErrors, SpeedErrors]:
@@ -129,18 +115,33 @@ def test_a_reading_of_0_is_not_extrapolated_and_no_worse_than_as_read() -> None:
     assert signed.extrapolated < 0.6 * unsigned.extrapolated
 
 
-def test_signed_readings_are_followed_where_the_hand_turns() -> None:
+@pytest.mark.parametrize("period", [5, 10, 20, 40])
+def test_signed_readings_are_followed_where_the_hand_turns(period: int) -> None:
     """docs/method/rendering.md#extrapolation"""
-    rows = pd.DataFrame(turning_rows(planted_texture("canvas")))
-    assert list(rows["update_samples"]) == list(PERIODS_SAMPLES)
-    assert rows["simulated"].all()
-    late_s = (rows["update_samples"] - 1) / RATE_HZ
-    as_read = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * late_s)
-    assert list(rows["speed_error_mm_s_as_read"]) == pytest.approx(list(as_read))
-    assert (rows["speed_error_mm_s_signed"] < 0.1 * as_read).all()
-    assert (rows["speed_error_mm_s_unsigned"] > 1.25 * as_read).all()
-    assert rows["speed_error_mm_s_unsigned"].iloc[0] == pytest.approx(5.1, abs=0.05)
-    assert (rows["error_db_unsigned"] > rows["error_db_signed"] + 3).all()
+    hand, plan = stroke(RATE_HZ), RenderPlan(rate_hz=RATE_HZ, update_samples=period)
+    unsigned = Hand(np.abs(hand.speed_mm_s), hand.force_n)
+    signed_errors, errors = (speed_errors(hand, read, plan=plan) for read in (hand, unsigned))
+    as_read = FASTEST_MM_S * np.sin(2 * np.pi * STROKE_HZ * (period - 1) / RATE_HZ)
+    assert errors.as_read == pytest.approx(as_read)
+    assert signed_errors.extrapolated < 0.1 * as_read
+    assert errors.extrapolated > 1.25 * as_read
+    if period == 5:
+        assert errors.extrapolated == pytest.approx(5.1, abs=0.05)
+    model = planted_texture("canvas")
+    signed_db, unsigned_db = (
+        update_error_db(model, hand, period, readings=read) for read in (hand, unsigned)
+    )
+    assert unsigned_db > signed_db + 3
+
+
+def held_gfc30(model: TextureModel, speed_mm_s: float) -> tuple[float, float]:
+    """GFC30 of the second after a stroke in which the speed is held, and its expected value."""
+    renderer = Renderer(model)
+    renderer.render(*stroke(model.rate_hz, duration_s=0.6))
+    held = renderer.render(speed_mm_s, FORCE_N, samples=round(model.rate_hz))
+    recording = Recording(held, model.rate_hz, speed_mm_s, FORCE_N, model.texture, simulated=True)
+    report = similarity.report(recording, model)
+    return report.gfc30, report.expected_gfc30
 
 
 @pytest.mark.parametrize("texture", TEXTURES)
@@ -165,46 +166,46 @@ def test_a_hand_that_comes_to_rest_fades_along_the_ramp_to_exactly_nothing() -> 
     assert not signal[1500 + fading + 25 :].any()  # 5 ms
 
 
-def test_steps_add_nothing_to_what_the_layer_itself_has_above_1_khz(signals: StepSignals) -> None:
-    table = click_table(signals).set_index("rendering")
-    ours, steady = table.loc[THIS_RENDERER], table.loc[STEADY]
-    assert ours["high_db"] < steady["high_db"] + 0.5
-    assert ours["energy_db"] < steady["energy_db"] + 0.5
-    assert ours["second_difference_db"] < steady["second_difference_db"] + 1
-    assert table["simulated"].all()
+STEPS = {
+    "pressed, 0 → 2 N": ((100.0, 0.0), (100.0, 2.0)),
+    "lifted, 2 → 0 N": ((100.0, 2.0), (100.0, 0.0)),
+    "faster, 100 → 200 mm/s": ((100.0, 2.0), (200.0, 2.0)),
+}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_steps_add_nothing_to_what_the_layer_itself_has_above_1_khz(step: str) -> None:
+    before, after = STEPS[step]
+    louder = after if step != "lifted, 2 → 0 N" else before
+    ours, steady = (
+        loudest_above_click_hz_db(this_renderer(*ends, streams=400), ends[0], after=ends[1])
+        for ends in ((before, after), (louder, louder))
+    )
+    assert ours < steady + 0.5
 
 
 def test_the_measure_of_clicks_sees_them() -> None:
     """A gain that jumps, and a filter whose state does not fit its new coefficients."""
-    lifted = click_table(step_signals("lifted, 2 → 0 N", streams=100)).set_index("rendering")
+    before, after = STEPS["lifted, 2 → 0 N"]
     for form in FORMS:
-        assert lifted.loc[f"{form}, switched", "high_db"] > 15
-        assert lifted.loc[f"{form}, switched", "second_difference_db"] > 15
-    faster = click_table(step_signals("faster, 100 → 200 mm/s", streams=100))
-    high_db = faster.set_index("rendering")["high_db"]
-    assert high_db["plain state-variable, switched"] > 10
-    assert high_db[f"{OURS}, switched"] < 1.5
+        signals = switched(before, after, form=form, streams=100)
+        assert loudest_above_click_hz_db(signals, before, after=after) > 15
+    before, after = STEPS["faster, 100 → 200 mm/s"]
+    high_db = {
+        form: loudest_above_click_hz_db(
+            switched(before, after, form=form, streams=100), before, after=after
+        )
+        for form in (PLAIN, OURS)
+    }
+    assert high_db[PLAIN] > 10
+    assert high_db[OURS] < 1.5
 
 
-def test_streams_of_a_step_are_the_same_until_the_hand_steps(signals: StepSignals) -> None:
-    before = signals.time_s < 0
-    ours = signals.renderings[THIS_RENDERER]
-    for name, other in signals.renderings.items():
-        assert np.abs(other - ours)[:, before].max() < 1e-9, name
-    faded = signals.time_s > 0.005
-    switched = signals.renderings[f"{OURS}, switched"]
-    assert np.abs(ours - switched)[:, faded].max() < 1e-9
-
-
-def test_figure_shows_the_levels_and_says_that_it_is_simulated(signals: StepSignals) -> None:
-    levels = level_above_click_hz(signals)
-    figure = figure_clicks([(signals, levels)], shown={signals.step: [THIS_RENDERER]})
-    assert figure.get_suptitle().startswith("Simulated")
-    signal, level = figure.axes
-    near = (signals.time_s >= -0.01) & (signals.time_s <= 0.015)
-    assert signal.get_lines()[0].get_ydata() == pytest.approx(
-        signals.renderings[THIS_RENDERER][0, near]
+@pytest.mark.parametrize("step", STEPS)
+def test_streams_of_a_step_are_the_same_until_the_hand_steps(step: str) -> None:
+    ours, at_once = (
+        this_renderer(*STEPS[step], streams=5),
+        switched(*STEPS[step], form=OURS, streams=5),
     )
-    labels = [line.get_label() for line in level.get_lines()]
-    assert labels[:2] == [THIS_RENDERER, STEADY]
-    assert level.get_lines()[1].get_ydata() == pytest.approx(levels[STEADY][near])
+    assert np.abs(at_once - ours)[:, times_s() < 0].max() < 1e-9
+    assert np.abs(at_once - ours)[:, times_s() > 0.005].max() < 1e-9  # faded

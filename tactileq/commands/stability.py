@@ -1,0 +1,132 @@
+"""tactileq stability: where methods hold and from where on they fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.keeping import check_own_results
+from tactileq.options import Out
+from tactileq.telling import progress
+from tactileq.workers import working
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from analysis.benches.atlas.case import Case
+    from analysis.benches.atlas.edges import Examined
+
+
+def stability(
+    out: Out = Path("stability"),
+    reduced: Annotated[
+        bool, typer.Option("--reduced", help="Fewer runs: edges to 1/16 of their axis.")
+    ] = False,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(metavar="FAMILY", help="These cases alone, such as filters; repeatable."),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes at once; one per core without it.")
+    ] = None,
+) -> None:
+    """Measure where methods hold, degrade and fail, and how far our defaults are from there.
+
+    Everything is simulated. Writes cells.tsv, edges.tsv, margins.tsv, atlas.png, atlas.svg and
+    atlas.html, which holds all of them.
+
+    Example: tactileq stability --only filters
+    """
+    from analysis.benches.atlas.cases import CASES
+
+    check_own_results(out, "stability")
+    chosen = cases_of(CASES, only)
+    with progress("Examining", sum(len(case.columns) for case in chosen)) as advance:
+        found = examined(chosen, full=not reduced, jobs=jobs, advance=advance)
+    settings = {"reduced": reduced, "only": sorted({case.family for case in chosen})}
+    _write(found, out, settings=settings)
+
+
+def cases_of(cases: Sequence[Case], families: Sequence[str] | None) -> list[Case]:
+    """The cases of these families, or all of them.
+
+    Raises
+    ------
+    ValueError
+        For a family that there is not.
+    """
+    known = list(dict.fromkeys(case.family for case in cases))
+    for family in families or ():
+        if family not in known:
+            raise ValueError(
+                f"expected a family of cases among {', '.join(known)}, got {family!r}; name one "
+                "of these with --only, or leave it out for all."
+            )
+    return [case for case in cases if not families or case.family in families]
+
+
+def examined(
+    cases: Sequence[Case],
+    *,
+    full: bool = False,
+    jobs: int | None = None,
+    advance: Callable[[str], None] = lambda item: None,
+) -> list[Examined]:
+    """Every column of every case, in their order, in several processes.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    full : bool
+        With all runs, or with the few of the reduced atlas.
+    jobs : int, optional
+        Processes; as many as cores without it.
+    advance : callable, optional
+        Told which column is done.
+    """
+    columns = [(number, column) for number, case in enumerate(cases) for column in case.columns]
+    found: dict[int, Examined] = {}
+    with working(partial(_examine, cases, full=full), columns, jobs=jobs) as done:
+        for number, one in done:
+            found[number] = one
+            advance(" · ".join(filter(None, (one.case.family, one.case.method, one.column))))
+    return [found[number] for number in sorted(found)]
+
+
+def _examine(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
+    from analysis.benches.atlas.edges import examine
+
+    number, column = which
+    return examine(cases[number], column, full=full)
+
+
+def _write(found: Sequence[Examined], out: Path, *, settings: dict[str, object]) -> None:
+    from analysis.benches.atlas.tables import margin_table
+    from analysis.report.section_stability import atlas_files
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import provenance_of, seal_folder
+
+    provenance = provenance_of("stability", settings)
+    with replace_folder(out) as fresh:
+        for name, data in atlas_files(found, provenance).items():
+            (fresh / name).write_bytes(data)
+        seal_folder(fresh, provenance)
+    _tell(margin_table(found))
+    print(f"simulated: {out / 'atlas.html'}")
+
+
+def _tell(margins: pd.DataFrame) -> None:
+    """How far each default is from the nearest edge."""
+    for row in margins.to_dict("records"):
+        most = "at least " if row["at_least"] else ""
+        near = "" if row["enough"] else f" ({row['exception'] or 'no reason is known'})"
+        unit = f" {row['unit']}" if row["unit"] else ""
+        print(
+            f"{row['family']}: {row['method']}, {row['measured']}: {row['verdict']} at "
+            f"{row['default']:.5g}{unit} ({row['axis']}), nearest edge {most}{row['margin']:.3g} × "
+            f"as far{near}"
+        )
