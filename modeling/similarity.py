@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol, runtime_checkable
@@ -150,56 +150,85 @@ def reports(
     rng : Generator, optional
         As in `report`.
     """
+    target = target_of(measured, rng=rng)
+    return [target.report(fitted) for fitted in filters]
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A spectrum that filters are compared with, and what does not depend on the filter.
+
+    Parameters
+    ----------
+    measured : Spectrum
+    truths : tuple of (n,) ndarray
+        Its smoothed magnitudes in the compared band, in the order of `SIGMAS_HZ`.
+    floors, expected : tuple of float
+        GFCs of white noise and of the true spectrum, in that order.
+    """
+
+    measured: Spectrum
+    truths: tuple[Floats, ...]
+    floors: tuple[float, ...]
+    expected: tuple[float, ...]
+
+    def report(self, fitted: SpectralFilter) -> SimilarityReport:
+        """All measures of one filter at the spectrum's rate."""
+        measured, truths = self.measured, self.truths
+        frequency, band = measured.frequency_hz, _compared(measured)
+        step_hz = measured.rate_hz / measured.n_samples
+        response = fitted.response(frequency)
+        smoothed = [smooth(response, sigma_hz, step_hz=step_hz)[band] for sigma_hz in SIGMAS_HZ]
+        scores = [gfc(ours, truth) for ours, truth in zip(smoothed, truths, strict=True)]
+        heard = measured.magnitude[band] > 0  # where the sensor's floor took all, dB mean nothing
+        edges, band_errors = band_energy_error_db(
+            frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2
+        )
+        return SimilarityReport(
+            gfc30=scores[0],
+            gfc5=scores[1],
+            floor_gfc30=self.floors[0],
+            floor_gfc5=self.floors[1],
+            expected_gfc30=self.expected[0],
+            expected_gfc5=self.expected[1],
+            log_spectral_distance_db=log_spectral_distance_db(smoothed[0][heard], truths[0][heard]),
+            rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
+            band_edges_hz=edges,
+            band_energy_error_db=band_errors,
+            gfc30_deficit=1 - scores[0] / self.expected[0],
+        )
+
+
+def target_of(measured: Spectrum, *, rng: np.random.Generator | None = None) -> Target:
+    """A spectrum made ready for any number of filters.
+
+    Parameters
+    ----------
+    measured : Spectrum
+        Not silent.
+    rng : Generator, optional
+        As in `report`.
+    """
     rng = np.random.default_rng(0) if rng is None else rng
     band = _compared(measured)
     step_hz = measured.rate_hz / measured.n_samples
     outline = measured.smoothed()
     draws = _draws(outline, rng)
-    truths, expected = [], []
+    truths, floors, expected = [], [], []
     for sigma_hz in SIGMAS_HZ:
-        truths.append(measured.smoothed(sigma_hz)[band])
+        truth = measured.smoothed(sigma_hz)[band]
         shape = smooth(outline, sigma_hz, step_hz=step_hz)[band]
         drawn = [smooth(draw, sigma_hz, step_hz=step_hz)[band] for draw in draws]
+        truths.append(truth)
+        floors.append(gfc(np.ones(truth.size), truth))
         expected.append(float(np.mean([gfc(shape, draw) for draw in drawn])))
-    return [_report(measured, fitted, truths, expected) for fitted in filters]
+    return Target(measured, tuple(truths), tuple(floors), tuple(expected))
 
 
 def _compared(measured: Spectrum) -> Bools:
     """10 Hz … 0.98 of the Nyquist frequency."""
     frequency = measured.frequency_hz
     return (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * measured.rate_hz / 2)
-
-
-def _report(
-    measured: Spectrum,
-    fitted: SpectralFilter,
-    truths: Sequence[Floats],
-    expected: Sequence[float],
-) -> SimilarityReport:
-    """One filter; `truths` (smoothed, in the band) and `expected` in the order of `SIGMAS_HZ`."""
-    frequency, band = measured.frequency_hz, _compared(measured)
-    step_hz = measured.rate_hz / measured.n_samples
-    response = fitted.response(frequency)
-    smoothed = [smooth(response, sigma_hz, step_hz=step_hz)[band] for sigma_hz in SIGMAS_HZ]
-    scores = [gfc(ours, truth) for ours, truth in zip(smoothed, truths, strict=True)]
-    floors = [gfc(np.ones(truth.size), truth) for truth in truths]
-    heard = measured.magnitude[band] > 0  # where the sensor's floor took all, dB mean nothing
-    edges, band_errors = band_energy_error_db(
-        frequency[band], response[band], measured.magnitude[band] * np.sqrt(np.pi) / 2
-    )
-    return SimilarityReport(
-        gfc30=scores[0],
-        gfc5=scores[1],
-        floor_gfc30=floors[0],
-        floor_gfc5=floors[1],
-        expected_gfc30=expected[0],
-        expected_gfc5=expected[1],
-        log_spectral_distance_db=log_spectral_distance_db(smoothed[0][heard], truths[0][heard]),
-        rms_error_db=_rms_error_db(response[band], measured.magnitude[band]),
-        band_edges_hz=edges,
-        band_energy_error_db=band_errors,
-        gfc30_deficit=1 - scores[0] / expected[0],
-    )
 
 
 def _rms_error_db(response: Floats, magnitude: Floats) -> float:

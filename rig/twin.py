@@ -40,7 +40,10 @@ class SimulatedRig:
         self._real = dict(real or {})
         self._seed = seed
         self._presentations = 0
-        self._renderer: Renderer | None = None
+        self._presented: TextureModel | None = None
+        self._renderer: Renderer | None = (
+            None  # made when the hand first moves on what is presented
+        )
         self._steps = 0
         self._button = False
         self._last_vibration = np.zeros(0)
@@ -58,7 +61,7 @@ class SimulatedRig:
     def present_model(self, model: TextureModel) -> None:
         """Render this model under the hand, with fresh noise."""
         self._presentations += 1
-        self._renderer = Renderer(model, seed=self._seed, stream=self._presentations)
+        self._presented, self._renderer = model, None
 
     def present_real(self, texture: str) -> None:
         """Let the hand feel the truth that stands for this texture.
@@ -80,7 +83,7 @@ class SimulatedRig:
 
     def silence(self) -> None:
         """Stop all vibration."""
-        self._renderer = None
+        self._presented = None
 
     def press_button(self) -> None:
         """Press the button; the next reading reports it once."""
@@ -96,8 +99,10 @@ class SimulatedRig:
         return RigReading(time_s, abs(float(speed[0])), float(force[0]), pressed, simulated=True)
 
     def _felt(self, time_s: float) -> Floats:
-        if self._renderer is None:
+        if self._presented is None:
             return np.zeros(0)
+        if self._renderer is None:
+            self._renderer = Renderer(self._presented, seed=self._seed, stream=self._presentations)
         samples = round(STEP_S * self._renderer.rate_hz)
         moments = time_s - STEP_S + np.arange(1, samples + 1) / self._renderer.rate_hz
         return self._renderer.render(*_hand(moments))

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any, TypeVar
 
 from modeling.errors import shown
@@ -77,6 +77,31 @@ def _dask(address: str) -> Iterator[None]:
         ) from error
     with client, parallel_config(backend="dask"):
         yield
+
+
+@contextmanager
+def mapping(*, jobs: int | None) -> Iterator[Callable[..., Iterator[Any]]]:
+    """As `map`, but with the work done by several processes, which begin at once.
+
+    What is asked of the results waits for them; after the block nothing goes on.
+    """
+    with ExitStack() as stack:
+
+        def mapped(work: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+            return _in_order(stack.enter_context(working(work, items, jobs=jobs)))
+
+        yield mapped
+
+
+def _in_order(results: Iterator[tuple[int, Result]]) -> Iterator[Result]:
+    """Numbered results by their numbers, each as soon as those before it are there."""
+    early: dict[int, Result] = {}
+    wanted = 0
+    for number, result in results:
+        early[number] = result
+        while wanted in early:
+            yield early.pop(wanted)
+            wanted += 1
 
 
 def _numbered(work: Callable[[Item], Result], number: int, item: Item) -> tuple[int, Result]:

@@ -58,6 +58,13 @@ def _file_size_limit(bytes_: int) -> Iterator[None]:
 
 
 @pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports of this process without the time that drawing takes: no picture holds anything."""
+    signature = b"\x89PNG\r\n\x1a\n"
+    monkeypatch.setattr("analysis.report.report.png_of", lambda figure, *, dpi: (signature, ""))
+
+
+@pytest.fixture
 def hatt_xml() -> Callable[..., str]:
     """Text of a file in the layout of the Penn Haptic Texture Toolkit, of planted filters."""
     return _hatt_xml

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, findSystemFonts, fontManager
 from matplotlib.ft2font import FT2Font
@@ -72,7 +73,9 @@ def _drawn(figure: Figure, *, dpi: float, families: tuple[str, ...]) -> bytes:
     with rc_context({"font.family": list(families)}), warnings.catch_warnings():
         # Said once for all characters by `missing_fonts`, and by Matplotlib for each.
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
-        figure.savefig(buffer, format="png", dpi=dpi)
+        figure.set_dpi(dpi)
+        # Laid out and drawn in one go; `savefig` goes through everything twice.
+        FigureCanvasAgg(figure).print_png(buffer)  # type: ignore[no-untyped-call]
     return buffer.getvalue()
 
 

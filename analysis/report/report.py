@@ -18,6 +18,7 @@ from analysis.report.page import (
     PICTURE_DPI,
     Fold,
     Item,
+    Picture,
     Table,
     bullets,
     folded,
@@ -35,13 +36,15 @@ from analysis.report.section_provenance import provenance_table
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
 from analysis.statistics.overall import OVERALL_COLUMNS, overall_tests
+from analysis.textures.compared import Mapped, comparisons
+from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
 from modeling.files.writing import write_text
 
 OVERALL_SHOWN = without(OVERALL_COLUMNS, "se_full", "se_simplified", "shapiro_p", "wilcoxon_w")
-MODELS_SHARE = 0.35  # of the time that a report of a whole study takes
-PARAMETERS_SHARE = 0.3
+MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
+PICTURES_SHARE = 0.4
 
 
 def write_report(
@@ -53,6 +56,7 @@ def write_report(
     title: str = "Can anybody feel the difference?",
     seed: int = 0,
     progress: Progress | None = None,
+    mapped: Mapped = map,
 ) -> Path:
     """Write report.html, and tables/*.tsv and figures/*.png beside it.
 
@@ -71,6 +75,9 @@ def write_report(
         Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
     progress : callable, optional
         Called with the share done (0–1) and what comes next.
+    mapped : callable
+        How textures and pictures are gone through: `map`, or one that uses several processes. It
+        changes no result.
 
     Returns
     -------
@@ -87,18 +94,24 @@ def write_report(
     rng = np.random.default_rng(seed)
     same = frozenset(r.texture for r in textures if r.simplification.identical)
     identical = same if responses is None else same | responses.identical
-    sections = _sections(responses, textures, identical=identical, rng=rng, tell=tell)
+    sections = _sections(
+        responses, textures, identical=identical, rng=rng, tell=tell, mapped=mapped
+    )
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
-    tell(0.8, "writing the report")
+    pictures = _pictures([item for section in sections for item in section.items])
+    drawn = mapped(_drawn, pictures)
     overall = pd.DataFrame()
     if responses is not None:
         overall = overall_tests(responses, identical=identical)
     families = [section.tests for section in sections if section.tests is not None]
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
+    for number, (picture, (png, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
+        tell(1 - PICTURES_SHARE * (1 - number / len(pictures)), f"drawing {picture.title}")
+        files.add_picture(picture, png, lacking=lacking)
     compared = files.html(_overall_items(overall, responses))
     shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
@@ -130,27 +143,36 @@ def _sections(
     identical: frozenset[str],
     rng: np.random.Generator,
     tell: Progress,
+    mapped: Mapped,
+) -> list[Section]:
+    # Begun first: other processes compare models while this one analyses answers.
+    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
+    tell(0.0, "analysing answers")
+    answered = _answer_sections(responses, identical=identical, rng=rng)
+    planted = [result for result in textures if result.truth is not None]
+    known = [planted_section(planted)] if planted else []
+    if not textures:
+        return answered
+    gfc, driven = [], []
+    before = 1 - PICTURES_SHARE - MODELS_SHARE
+    for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
+        share = before + MODELS_SHARE * number / len(textures)
+        tell(share, f"comparing models of {result.texture}")
+        gfc.append(comparison.gfc)
+        driven.append(comparison.driven)
+    tell(1 - PICTURES_SHARE, "regressing parameters on speed and force")
+    models = model_section(textures, pd.concat(gfc, ignore_index=True))
+    return [models, parameter_section(textures, driving_table(driven)), *answered, *known]
+
+
+def _answer_sections(
+    responses: Responses | None, *, identical: frozenset[str], rng: np.random.Generator
 ) -> list[Section]:
     sections = []
-    if textures:
-
-        def tell_models(share: float, what: str) -> None:
-            tell(MODELS_SHARE * share, what)
-
-        def tell_parameters(share: float, what: str) -> None:
-            tell(MODELS_SHARE + PARAMETERS_SHARE * share, what)
-
-        sections.append(model_section(textures, rng=rng, progress=tell_models))
-        sections.append(parameter_section(textures, rng=rng, progress=tell_parameters))
-    if responses is not None:
-        tell(MODELS_SHARE + PARAMETERS_SHARE, "analysing answers")
-        if not responses.absolute.empty:
-            sections.append(rating_section(responses, identical=identical))
-        if not responses.relative.empty:
-            sections.append(choice_section(responses, identical=identical, rng=rng))
-    planted = [result for result in textures if result.truth is not None]
-    if planted:
-        sections.append(planted_section(planted))
+    if responses is not None and not responses.absolute.empty:
+        sections.append(rating_section(responses, identical=identical))
+    if responses is not None and not responses.relative.empty:
+        sections.append(choice_section(responses, identical=identical, rng=rng))
     return sections
 
 
@@ -215,15 +237,40 @@ def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> s
     return f"SIMULATED: {'; '.join(reasons)}." if reasons else ""
 
 
+def _pictures(items: Sequence[Item]) -> list[Picture]:
+    """All pictures among the items, folded ones too, in order."""
+    found = []
+    for item in items:
+        if isinstance(item, Fold):
+            found += _pictures(item.items)
+        elif isinstance(item, Picture):
+            found.append(item)
+    return found
+
+
+def _drawn(picture: Picture) -> tuple[bytes, str]:
+    """The picture as PNG, and the characters that no font here has."""
+    return png_of(picture.figure, dpi=PICTURE_DPI)
+
+
 class _Files:
     """The folder beside the report, and what none of its pictures could draw."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.lacking: set[str] = set()
+        self.pictures: dict[str, bytes] = {}
+
+    def add_picture(self, picture: Picture, png: bytes, *, lacking: str) -> None:
+        """Write a picture's file; `html` will show it."""
+        target = self.folder / "figures" / f"{picture.name}.png"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(png)
+        self.pictures[picture.name] = png
+        self.lacking.update(lacking)
 
     def html(self, items: Sequence[Item]) -> str:
-        """The items as HTML; their tables and pictures are written to the folder as well."""
+        """The items as HTML, pictures as added; their tables are written to the folder as well."""
         return "".join(self._item_html(item) for item in items)
 
     def _item_html(self, item: Item) -> str:
@@ -232,12 +279,7 @@ class _Files:
         if isinstance(item, Table):
             _save_table(item, self.folder / "tables")
             return table_html(item)
-        png, lacking = png_of(item.figure, dpi=PICTURE_DPI)
-        self.lacking.update(lacking)
-        target = self.folder / "figures" / f"{item.name}.png"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(png)
-        return picture_html(item, png)
+        return picture_html(item, self.pictures[item.name])
 
 
 def _save_table(table: Table, folder: Path) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
 from analysis.columns import chosen, without
@@ -12,12 +11,12 @@ from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
 from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Progress, Section
+from analysis.report.sections import Section
 from analysis.report.sentences import described, left_out_outcomes, simplification_outcomes
 from analysis.spectra.comparison import compare_spectra
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
-from analysis.textures.likeness import GFC_COLUMNS, gfc_table
+from analysis.textures.likeness import GFC_COLUMNS
 from analysis.textures.results import (
     VERDICT_COLUMNS,
     TextureResult,
@@ -34,27 +33,17 @@ VERDICTS_SHOWN = chosen(
 )
 
 
-def model_section(
-    textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
-) -> Section:
+def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Section:
     """Models, what was dropped, and how alike the spectra stay (PAPER V).
 
     Parameters
     ----------
     textures : sequence of TextureResult
         At least one.
-    rng : Generator
-        Draws behind the expected GFCs.
-    progress : callable
-        Called with a share (0–1) and what comes next.
+    gfc : DataFrame
+        `analysis.textures.likeness.gfc_table` of all of them.
     """
-    rows, folds = [], []
-    for number, result in enumerate(textures):
-        progress(number / len(textures), f"comparing models of {result.texture}")
-        simplified = result.simplification.model
-        rows.append(gfc_table(result.recordings, result.model, simplified, rng=rng))
-        folds.append(_texture_fold(result, number=number))
-    gfc = pd.concat(rows, ignore_index=True)
+    folds = [_texture_fold(result, number=number) for number, result in enumerate(textures)]
     table = Table(
         "gfc",
         "Simplification rate and quality",

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import pandas as pd
 
 from analysis.columns import chosen
 from analysis.figures.regression import figure_centroid
 from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Progress, Section
+from analysis.report.sections import Section
 from analysis.report.sentences import described, driving_outcomes, regression_outcomes
 from analysis.textures.regressions import (
     CENTROID_AMPLITUDE_COLUMNS,
@@ -24,7 +23,6 @@ from analysis.textures.regressions import (
     centroid_table,
     centroids_over_speed,
     coefficient_table,
-    driving_table,
     regression_table,
     support_table,
 )
@@ -54,9 +52,7 @@ DRIVING_SHOWN = chosen(
 NO_CORRECTION = "The paper corrects for no multiple testing, and neither does this table."
 
 
-def parameter_section(
-    textures: Sequence[TextureResult], *, rng: np.random.Generator, progress: Progress
-) -> Section:
+def parameter_section(textures: Sequence[TextureResult], driving: pd.DataFrame) -> Section:
     """Regressions of the full models' parameters, and the models that they drive.
 
     docs/method/regression.md
@@ -65,18 +61,13 @@ def parameter_section(
     ----------
     textures : sequence of TextureResult
         At least one.
-    rng : Generator
-        Draws behind the expected GFCs.
-    progress : callable
-        Called with a share (0–1) and what comes next.
+    driving : DataFrame
+        `analysis.textures.regressions.driving_table` of all of them.
     """
     models = [result.model for result in textures]
     simulated = any(result.simulated for result in textures)
-    progress(0.0, "regressing parameters on speed and force")
     found = regression_table(models)
     support = support_table(found)
-    progress(0.3, "driving models by regressions")
-    driving = driving_table(textures, rng=rng)
     return Section(
         "parameters",
         "What the parameters say",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
@@ -10,6 +11,7 @@ import pandas as pd
 from analysis.columns import CONDITIONS, MODEL, TEXTURE, Column
 from modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
 from modeling.fitting.conditions import recording_spectra
+from modeling.models.grid import Condition
 
 MEASURE_COLUMNS = (
     Column("gfc30_mean", "GFC30 mean", format=".4f"),
@@ -34,25 +36,64 @@ GFC_COLUMNS = (
 )
 
 
+@dataclass(frozen=True, eq=False)
+class ConditionTarget:
+    """What models of a texture are compared with in one condition, (speed, force)."""
+
+    condition: Condition
+    spectrum: similarity.Target
+
+
+def condition_targets(
+    recordings: RecordingSet, *, rate_hz: float, rng: np.random.Generator
+) -> list[ConditionTarget]:
+    """What models of one texture are compared with, one for each recording above the floor.
+
+    Parameters
+    ----------
+    recordings : RecordingSet
+        Of one texture; those at force 0 are the sensor's floor and are subtracted.
+    rate_hz : float
+        Of the models.
+    rng : Generator
+        Draws behind the expected GFC (docs/method/similarity.md#floor-and-expected-gfc), the same
+        for all models.
+
+    Raises
+    ------
+    InputError
+        Where no recording is above the floor.
+    """
+    above_floor = [
+        (recording, measured)
+        for recording, measured in recording_spectra(recordings, rate_hz=rate_hz)
+        if measured.magnitude.any()
+    ]
+    if not above_floor:
+        raise InputError(
+            f"{recordings.texture}: expected recordings above the sensor's floor, got none; check "
+            "those at force 0."
+        )
+    seeds = rng.integers(2**63, size=len(above_floor))
+    return [
+        ConditionTarget(
+            recording.condition, similarity.target_of(measured, rng=np.random.default_rng(seed))
+        )
+        for (recording, measured), seed in zip(above_floor, seeds, strict=True)
+    ]
+
+
 def gfc_table(
-    recordings: RecordingSet,
-    full: TextureModel,
-    simplified: TextureModel,
-    *,
-    rng: np.random.Generator,
+    targets: Sequence[ConditionTarget], full: TextureModel, simplified: TextureModel
 ) -> pd.DataFrame:
     """Simplification rate and quality of one texture (PAPER table 3).
 
     Parameters
     ----------
-    recordings : RecordingSet
-        What both models are compared with, condition by condition; those at force 0 are the
-        sensor's floor and are subtracted.
+    targets : sequence of ConditionTarget
+        What both models are compared with, condition by condition.
     full, simplified : TextureModel
         Before and after simplification.
-    rng : Generator
-        Draws behind the expected GFC (docs/method/similarity.md#floor-and-expected-gfc), the same
-        for both models.
 
     Returns
     -------
@@ -64,45 +105,23 @@ def gfc_table(
         |error|), band_energy_error_db (RMS over bands) and gfc30_deficit (1 − GFC30/expected).
     """
     models = {"full": full, "simplified": simplified}
-    table = likeness_table(recordings, models, rng=rng)
+    table = likeness_table(targets, models)
     table.insert(3, "parameters", [model.n_parameters for model in models.values()])
     return table
 
 
 def likeness_table(
-    recordings: RecordingSet,
-    models: Mapping[str, TextureModel | RegressedModel],
-    *,
-    rng: np.random.Generator,
+    targets: Sequence[ConditionTarget], models: Mapping[str, TextureModel | RegressedModel]
 ) -> pd.DataFrame:
     """How alike recordings and each of these models of one texture are, one row per model.
 
-    Parameters, errors and columns as in `gfc_table`, but for `parameters`.
+    Parameters and columns as in `gfc_table`, but for `parameters`.
     """
-    first = next(iter(models.values()))
-    above_floor = [
-        (recording, measured)
-        for recording, measured in recording_spectra(recordings, rate_hz=first.rate_hz)
-        if measured.magnitude.any()
-    ]
-    if not above_floor:
-        raise InputError(
-            f"{first.texture}: expected recordings above the sensor's floor, got none; check those "
-            "at force 0."
-        )
-    seeds = rng.integers(2**63, size=len(above_floor))
-    by_condition = [
-        similarity.reports(
-            measured,
-            [model.peq(*recording.condition) for model in models.values()],
-            rng=np.random.default_rng(seed),
-        )
-        for (recording, measured), seed in zip(above_floor, seeds, strict=True)
-    ]
     rows = []
-    for (name, model), reports in zip(models.items(), zip(*by_condition, strict=True), strict=True):
+    for name, model in models.items():
+        reports = [target.spectrum.report(model.peq(*target.condition)) for target in targets]
         labels = {
-            "texture": first.texture,
+            "texture": model.texture,
             "model": name,
             "layers": model.n_layers,
             "conditions": len(reports),

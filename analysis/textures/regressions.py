@@ -10,8 +10,7 @@ import pandas as pd
 
 from analysis.columns import CONDITIONS, SIMULATED, TEXTURE, Column, P
 from analysis.labels import ALL_TEXTURES, significance_mark
-from analysis.textures.likeness import MEASURE_COLUMNS, likeness_table
-from analysis.textures.results import TextureResult
+from analysis.textures.likeness import MEASURE_COLUMNS, ConditionTarget, likeness_table
 from modeling import RegressedModel, TextureModel, regressed
 from modeling.arrays import Floats
 from modeling.models.own_peaks import own_peaks
@@ -399,25 +398,21 @@ DRIVING_COLUMNS = (
 )
 
 
-def driving_table(results: Sequence[TextureResult], *, rng: np.random.Generator) -> pd.DataFrame:
+def driving_table(driven: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """What the grid's numbers buy: grid, regressions and centroid against the recordings.
 
     Parameters
     ----------
-    results : sequence of TextureResult
-        Their full models are driven in the three ways.
-    rng : Generator
-        Draws behind the expected GFCs, the same for all three.
+    driven : sequence of DataFrame
+        `driven_table` of each texture.
 
     Returns
     -------
     DataFrame
-        Per texture one row each for grid, conditions (reduced regressions on speed, force and
-        their product) and, where it has a layer, centroid; then the means over the textures that
-        have all three, in rows of `ALL_TEXTURES`: texture, driven_by, numbers (stored in all),
-        conditions, and the measures of `analysis.textures.likeness.gfc_table`.
+        Their rows, then the means over the textures that have all three, in rows of
+        `ALL_TEXTURES`.
     """
-    table = pd.concat([_driven(result, rng=rng) for result in results], ignore_index=True)
+    table = pd.concat(driven, ignore_index=True)
     complete = table.groupby("texture")["driven_by"].transform("size") == 1 + len(DRIVERS)
     measures = [name for name in table if name not in ("texture", "driven_by")]
     if not complete.any():
@@ -429,16 +424,28 @@ def driving_table(results: Sequence[TextureResult], *, rng: np.random.Generator)
     return pd.concat([table, means], ignore_index=True)
 
 
-def _driven(result: TextureResult, *, rng: np.random.Generator) -> pd.DataFrame:
-    full = result.model
+def driven_table(full: TextureModel, targets: Sequence[ConditionTarget]) -> pd.DataFrame:
+    """One texture's model driven in three ways, against its recordings.
+
+    Parameters
+    ----------
+    full : TextureModel
+    targets : sequence of ConditionTarget
+        What all three are compared with.
+
+    Returns
+    -------
+    DataFrame
+        One row each for grid, conditions (reduced regressions on speed, force and their product)
+        and, where the model has a layer, centroid: texture, driven_by, numbers (stored in all),
+        conditions, and the measures of `analysis.textures.likeness.gfc_table`.
+    """
     models: dict[str, TextureModel | RegressedModel] = {GRID: full}
     numbers = [full.noise_gains.size * full.n_parameters]
     for by in DRIVERS if with_centroid(full).any() else DRIVERS[:1]:
         driven = regressed(full, by=by)
         models[by] = driven
         numbers.append(driven.n_parameters)
-    table = likeness_table(result.recordings, models, rng=rng).rename(
-        columns={"model": "driven_by"}
-    )
+    table = likeness_table(targets, models).rename(columns={"model": "driven_by"})
     table.insert(2, "numbers", numbers)
     return table.drop(columns="layers")

@@ -125,7 +125,7 @@ def _gaussian_jacobian(shape: Floats, offset: Floats, values: Floats) -> Floats:
 
 def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> float:
     """Standard deviation s (Hz) of a Gaussian fitted within ±1.5·max(30 Hz, s); NaN on failure."""
-    from scipy.optimize import least_squares
+    from scipy.optimize import leastsq
 
     s = SMOOTHING_HZ
     for _ in range(2):
@@ -135,16 +135,20 @@ def _peak_width(frequency_hz: Floats, heights: Floats, centre_hz: float) -> floa
         if values.size < 4 or not (values > 0).any():
             return np.nan
         top = float(values.max())
-        found = least_squares(
+        # For a few numbers `least_squares` takes longer to prepare than MINPACK to find them.
+        (height, width), _, _, _, status = leastsq(
             _gaussian_misfit,
             (1.0, s),
-            jac=_gaussian_jacobian,
             args=(offset, values / top),
-            method="lm",
-            max_nfev=200,
+            Dfun=_gaussian_jacobian,
+            full_output=True,
+            ftol=1e-8,
+            xtol=1e-8,
+            gtol=1e-8,
+            maxfev=200,
         )
-        height, s = found.x[0], abs(float(found.x[1]))
-        if not (found.success and height > 0 and 0 < s < frequency_hz[-1]):
+        s = abs(float(width))
+        if not (1 <= status <= 4 and height > 0 and 0 < s < frequency_hz[-1]):
             return np.nan
     return s
 

@@ -12,11 +12,12 @@ a record are part of the field, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
+from modeling.arrays import Floats, Integers
 from modeling.estimation.coherent import (
     FIRST_DAMPING,
     HOPELESS_DAMPING,
@@ -246,17 +247,40 @@ def solve(field: Field, blocks: Floats, right: Floats) -> Floats:
 def _band(field: Field, blocks: Floats) -> Floats:
     """Lower band of blocks + field's penalty, as SciPy's banded solvers read it."""
     count, p = blocks.shape[:2]
-    band = np.zeros(((field.columns + 1) * p, count * p))
+    places = _band_places(field.rows, field.columns, p)
+    band = np.zeros((field.columns + 1) * p * count * p)
     diagonal = blocks + field.neighbours()[:, None, None] * field.precision
-    starts = np.arange(count) * p
+    band[places.diagonal] = diagonal.reshape(count, -1)[:, places.lower]
+    for coupled in places.coupled:
+        band[coupled] = -field.precision.ravel()
+    return band.reshape(-1, count * p)[: count * p]
+
+
+class _BandPlaces(NamedTuple):
+    """Where blocks and couplings of neighbours stand in the band, its rows one after the other.
+
+    `lower` (t,) are the places of a block's lower triangle in the block, `diagonal` (C, t) those in
+    the band; `coupled` those of whole blocks that join neighbours in a row, and in a column.
+    """
+
+    lower: Integers
+    diagonal: Integers
+    coupled: tuple[Integers, Integers]
+
+
+@lru_cache(maxsize=64)
+def _band_places(rows: int, columns: int, p: int) -> _BandPlaces:
+    grid = np.arange(rows * columns).reshape(rows, columns)
+    starts, width = grid * p, grid.size * p
     row, column = np.tril_indices(p)
-    band[(row - column)[None, :], starts[:, None] + column[None, :]] = diagonal[:, row, column]
-    row, column = (index.ravel() for index in np.indices((p, p)))
-    coupling = -field.precision[row, column]
-    for far, first in ((1, _has_next_column(field)), (field.columns, _has_next_row(field))):
-        if first.size:
-            band[(far * p + row - column)[None, :], starts[first][:, None] + column] = coupling
-    return band[: count * p]
+    diagonal = (row - column) * width + starts.reshape(-1, 1) + column
+    across, down = (index.ravel() for index in np.indices((p, p)))
+
+    def joined(first: Integers, far: int) -> Integers:
+        return (far * p + across - down) * width + first.reshape(-1, 1) + down
+
+    coupled = (joined(starts[:, :-1], 1), joined(starts[:-1], columns))
+    return _BandPlaces(row * p + column, diagonal, coupled)
 
 
 def log_evidence(fit: FieldFit) -> float:
@@ -273,15 +297,6 @@ def log_evidence(fit: FieldFit) -> float:
     factor = cholesky_banded(_band(field, blocks), lower=True, check_finite=False)
     expected = field.degrees * np.linalg.slogdet(field.precision)[1] + p * np.log(FAINTEST)
     return -fit.value + 0.5 * float(expected) - float(np.log(factor[0]).sum())
-
-
-def _has_next_column(field: Field) -> np.ndarray:
-    grid = np.arange(field.rows * field.columns).reshape(field.rows, field.columns)
-    return grid[:, :-1].ravel()
-
-
-def _has_next_row(field: Field) -> np.ndarray:
-    return np.arange((field.rows - 1) * field.columns)
 
 
 class Covariances(NamedTuple):

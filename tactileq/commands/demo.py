@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,12 +13,15 @@ from tactileq.commands.stimuli import render_set
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
 from tactileq.telling import progress, share_of
-from tactileq.workers import working
+from tactileq.workers import mapping
 
 if TYPE_CHECKING:
+    from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
     from modeling import Threshold
     from stimuli.sets.recipe import Recipe
+
+JOBS = 2
 
 
 def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
@@ -24,8 +29,6 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
 
     Example: tactileq demo --out demo
     """
-    from analysis.answers.loading import load_responses
-    from analysis.report.report import write_report
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
@@ -37,21 +40,18 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     plan = Study.load()
     threshold = Threshold.named("codec")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
-    with replace_folder(out) as fresh:
+    with replace_folder(out) as fresh, mapping(jobs=JOBS) as mapped:
+        record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
-            made = {}
-            with working(record, tuple(TEXTURES), jobs=2) as done:
-                for number, result in done:
-                    made[number] = result
-                    advance(result.texture)
-            results = [made[number] for number in sorted(made)]
+            made = list(_told(mapped(record, TEXTURES), advance))
+        # Other processes check the models while this one presents them.
+        checked = mapped(with_checks, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
-            full={r.texture: r.model for r in results},
-            simplified={r.texture: r.simplification.model for r in results},
+            full={r.texture: r.model for r in made},
+            simplified={r.texture: r.simplification.model for r in made},
         )
-        real = {r.texture: r.truth for r in results if r.truth is not None}
+        real = {r.texture: r.truth for r in made if r.truth is not None}
         run_study(
             plan,
             real=real,
@@ -60,6 +60,8 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             threshold=threshold,
             seed=seed,
         )
+        with progress("Predicting conditions that were left out", len(made)) as advance:
+            results = list(_told(checked, advance))
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
@@ -71,15 +73,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             "study": plan.to_dict(),
         }
         provenance = provenance_of("demo", settings, seed=seed)
-        with share_of("Analyzing") as tell:
-            write_report(
-                fresh / "report.html",
-                responses=load_responses(fresh / "data"),
-                textures=results,
-                provenance=provenance,
-                seed=seed,
-                progress=tell,
-            )
+        write_demo_report(fresh, results, provenance=provenance, seed=seed, mapped=mapped)
         seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
@@ -99,13 +93,10 @@ def demo_recipe(folder: Path, *, seed: int) -> Recipe:
 
 def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) -> TextureResult:
     """Record, model and simplify one planted texture; everything goes by way of the disk."""
-    from analysis.textures.between import left_out_by_model
     from analysis.textures.results import TextureResult
-    from modeling import RecordingSet
+    from modeling import RecordingSet, fit_texture
     from modeling import simplify as drop_layers
     from modeling.files.writing import file_stem
-    from modeling.fitting.conditions import recording_spectra
-    from modeling.fitting.texture import fit_spectra
     from modeling.perception.verdicts import ENDING
     from stimuli.planted.textures import planted_texture, record_texture
 
@@ -113,12 +104,56 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     place = folder / "recordings" / file_stem(name)
     record_texture(truth, seed=seed).save(place)
     records = RecordingSet.load(place)
-    measured = recording_spectra(records)
-    full = fit_spectra(measured)
+    full = fit_texture(records)
     simplification = drop_layers(full, threshold)
     full.save(folder / "models" / f"{file_stem(name)}.json")
     simplification.model.save(folder / "simplified" / f"{file_stem(name)}.json")
     simplification.save(folder / "simplified" / f"{file_stem(name)}{ENDING}")
-    others = (fit_spectra(measured, estimator="paper"),)
-    left_out = left_out_by_model(measured, full)
-    return TextureResult(records, full, simplification, truth, others, left_out)
+    return TextureResult(records, full, simplification, truth)
+
+
+def with_checks(result: TextureResult) -> TextureResult:
+    """The result with what its model is judged by: the paper's own, and conditions left out."""
+    from analysis.textures.between import left_out_by_model
+    from modeling.fitting.conditions import recording_spectra
+    from modeling.fitting.texture import fit_spectra
+
+    measured = recording_spectra(result.recordings)
+    return replace(
+        result,
+        other_estimates=(fit_spectra(measured, estimator="paper"),),
+        left_out=left_out_by_model(measured, result.model),
+    )
+
+
+def write_demo_report(
+    folder: Path,
+    results: Sequence[TextureResult],
+    *,
+    provenance: Mapping[str, object],
+    seed: int,
+    mapped: Mapped,
+) -> None:
+    """The report of everything in the demo's folder, with a progress bar."""
+    from analysis.answers.loading import load_responses
+    from analysis.report.report import write_report
+
+    with share_of("Analyzing") as tell:
+        write_report(
+            folder / "report.html",
+            responses=load_responses(folder / "data"),
+            textures=results,
+            provenance=provenance,
+            seed=seed,
+            progress=tell,
+            mapped=mapped,
+        )
+
+
+def _told(
+    results: Iterable[TextureResult], advance: Callable[[str], None]
+) -> Iterator[TextureResult]:
+    """The results, each told as it comes."""
+    for result in results:
+        advance(result.texture)
+        yield result

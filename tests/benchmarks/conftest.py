@@ -11,7 +11,13 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from modeling import Recording, RecordingSet
-from stimuli.planted.textures import TEXTURES, planted_texture, record_texture
+from stimuli.planted.textures import (
+    FORCES_N,
+    SPEEDS_MM_S,
+    TEXTURES,
+    planted_texture,
+    record_texture,
+)
 
 RIVAL = "rival"
 
@@ -31,9 +37,11 @@ def timed(request: pytest.FixtureRequest) -> bool:
 
 @pytest.fixture(scope="session")
 def study(timed: bool) -> tuple[RecordingSet, ...]:
-    """A whole study, simulated: 7 textures × 49 conditions, 1 s at 22 704 Hz (untimed: one)."""
+    """A whole study, simulated: 7 textures × 49 conditions, 1 s at 22 704 Hz (untimed: 1 × 9)."""
     names = list(TEXTURES) if timed else list(TEXTURES)[:1]
-    return tuple(record_texture(planted_texture(name), seed=1) for name in names)
+    some = slice(None, None, 1 if timed else 3)
+    axes = {"speeds_mm_s": SPEEDS_MM_S[some], "forces_n": FORCES_N[some]}
+    return tuple(record_texture(planted_texture(name, **axes), seed=1) for name in names)
 
 
 @pytest.fixture(scope="session")

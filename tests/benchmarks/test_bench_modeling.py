@@ -86,7 +86,7 @@ def test_fit_of_a_texture(
 ) -> None:
     benchmark.extra_info |= {"what": estimator}
     model = benchmark(lambda: fit_texture(study[0], estimator=estimator))
-    assert model.gains.shape[:2] == (7, 7)
+    assert model.gains.shape[0] * model.gains.shape[1] == len(study[0])
 
 
 @pytest.mark.benchmark(group="one texture, 49 records, as recorded")
@@ -95,7 +95,7 @@ def test_autoregressive_fit_of_a_texture(
 ) -> None:
     benchmark.extra_info |= {"what": f"AR({AR_ORDER})", "rival": True}
     model = benchmark(lambda: fit_ar(study[0], order=AR_ORDER))
-    assert model.gains.shape == (7, 7)
+    assert model.gains.size == len(study[0])
 
 
 def resampling_and_one_paper_fit(study: tuple[RecordingSet, ...]) -> int:

@@ -24,8 +24,8 @@ def files(tmp_path: Path, hatt_xml: Xml) -> list[str]:
     return names
 
 
-def test_two_textures_become_recordings_and_models(run, tmp_path: Path, files: list[str]) -> None:
-    imported = run("import", "hatt", *files, *GRID, "--out", "set", "--seed", 3)
+def test_two_textures_become_recordings_and_models(main, tmp_path: Path, files: list[str]) -> None:
+    imported = main("import", "hatt", *files, *GRID, "--out", "set", "--seed", 3)
     assert imported.returncode == 0, imported.stderr
     assert "12 recordings added at 1000 Hz, 12 in set" in imported.stdout
     assert "beyond its models" not in imported.stdout
@@ -36,11 +36,11 @@ def test_two_textures_become_recordings_and_models(run, tmp_path: Path, files: l
     assert provenance["command"] == "tactileq import hatt"
     assert provenance["settings"]["seed"] == 3
     assert set(provenance["inputs_sha256"]) == set(files)
-    fitted = run("model", "set", "--out", "models")
+    fitted = main("model", "set", "--out", "models")
     assert fitted.returncode == 0, fitted.stderr
     for name in ("Canvas-9", "MDF"):
         assert TextureModel.load(tmp_path / f"models/{name}.json").simulated
-    again = run("import", "hatt", *files, *GRID, "--out", "again", "--seed", 3)
+    again = main("import", "hatt", *files, *GRID, "--out", "again", "--seed", 3)
     assert again.returncode == 0
     assert RecordingSet.load(tmp_path / "again") == records
 

@@ -51,7 +51,7 @@ def write_grid_of_wavs(folder: Path, *, forces: tuple[float, ...], leave_out=())
     return table
 
 
-def test_ten_files_at_one_force_give_models_of_that_force(run, tmp_path: Path) -> None:
+def test_ten_files_at_one_force_give_models_of_that_force(main, tmp_path: Path) -> None:
     rows = ["file\ttexture\tspeed_mm_s\tforce_n"]
     for number in range(10):
         texture, speed = ("cloth A", "cloth B")[number % 2], SPEEDS_MM_S[number // 2]
@@ -60,10 +60,10 @@ def test_ten_files_at_one_force_give_models_of_that_force(run, tmp_path: Path) -
         rows.append(f"{number}.wav\t{texture}\t{speed:g}\t1.0")
     (tmp_path / "labels.tsv").write_text("\n".join(rows) + "\n", encoding="utf-8")
     wavs = [f"{n}.wav" for n in range(10)]
-    imported = run("import", "wav", *wavs, "--labels", "labels.tsv", "--out", "set")
+    imported = main("import", "wav", *wavs, "--labels", "labels.tsv", "--out", "set")
     assert imported.returncode == 0, imported.stderr
     assert "unit is arbitrary" in imported.stdout
-    fitted = run("model", "set", "--out", "models")
+    fitted = main("model", "set", "--out", "models")
     assert fitted.returncode == 0, fitted.stderr
     for name in ("cloth A", "cloth B"):
         told = f"note: {name}: recorded at 1 N alone; nothing is known of other forces."
@@ -83,7 +83,7 @@ def test_ten_files_at_one_force_give_models_of_that_force(run, tmp_path: Path) -
     for name in ("cloth-A", "cloth-B"):
         model = TextureModel.load(tmp_path / f"models/{name}.json")
         assert model.noise_gains.shape == (5, 1)
-    rendered = run("stimuli", "models/cloth-A.json", "--out", "wavs")
+    rendered = main("stimuli", "models/cloth-A.json", "--out", "wavs")
     assert rendered.returncode == 0, rendered.stderr
 
 

@@ -67,9 +67,17 @@ def test_full_and_simplified_models_do_not_replace_each_other(main, tmp_path: Pa
     assert TextureModel.load(tmp_path / "models/canvas.json") == full
 
 
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory) -> Path:
+    """Where the first test that needs the study leaves it for the others."""
+    return tmp_path_factory.mktemp("study") / "made"
+
+
 @pytest.fixture
-def study(main, tmp_path: Path, small_study: str) -> Path:
+def study(main, tmp_path: Path, small_study: str, made_once: Path) -> Path:
     """A small simulated study, from recordings to answers, in `tmp_path`."""
+    if made_once.exists():
+        return shutil.copytree(made_once, tmp_path, dirs_exist_ok=True)
     (tmp_path / "study.toml").write_text(small_study)
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / "recordings" / name)
@@ -78,9 +86,11 @@ def study(main, tmp_path: Path, small_study: str) -> Path:
         assert made.returncode == 0
     simulated = main("simulate", "--study", "study.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr
+    shutil.copytree(tmp_path, made_once)
     return tmp_path
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_analysis_holds_to_the_models_that_were_presented(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
     same = main("analyze", "data", *folders)
@@ -104,6 +114,7 @@ def test_analysis_holds_to_the_models_that_were_presented(main, study: Path) -> 
     assert "give all three or none" in partial.stderr
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_new_analysis_replaces_the_whole_old_one(main, study: Path) -> None:
     folders = ["--recordings", "recordings", "--models", "models", "--simplified", "simplified"]
     assert main("analyze", "data", *folders).returncode == 0

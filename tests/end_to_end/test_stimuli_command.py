@@ -43,8 +43,8 @@ def hashes(folder: Path) -> dict[str, str]:
     return dict(pd.read_csv(folder / "manifest.tsv", sep="\t")[["file", "sha256"]].to_numpy())
 
 
-def test_a_set_and_once_more_from_its_own_recipe(run, tmp_path: Path, study: Path) -> None:
-    made = run("stimuli", "study/set.toml", "--out", "a")
+def test_a_set_and_once_more_from_its_own_recipe(main, tmp_path: Path, study: Path) -> None:
+    made = main("stimuli", "study/set.toml", "--out", "a")
     assert made.returncode == 0, made.stderr
     assert made.stdout.endswith("8 files: a/manifest.tsv\n")
     # The recipe's paths are relative to it, and the hand is faster than any recording.
@@ -62,11 +62,11 @@ def test_a_set_and_once_more_from_its_own_recipe(run, tmp_path: Path, study: Pat
         "study/models",
         "study/hand.csv",
     }
-    again = run("stimuli", "a/recipe.toml", "--out", "b")
+    again = main("stimuli", "a/recipe.toml", "--out", "b")
     assert again.returncode == 0, again.stderr
     assert hashes(tmp_path / "b") == hashes(tmp_path / "a")
     # A set replaces a set.
-    assert run("stimuli", "a/recipe.toml", "--out", "a").returncode == 0
+    assert main("stimuli", "a/recipe.toml", "--out", "a").returncode == 0
     assert hashes(tmp_path / "a") == hashes(tmp_path / "b")
 
 

@@ -18,7 +18,8 @@ from analysis.report.report import write_report
 from analysis.textures.results import TextureResult
 from modeling import InputError, RecordingSet, Threshold, simplify
 
-pytestmark = pytest.mark.filterwarnings("error")
+# One report is drawn whole, for all tests that only read it (`folder`); the others are about words.
+pytestmark = [pytest.mark.filterwarnings("error"), pytest.mark.usefixtures("undrawn")]
 WARNING = "sub-01_ses-01_task-absolute_beh.tsv: the last line was cut short & is left out."
 
 
@@ -193,6 +194,13 @@ def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choic
     assert "So far, yes" in shown.text
 
 
+@pytest.fixture
+def drawn(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures as they are."""
+    monkeypatch.setattr("analysis.report.report.png_of", saving.png_of)
+
+
+@pytest.mark.usefixtures("drawn")
 def test_names_that_no_font_has_are_told_once(tmp_path, ratings, monkeypatch):
     path = saving.findfont(saving.FontProperties(family=saving.DEFAULT_FAMILY))
     monkeypatch.setattr(saving, "_faces", lambda: ((saving.DEFAULT_FAMILY, path, 0),))
@@ -379,6 +387,7 @@ def test_a_texture_without_layers_is_reported(tmp_path, results):
     assert not re.search(r"\bnan\b", shown.text)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_second_report_takes_the_place_of_the_first(tmp_path, ratings, choices):
     answers = responses_of(ratings, choices, simulated=True)
     first = write_report(tmp_path / "report.html", responses=answers, seed=1).read_bytes()

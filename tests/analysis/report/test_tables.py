@@ -27,6 +27,7 @@ from analysis.statistics.overall import OVERALL_COLUMNS
 from analysis.statistics.paired import RATING_TEST_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, RATE_TEST_COLUMNS
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
+from analysis.textures.compared import comparisons
 from analysis.textures.likeness import GFC_COLUMNS
 from analysis.textures.recovery import PLANTED_LAYER_COLUMNS, PLANTED_TRUTH_COLUMNS
 from analysis.textures.regressions import (
@@ -36,6 +37,7 @@ from analysis.textures.regressions import (
     DRIVING_COLUMNS,
     REGRESSION_COLUMNS,
     SUPPORT_COLUMNS,
+    driving_table,
 )
 from analysis.textures.results import VERDICT_COLUMNS
 
@@ -93,11 +95,10 @@ def tables(results, ratings, choices) -> list[Table]:
         columns=["speed_mm_s", "force_n", "level_error_db", "log_spectral_distance_db"],
     )
     textures = [replace(results[0], left_out={"joint": predicted}), *results[1:]]
+    compared = list(comparisons(textures, rng=np.random.default_rng(1)))
     sections = (
-        model_section(textures, rng=np.random.default_rng(1), progress=lambda share, what: None),
-        parameter_section(
-            textures, rng=np.random.default_rng(1), progress=lambda share, what: None
-        ),
+        model_section(textures, pd.concat([each.gfc for each in compared])),
+        parameter_section(textures, driving_table([each.driven for each in compared])),
         rating_section(responses),
         choice_section(responses, rng=np.random.default_rng(1)),
         planted_section(textures),

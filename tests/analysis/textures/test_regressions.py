@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.figures.regression import figure_centroid, plot_centroid
 from analysis.report.section_parameters import parameter_section
+from analysis.textures.compared import comparisons
 from analysis.textures.regressions import (
     NAMES,
     centroid_amplitude_table,
@@ -224,8 +225,13 @@ def test_figure_five_shows_every_texture_with_units(models, tmp_path) -> None:
     assert isinstance(real.figure, Figure)
 
 
+def driving_of(results):
+    compared = comparisons(results, rng=np.random.default_rng(3))
+    return driving_table([comparison.driven for comparison in compared])
+
+
 def test_driven_models_are_compared_on_the_same_recordings(results) -> None:
-    table = driving_table(results, rng=np.random.default_rng(3))
+    table = driving_of(results)
     assert table["driven_by"].tolist() == ["grid", "conditions", "centroid"] * 3
     assert table["texture"].tolist()[6:] == ["all textures"] * 3
     first = results[0]
@@ -255,24 +261,19 @@ def bare_result(result: TextureResult) -> TextureResult:
 
 
 def test_a_texture_without_layers_is_driven_by_its_noise_alone(results) -> None:
-    table = driving_table([bare_result(results[0])], rng=np.random.default_rng(3))
+    table = driving_of([bare_result(results[0])])
     assert table["driven_by"].tolist() == ["grid", "conditions"]
     assert table["numbers"].tolist()[0] == 4
     assert "all textures" not in table["texture"].tolist()
 
 
 def test_the_section_says_what_came_out(results) -> None:
-    determined: list[float] = []
-    section = parameter_section(
-        results, rng=np.random.default_rng(1), progress=lambda share, what: determined.append(share)
-    )
-    assert determined == sorted(determined)
+    section = parameter_section(results, driving_of(results))
     (driven,) = section.outcomes  # nothing could be tested on 2 × 2 conditions
     for way in ("the grid", "regressions", "the centroid alone"):
         assert way in driven.sentence
-    bare = parameter_section(
-        [bare_result(results[0])], rng=np.random.default_rng(1), progress=lambda share, what: None
-    )
+    without_layers = [bare_result(results[0])]
+    bare = parameter_section(without_layers, driving_of(without_layers))
     assert bare.outcomes == ()
     assert all(item.simulated for item in bare.items if not hasattr(item, "items"))
 
@@ -280,9 +281,7 @@ def test_the_section_says_what_came_out(results) -> None:
 def test_the_section_reports_published_values_beside_ours(models, results) -> None:
     textures = [replace(results[0], model=replace(models[0], texture="leather"), truth=None)]
     # The recordings are of other conditions; only the tables' sentences matter here.
-    section = parameter_section(
-        textures, rng=np.random.default_rng(1), progress=lambda share, what: None
-    )
+    section = parameter_section(textures, driving_of(textures))
     assert (
         "noise gain n 1.00 (0.68); frequency f (Hz) 1.00 (0.40); amplitude a 1.00 (0.88)"
         in section.outcomes[0].sentence

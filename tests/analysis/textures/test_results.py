@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis.spectra.comparison import compare_spectra
-from analysis.textures.likeness import gfc_table
+from analysis.textures.likeness import condition_targets, gfc_table
 from analysis.textures.recordings import layers_of_recordings, layers_table, spectra_table
 from analysis.textures.results import TextureResult, simplification_table
 from modeling import (
@@ -26,14 +26,15 @@ from modeling.fitting.conditions import recording_spectra
 from stimuli.planted.textures import planted_texture, record_texture
 
 
+def targets_of(recordings: RecordingSet, *, rng=None):
+    rng = np.random.default_rng(0) if rng is None else rng
+    return condition_targets(recordings, rate_hz=5000.0, rng=rng)
+
+
 def test_gfc_table_holds_means_and_minimum_of_the_reports(results):
     result = results[0]
-    table = gfc_table(
-        result.recordings,
-        result.model,
-        result.simplification.model,
-        rng=np.random.default_rng(4),
-    )
+    targets = targets_of(result.recordings, rng=np.random.default_rng(4))
+    table = gfc_table(targets, result.model, result.simplification.model)
     assert table["model"].tolist() == ["full", "simplified"]
     assert table["texture"].tolist() == ["leather", "leather"]
     assert (table["conditions"] == 4).all()
@@ -63,7 +64,7 @@ def test_no_contact_recordings_are_not_compared(results):
     noise = np.random.default_rng(5).normal(0, 1e-4, 2500)
     still = Recording(noise, 5000.0, 200.0, 0.0, "leather", simulated=True)
     recordings = RecordingSet([*result.recordings.recordings, still])
-    table = gfc_table(recordings, result.model, result.model, rng=np.random.default_rng(0))
+    table = gfc_table(targets_of(recordings), result.model, result.model)
     assert (table["conditions"] == 4).all()
 
 
@@ -104,7 +105,7 @@ def test_a_condition_that_was_not_recorded_is_refused(results):
 def test_a_recording_has_one_expected_gfc_for_both_models(results):
     result = results[0]
     bare = result.model.with_layers([0])
-    table = gfc_table(result.recordings, result.model, bare, rng=np.random.default_rng(1))
+    table = gfc_table(targets_of(result.recordings), result.model, bare)
     for name in ("gfc30_expected", "gfc5_expected", "gfc30_floor", "gfc5_floor"):
         assert table[name].nunique() == 1
     assert table["gfc30_mean"].nunique() == 2
@@ -128,7 +129,7 @@ def test_the_sensors_floor_is_subtracted_from_what_models_are_held_against():
     model = fit_texture(clean)
     noisy, still = with_sensor_noise(clean, 0.05, rng=np.random.default_rng(1))
     gfc30 = [
-        gfc_table(records, model, model, rng=np.random.default_rng(0))["gfc30_mean"][0]
+        gfc_table(targets_of(records), model, model)["gfc30_mean"][0]
         for records in (clean, RecordingSet([*noisy.recordings, still]), noisy)
     ]
     assert gfc30[1] == pytest.approx(gfc30[0], abs=0.006)
@@ -152,16 +153,11 @@ def test_recordings_below_the_floor_are_not_compared(results):
     faint = replace(recordings.recordings[0], samples=recordings.recordings[0].samples / 100)
     quiet = replace(still, samples=still.samples / 500)
     some = RecordingSet([faint, *recordings.recordings[1:], quiet])
-    table = gfc_table(some, model, model, rng=np.random.default_rng(0))
+    table = gfc_table(targets_of(some), model, model)
     assert (table["conditions"] == 3).all()
     assert np.isfinite(table["log_spectral_distance_db"]).all()
     with pytest.raises(InputError, match="above the sensor's floor, got none"):
-        gfc_table(
-            RecordingSet([*recordings.recordings, still]),
-            model,
-            model,
-            rng=np.random.default_rng(0),
-        )
+        targets_of(RecordingSet([*recordings.recordings, still]))
 
 
 @pytest.mark.parametrize("table_of", [layers_table, spectra_table])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,10 +15,10 @@ from modeling.estimation.estimators import find_layers
 from modeling.estimation.joint import as_layers
 from modeling.estimation.layers import EstimatorName
 from modeling.estimation.likelihood import signal_power
-from modeling.estimation.paper import BANDWIDTH_PER_S, FWHM_PER_S, fit_layers, noise_amount
+from modeling.estimation.paper import fit_layers
 from modeling.estimation.paper_deviations import smoothed_level_sd_db
 from modeling.perception.simplification import distances_db
-from modeling.recordings.spectrum import SMOOTHING_HZ, spectrum_of_samples
+from modeling.recordings.spectrum import spectrum_of_samples
 
 ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0
@@ -46,21 +45,8 @@ def draws(
 
 def by_the_recipe(measured: Spectrum, estimator: EstimatorName) -> Layers:
     """The one layer, fitted at its known frequency, with the deviation under test."""
-    where = np.array([FREQUENCY_HZ])
-    layers = fit_layers(
-        measured, where, fallback_bandwidths_hz=np.array([np.nan]), estimator=estimator
-    )
-    consistent = estimator == "paper-consistent"
-    s_hz = layers.bandwidths_hz / (BANDWIDTH_PER_S if consistent else FWHM_PER_S)
-    fitted = np.hypot(s_hz, SMOOTHING_HZ) if consistent else s_hz
-    sd_db = smoothed_level_sd_db(
-        measured,
-        measured.smoothed() - consistent * noise_amount(measured),
-        frequencies_hz=where,
-        fitted_s_hz=np.where(layers.unresolved, np.nan, fitted),
-        deconvolved=consistent,
-    )
-    return replace(layers, level_sd_db=sd_db)
+    where, unknown = np.array([FREQUENCY_HZ]), np.array([np.nan])
+    return fit_layers(measured, where, fallback_bandwidths_hz=unknown, estimator=estimator)
 
 
 def level_and_sd_db(samples: Floats, estimator: EstimatorName) -> tuple[float, float]:

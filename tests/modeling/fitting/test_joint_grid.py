@@ -9,10 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from modeling import PEQ, Recording, fit_texture
+from modeling import PEQ, Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.equalizer.bands import band_response
+from modeling.fitting.conditions import recording_spectra
 from modeling.fitting.joint_grid import GridFit, fit_grid_jointly
+from modeling.fitting.texture import fit_spectra
 from modeling.models.grid import Condition
 from modeling.models.own_peaks import own_peaks
 from modeling.recordings.spectrum import Spectrum, spectrum_of_samples
@@ -144,17 +146,19 @@ def judged() -> Mapping[tuple[str, bool], list[Names]]:
         for seed in range(6):
             rng = np.random.default_rng([7, int(independent), seed])
             truth, grid = random_texture(rng), axes(4 + seed % 4, 4 + seed // 2 % 4)
-            recordings = [
-                Recording(draw(truth(*c), rng, independent=independent), RATE_HZ, *c, "planted")
-                for c in grid
-            ]
+            measured = recording_spectra(
+                RecordingSet(
+                    Recording(draw(truth(*c), rng, independent=independent), RATE_HZ, *c, "planted")
+                    for c in grid
+                )
+            )
             true = [truth(*c) for c in grid]
             true_hz, width_hz = (
                 np.array([getattr(peq, name) for peq in true])
                 for name in ("frequencies_hz", "bandwidths_hz")
             )
             for estimator in ("joint", "paper-consistent"):
-                model = fit_texture(recordings, estimator=estimator)
+                model = fit_spectra(measured, estimator=estimator)
                 # Of layers that only fill another's shape nobody claims that they are there.
                 found = np.flatnonzero(own_peaks(model).is_peak)
                 found_hz = model.frequencies_hz.reshape(len(grid), -1)[:, found]
@@ -324,9 +328,8 @@ def test_the_order_in_which_conditions_come_does_not_matter() -> None:
     texture = random_texture(np.random.default_rng(5))
     measured = spectra(texture, grid)
     found = fit_grid_jointly(measured)
-    for seed in range(3):
-        shuffled = [grid[i] for i in np.random.default_rng(seed).permutation(len(grid))]
-        again = fit_grid_jointly({c: measured[c] for c in shuffled})
-        for name in ("frequencies_hz", "bandwidths_hz", "gains", "noise_gain", "level_sd_db"):
-            assert (table(again, name, grid) == table(found, name, grid)).all()
-        assert all((again.inherited[c] == found.inherited[c]).all() for c in grid)
+    shuffled = [grid[i] for i in np.random.default_rng(0).permutation(len(grid))]
+    again = fit_grid_jointly({c: measured[c] for c in shuffled})
+    for name in ("frequencies_hz", "bandwidths_hz", "gains", "noise_gain", "level_sd_db"):
+        assert (table(again, name, grid) == table(found, name, grid)).all()
+    assert all((again.inherited[c] == found.inherited[c]).all() for c in grid)

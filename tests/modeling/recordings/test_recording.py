@@ -271,6 +271,19 @@ def test_folder_loads_back_equal(
     assert len(list(folder.iterdir())) == len(recordings) + 1
 
 
+def test_values_that_come_again_keep_their_bits(
+    make_recording: RecordingMaker, tmp_path: Path
+) -> None:
+    steps = np.round(NOISE / 0.01) * 0.01  # of a sensor; some are −0.0
+    steps[:2] = -0.0, 0.0
+    assert np.unique(steps).size < steps.size
+    RecordingSet([make_recording(steps)]).save(tmp_path / "set")
+    (loaded,) = RecordingSet.load(tmp_path / "set")
+    assert loaded.samples.tobytes() == steps.tobytes()
+    lines = (tmp_path / "set/0001.csv").read_text().splitlines()
+    assert lines[1:] == [repr(value) for value in steps.tolist()]
+
+
 # --- folders
 
 

@@ -1,0 +1,59 @@
+"""One texture's models against its recordings: full, simplified and driven by regressions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+import numpy as np
+import pandas as pd
+
+from analysis.textures.likeness import condition_targets, gfc_table
+from analysis.textures.regressions import driven_table
+from analysis.textures.results import TextureResult
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+
+class Mapped(Protocol):
+    """Results of a function of each item, in order: `map`, or one that uses several processes."""
+
+    def __call__(
+        self, work: Callable[[Item], Result], items: Sequence[Item], /
+    ) -> Iterable[Result]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What `gfc_table` and `driven_table` say of one texture, against the same draws."""
+
+    gfc: pd.DataFrame
+    driven: pd.DataFrame
+
+
+def comparisons(
+    results: Sequence[TextureResult], *, rng: np.random.Generator, mapped: Mapped = map
+) -> Iterable[Comparison]:
+    """The comparison of each texture, in order.
+
+    Parameters
+    ----------
+    results : sequence of TextureResult
+    rng : Generator
+        Of the draws behind the expected GFCs: each texture has a stream of its own, so that its
+        numbers do not depend on how the work is divided.
+    mapped : callable
+        How the textures are gone through.
+    """
+    return mapped(_comparison, list(zip(results, rng.spawn(len(results)), strict=True)))
+
+
+def _comparison(texture: tuple[TextureResult, np.random.Generator]) -> Comparison:
+    result, rng = texture
+    full = result.model
+    targets = condition_targets(result.recordings, rate_hz=full.rate_hz, rng=rng)
+    return Comparison(
+        gfc_table(targets, full, result.simplification.model), driven_table(full, targets)
+    )
