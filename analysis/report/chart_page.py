@@ -12,9 +12,14 @@ from plotly.offline import get_plotlyjs
 
 from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import PLACES
-from analysis.benches.chart.summary import comparison_table, default_rows
+from analysis.benches.chart.summary import (
+    COMPARISON_COLUMNS,
+    METHOD_COLUMNS,
+    comparison_table,
+    default_rows,
+)
 from analysis.benches.chart.surfaces import KINDS
-from analysis.columns import Column, Columns
+from analysis.columns import names, without
 from analysis.figures.chart import STYLES, figure_chart
 from analysis.figures.saving import png_of
 from analysis.report.page import (
@@ -67,36 +72,9 @@ _SYMBOLS = {
 }
 FIRST_MEASURE = "stroking_distance_db"
 
-COMPARISON_COLUMNS: Columns = (
-    Column("kind", "surfaces", is_name=True),
-    Column("rival", is_name=True),
-    Column("surfaces", "number"),
-    Column("operations", "operations, times ours"),
-    Column("numbers", "numbers stored, times ours"),
-    Column("between", "distance between, times ours"),
-    Column("between_low", "95% from"),
-    Column("between_high", "to"),
-    Column("stroking", "while stroking, times ours"),
-    Column("stroking_low", "95% from"),
-    Column("stroking_high", "to"),
-)
-METHOD_COLUMNS: Columns = (
-    Column("kind", "surfaces", is_name=True),
-    Column("method", is_name=True),
-    Column("layers"),
-    Column("numbers", "numbers stored"),
-    Column("operations", "operations per sample"),
-    Column("most_operations", "at most"),
-    Column("bytes"),
-    Column("ns", "time per sample", "ns"),
-    Column("fit_ms", "fitting per record", "ms"),
-    Column("at_gfc30", "GFC30 at", format=".4f"),
-    Column("at_distance_db", "distance at", "dB"),
-    Column("between_distance_db", "between", "dB"),
-    Column("between_distance_db_worst", "between, worst surface", "dB"),
-    Column("stroking_distance_db", "while stroking", "dB"),
-    Column("between_worst_level_db", "worst level between", "dB"),
-    Column("single_error_db", "single precision", "dB"),
+SHOWN_COMPARISONS = without(
+    COMPARISON_COLUMNS,
+    *("operations_low", "operations_high", "numbers_low", "numbers_high", "verdict", "sentence"),
 )
 METHODS_NOTE = (
     "Medians over the surfaces, as the program renders by default: each method's own blending, "
@@ -126,10 +104,17 @@ def chart_tables(chart: Chart) -> tuple[Table, Table]:
             "Who dominates whom",
             COMPARISON_NOTE,
             comparison_table(chart.comparisons),
-            COMPARISON_COLUMNS,
+            SHOWN_COMPARISONS,
             simulated,
         ),
-        Table("chart_methods", "All methods", METHODS_NOTE, worst, METHOD_COLUMNS, simulated),
+        Table(
+            "chart_methods",
+            "All methods",
+            METHODS_NOTE,
+            worst[names(METHOD_COLUMNS)],
+            METHOD_COLUMNS,
+            simulated,
+        ),
     )
 
 

@@ -52,6 +52,7 @@ def write_report(
     *,
     responses: Responses | None = None,
     textures: Sequence[TextureResult] = (),
+    benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
     seed: int = 0,
@@ -68,6 +69,8 @@ def write_report(
         Answers of the study; without them the report is on the models alone.
     textures : sequence of TextureResult, optional
         Models, their simplification and, where known, the planted truth.
+    benches : sequence of Section
+        What is said of methods, not of this study: speed against accuracy, where methods fail.
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
@@ -97,6 +100,7 @@ def write_report(
     sections = _sections(
         responses, textures, identical=identical, rng=rng, tell=tell, mapped=mapped
     )
+    sections += benches
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."

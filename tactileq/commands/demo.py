@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from tactileq.commands.simulate import run_study
+from tactileq.commands.stability import columns_of, examine_column
 from tactileq.commands.stimuli import render_set
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
@@ -16,12 +17,17 @@ from tactileq.telling import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
+    from analysis.benches.atlas.edges import Examined
+    from analysis.benches.chart.judging import Judged
+    from analysis.report.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
     from modeling import Threshold
     from stimuli.sets.recipe import Recipe
 
 JOBS = 2
+CHART_TURNS = 5
+Result = TypeVar("Result")
 
 
 def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
@@ -43,9 +49,9 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     with replace_folder(out) as fresh, mapping(jobs=JOBS) as mapped:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            made = list(_told(mapped(record, TEXTURES), advance))
+            made = list(_told(mapped(record, TEXTURES), advance, _texture))
         # Other processes check the models while this one presents them.
-        checked = mapped(with_checks, made)
+        checked, benches = mapped(with_checks, made), Benches.begun(mapped)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
             full={r.texture: r.model for r in made},
@@ -61,7 +67,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             seed=seed,
         )
         with progress("Predicting conditions that were left out", len(made)) as advance:
-            results = list(_told(checked, advance))
+            results = list(_told(checked, advance, _texture))
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
@@ -73,7 +79,14 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             "study": plan.to_dict(),
         }
         provenance = provenance_of("demo", settings, seed=seed)
-        write_demo_report(fresh, results, provenance=provenance, seed=seed, mapped=mapped)
+        write_demo_report(
+            fresh,
+            results,
+            benches=benches.sections(),
+            provenance=provenance,
+            seed=seed,
+            mapped=mapped,
+        )
         seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
@@ -126,10 +139,46 @@ def with_checks(result: TextureResult) -> TextureResult:
     )
 
 
+class Benches(NamedTuple):
+    """The reduced chart's textures and the reduced atlas's columns, as other processes do them."""
+
+    judged: Iterable[Judged]
+    examined: Iterable[Examined]
+
+    @classmethod
+    def begun(cls, mapped: Mapped) -> Benches:
+        """Both, from now on."""
+        from analysis.benches.atlas.cases import CASES
+        from analysis.benches.chart.judging import judge
+        from analysis.benches.chart.methods import BRIEF
+        from analysis.benches.chart.surfaces import FEW, simulated_sources
+
+        return cls(
+            mapped(partial(judge, methods=BRIEF), simulated_sources(FEW)),
+            mapped(partial(examine_column, CASES, full=False), columns_of(CASES)),
+        )
+
+    def sections(self) -> list[Section]:
+        """Speed against accuracy, and where methods fail, when all is done."""
+        from analysis.benches.atlas.cases import CASES
+        from analysis.benches.chart.chart import chart_of
+        from analysis.benches.chart.surfaces import FEW
+        from analysis.report.chart_page import chart_section
+        from analysis.report.section_stability import stability_section
+
+        with progress("Speed against accuracy", FEW.drawn) as advance:
+            judged = list(_told(self.judged, advance, lambda one: one.source.name))
+        with progress("Where methods fail", len(columns_of(CASES))) as advance:
+            examined = list(_told(self.examined, advance, lambda one: one.case.family))
+        # Rendering is timed now that no other process works.
+        return [chart_section(chart_of(judged, turns=CHART_TURNS)), stability_section(examined)]
+
+
 def write_demo_report(
     folder: Path,
     results: Sequence[TextureResult],
     *,
+    benches: Sequence[Section],
     provenance: Mapping[str, object],
     seed: int,
     mapped: Mapped,
@@ -143,6 +192,7 @@ def write_demo_report(
             folder / "report.html",
             responses=load_responses(folder / "data"),
             textures=results,
+            benches=benches,
             provenance=provenance,
             seed=seed,
             progress=tell,
@@ -151,9 +201,13 @@ def write_demo_report(
 
 
 def _told(
-    results: Iterable[TextureResult], advance: Callable[[str], None]
-) -> Iterator[TextureResult]:
-    """The results, each told as it comes."""
+    results: Iterable[Result], advance: Callable[[str], None], name: Callable[[Result], str]
+) -> Iterator[Result]:
+    """The results, each told by its name as it comes."""
     for result in results:
-        advance(result.texture)
+        advance(name(result))
         yield result
+
+
+def _texture(result: TextureResult) -> str:
+    return result.texture

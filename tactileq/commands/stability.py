@@ -88,16 +88,21 @@ def examined(
     advance : callable, optional
         Told which column is done.
     """
-    columns = [(number, column) for number, case in enumerate(cases) for column in case.columns]
     found: dict[int, Examined] = {}
-    with working(partial(_examine, cases, full=full), columns, jobs=jobs) as done:
+    with working(partial(examine_column, cases, full=full), columns_of(cases), jobs=jobs) as done:
         for number, one in done:
             found[number] = one
             advance(" · ".join(filter(None, (one.case.family, one.case.method, one.column))))
     return [found[number] for number in sorted(found)]
 
 
-def _examine(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
+def columns_of(cases: Sequence[Case]) -> list[tuple[int, str]]:
+    """Every column: the number of its case, and its name."""
+    return [(number, column) for number, case in enumerate(cases) for column in case.columns]
+
+
+def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
+    """One of `columns_of`, in whatever process."""
     from analysis.benches.atlas.edges import examine
 
     number, column = which

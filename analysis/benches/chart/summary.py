@@ -13,6 +13,7 @@ from scipy.stats import ttest_1samp
 from analysis.benches.chart.judging import BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from analysis.benches.chart.measures import SUMMARIES
 from analysis.benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
+from analysis.columns import Column, Columns, names
 from modeling.arrays import Bools, Floats
 from modeling.models.texture_model import BLENDINGS
 
@@ -21,6 +22,26 @@ COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers"
 MEASURES = tuple(f"{place}_{name}" for place in PLACES for name in SUMMARIES)
 CONFIDENCE = 0.95
 FEWEST_SURFACES = 3
+
+
+METHOD_COLUMNS: Columns = (
+    Column("kind", "surfaces", is_name=True),
+    Column("method", is_name=True),
+    Column("layers"),
+    Column("numbers", "numbers stored"),
+    Column("operations", "operations per sample"),
+    Column("most_operations", "at most"),
+    Column("bytes"),
+    Column("ns", "time per sample", "ns"),
+    Column("fit_ms", "fitting per record", "ms"),
+    Column("at_gfc30", "GFC30 at", format=".4f"),
+    Column("at_distance_db", "distance at", "dB"),
+    Column("between_distance_db", "between", "dB"),
+    Column("between_distance_db_worst", "between, worst surface", "dB"),
+    Column("stroking_distance_db", "while stroking", "dB"),
+    Column("between_worst_level_db", "worst level between", "dB"),
+    Column("single_error_db", "single precision", "dB"),
+)
 
 
 def summarised(rows: pd.DataFrame) -> pd.DataFrame:
@@ -266,16 +287,32 @@ def front_table(summary: pd.DataFrame) -> pd.DataFrame:
             front = named[on_front(named["operations"].to_numpy(), named["distance_db"].to_numpy())]
             unique = front.drop_duplicates(["operations", "distance_db"])
             rows.append(unique.sort_values("operations"))
-    names = ["kind", "place", "method", "blending", "update_ms", "precision", "operations"]
-    return pd.concat(rows, ignore_index=True)[[*names, "distance_db", "simulated"]]
+    shown = ["kind", "place", "method", "blending", "update_ms", "precision", "operations"]
+    return pd.concat(rows, ignore_index=True)[[*shown, "distance_db", "simulated"]]
+
+
+def _ratio_columns(name: str, label: str) -> Columns:
+    return Column(name, label), Column(f"{name}_low", "95% from"), Column(f"{name}_high", "to")
+
+
+COMPARISON_COLUMNS: Columns = (
+    Column("kind", "surfaces", is_name=True),
+    Column("rival", is_name=True),
+    Column("surfaces", "number of them"),
+    *_ratio_columns("operations", "operations, times ours"),
+    *_ratio_columns("numbers", "numbers stored, times ours"),
+    *_ratio_columns(BETWEEN, "distance between, times ours"),
+    *_ratio_columns(STROKING, "while stroking, times ours"),
+    Column("verdict"),
+    Column("sentence"),
+)
 
 
 def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
     """The comparisons as a table: ratios with their intervals, and the sentence."""
-    ratios = ("operations", "numbers", BETWEEN, STROKING)
-    names = [f"{name}{end}" for name in ratios for end in ("", "_low", "_high")]
     rows = []
     for one in found:
-        values = [value for name in ratios for value in getattr(one, name)]
+        ratios = (one.operations, one.numbers, one.between, one.stroking)
+        values = [value for ratio in ratios for value in ratio]
         rows.append((one.kind, one.rival, one.surfaces, *values, one.verdict, one.sentence))
-    return pd.DataFrame(rows, columns=["kind", "rival", "surfaces", *names, "verdict", "sentence"])
+    return pd.DataFrame(rows, columns=names(COMPARISON_COLUMNS))

@@ -14,14 +14,23 @@ import pytest
 
 import analysis.report.page
 from analysis.answers.loading import Responses
+from analysis.benches.atlas import hands
+from analysis.benches.atlas.edges import examine
+from analysis.benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
+from analysis.benches.chart.chart import chart_of
+from analysis.benches.chart.judging import judge
+from analysis.benches.chart.summary import COMPARISON_COLUMNS, METHOD_COLUMNS
+from analysis.benches.chart.surfaces import Simulated, simulated_sources
 from analysis.columns import TEXTURE, Column, Columns, chosen, names, without
 from analysis.labels import ALL_TEXTURES
+from analysis.report.chart_page import chart_section
 from analysis.report.page import Fold, Item, Table, table_html
 from analysis.report.section_answers import choice_section, rating_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import PROVENANCE_COLUMNS
+from analysis.report.section_stability import stability_section
 from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.overall import OVERALL_COLUMNS
 from analysis.statistics.paired import RATING_TEST_COLUMNS
@@ -62,6 +71,10 @@ DECLARED = {
     "planted_between": PLANTED_BETWEEN_COLUMNS,
     "provenance": PROVENANCE_COLUMNS,
     "overall_tests": OVERALL_COLUMNS,
+    "chart_comparisons": COMPARISON_COLUMNS,
+    "chart_methods": METHOD_COLUMNS,
+    "stability_margins": MARGIN_COLUMNS,
+    "stability_edges": EDGE_COLUMNS,
 }
 OF_THE_REPORT = {"provenance", "overall_tests"}  # stand in no section
 EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
@@ -94,6 +107,8 @@ def tables(results, ratings, choices) -> list[Table]:
         [(200.0, 1.0, -0.5, 1.5)],
         columns=["speed_mm_s", "force_n", "level_error_db", "log_spectral_distance_db"],
     )
+    case = hands.CASES[0]
+    [surface] = simulated_sources(Simulated(1, ()))
     textures = [replace(results[0], left_out={"joint": predicted}), *results[1:]]
     compared = list(comparisons(textures, rng=np.random.default_rng(1)))
     sections = (
@@ -102,6 +117,10 @@ def tables(results, ratings, choices) -> list[Table]:
         rating_section(responses),
         choice_section(responses, rng=np.random.default_rng(1)),
         planted_section(textures),
+        chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
+        stability_section(
+            [examine(hands.CASES[0], next(iter(hands.CASES[0].columns)), full=False)]
+        ),
     )
     return [table for section in sections for table in tables_in(section.items)]
 
