@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, NullLocator
 
-from analysis.benches.atlas.case import DEGRADES, FAILS, HOLDS, Axis, Case
+from analysis.benches.atlas.case import DEGRADES, FAILS, HOLDS, VERDICTS, Axis, Case
 from analysis.benches.atlas.edges import Examined
 from analysis.benches.atlas.tables import theory_of
 from analysis.figures.drawing import (
@@ -30,7 +30,10 @@ BARS = {HOLDS: SKY_BLUE, DEGRADES: ORANGE, FAILS: VERMILLION}
 MARKERS = {HOLDS: "o", DEGRADES: "^", FAILS: "X"}
 FADED = {HOLDS: 0.45, DEGRADES: 0.3, FAILS: 0.35}
 COLUMNS = 3
-COLUMN_INCHES, ROW_INCHES, HEAD_ROWS = 5.4, 0.17, 5.0
+# Inches: of a column its labels and its panels; of a panel what is above its rows and below them.
+LABELS_IN, PANEL_IN, GAP_IN = 2.45, 3.3, 0.25
+ROW_IN, ABOVE_IN, BELOW_IN = 0.18, 0.52, 0.44
+TOP_IN, BOTTOM_IN = 0.45, 0.35
 _BAR_SHARE = 0.72
 
 
@@ -46,21 +49,25 @@ def figure_atlas(examined: Sequence[Examined], *, columns: int = COLUMNS) -> Fig
     """
     panels = panels_of(examined)
     stacks = _stacked(panels, min(columns, len(panels)))
-    rows = max(sum(len(panel) + HEAD_ROWS for panel in stack) for stack in stacks)
-    figure = Figure(
-        figsize=(COLUMN_INCHES * len(stacks), ROW_INCHES * rows + 1.2), layout="constrained"
-    )
-    outer = figure.add_gridspec(1, len(stacks))
+    column_in = LABELS_IN + PANEL_IN + GAP_IN
+    width = column_in * len(stacks)
+    height = TOP_IN + BOTTOM_IN + max(sum(map(_height_in, stack)) for stack in stacks)
+    figure = Figure(figsize=(width, height))
     for number, stack in enumerate(stacks):
-        heights = [len(panel) + HEAD_ROWS for panel in stack]
-        heights.append(rows - sum(heights))
-        inner = outer[number].subgridspec(len(heights), 1, height_ratios=_above_0(heights))
-        for place, panel in enumerate(stack):
-            plot_panel(panel, ax=figure.add_subplot(inner[place]))
-    figure.legend(handles=_legend(), loc="outside upper center", ncols=6, frameon=False, fontsize=9)
-    figure.supxlabel(
+        left, top = number * column_in + LABELS_IN, height - TOP_IN
+        for panel in stack:
+            rows_in = ROW_IN * len(panel)
+            bottom = top - ABOVE_IN - rows_in
+            place = (left / width, bottom / height, PANEL_IN / width, rows_in / height)
+            plot_panel(panel, ax=figure.add_axes(place))
+            top -= _height_in(panel)
+    figure.legend(handles=_legend(), loc="upper center", ncols=6, frameon=False, fontsize=9)
+    figure.text(
+        0.5,
+        0.1 / height,
         "Simulated: every mark is a run on signals, hands and answers that were made up. "
         "Easy on the left, hard on the right; bold: what the program does by default.",
+        ha="center",
         fontsize=9,
         color=GREY,
     )
@@ -76,20 +83,21 @@ def panels_of(examined: Sequence[Examined]) -> list[list[Examined]]:
     return list(panels.values())
 
 
+def _height_in(panel: Sequence[Examined]) -> float:
+    """Of a panel with its title and its axis, in inches."""
+    return ABOVE_IN + ROW_IN * len(panel) + BELOW_IN
+
+
 def _stacked(panels: Sequence[list[Examined]], count: int) -> list[list[list[Examined]]]:
     """The panels in order, in so many columns of about one height."""
-    total = sum(len(panel) + HEAD_ROWS for panel in panels)
+    total = sum(map(_height_in, panels))
     stacks: list[list[list[Examined]]] = [[] for _ in range(count)]
     before = 0.0
     for panel in panels:
-        middle = before + (len(panel) + HEAD_ROWS) / 2
+        middle = before + _height_in(panel) / 2
         stacks[min(count - 1, int(count * middle / total))].append(panel)
-        before += len(panel) + HEAD_ROWS
+        before += _height_in(panel)
     return [stack for stack in stacks if stack]
-
-
-def _above_0(heights: Sequence[float]) -> list[float]:
-    return [max(height, 1e-3) for height in heights]
 
 
 def plot_panel(panel: Sequence[Examined], *, ax: Axes | None = None) -> Axes:
@@ -102,6 +110,7 @@ def plot_panel(panel: Sequence[Examined], *, ax: Axes | None = None) -> Axes:
     case = panel[0].case
     for row, one in enumerate(panel):
         _plot_row(one, row=row, ax=ax)
+    _plot_runs(panel, ax=ax)
     _finish(panel, ax=ax)
     rows = " or ".join(dict.fromkeys(one.case.across for one in panel if one.case.across))
     ax.set_title(
@@ -109,7 +118,7 @@ def plot_panel(panel: Sequence[Examined], *, ax: Axes | None = None) -> Axes:
         f"{_limit(case, case.holds)}, fails beyond {_limit(case, case.degrades)}",
         fontsize=8,
         loc="left",
-        x=-0.45,  # above the labels
+        x=-LABELS_IN / PANEL_IN + 0.05,  # above the labels
     )
     stamp_if_simulated(ax, True)
     return ax
@@ -131,17 +140,6 @@ def _plot_row(one: Examined, *, row: int, ax: Axes) -> None:
                 alpha=FADED[verdict],
                 linewidth=0,
             )
-    for cell in one.cells:
-        ax.plot(
-            cell.value,
-            row,
-            color=COLOURS[cell.verdict],
-            marker=MARKERS[cell.verdict],
-            markersize=4,
-            linestyle="",
-            clip_on=False,
-            zorder=4,
-        )
     if axis.default is not None:
         ax.vlines(axis.default, row - 0.5, row + 0.5, color=GREY, linestyle=(0, (2, 1)), lw=1.1)
     theory = theory_of(one)
@@ -160,6 +158,27 @@ def _plot_row(one: Examined, *, row: int, ax: Axes) -> None:
         )
 
 
+def _plot_runs(panel: Sequence[Examined], *, ax: Axes) -> None:
+    """The marks of all rows, those of one verdict together: far fewer things to draw."""
+    for verdict in VERDICTS:
+        runs = [
+            (cell.value, row)
+            for row, one in enumerate(panel)
+            for cell in one.cells
+            if cell.verdict == verdict
+        ]
+        ax.plot(
+            [value for value, _ in runs],
+            [row for _, row in runs],
+            color=COLOURS[verdict],
+            marker=MARKERS[verdict],
+            markersize=4,
+            linestyle="",
+            clip_on=False,
+            zorder=4,
+        )
+
+
 def _finish(panel: Sequence[Examined], *, ax: Axes) -> None:
     axis: Axis = panel[0].case.axis
     if axis.logarithmic:
@@ -167,7 +186,7 @@ def _finish(panel: Sequence[Examined], *, ax: Axes) -> None:
         decades = abs(math.log10(axis.severe / axis.mild))
         ax.xaxis.set_major_locator(LogLocator(subs=(1,) if decades > 2 else (1, 2, 5)))
         ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter("")
+        ax.xaxis.set_minor_locator(NullLocator())
     ax.set_xlim(axis.mild, axis.severe)
     ax.set_xlabel(f"{axis.name} ({axis.unit})" if axis.unit else axis.name, fontsize=8)
     ax.set_ylim(len(panel) - 0.4, -0.6)

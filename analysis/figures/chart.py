@@ -194,11 +194,12 @@ def _plot_front(every: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
         if row["update_ms"] > 1:
             ax.axhline(row[error], color=BLACK, linewidth=0.7, linestyle=":", zorder=1)
             name = f"truth, updated each {row['update_ms']:g} ms"
-            ax.annotate(
+            ax.text(
+                0.01,
+                row[error],
                 name,
-                (0.99, row[error]),
-                ("axes fraction", "data"),
-                ha="right",
+                transform=ax.get_yaxis_transform(),
+                ha="left",
                 va="bottom",
                 fontsize=6.5,
             )

@@ -155,7 +155,7 @@ class Benches(NamedTuple):
 
         return cls(
             mapped(partial(judge, methods=BRIEF), simulated_sources(FEW)),
-            mapped(partial(examine_column, CASES, full=False), columns_of(CASES)),
+            mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
         )
 
     def sections(self) -> list[Section]:
@@ -168,7 +168,7 @@ class Benches(NamedTuple):
 
         with progress("Speed against accuracy", FEW.drawn) as advance:
             judged = list(_told(self.judged, advance, lambda one: one.source.name))
-        with progress("Where methods fail", len(columns_of(CASES))) as advance:
+        with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
             examined = list(_told(self.examined, advance, lambda one: one.case.family))
         # Rendering is timed now that no other process works.
         return [chart_section(chart_of(judged, turns=CHART_TURNS)), stability_section(examined)]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def stability(
     out: Out = Path("stability"),
     reduced: Annotated[
-        bool, typer.Option("--reduced", help="Fewer runs: edges to 1/16 of their axis.")
+        bool, typer.Option("--reduced", help="A column of each case, edges to 1/8 of their axis.")
     ] = False,
     only: Annotated[
         list[str] | None,
@@ -45,7 +45,7 @@ def stability(
 
     check_own_results(out, "stability")
     chosen = cases_of(CASES, only)
-    with progress("Examining", sum(len(case.columns) for case in chosen)) as advance:
+    with progress("Examining", len(columns_of(chosen, full=not reduced))) as advance:
         found = examined(chosen, full=not reduced, jobs=jobs, advance=advance)
     settings = {"reduced": reduced, "only": sorted({case.family for case in chosen})}
     _write(found, out, settings=settings)
@@ -76,7 +76,7 @@ def examined(
     jobs: int | None = None,
     advance: Callable[[str], None] = lambda item: None,
 ) -> list[Examined]:
-    """Every column of every case, in their order, in several processes.
+    """The columns of every case, in their order, in several processes.
 
     Parameters
     ----------
@@ -89,16 +89,21 @@ def examined(
         Told which column is done.
     """
     found: dict[int, Examined] = {}
-    with working(partial(examine_column, cases, full=full), columns_of(cases), jobs=jobs) as done:
+    columns = columns_of(cases, full=full)
+    with working(partial(examine_column, cases, full=full), columns, jobs=jobs) as done:
         for number, one in done:
             found[number] = one
             advance(" · ".join(filter(None, (one.case.family, one.case.method, one.column))))
     return [found[number] for number in sorted(found)]
 
 
-def columns_of(cases: Sequence[Case]) -> list[tuple[int, str]]:
-    """Every column: the number of its case, and its name."""
-    return [(number, column) for number, case in enumerate(cases) for column in case.columns]
+def columns_of(cases: Sequence[Case], *, full: bool) -> list[tuple[int, str]]:
+    """Every column by its case's number and its name; in the reduced atlas one of each case."""
+    return [
+        (number, column)
+        for number, case in enumerate(cases)
+        for column in list(case.columns)[: None if full else 1]
+    ]
 
 
 def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:

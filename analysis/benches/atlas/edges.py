@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from analysis.benches.atlas.case import FAILS, HOLDS, Case, Verdict
 
 CELLS = {False: 3, True: 5}
-BISECTIONS = {False: 3, True: 6}
+BISECTIONS = {False: 2, True: 6}
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def examine(case: Case, column: str, *, full: bool) -> Examined:
     """Cells and edges of one column of a case.
 
     Between the first cell that holds no more and the one before it the edge is bisected, so that it
-    is known to 1/256 of the axis (1/16 in the reduced atlas); likewise for failure. An edge is the
+    is known to 1/256 of the axis (1/8 in the reduced atlas); likewise for failure. An edge is the
     value before which the runs were right: at most that much too mild.
     """
     probe = _Probe(case, column, full=full)

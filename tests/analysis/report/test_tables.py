@@ -118,9 +118,7 @@ def tables(results, ratings, choices) -> list[Table]:
         choice_section(responses, rng=np.random.default_rng(1)),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
-        stability_section(
-            [examine(hands.CASES[0], next(iter(hands.CASES[0].columns)), full=False)]
-        ),
+        stability_section([examine(case, next(iter(case.columns)), full=False)]),
     )
     return [table for section in sections for table in tables_in(section.items)]
 
