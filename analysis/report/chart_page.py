@@ -21,7 +21,8 @@ from analysis.benches.chart.summary import (
 from analysis.benches.chart.surfaces import KINDS
 from analysis.columns import names, without
 from analysis.figures.chart import STYLES, figure_chart
-from analysis.figures.saving import png_of
+from analysis.figures.saving import png_of, warn_of_missing_fonts
+from analysis.report.findings import table_bytes
 from analysis.report.page import (
     PICTURE_DPI,
     Picture,
@@ -151,13 +152,30 @@ def _counted(chart: Chart) -> str:
     return ", ".join(f"{surfaces[kind]} {KINDS[kind]}" for kind in chart.kinds)
 
 
-def chart_page(chart: Chart) -> str:
+def chart_files(chart: Chart) -> dict[str, bytes]:
+    """Everything by file name: tables, a picture for each kind of surface, and the page."""
+    tables = {
+        "rows.tsv": chart.rows,
+        "summary.tsv": chart.summary,
+        "fronts.tsv": chart.fronts,
+        "comparisons.tsv": comparison_table(chart.comparisons),
+    }
+    pictures = chart_pictures(chart)
+    drawn = [png_of(picture.figure, dpi=PICTURE_DPI) for picture in pictures]
+    warn_of_missing_fonts("".join(lacking for _, lacking in drawn))
+    shown = "".join(
+        picture_html(picture, png) for picture, (png, _) in zip(pictures, drawn, strict=True)
+    )
+    return {
+        **{name: table_bytes(table) for name, table in tables.items()},
+        **{f"{p.name}.png": png for p, (png, _) in zip(pictures, drawn, strict=True)},
+        "chart.html": _page(chart, shown).encode(),
+    }
+
+
+def _page(chart: Chart, pictures: str) -> str:
     """The page as HTML, which needs nothing but itself."""
     comparison, methods = chart_tables(chart)
-    pictures = "".join(
-        picture_html(picture, png_of(picture.figure, dpi=PICTURE_DPI)[0])
-        for picture in chart_pictures(chart)
-    )
     told = grouped(
         {
             f"On {KINDS[kind]}": [c.sentence for c in chart.comparisons if c.kind == kind]

@@ -59,10 +59,14 @@ def bench_chart(
         typer.Option(help="Folder of models of these recordings, to be judged beside the others."),
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option(help="A method, such as AR(20); all without it.")
+        list[str] | None, typer.Option(help="A method, such as AR(20); most without it.")
     ] = None,
     full: Annotated[
-        bool, typer.Option("--full", help="40 drawn surfaces, all planted ones; both halves out.")
+        bool,
+        typer.Option(
+            "--full",
+            help="All methods and 47 surfaces; hold out both halves.",
+        ),
     ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
@@ -83,7 +87,7 @@ def bench_chart(
     from analysis.benches.chart.methods import chosen_methods
 
     check_own_results(out, "bench chart")
-    methods = chosen_methods(method or [])
+    methods = chosen_methods(method or [], full=full)
     sources = chart_sources(recordings or [], toolkit or [], models or [], full=full)
     chart = charted(sources, methods, jobs=jobs, dask=dask)
     settings = {
@@ -148,26 +152,13 @@ def charted(
 
 
 def _write_chart(chart: Chart, out: Path, settings: dict[str, object]) -> None:
-    from analysis.benches.chart.summary import comparison_table
-    from analysis.figures.chart import figure_chart
-    from analysis.report.chart_page import chart_page
-    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.report.chart_page import chart_files
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
-    from modeling.files.writing import write_text
 
-    tables = {
-        "rows": chart.rows,
-        "summary": chart.summary,
-        "fronts": chart.fronts,
-        "comparisons": comparison_table(chart.comparisons),
-    }
     with replace_folder(out) as fresh:
-        for name, table in tables.items():
-            table.to_csv(fresh / f"{name}.tsv", sep="\t", index=False, na_rep="n/a")
-        for kind in chart.kinds:
-            figure_chart(chart, kind).savefig(fresh / f"chart_{kind}.png", dpi=DOTS_PER_INCH)
-        write_text(fresh / "chart.html", chart_page(chart))
+        for name, data in chart_files(chart).items():
+            (fresh / name).write_bytes(data)
         seal_folder(fresh, provenance_of("bench chart", settings))
 
 

@@ -115,6 +115,8 @@ class _Judging:
         self._frequency = frequencies_hz(material.rate_hz)
         self._stroke = judged_stroke(material.rate_hz)
         self._yardsticks: dict[Condition, Yardstick] = {}
+        # Often nothing is dropped, and a simplified model is the full one.
+        self._known: dict[tuple[str, bool], list[dict[str, Any]]] = {}
 
     def rows(self, fit: Fit) -> list[dict[str, Any]]:
         """Of one method: its blendings × updates × precisions."""
@@ -129,10 +131,21 @@ class _Judging:
         }
         rows = []
         for blending, fitted in fit.variants().items():
-            standing = self._standing(fitted, given=fit.method.family == LOADED)
             own = {"blending": blending, "default_blending": blending == fit.own_blending}
-            rows += [common | own | standing | moving for moving in self._moving(fitted)]
+            found = self._found(fitted, given=fit.method.family == LOADED)
+            rows += [common | own | row for row in found]
         return rows
+
+    def _found(self, fitted: Fitted, *, given: bool) -> list[dict[str, Any]]:
+        """What does not depend on how it was fitted; of a model that was seen, known already."""
+        key = fitted.model.sha256 if isinstance(fitted, Layered) else "", given
+        if key in self._known:
+            return self._known[key]
+        standing = self._standing(fitted, given=given)
+        found = [standing | moving for moving in self._moving(fitted)]
+        if isinstance(fitted, Layered):
+            self._known[key] = found
+        return found
 
     def _moving(self, fitted: Fitted) -> list[dict[str, Any]]:
         """Update intervals and precisions; FFT blocks have an interval of their own."""

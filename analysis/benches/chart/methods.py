@@ -169,6 +169,9 @@ def _methods() -> Iterable[Method]:
 
 
 METHODS = {method.name: method for method in _methods()}
+# Between these numbers of layers there is little to see; they take half of the fitting time.
+LEFT_TO_FULL = ("joint, 5 layers", "joint, 6 layers", "joint, 7 layers")
+USUAL_METHODS = tuple(name for name in METHODS if name not in LEFT_TO_FULL)
 # The bench's few: one of each kind, and the numbers of layers that a texture mostly needs.
 BRIEF = (
     *("joint", "joint, 1 layer", "joint, 2 layers", "joint, 3 layers", "simplified, energy"),
@@ -184,8 +187,8 @@ RIVALS = tuple(
 )
 
 
-def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
-    """The methods of these names in the chart's order; all without names.
+def chosen_methods(names: Sequence[str], *, full: bool) -> tuple[str, ...]:
+    """The methods of these names in the chart's order; without names the usual ones, or all.
 
     Raises
     ------
@@ -197,7 +200,8 @@ def chosen_methods(names: Sequence[str]) -> tuple[str, ...]:
             raise InputError(
                 f"expected methods among {'; '.join(METHODS)}, got {shown(name)}; correct it."
             )
-    return tuple(name for name in METHODS if not names or name in names)
+    wanted = names or (METHODS if full else USUAL_METHODS)
+    return tuple(name for name in METHODS if name in wanted)
 
 
 @dataclass(frozen=True, eq=False)

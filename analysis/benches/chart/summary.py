@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from scipy.stats import ttest_1samp
+from scipy.special import stdtrit
 
 from analysis.benches.chart.judging import BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from analysis.benches.chart.measures import SUMMARIES
@@ -113,8 +113,9 @@ def ratio_over_surfaces(numerator: Floats, denominator: Floats) -> Ratio:
         return Ratio(mean, float("nan"), float("nan"))
     if np.ptp(logs) < 1e-12:
         return Ratio(mean, mean, mean)
-    found = ttest_1samp(logs, 0.0).confidence_interval(CONFIDENCE)
-    return Ratio(mean, float(np.exp(found.low)), float(np.exp(found.high)))
+    half = stdtrit(logs.size - 1, (1 + CONFIDENCE) / 2) * logs.std(ddof=1) / np.sqrt(logs.size)
+    low, high = np.exp(logs.mean() + np.array([-half, half]))
+    return Ratio(mean, float(low), float(high))
 
 
 @dataclass(frozen=True)

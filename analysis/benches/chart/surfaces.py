@@ -217,7 +217,7 @@ class Simulated:
     planted: tuple[str, ...]
 
 
-USUAL = Simulated(6, ("canvas", "leather", "PVC"))
+USUAL = Simulated(4, ("canvas",))
 FULL = Simulated(40, TEXTURES)
 FEW = Simulated(3, ())
 

@@ -13,7 +13,7 @@ from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import Judged
 from analysis.benches.chart.timing import stream_of, time_table
 from analysis.figures.chart import PANELS, figure_chart
-from analysis.report.chart_page import COSTS, MEASURES, chart_page, chart_section
+from analysis.report.chart_page import COSTS, MEASURES, chart_files, chart_section
 
 
 def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> None:
@@ -69,7 +69,7 @@ def test_a_picture_of_recordings_has_no_panel_for_what_is_not_known(chart: Chart
 
 @pytest.fixture(scope="module")
 def page(chart: Chart) -> str:
-    return chart_page(chart)
+    return chart_files(chart)["chart.html"].decode()
 
 
 def test_the_page_needs_nothing_but_itself(page: str) -> None:

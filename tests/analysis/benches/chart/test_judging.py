@@ -11,6 +11,7 @@ import pytest
 
 from analysis.benches.chart.judging import PRECISIONS, UPDATES_MS, Judged, judge
 from analysis.benches.chart.methods import (
+    LEFT_TO_FULL,
     METHODS,
     Subject,
     chosen_methods,
@@ -111,10 +112,11 @@ def test_a_stroke_is_judged_on_the_usual_grid() -> None:
 
 
 def test_names_of_methods() -> None:
-    assert chosen_methods([]) == tuple(METHODS)
-    assert chosen_methods(["truth", "AR(6)"]) == ("AR(6)", "truth")
+    assert chosen_methods([], full=True) == tuple(METHODS)
+    assert set(METHODS) - set(chosen_methods([], full=False)) == set(LEFT_TO_FULL)
+    assert chosen_methods(["truth", "AR(6)"], full=False) == ("AR(6)", "truth")
     with pytest.raises(InputError, match=r"expected methods among joint; .*, got 'AR\(7\)'"):
-        chosen_methods(["AR(7)"])
+        chosen_methods(["AR(7)"], full=True)
 
 
 def test_sources_are_drawn_surfaces_and_planted_textures() -> None:
