@@ -15,7 +15,7 @@ from modeling.errors import shown
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-ANSWER_S = 10.0  # within which a scheduler must answer
+ANSWER_S = 5.0  # within which a scheduler must answer
 LOOK_S = 0.1  # how often a worker looks whether its parent is still there
 
 

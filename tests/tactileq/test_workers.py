@@ -1,52 +1,58 @@
-"""Work divided among processes: results in the order of the items, begun before they are asked."""
+"""Work divided among processes: results in the order of the items, begun before they are asked.
+
+The work is defined within the tests: processes cannot import a test module.
+"""
 
 from __future__ import annotations
 
 import os
 import time
-from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tactileq.workers import mapping
 
-
-def slow_first(number: int) -> tuple[int, int]:
-    """The first item is done last."""
-    time.sleep(0.5 * (number == 0))
-    return number, os.getpid()
-
-
-def leave_a_mark(name: str, folder: Path) -> str:
-    (folder / name).touch()
-    return name
-
-
-def refuse(number: int) -> int:
-    if number == 1:
-        raise ValueError("expected another number, got 1; give 0.")
-    return number
+LONGEST_S = 60.0
 
 
 def test_results_keep_the_order_of_their_items():
+    def slow_first(number: int) -> tuple[int, int]:
+        time.sleep(0.5 * (number == 0))  # the first item is done last
+        return number, os.getpid()
+
     with mapping(jobs=2) as mapped:
         found = list(mapped(slow_first, range(4)))
     assert [number for number, _ in found] == [0, 1, 2, 3]
     assert os.getpid() not in {process for _, process in found}
 
 
-def test_work_goes_on_before_anybody_asks_for_it(tmp_path):
+def test_work_goes_on_before_anybody_asks_for_it(tmp_path: Path):
+    def leave_a_mark(name: str) -> str:
+        (tmp_path / name).touch()
+        return name
+
     with mapping(jobs=2) as mapped:
-        results = mapped(partial(leave_a_mark, folder=tmp_path), ["a", "b", "c"])
-        for _ in range(600):
-            if len(list(tmp_path.iterdir())) == 3:
-                break
+        results = mapped(leave_a_mark, ["a", "b", "c"])
+        end = time.monotonic() + LONGEST_S
+        while len(list(tmp_path.iterdir())) < 3 and time.monotonic() < end:
             time.sleep(0.1)
         assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "c"]
         assert list(results) == ["a", "b", "c"]
 
 
 def test_what_goes_wrong_in_a_process_is_told_by_the_one_that_asked():
+    def refuse(number: int) -> int:
+        if number == 1:
+            raise ValueError("expected another number, got 1; give 0.")
+        return number
+
     with pytest.raises(ValueError, match="got 1; give 0"), mapping(jobs=2) as mapped:
         list(mapped(refuse, range(2)))
+
+
+def test_several_maps_share_the_processes():
+    with mapping(jobs=2) as mapped:
+        first, second = mapped(abs, range(-6, 0)), mapped(str, range(3))
+        assert list(second) == ["0", "1", "2"]
+        assert list(first) == [6, 5, 4, 3, 2, 1]
