@@ -172,11 +172,10 @@ METHODS = {method.name: method for method in _methods()}
 # Between these numbers of layers there is little to see; they take half of the fitting time.
 LEFT_TO_FULL = ("joint, 5 layers", "joint, 6 layers", "joint, 7 layers")
 USUAL_METHODS = tuple(name for name in METHODS if name not in LEFT_TO_FULL)
-# The bench's few: one of each kind, and the numbers of layers that a texture mostly needs.
+# The demo's few: one of each kind.
 BRIEF = (
-    *("joint", "joint, 1 layer", "joint, 2 layers", "joint, 3 layers", "simplified, energy"),
-    *("simplified, paper-fft", "regressed, conditions", "paper", "paper-consistent"),
-    *("AR(6)", "AR(20)", "FFT, 1/16 s", WHITE, TRUTH),
+    *("joint", "joint, 1 layer", "joint, 2 layers", "simplified, energy", "regressed, conditions"),
+    *("paper", "paper-consistent", "AR(6)", "AR(20)", "FFT, 1/16 s", WHITE, TRUTH),
 )
 OUR_FAMILIES = ("joint", "joint, given layers", "simplified", "regressed")
 # What users could take instead of ours.
