@@ -87,8 +87,8 @@ METHODS_NOTE = (
 )
 COMPARISON_NOTE = (
     "The rival over joint, geometric means over surfaces, with Student's t intervals (95%) of the "
-    "logarithms. Dominated is what another takes no more operations than on any count and is "
-    "nearer to the truth, its interval being below 1."
+    "logarithms. One dominates another if it takes no more operations and is nearer to the truth, "
+    "the upper ends of both intervals being at most 1."
 )
 
 

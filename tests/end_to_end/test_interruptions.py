@@ -40,6 +40,7 @@ LONG = {
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
     "demo": ("demo", "--seed", "{}"),
+    "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
     "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
 QUICK = ("import", "record")

@@ -147,7 +147,9 @@ FOREIGN = {
 }
 
 
-@pytest.mark.parametrize("command", ["analyze data", "demo", "bench render", "stability"])
+@pytest.mark.parametrize(
+    "command", ["analyze data", "demo", "bench render", "bench chart", "stability"]
+)
 @pytest.mark.parametrize("foreign", FOREIGN.values(), ids=FOREIGN)
 def test_folders_with_one_foreign_file_are_not_replaced(
     main, tmp_path: Path, command: str, foreign: str

@@ -68,8 +68,8 @@ def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) ->
 def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> tuple[Run, int] | None:
     """What renders at 5 kHz along a moving hand, and how many samples; None of what is not timed.
 
-    Layers by the program's renderer, autoregressive filters by C written with equal care (in double
-    precision only), FFT-shaped noise by NumPy.
+    Layers by the program's renderer, in double or single precision; autoregressive filters by C
+    written with equal care, FFT-shaped noise by NumPy.
     """
     hand = _hand()
     if isinstance(fitted, Layered):
@@ -78,9 +78,9 @@ def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> tuple[Run, i
         if single:
             return partial(renderer.render, *hand, out=np.empty(SAMPLES, dtype=np.float32)), SAMPLES
         return partial(renderer.render, *hand, out=np.empty(SAMPLES)), SAMPLES
-    if isinstance(fitted, Predictor) and not single:
+    if isinstance(fitted, Predictor):
         return _predictor_stream(fitted.model, hand, update_ms), SAMPLES
-    if isinstance(fitted, Shaped) and not single:
+    if isinstance(fitted, Shaped):
         return _shaped_stream(fitted), _BLOCKS * fitted.model.block // 2
     return None
 

@@ -21,7 +21,7 @@ def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> N
     assert times["joint, 1 layer", "single"] > 0
     assert times["AR(6)", "double"] > 0
     assert times["truth", "double"] == 0
-    assert times["AR(6)", "single"] == 0
+    assert ("AR(6)", "single") not in times  # it would need another form
     timed = chart.summary.dropna(subset=["ns"])
     assert (timed["ns_25"] <= timed["ns"]).all()
     assert (timed["ns"] <= timed["ns_75"]).all()
