@@ -1,4 +1,4 @@
-"""The speed–accuracy chart; it draws and computes nothing."""
+"""The speed–accuracy chart; it draws, and computes nothing but the front of what it draws."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import AT, BETWEEN, LOADED, STROKING
 from analysis.benches.chart.methods import OURS, TRUTH, WHITE
-from analysis.benches.chart.summary import default_rows, on_front
+from analysis.benches.chart.summary import competing, default_rows, front_of
 from analysis.benches.chart.surfaces import KINDS, Kind
 from analysis.figures.drawing import (
     BLACK,
@@ -113,7 +113,7 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
     ax = axes_or_new(ax)
     error = f"{panel.place}_distance_db"
     usual = default_rows(summary)
-    every = summary if panel.place == STROKING else usual
+    every = competing(summary, panel.place)
     ax.plot(every[panel.cost], every[error], ".", color=GREY, alpha=0.35, markersize=4, zorder=1)
     _plot_front(every, panel, ax=ax)
     for family, rows in usual.groupby("family", sort=False):
@@ -184,9 +184,7 @@ def _short(method: str) -> str:
 def _plot_front(every: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
     """The front as a staircase: what no other variant beats."""
     error = f"{panel.place}_distance_db"
-    known = every[every[error].gt(0)]
-    front = known[on_front(known[panel.cost].to_numpy(), known[error].to_numpy())]
-    front = front.drop_duplicates([panel.cost, error]).sort_values(panel.cost)
+    front = front_of(every[every[error].gt(0)], cost=panel.cost, error=error)
     ax.step(front[panel.cost], front[error], where="post", color=BLACK, linewidth=1.1, zorder=2)
     if panel.place != STROKING:
         return

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 from threadpoolctl import threadpool_limits
 
 from analysis.benches.chart.fitted import Fitted, Layered, Predictor, Shaped, update_samples
 from analysis.benches.chart.measures import (
-    SILENT,
     Accuracy,
+    RecordYardstick,
     Yardstick,
-    accuracy_of_record,
     frequencies_hz,
     over_conditions,
 )
-from analysis.benches.chart.methods import TRUTH, Fit, Method, Subject, fit_method
+from analysis.benches.chart.methods import TRUTH, Fit, Subject, fit_method
 from analysis.benches.chart.surfaces import Material, Source, judged_stroke, load_material
 from analysis.textures.between import Measured
-from modeling import ARModel, InputError, Spectrum, similarity
-from modeling.arrays import Floats
+from modeling import ARModel, InputError
 from modeling.fitting.conditions import spectra_by_condition
 from modeling.models.grid import Condition
 from modeling.models.loading import load_model
 from modeling.recordings.spectrum import mean_spectrum
-from modeling.similarity import SpectralFilter
 
 UPDATES_MS = (1.0, 4.0, 16.0)
 DOUBLE, SINGLE = "double", "single"
@@ -85,7 +81,7 @@ def judge(source: Source, *, methods: Sequence[str]) -> Judged:
         for fit in fits:
             rows += judging.rows(fit)
     fitted = {
-        (fit.method.name, blending): variant
+        (fit.name, blending): variant
         for fit in fits
         for blending, variant in fit.variants().items()
     }
@@ -98,13 +94,14 @@ def _loaded(source: Source) -> list[Fit]:
     for name, path in source.models:
         model = load_model(path)
         fitted = Predictor(model) if isinstance(model, ARModel) else Layered(model)
-        method = Method(name, LOADED, partial(_as_given, fitted=fitted))
-        fits.append(Fit(method, fitted, float("nan")))
+        fits.append(Fit(name, LOADED, fitted, float("nan")))
     return fits
 
 
-def _as_given(_: Subject, *, fitted: Fitted) -> Fitted:
-    return fitted
+def record_yardsticks(measured: Measured) -> dict[Condition, RecordYardstick]:
+    """Of every condition that was recorded and is not silent; repeats are averaged."""
+    spectra = {c: mean_spectrum(found) for c, found in spectra_by_condition(measured).items()}
+    return {c: RecordYardstick(found) for c, found in spectra.items() if found.magnitude.any()}
 
 
 class _Judging:
@@ -125,14 +122,14 @@ class _Judging:
             "kind": self._source.kind,
             "surface": self._source.name,
             "simulated": self._material.simulated,
-            "method": fit.method.name,
-            "family": fit.method.family,
+            "method": fit.name,
+            "family": fit.family,
             "fit_ms": per_record_ms * (fit.seconds + self._material.prepare_s),
         }
         rows = []
         for blending, fitted in fit.variants().items():
             own = {"blending": blending, "default_blending": blending == fit.own_blending}
-            found = self._found(fitted, given=fit.method.family == LOADED)
+            found = self._found(fitted, given=fit.family == LOADED)
             rows += [common | own | row for row in found]
         return rows
 
@@ -179,8 +176,8 @@ class _Judging:
             }
         else:
             found = {
-                AT: _against_records(fitted, material.measured),
-                BETWEEN: [] if given else _against_records(fitted, material.hidden),
+                AT: self._against_records(fitted, self._recorded),
+                BETWEEN: [] if given else self._against_records(fitted, self._held_out),
             }
         return {
             f"{place}_{name}": value
@@ -192,6 +189,14 @@ class _Judging:
         return [
             self._yardstick(condition).accuracy(fitted.filter(*condition).response(self._frequency))
             for condition in conditions
+        ]
+
+    def _against_records(
+        self, fitted: Fitted, yardsticks: Mapping[Condition, RecordYardstick]
+    ) -> list[Accuracy]:
+        return [
+            yardstick.accuracy(fitted.filter(*condition))
+            for condition, yardstick in yardsticks.items()
         ]
 
     def _while_stroking(self, fitted: Fitted, period: int) -> dict[str, float]:
@@ -219,39 +224,18 @@ class _Judging:
         return self._yardsticks[condition]
 
     @cached_property
+    def _recorded(self) -> dict[Condition, RecordYardstick]:
+        return record_yardsticks(self._material.measured)
+
+    @cached_property
+    def _held_out(self) -> dict[Condition, RecordYardstick]:
+        return record_yardsticks(self._material.hidden)
+
+    @cached_property
     def _along_stroke(self) -> list[Yardstick]:
         speed, force = self._stroke.hand
         conditions = [(abs(float(speed[n])), float(force[n])) for n in self._stroke.places]
         return [self._yardstick(condition) for condition in conditions]
-
-
-@dataclass(frozen=True, eq=False)
-class _Audible:
-    """A filter that is at most 60 dB below a recording's smoothed spectrum."""
-
-    filter: SpectralFilter
-    spectrum: Spectrum
-
-    @property
-    def rate_hz(self) -> float:
-        return self.filter.rate_hz
-
-    def response(self, frequency_hz: ArrayLike) -> Floats:
-        least = SILENT * self.spectrum.smoothed()
-        at_least: Floats = np.maximum(self.filter.response(frequency_hz), least)
-        return at_least
-
-
-def _against_records(fitted: Fitted, measured: Measured) -> list[Accuracy]:
-    found = []
-    for condition, spectra in spectra_by_condition(measured).items():
-        spectrum = mean_spectrum(spectra)
-        if not spectrum.magnitude.any():
-            continue
-        heard = _Audible(fitted.filter(*condition), spectrum)
-        report = similarity.reports(spectrum, [heard])[0]
-        found.append(accuracy_of_record(report))
-    return found
 
 
 def _costs(fitted: Fitted, update_ms: float, *, single: bool) -> dict[str, Any]:

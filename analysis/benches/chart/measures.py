@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from modeling import similarity
+from modeling import Spectrum, similarity
 from modeling.arrays import Bools, Floats
 from modeling.recordings.spectrum import smooth
-from modeling.similarity import HIGHEST_SHARE, LOWEST_HZ, SIGMAS_HZ, SimilarityReport
+from modeling.similarity import (
+    HIGHEST_SHARE,
+    LOWEST_HZ,
+    SIGMAS_HZ,
+    SpectralFilter,
+    target_of,
+)
 
 POINTS = 1000  # of the frequency axis, from 0 to the Nyquist frequency
 COARSEST_STEP_HZ = 1.0
@@ -71,15 +79,39 @@ class Yardstick:
         )
 
 
-def accuracy_of_record(report: SimilarityReport) -> Accuracy:
-    """The same against a recording; its own scatter is in it."""
-    return Accuracy(
-        report.gfc30,
-        report.gfc5,
-        report.log_spectral_distance_db,
-        rms(report.band_energy_error_db[:BANDS]),
-        report.rms_error_db,
-    )
+class RecordYardstick:
+    """The same by a recording's spectrum, whose own scatter is in every figure; not silent."""
+
+    def __init__(self, spectrum: Spectrum) -> None:
+        self._target = target_of(spectrum)
+        self._least = SILENT * spectrum.smoothed()
+
+    def accuracy(self, heard: SpectralFilter) -> Accuracy:
+        """Of a filter at the spectrum's rate."""
+        report = self._target.report(_Audible(heard, self._least))
+        return Accuracy(
+            report.gfc30,
+            report.gfc5,
+            report.log_spectral_distance_db,
+            rms(report.band_energy_error_db[:BANDS]),
+            report.rms_error_db,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Audible:
+    """A filter that is at most 60 dB below a spectrum."""
+
+    filter: SpectralFilter
+    least: Floats
+
+    @property
+    def rate_hz(self) -> float:
+        return self.filter.rate_hz
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        at_least: Floats = np.maximum(self.filter.response(frequency_hz), self.least)
+        return at_least
 
 
 def rms(values: Floats) -> float:

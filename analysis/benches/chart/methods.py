@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from time import process_time
 
 import numpy as np
@@ -39,22 +39,20 @@ class Subject:
 
     measured: Measured
     truth: Truth | None = None
-    _joint: tuple[TextureModel, float] | None = field(default=None, init=False)
 
     @property
     def joint(self) -> TextureModel:
-        return self._joint_and_seconds()[0]
+        return self._joint_and_seconds[0]
 
     @property
     def joint_seconds(self) -> float:
         """Of processor time."""
-        return self._joint_and_seconds()[1]
+        return self._joint_and_seconds[1]
 
+    @cached_property
     def _joint_and_seconds(self) -> tuple[TextureModel, float]:
-        if self._joint is None:
-            start = process_time()
-            self._joint = fit_spectra(self.measured), process_time() - start
-        return self._joint
+        start = process_time()
+        return fit_spectra(self.measured), process_time() - start
 
 
 @dataclass(frozen=True)
@@ -205,9 +203,10 @@ def chosen_methods(names: Sequence[str], *, full: bool) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A method that was fitted, and how many seconds of processor time it took."""
+    """A model by its name and family, and how many seconds of processor time its fit took."""
 
-    method: Method
+    name: str
+    family: str
     fitted: Fitted
     seconds: float
 
@@ -238,4 +237,4 @@ def fit_method(name: str, subject: Subject) -> Fit:
     before = subject.joint_seconds if method.derived or name == OURS else 0.0
     start = process_time()
     fitted = method.fit(subject)
-    return Fit(method, fitted, before + process_time() - start)
+    return Fit(name, method.family, fitted, before + process_time() - start)

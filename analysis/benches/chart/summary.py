@@ -204,7 +204,10 @@ class Comparison:
 def comparisons(rows: pd.DataFrame) -> list[Comparison]:
     """Our default against every rival, surface by surface, for each kind of surface."""
     found = []
-    for kind, of_kind in rows[rows["precision"] == DOUBLE].groupby("kind", sort=False):
+    # Of recordings whose halves were held out in turn a surface has two rows, which are one case.
+    by_surface = rows[rows["precision"] == DOUBLE].groupby([*VARIANT, "surface"], sort=False)
+    cases = by_surface.mean(numeric_only=True).reset_index()
+    for kind, of_kind in cases.groupby("kind", sort=False):
         default = default_rows(of_kind)
         mine = default[default["method"] == OURS].set_index("surface")
         for rival in RIVALS:
@@ -268,11 +271,23 @@ def default_rows(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[rows["default_blending"] & usual & (rows["precision"] == DOUBLE)]
 
 
-def front_table(summary: pd.DataFrame) -> pd.DataFrame:
-    """For each kind and place the variants on the front of operations against distance.
+def competing(of_kind: pd.DataFrame, place: str) -> pd.DataFrame:
+    """The variants that compete at a place, of rows of one kind.
 
     At and between the conditions the hand rests, and a method is taken at its usual interval; while
-    stroking all intervals compete. Of points that coincide the first method's is named.
+    stroking all intervals compete.
+    """
+    return of_kind if place == STROKING else default_rows(of_kind)
+
+
+def front_of(variants: pd.DataFrame, *, cost: str, error: str) -> pd.DataFrame:
+    """The rows on the front of two columns, cheapest first; of those that coincide the first."""
+    front = variants[on_front(variants[cost].to_numpy(), variants[error].to_numpy())]
+    return front.drop_duplicates([cost, error]).sort_values(cost)
+
+
+def front_table(summary: pd.DataFrame) -> pd.DataFrame:
+    """For each kind and place the variants on the front of operations against distance.
 
     Returns
     -------
@@ -283,11 +298,9 @@ def front_table(summary: pd.DataFrame) -> pd.DataFrame:
     rows = []
     for _, of_kind in summary[summary["precision"] == DOUBLE].groupby("kind", sort=False):
         for place in PLACES:
-            rivals = of_kind if place == STROKING else default_rows(of_kind)
-            named = rivals.assign(place=place, distance_db=rivals[f"{place}_distance_db"])
-            front = named[on_front(named["operations"].to_numpy(), named["distance_db"].to_numpy())]
-            unique = front.drop_duplicates(["operations", "distance_db"])
-            rows.append(unique.sort_values("operations"))
+            error = f"{place}_distance_db"
+            front = front_of(competing(of_kind, place), cost="operations", error=error)
+            rows.append(front.assign(place=place, distance_db=front[error]))
     shown = ["kind", "place", "method", "blending", "update_ms", "precision", "operations"]
     return pd.concat(rows, ignore_index=True)[[*shown, "distance_db", "simulated"]]
 

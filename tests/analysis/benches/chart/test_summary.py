@@ -138,6 +138,11 @@ def test_nobody_dominates_where_accuracy_is_not_told_apart() -> None:
     assert few.verdict.startswith("too few surfaces")
 
 
+def test_two_halves_of_one_surface_are_one_case() -> None:
+    twice = pd.concat([OURS_NEARER, OURS_NEARER], ignore_index=True)
+    assert comparisons(twice) == comparisons(OURS_NEARER)
+
+
 def test_summary_and_front_tables() -> None:
     summary = summarised(OURS_NEARER)
     assert len(summary) == 5
