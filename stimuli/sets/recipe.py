@@ -61,13 +61,13 @@ from modeling.checks import (
 )
 from modeling.errors import shown
 from modeling.files.documents import read_toml
+from modeling.recordings.trajectory import LONGEST_S
 
 SampleFormat = Literal["float32", "pcm24"]
 Noise = Literal["independent", "frozen"]
 LevelMode = Literal["as modelled", "rms", "loudness"]
 
 VERSION = 1
-LONGEST_S = 3600.0
 LONGEST_SETTLING_S = 60.0
 HIGHEST_RATE_HZ = 768_000
 HIGHEST_SEED = 2**63 - 1

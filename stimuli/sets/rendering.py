@@ -12,8 +12,8 @@ from scipy.io import wavfile
 from modeling import Compensation, Renderer
 from modeling.arrays import Floats
 from modeling.models.loading import AnyModel
+from modeling.recordings.trajectory import Trajectory
 from stimuli.sets.recipe import SampleFormat
-from stimuli.sets.trajectories import Trajectory
 
 FADE_S = 0.01
 # Rendered beyond both ends and faded to 0 there, so that the resampling's circle has no seam.

@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
 
+import numpy as np
+
 from modeling import InputError, Threshold, Vibrator, compensation_for
 from modeling.errors import shown
 from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
+from modeling.recordings.trajectory import Trajectory, load_trajectory
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
-from stimuli.sets.trajectories import Trajectory
 
 FOLDER = "sources"
 RECIPE = "recipe.toml"
@@ -60,7 +62,7 @@ def load_sources(recipe: Recipe) -> Sources:
     models, passed_over = _models_of(recipe)
     _check_models(models, recipe)
     trajectories = tuple(
-        Trajectory.of(entry, duration_s=recipe.duration_s) for entry in recipe.trajectories
+        trajectory_of(entry, duration_s=recipe.duration_s) for entry in recipe.trajectories
     )
     for trajectory in trajectories:
         _check_lasts(trajectory, recipe)
@@ -88,6 +90,16 @@ def _models_of(recipe: Recipe) -> tuple[tuple[LabelledModel, ...], tuple[Path, .
         passed_over += others
     models = (LabelledModel(label, load_model(path), path, _sha256(path)) for label, path in found)
     return tuple(models), tuple(passed_over)
+
+
+def trajectory_of(entry: TrajectoryEntry, *, duration_s: float) -> Trajectory:
+    """What a recipe's entry stands for; `duration_s` is that of constant ones."""
+    if entry.file is not None:
+        return load_trajectory(entry.file, name=entry.name)
+    speed, force = (
+        np.full(2, value, dtype=np.float64) for value in (entry.speed_mm_s, entry.force_n)
+    )
+    return Trajectory(entry.name, np.array([0.0, duration_s]), speed, force)
 
 
 def _sha256(path: Path) -> str:

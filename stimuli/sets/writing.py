@@ -19,6 +19,7 @@ from modeling.files.folders import check_replaceable, replace_folder
 from modeling.files.reading import reason_of
 from modeling.files.writing import file_stem
 from modeling.perception.sensation_level import SensationLevel, sensation_level
+from modeling.recordings.trajectory import Trajectory
 from modeling.seeds import noise_stream
 from modeling.threads import in_order, usable_cores
 from stimuli.sets.manifest import (
@@ -50,7 +51,6 @@ from stimuli.sets.sources import (
     load_sources,
     recipe_of_copies,
 )
-from stimuli.sets.trajectories import Trajectory
 
 CONTACT_SHEET = "spectra.png"
 # All threads together work on this many samples, in at most 0.1 kB each.

@@ -33,13 +33,13 @@ from modeling import (
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.fitting.conditions import recording_spectra
 from modeling.models.loading import AnyModel, load_model
+from modeling.recordings.trajectory import load_trajectory
 from rig.importing.files import Label, import_csv, import_wav, labels_from_table
 from rig.importing.hatt import load_hatt
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.sources import load_sources
-from stimuli.sets.trajectories import load_trajectory
 
 MUTATIONS = 100  # of each kind; the answers of a study are five files
 LONGEST_MESSAGE = 400

@@ -16,6 +16,7 @@ from scipy.signal import firwin, iirpeak, lfilter, resample
 
 from modeling import Compensation, Renderer, TextureModel, fit_ar, regressed
 from modeling.models.loading import AnyModel
+from modeling.recordings.trajectory import Trajectory
 from stimuli.planted.textures import planted_texture, record_texture
 from stimuli.sets.recipe import TrajectoryEntry
 from stimuli.sets.rendering import (
@@ -27,7 +28,6 @@ from stimuli.sets.rendering import (
     steady_part,
     wav_bytes,
 )
-from stimuli.sets.trajectories import Trajectory
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 RATES_HZ = (5000, 44_100, 48_000)

@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import InputError
 from modeling.arrays import Floats
-from modeling.errors import shown
+from modeling.errors import InputError, shown
 from modeling.files.reading import read_text
 from modeling.files.tables import check_named_once, csv_cells, number
 from modeling.hand import Hand
-from stimuli.sets.recipe import LONGEST_S, TrajectoryEntry
 
+LONGEST_S = 3600.0
 COLUMNS = ("time_s", "speed_mm_s", "force_n")
 
 
@@ -95,16 +94,6 @@ class Trajectory:
         time_s = self.time_s[0] + elapsed_s
         hand = (np.interp(time_s, self.time_s, v) for v in (self.speed_mm_s, self.force_n))
         return Hand(*(np.asarray(values, dtype=np.float64) for values in hand))
-
-    @staticmethod
-    def of(entry: TrajectoryEntry, *, duration_s: float) -> Trajectory:
-        """What a recipe's entry stands for; `duration_s` is that of constant ones."""
-        if entry.file is not None:
-            return load_trajectory(entry.file, name=entry.name)
-        speed, force = (
-            np.full(2, value, dtype=np.float64) for value in (entry.speed_mm_s, entry.force_n)
-        )
-        return Trajectory(entry.name, np.array([0.0, duration_s]), speed, force)
 
 
 def _highest(values: Floats) -> float:

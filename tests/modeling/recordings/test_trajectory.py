@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from modeling import InputError
-from stimuli.sets.recipe import TrajectoryEntry
-from stimuli.sets.trajectories import Trajectory, load_trajectory
+from modeling.recordings.trajectory import Trajectory, load_trajectory
 
 HEADER = "time_s,speed_mm_s,force_n\n"
 
@@ -32,16 +31,6 @@ def test_lift_off_is_passed_on(tmp_path: Path) -> None:
     assert np.isnan(speed).tolist() == np.isnan(force).tolist() == [True, True, True, False]
     lifted = Trajectory("off", np.arange(2.0), np.full(2, np.nan), np.full(2, np.nan))
     assert (lifted.highest_speed_mm_s, lifted.highest_force_n) == (0.0, 0.0)
-
-
-def test_constant_entries() -> None:
-    entry = TrajectoryEntry.constant(150, 1.5)
-    assert entry.name == "150mms_1.5N"
-    constant = Trajectory.of(entry, duration_s=3.0)
-    assert constant.duration_s == 3.0
-    speed, force = constant.at(np.linspace(-1, 5, 7))
-    assert set(speed) == {150.0}
-    assert set(force) == {1.5}
 
 
 @pytest.mark.parametrize(
