@@ -28,6 +28,7 @@ from stimuli.sets.rendering import (
     steady_part,
     wav_bytes,
 )
+from stimuli.sets.sources import trajectory_of
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 RATES_HZ = (5000, 44_100, 48_000)
@@ -35,7 +36,7 @@ SECONDS = 2.0
 
 
 def stroke(duration_s: float = SECONDS) -> Trajectory:
-    return Trajectory.of(TrajectoryEntry.constant(200.0, 2.0), duration_s=duration_s)
+    return trajectory_of(TrajectoryEntry.constant(200.0, 2.0), duration_s=duration_s)
 
 
 def rendered(model: AnyModel, rate_hz: int, duration_s: float = SECONDS) -> np.ndarray:
