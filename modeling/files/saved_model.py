@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
-from dataclasses import fields
+from dataclasses import asdict, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
@@ -38,9 +38,13 @@ class SavedModel(_Base):
         return dump_json(self.to_dict())
 
     def to_dict(self) -> dict[str, Any]:
-        """The model as plain values, those of its file; `from_dict` makes it again."""
+        """The model as plain values, those of its file; `from_dict` makes it again.
+
+        An optional field that is None is left out.
+        """
         values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
-        return {"format": self.FORMAT, "version": self.VERSION, **values}
+        given = {n: v for n, v in values.items() if not (v is None and n in self.OPTIONAL)}
+        return {"format": self.FORMAT, "version": self.VERSION, **given}
 
     @cached_property
     def sha256(self) -> str:
@@ -120,7 +124,9 @@ class SavedModel(_Base):
 
 
 def _plain(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
 
 
 def _fields(values: Any, file_format: str, *, version: int, source: Path) -> dict[str, Any]:

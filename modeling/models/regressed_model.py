@@ -15,6 +15,7 @@ from modeling.checks import UNITS, check_rate, check_texture_name, is_positive
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
+from modeling.models.compiled_for import CompiledFor
 from modeling.models.grid import check_axes
 from modeling.models.parameter_table import Parameters, ParameterTable
 from modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy, check_driver
@@ -50,6 +51,8 @@ class RegressedModel(SavedModel):
         c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing.
     estimator, unit, simulated
         As in the `TextureModel` behind it.
+    compiled_for : CompiledFor, optional
+        As in `TextureModel`.
 
     Raises
     ------
@@ -58,6 +61,7 @@ class RegressedModel(SavedModel):
     """
 
     FORMAT = "tactileq.regressed-model"
+    OPTIONAL = frozenset({"compiled_for"})
 
     texture: str
     rate_hz: float
@@ -73,9 +77,11 @@ class RegressedModel(SavedModel):
     estimator: str
     unit: str = "g"
     simulated: bool = False
+    compiled_for: CompiledFor | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
+        object.__setattr__(self, "compiled_for", CompiledFor.of(self.compiled_for))
         self._freeze(_ARRAYS)
         object.__setattr__(self, "rate_hz", float(self.rate_hz))
         check_axes(self.speeds_mm_s, self.forces_n)

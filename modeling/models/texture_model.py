@@ -15,6 +15,7 @@ from modeling.equalizer.bands import check_bands, clamp_bands
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
+from modeling.models.compiled_for import CompiledFor
 from modeling.models.grid import check_axes
 from modeling.models.parameter_table import (
     Parameters,
@@ -67,6 +68,8 @@ class TextureModel(SavedModel):
         How parameters are read between conditions: linearly over speed and force, or as powers of
         both (docs/method/rendering.md#blending), for which no layer may change its sign. A file
         without it means linear.
+    compiled_for : CompiledFor, optional
+        The scene that the model was compiled for, with the bound that it keeps there.
 
     Raises
     ------
@@ -75,7 +78,7 @@ class TextureModel(SavedModel):
     """
 
     FORMAT = "tactileq.texture-model"
-    OPTIONAL = frozenset({"blending"})
+    OPTIONAL = frozenset({"blending", "compiled_for"})
 
     texture: str
     rate_hz: float
@@ -93,9 +96,11 @@ class TextureModel(SavedModel):
     unresolved: Bools = field(default_factory=_no_marks)
     interpolated: Bools = field(default_factory=_no_marks)
     blending: Blending = "linear"
+    compiled_for: CompiledFor | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
+        object.__setattr__(self, "compiled_for", CompiledFor.of(self.compiled_for))
         self._freeze(("gains",))
         shape = np.shape(self.gains)
         for name in _BOOLEAN_ARRAYS:

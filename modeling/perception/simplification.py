@@ -99,7 +99,7 @@ def simplify(
         model, threshold, criterion=criterion, margin_db=margin_db, hold_above=hold_above
     )
     level_sd_db = DEVIATIONS_PER_LEVEL_SD[criterion] * model.level_sd_db.reshape(by_condition)
-    flips = _flip_probabilities(distances + margin_db, level_sd_db)
+    flips = flip_probabilities(distances + margin_db, level_sd_db)
     fills = own_peaks(model).fills
     decided = _decide(distances + margin_db, flips, threshold, fills=fills, margin_db=margin_db)
     _name_doubts(decided, model.unresolved.reshape(by_condition), assumed)
@@ -288,7 +288,7 @@ def _keep_summed(distances: Floats, decided: list[tuple[bool, str]]) -> None:
         decided[loudest] = (True, "below threshold alone, but not together with the other dropped")
 
 
-def _flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
+def flip_probabilities(distances: Floats, level_sd_db: Floats) -> Floats:
     """P(flip) per layer, (m,), from (conditions, m) distances and deviations; NaN if unknown.
 
     The levels' deviations enter once, as in a bootstrap of the records. That two recordings differ

@@ -1,0 +1,315 @@
+"""A compiled scene: a model for each texture, what it costs and how well it keeps the bound."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from modeling.checks import check_keys
+from modeling.errors import InputError, shown
+from modeling.files.documents import dump_json, read_json_object
+from modeling.files.hashes import sha256_of_values
+from modeling.files.writing import file_stem, write_text
+from modeling.models.loading import load_model
+from modeling.models.regressed_model import RegressedModel
+from modeling.models.texture_model import TextureModel
+from modeling.rendering.cost import Cost
+from modeling.rendering.plan import RenderPlan
+from modeling.rendering.renderer import Renderer
+from modeling.scenes.cost import scene_bytes
+from modeling.scenes.scene import Scene
+
+FORMAT = "tactileq.compiled-scene"
+VERSION = 1
+FILE = "scene.json"
+Way = Literal["grid", "regression", "centroid"]
+Measure = Literal["gfc30", "bands_db", "level_db"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One measure of a compiled model, over the places of the scene.
+
+    Parameters
+    ----------
+    measure : {"gfc30", "bands_db", "level_db"}
+    bound : float
+    mean : float
+        With the hand at rest at each place, weighted by its time there; of dB the RMS.
+    worst : float
+        The worst place that counts, everything together: blending, late updates, precision.
+    place : str
+        Which one.
+    of_full : float
+        The worst against the full model, whose layers that are not felt are gone.
+    """
+
+    measure: Measure
+    bound: float
+    mean: float
+    worst: float
+    place: str
+    of_full: float
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the compiler, and what a texture costs after it and those before it.
+
+    Parameters
+    ----------
+    step : str
+    layers, numbers, bytes : int
+        Of tables and a state.
+    operations : float
+        Per sample.
+    share : float
+        Of the bound, that of the measure and place which take most; 1 is all of it.
+    """
+
+    step: str
+    layers: int
+    numbers: int
+    bytes: int
+    operations: float
+    share: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """Another update interval: what the cheapest table costs with it, and how much it takes.
+
+    `share` is that of the bound; above 1 the bound is broken.
+    """
+
+    update_ms: float
+    operations: float
+    bytes: int
+    share: float
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CompiledTexture:
+    """The least model of one texture.
+
+    Parameters
+    ----------
+    full : TextureModel
+        What it was compiled from.
+    felt : TextureModel
+        The full model without the layers that nobody can feel in the scene: what the bound is
+        measured against.
+    model : TextureModel or RegressedModel
+        The least one, which names the scene in `compiled_for`.
+    dropped : tuple of int
+        Layers of the full model, from 1.
+    way : {"grid", "regression", "centroid"}
+        What drives its parameters.
+    full_plan, plan : RenderPlan
+        How the full and the least model are rendered: by default every millisecond in double
+        precision; and as the compiler chose.
+    measures : tuple of Measured
+    steps : tuple of Step
+    alternatives : tuple of Alternative
+    """
+
+    full: TextureModel
+    felt: TextureModel
+    model: TextureModel | RegressedModel
+    dropped: tuple[int, ...]
+    way: Way
+    full_plan: RenderPlan
+    plan: RenderPlan
+    measures: tuple[Measured, ...]
+    steps: tuple[Step, ...]
+    alternatives: tuple[Alternative, ...]
+
+    @property
+    def texture(self) -> str:
+        """Its name."""
+        return self.full.texture
+
+    @property
+    def before(self) -> Cost:
+        """Of rendering the full model."""
+        return self.full_plan.cost(self.full)
+
+    @property
+    def after(self) -> Cost:
+        """Of rendering the least one."""
+        return self.plan.cost(self.model)
+
+    def renderer(self, *, seed: int = 0, stream: int = 0) -> Renderer:
+        """A renderer of the least model, within the actuator's limits."""
+        return Renderer(
+            self.model,
+            rate_hz=self.plan.rate_hz,
+            seed=seed,
+            stream=stream,
+            update_samples=self.plan.update_samples,
+            limits=self.plan.limits,
+            single=self.plan.single,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledScene:
+    """The least models of all textures of a scene."""
+
+    scene: Scene
+    textures: tuple[CompiledTexture, ...]
+
+    @property
+    def models(self) -> dict[str, TextureModel | RegressedModel]:
+        """By the name of their texture."""
+        return {compiled.texture: compiled.model for compiled in self.textures}
+
+    @property
+    def bytes_before(self) -> int:
+        """Of the tables and states of all full models, each by itself."""
+        costs = [compiled.before for compiled in self.textures]
+        return sum(cost.table_bytes + cost.state_bytes for cost in costs)
+
+    @property
+    def bytes_apart(self) -> int:
+        """Of the tables and states of all least models, each by itself."""
+        costs = [compiled.after for compiled in self.textures]
+        return sum(cost.table_bytes + cost.state_bytes for cost in costs)
+
+    @property
+    def bytes_after(self) -> int:
+        """Of the least models together: what they share and a hand's state are stored once."""
+        return scene_bytes((compiled.model, compiled.plan) for compiled in self.textures)
+
+    @property
+    def operations_before(self) -> float:
+        """Per sample, of the full model that takes most."""
+        return max(compiled.before.operations for compiled in self.textures)
+
+    @property
+    def operations_after(self) -> float:
+        """Per sample, of the least model that takes most."""
+        return max(compiled.after.operations for compiled in self.textures)
+
+    def save(self, folder: str | Path) -> None:
+        """Write each model as TEXTURE.json, and scene.json, which says what they are for.
+
+        Raises
+        ------
+        InputError
+            Where two textures would have one file.
+        """
+        names = [f"{file_stem(compiled.texture)}.json" for compiled in self.textures]
+        if FILE in names or len(set(names)) < len(names):
+            raise InputError(
+                f"expected textures whose files have different names, none of them {FILE}, got "
+                f"{', '.join(names)}; rename a texture."
+            )
+        for name, compiled in zip(names, self.textures, strict=True):
+            compiled.model.save(Path(folder) / name)
+        write_text(Path(folder) / FILE, dump_json(self.to_dict()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values of scene.json: the scene, and each texture's models, costs and measures."""
+        values = {
+            "format": FORMAT,
+            "version": VERSION,
+            "scene": self.scene.to_dict(),
+            "scene_sha256": self.scene.sha256,
+            "simulated": any(compiled.full.simulated for compiled in self.textures),
+            "bytes_before": self.bytes_before,
+            "bytes_after": self.bytes_after,
+            "textures": [_texture_values(compiled) for compiled in self.textures],
+        }
+        return {**values, "sha256": sha256_of_values(values)}
+
+
+def _texture_values(compiled: CompiledTexture) -> dict[str, Any]:
+    return {
+        "texture": compiled.texture,
+        "full_sha256": compiled.full.sha256,
+        "model_sha256": compiled.model.sha256,
+        "dropped": list(compiled.dropped),
+        "way": compiled.way,
+        "update_samples": compiled.plan.update_samples,
+        "single": compiled.plan.single,
+        "operations": compiled.after.operations,
+        "measures": [asdict(measured) for measured in compiled.measures],
+    }
+
+
+def load_compiled(
+    folder: str | Path, full: Mapping[str, TextureModel] | None = None
+) -> dict[str, TextureModel | RegressedModel]:
+    """The models of a scene that was compiled into a folder, by the name of their texture.
+
+    Parameters
+    ----------
+    folder : path
+        As `CompiledScene.save` wrote it.
+    full : mapping, optional
+        The full models of today; each compiled model must come from the one of its texture.
+
+    Raises
+    ------
+    InputError
+        For a folder without a compiled scene, files that were changed, a texture without a full
+        model, and full models that have changed since.
+    """
+    place = Path(folder) / FILE
+    stated = _stated(place)
+    models: dict[str, TextureModel | RegressedModel] = {}
+    for texture, hashes in stated.items():
+        file = Path(folder) / f"{file_stem(texture)}.json"
+        model = load_model(file)
+        if not isinstance(model, TextureModel | RegressedModel) or (
+            model.sha256 != hashes["model_sha256"]
+        ):
+            raise InputError(
+                f"expected {file} as tactileq scene wrote it, got something else; compile the "
+                "scene again."
+            )
+        models[texture] = model
+        if full is not None:
+            _check_full(texture, hashes["full_sha256"], full=full, folder=Path(folder))
+    return models
+
+
+def _check_full(
+    texture: str, sha256: str, *, full: Mapping[str, TextureModel], folder: Path
+) -> None:
+    if texture not in full:
+        raise InputError(
+            f"expected a full model of {texture}, which is in the scene of {folder}, got none; "
+            "give the folder of models that the scene was compiled from."
+        )
+    if full[texture].sha256 != sha256:
+        raise InputError(
+            f"expected the model of {texture} that the scene of {folder} was compiled from, got "
+            "one that has changed since; compile the scene again."
+        )
+
+
+def _stated(place: Path) -> dict[str, dict[str, str]]:
+    """What scene.json says of each texture's hashes."""
+    values = read_json_object(place, what="a compiled scene", advice="compile the scene again")
+    texts = ("texture", "full_sha256", "model_sha256")
+    content = {name: value for name, value in values.items() if name != "sha256"}
+    if (values.get("format"), values.get("version")) != (FORMAT, VERSION):
+        raise InputError(
+            f"expected the format {FORMAT}, version {VERSION}, in {place}, got "
+            f"{shown(values.get('format'))}, version {shown(values.get('version'))}; give a folder "
+            "that tactileq scene wrote."
+        )
+    if values.get("sha256") != sha256_of_values(content):
+        raise InputError(
+            f"expected {place} as tactileq scene wrote it, got something else; compile the scene "
+            "again."
+        )
+    found = {}
+    for entry in values["textures"]:
+        check_keys(entry, tuple(entry), where=str(place))
+        found[entry["texture"]] = {name: entry[name] for name in texts}
+    return found

@@ -1,0 +1,33 @@
+"""What a whole scene costs: distinct tables of all textures, and one state for a hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from modeling.models.regressed_model import RegressedModel
+from modeling.models.texture_model import TextureModel
+from modeling.rendering.plan import RenderPlan
+
+Rendered = tuple[TextureModel | RegressedModel, RenderPlan]
+
+
+def scene_bytes(rendered: Iterable[Rendered]) -> int:
+    """Bytes of a scene: arrays that are equal bit for bit are stored once, and so is the state."""
+    arrays: dict[tuple[str, bytes], int] = {}
+    states = [0]
+    for model, plan in rendered:
+        for value in plan.texture(model).values():
+            if np.ndim(value):
+                array = np.asarray(value)
+                arrays[array.dtype.str, array.tobytes()] = array.nbytes
+        states.append(plan.cost(model).state_bytes)
+    return sum(arrays.values()) + max(states)
+
+
+def stored_numbers(model: TextureModel | RegressedModel) -> int:
+    """Of a grid S·F·(1 + 3m), of regressions the coefficients that are not 0."""
+    if isinstance(model, RegressedModel):
+        return model.n_parameters
+    return model.noise_gains.size * model.n_parameters

@@ -1,0 +1,209 @@
+"""What each thing that the compiler may do costs in likeness, place by place.
+
+docs/method/scenes.md#errors
+
+Errors do not depend on the scene, but only on the model and the actuator's band: a scene chooses
+the places that count and how large an error may be there. That is why a narrower scene never needs
+a dearer model.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise, product
+
+import numpy as np
+
+from modeling.arrays import Floats, Integers
+from modeling.models.parameter_table import Parameters
+from modeling.models.regressed_model import RegressedModel
+from modeling.models.texture_model import TextureModel
+from modeling.rendering.compiled import is_compiled
+from modeling.rendering.renderer import Renderer
+from modeling.scenes.measures import Errors, Features, Yardstick, errors_between
+from modeling.scenes.places import Places, nodes_of
+
+Segment = tuple[int, int]
+# Least displacement of a hand by a late update that is told from none.
+LEAST_SPEED_MM_S, LEAST_FORCE_N = 0.25, 0.0025
+ROUNDING_S = 0.5  # of each of the records by which precisions are compared
+
+
+class ErrorMaps:
+    """Errors against one model at the P nodes of its table, in C order.
+
+    Parameters
+    ----------
+    model : TextureModel
+        What is felt of the full model.
+    yardstick : Yardstick
+    """
+
+    def __init__(self, model: TextureModel, yardstick: Yardstick) -> None:
+        self.model, self.yardstick = model, yardstick
+        self._speeds, self._forces = nodes_of(model)
+        self.shape = (self._speeds.size, self._forces.size)
+        speed, force = np.meshgrid(self._speeds, self._forces, indexing="ij")
+        self._speed, self._force = speed.ravel(), force.ravel()
+        self._at = model.parameters(self._speed, self._force)
+        self.truth: Features = yardstick.features(self._at)
+        self._index = np.arange(speed.size).reshape(self.shape)
+        self._cells: dict[tuple[Segment, Segment], tuple[Integers, Errors]] = {}
+        self._centres: dict[tuple[Segment, Segment], Errors] = {}
+        self._late: dict[str, list[Errors]] = {"speed": [], "force": []}
+
+    # --- A grid with fewer conditions
+
+    def cell(self, rows: Segment, columns: Segment) -> tuple[Integers, Errors]:
+        """Errors of blending linearly between the four corners of a wider cell.
+
+        Parameters
+        ----------
+        rows, columns : (int, int)
+            First and last node of the cell along speed and force; twice the same of a cell without
+            an extent.
+
+        Returns
+        -------
+        (k,) ndarray, Errors
+            The nodes in the cell, and the errors there.
+        """
+        key = rows, columns
+        if key not in self._cells:
+            across, along = (np.arange(a, b + 1) for a, b in key)
+            self._cells[key] = self._blended(key, across, along)
+        return self._cells[key]
+
+    def centre(self, rows: Segment, columns: Segment) -> tuple[int, Errors]:
+        """As `cell`, but in its middle alone: one that fails there need not be looked at."""
+        key = rows, columns
+        across, along = (np.array([(a + b) // 2]) for a, b in key)
+        if key not in self._centres:
+            self._centres[key] = self._blended(key, across, along)[1]
+        return int(across[0] * self.shape[1] + along[0]), self._centres[key]
+
+    def _blended(
+        self, key: tuple[Segment, Segment], across: Integers, along: Integers
+    ) -> tuple[Integers, Errors]:
+        (row, next_row), (column, next_column) = key
+        x = _shares(self._speeds, row, next_row, across)[:, None]
+        y = _shares(self._forces, column, next_column, along)[None, :]
+        corners = self._index[np.ix_([row, next_row], [column, next_column])]
+        weights = np.array([[(1 - x) * (1 - y), (1 - x) * y], [x * (1 - y), x * y]])
+        flat = weights.reshape(4, -1)
+        blended = Parameters(
+            *(np.tensordot(flat, part[corners.ravel()], (0, 0)) for part in self._at)
+        )
+        places = (across[:, None] * self.shape[1] + along[None, :]).ravel()
+        ours = self.yardstick.features(blended)
+        return places, errors_between(ours, self.truth.at(places))
+
+    def of_nodes(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Errors:
+        """Errors of the table with these nodes alone, at all nodes; 0 beyond them."""
+        errors = Errors.none(self._index.size)
+        for row, column in product(segments_of(rows), segments_of(columns)):
+            places, found = self.cell(row, column)
+            for part, values in zip(errors, found, strict=True):
+                part[places] = np.maximum(part[places], values)
+        return errors
+
+    # --- Another way of driving the parameters
+
+    def of_model(self, model: TextureModel | RegressedModel) -> Errors:
+        """Errors of another model at all places."""
+        ours = self.yardstick.features(model.parameters(self._speed, self._force))
+        return errors_between(ours, self.truth)
+
+    # --- Late updates
+
+    def late(self, update_s: float, places: Places) -> Errors:
+        """Errors of parameters that are held from update to update, at all places.
+
+        Frequencies and bandwidths are those for the middle of an update; half an update earlier or
+        later the hand has another speed and force. Gains ramp and are taken to be right.
+        """
+        half_s = update_s / 2
+        by_speed = self._late_by("speed", half_s * places.speed_change_mm_s2)
+        return by_speed + self._late_by("force", half_s * places.force_change_n_s)
+
+    def _late_by(self, axis: str, displacement: Floats) -> Errors:
+        """Errors where the hand is displaced by so much, (p, q), rounded up to doublings."""
+        least = LEAST_SPEED_MM_S if axis == "speed" else LEAST_FORCE_N
+        with np.errstate(divide="ignore"):
+            steps = np.ceil(np.log2(displacement.ravel() / least) - 1e-9)
+        index = np.where(displacement.ravel() > 1e-12, np.maximum(steps, 0), -1).astype(int)
+        ladder = self._ladder(axis, int(index.max()))
+        none = np.zeros(index.size)
+        return Errors(
+            *(
+                np.choose(index + 1, [none, *(np.asarray(step[kind]) for step in ladder)])
+                if ladder
+                else none
+                for kind in range(3)
+            )
+        )
+
+    def _ladder(self, axis: str, highest: int) -> list[Errors]:
+        """Errors of displacements of 1, 2, 4, … times the least one; each no less than the last."""
+        known = self._late[axis]
+        while len(known) <= highest:
+            least = LEAST_SPEED_MM_S if axis == "speed" else LEAST_FORCE_N
+            found = self._displaced(axis, least * 2 ** len(known))
+            known.append(Errors.largest([known[-1], found]) if known else found)
+        return known[: highest + 1]
+
+    def _displaced(self, axis: str, by: float) -> Errors:
+        """Of a hand that was, or will be, so much faster or slower (mm/s), or presses so (N)."""
+        found = []
+        for step in (-by, by):
+            there = self.model.parameters(
+                np.maximum(self._speed + step * (axis == "speed"), self._speeds[0]),
+                np.maximum(self._force + step * (axis == "force"), self._forces[0]),
+            )
+            late = self._at._replace(
+                frequencies_hz=there.frequencies_hz, bandwidths_hz=there.bandwidths_hz
+            )
+            found.append(errors_between(self.yardstick.features(late), self.truth))
+        return Errors.largest(found)
+
+    # --- Precision
+
+    def rounding(self, rate_hz: float) -> Errors | None:
+        """Largest errors of single precision, each (1,); None where it cannot be rendered here.
+
+        Of records with the hand at rest in the corners and in the middle of the grid.
+        """
+        if not is_compiled():
+            return None
+        speeds, forces = self.model.speeds_mm_s, self.model.forces_n
+        middle = (speeds[speeds.size // 2], forces[forces.size // 2])
+        conditions = {(v, f) for v in speeds[[0, -1]] for f in forces[[0, -1]]} | {middle}
+        found = [self._rounded(v, f, rate_hz) for v, f in sorted(conditions)]
+        return Errors.largest(found)
+
+    def _rounded(self, speed: float, force: float, rate_hz: float) -> Errors:
+        features = []
+        for single in (False, True):
+            renderer = Renderer(self.model, rate_hz=rate_hz, single=single, update_samples=1000)
+            samples = renderer.render(speed, force, samples=math.ceil(ROUNDING_S * rate_hz))
+            frequency = np.fft.rfftfreq(samples.size, 1 / rate_hz)
+            magnitude = np.abs(np.fft.rfft(samples))
+            features.append(
+                self.yardstick.features_of(
+                    np.interp(self.yardstick.frequency_hz, frequency, magnitude)[None, :]
+                )
+            )
+        return errors_between(features[1], features[0])
+
+
+def segments_of(nodes: tuple[int, ...]) -> list[Segment]:
+    """From each node to the next; of a single node from it to itself."""
+    return list(pairwise(nodes)) or [(nodes[0], nodes[0])]
+
+
+def _shares(axis: Floats, first: int, last: int, at: Integers) -> Floats:
+    """How far places of an axis are from its value `first` to `last`, 0 … 1."""
+    if first == last:
+        return np.zeros(at.size)
+    share: Floats = (axis[at] - axis[first]) / (axis[last] - axis[first])
+    return share

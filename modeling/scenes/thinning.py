@@ -1,0 +1,163 @@
+"""The fewest nodes of a table between which blending linearly keeps a bound.
+
+docs/method/scenes.md#fewest-nodes
+
+An error in a cell depends on its four corners alone. So a choice of speeds and of forces is good
+where each of its cells is, and the fewest forces for a choice of speeds are a shortest path through
+cells. All choices of speeds are looked at that could still be cheaper: the result is the cheapest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+
+import numpy as np
+
+from modeling.arrays import Floats, Integers
+from modeling.scenes.error_maps import ErrorMaps, Segment, segments_of
+from modeling.scenes.measures import Errors
+from modeling.scenes.places import Places, enclosing
+from modeling.scenes.scene import Bound, Range
+
+Nodes = tuple[int, ...]
+
+
+def fewest_nodes(
+    maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors
+) -> tuple[Nodes, Nodes] | None:
+    """Speeds and forces of a table, as indices, that keep a bound with the fewest numbers.
+
+    Parameters
+    ----------
+    maps : ErrorMaps
+    places : Places
+        Where the bound counts.
+    bound : Bound
+    taken : Errors
+        What of it is taken already at each node, (P,).
+
+    Returns
+    -------
+    two tuples of int, or None
+        The first may be below the scene and the last above it. None where what is taken breaks the
+        bound.
+    """
+    good = _Cells(maps, places, bound=bound, taken=taken)
+    speeds = _Axis(places.speeds_mm_s, places.speed_range)
+    forces = _Axis(places.forces_n, places.force_range)
+    width = 1 + 3 * maps.model.n_layers
+    best: tuple[int, Nodes, Nodes] | None = None
+
+    def viable(row: Segment) -> bool:
+        return forces.shortest(lambda column: good(row, column)) is not None
+
+    for rows in speeds.choices(viable):
+        size = speeds.size_of(rows)
+        if best is not None and _numbers(size, forces.least, width) >= best[0]:
+            break  # those to come are no smaller
+        columns = forces.shortest(partial(_all_good, good, segments_of(rows)))
+        if columns is not None:
+            numbers = _numbers(size, forces.size_of(columns), width)
+            if best is None or numbers < best[0]:
+                best = numbers, rows, columns
+    return None if best is None else best[1:]
+
+
+def _numbers(speeds: int, forces: int, width: int) -> int:
+    """Of a table with these axes; one of a single value is stored twice."""
+    return max(speeds, 2) * max(forces, 2) * width + max(speeds, 2) + max(forces, 2)
+
+
+def _all_good(
+    good: Callable[[Segment, Segment], bool], rows: list[Segment], column: Segment
+) -> bool:
+    return all(good(row, column) for row in rows)
+
+
+class _Axis:
+    """The nodes of one axis, and which of them must enclose the scene."""
+
+    def __init__(self, nodes: Floats, asked: Range) -> None:
+        inside = np.flatnonzero(enclosing(nodes, asked))
+        first, last = int(inside[0]), int(inside[-1])
+        self._single = asked[0] == asked[1]
+        self.starts = list(range(first, -1, -1))
+        self.ends = list(range(last, nodes.size))
+        self.inner = list(range(first + 1, last))
+        self.least = 1 if self._single else 2
+
+    def size_of(self, nodes: Nodes) -> int:
+        """How many values are left once the axis is cut off at the scene's ends."""
+        return 1 if self._single else max(len(nodes), 2)
+
+    def choices(self, viable: Callable[[Segment], bool]) -> Iterator[Nodes]:
+        """All choices of nodes that enclose the scene by viable segments, smallest first."""
+        for start in self.starts:
+            if start in self.ends and viable((start, start)):
+                yield (start,)
+        good = cache(viable)
+        paths: list[Nodes] = [(start,) for start in self.starts]
+        while paths:
+            yield from (
+                (*path, end) for path in paths for end in self.ends if good((path[-1], end))
+            )
+            paths = [
+                (*path, node)
+                for path in paths
+                for node in self.inner
+                if path[-1] < node and good((path[-1], node))
+            ]
+
+    def shortest(self, good: Callable[[Segment], bool]) -> Nodes | None:
+        """The fewest nodes, all segments between which are good; None where there are none."""
+        paths: dict[int, Nodes] = {start: (start,) for start in self.starts}
+        for node in self.starts:
+            if node in self.ends and good((node, node)):
+                return (node,)
+        found: list[Nodes] = []
+        for node in sorted({*self.inner, *self.ends}):
+            reached = [
+                (*paths[other], node)
+                for other in sorted(paths, key=lambda other: (len(paths[other]), other))
+                if other < node
+            ]
+            path = next((p for p in _by_length(reached) if good((p[-2], p[-1]))), None)
+            if path is None:
+                continue
+            if node in self.ends:
+                found.append(path)
+            else:
+                paths[node] = path
+        return min(found, key=len, default=None)
+
+
+def _by_length(paths: list[Nodes]) -> list[Nodes]:
+    return sorted(paths, key=lambda path: (len(path), -path[-2]))
+
+
+class _Cells:
+    """Which cells keep the bound, looked at when it is asked for."""
+
+    def __init__(self, maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors) -> None:
+        self._maps, self._bound, self._taken = maps, bound, taken
+        self._counts = places.counts.ravel()
+        self._known: dict[tuple[Segment, Segment], bool] = {}
+
+    def __call__(self, rows: Segment, columns: Segment) -> bool:
+        key = rows, columns
+        if key not in self._known:
+            self._known[key] = self._centre(*key) and self._all(*key)
+        return self._known[key]
+
+    def _centre(self, rows: Segment, columns: Segment) -> bool:
+        place, errors = self._maps.centre(rows, columns)
+        return not self._counts[place] or self._kept(np.array([place]), errors)
+
+    def _all(self, rows: Segment, columns: Segment) -> bool:
+        places, errors = self._maps.cell(rows, columns)
+        there = self._counts[places]
+        return self._kept(places[there], errors.at(there))
+
+    def _kept(self, places: Integers, errors: Errors) -> bool:
+        return bool(errors.within(self._bound, taken=self._taken.at(places)).all())
