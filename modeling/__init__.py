@@ -30,6 +30,9 @@ HOMES = {
     "rendering.limits": "Limits",
     "rendering.many": "render_many",
     "rendering.renderer": "Renderer",
+    "scenes.scene": "Scene",
+    "scenes.compiled": "CompiledScene",
+    "scenes.compiler": "compile_scene",
     "similarity": "",
 }
 
@@ -61,6 +64,9 @@ if TYPE_CHECKING:
     from modeling.rendering.limits import Limits as Limits
     from modeling.rendering.many import render_many as render_many
     from modeling.rendering.renderer import Renderer as Renderer
+    from modeling.scenes.compiled import CompiledScene as CompiledScene
+    from modeling.scenes.compiler import compile_scene as compile_scene
+    from modeling.scenes.scene import Scene as Scene
     from modeling.vibrators.compensation import Compensation as Compensation
     from modeling.vibrators.compensation import compensation_for as compensation_for
     from modeling.vibrators.compensation import flat_band as flat_band

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Any
 
@@ -121,7 +122,7 @@ class Candidate:
         """All errors of the candidate."""
         return self.late + self.rounding + self.at_rest
 
-    @property
+    @cached_property
     def key(self) -> tuple[float, int, int]:
         """What it costs: operations per sample, bytes of its table and state, stored numbers."""
         cost = self.plan.cost(self.model)
@@ -156,6 +157,7 @@ class _Search:
         self._maps: dict[tuple[int, ...], ErrorMaps] = {}
         self._roundings: dict[tuple[int, ...], Errors | None] = {}
         self._regressions: dict[tuple[int, ...], list[tuple[Way, RegressedModel, Errors]]] = {}
+        self._counted: dict[tuple[int, int], float] = {}
         self._found: dict[tuple[Any, ...], Candidate | None] = {}
         self._check_limits()
 
@@ -245,8 +247,12 @@ class _Search:
         return best
 
     def _operations(self, layers: tuple[int, ...], samples: int) -> float:
-        plan = self.plan(samples, single=False)
-        return plan.cost(self.full.with_layers(list(layers))).operations
+        """Of any table with so many layers."""
+        key = len(layers), samples
+        if key not in self._counted:
+            model = self.full.with_layers(list(layers))
+            self._counted[key] = self.plan(samples, single=False).cost(model).operations
+        return self._counted[key]
 
     def _best(self, layers: tuple[int, ...], samples: int, bound: Bound) -> Candidate | None:
         """The one with the fewest bytes; None where even the felt model breaks the bound."""

@@ -10,6 +10,7 @@ a dearer model.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise, product
 
 import numpy as np
@@ -26,6 +27,7 @@ from modeling.scenes.places import Places, nodes_of
 Segment = tuple[int, int]
 # Least displacement of a hand by a late update that is told from none.
 LEAST_SPEED_MM_S, LEAST_FORCE_N = 0.25, 0.0025
+AT_ONCE = 64  # responses, so that they stay small beside the processor's cache
 ROUNDING_S = 0.5  # of each of the records by which precisions are compared
 
 
@@ -49,60 +51,83 @@ class ErrorMaps:
         self.truth: Features = yardstick.features(self._at)
         self._index = np.arange(speed.size).reshape(self.shape)
         self._cells: dict[tuple[Segment, Segment], tuple[Integers, Errors]] = {}
-        self._centres: dict[tuple[Segment, Segment], Errors] = {}
+        self._centres: dict[Segment, tuple[Integers, Errors]] = {}
         self._late: dict[str, list[Errors]] = {"speed": [], "force": []}
 
-    # --- A grid with fewer conditions
+    # --- A grid with fewer nodes
 
-    def cell(self, rows: Segment, columns: Segment) -> tuple[Integers, Errors]:
-        """Errors of blending linearly between the four corners of a wider cell.
+    @property
+    def column_segments(self) -> list[Segment]:
+        """Every segment of the forces, one without an extent at each node among them."""
+        nodes = range(self._forces.size)
+        return [(a, b) for a in nodes for b in nodes if a <= b]
+
+    def centres(self, rows: Segment) -> tuple[Integers, Errors]:
+        """As `cells`, but in the middle of every cell alone, in the order of `column_segments`.
+
+        A wide cell that fails there need not be looked at.
+        """
+        if rows not in self._centres:
+            across = np.array([sum(rows) // 2])
+            parts = [(a, b, np.array([(a + b) // 2])) for a, b in self.column_segments]
+            places, errors = self._blended(rows, across, parts)
+            self._centres[rows] = places, errors
+        return self._centres[rows]
+
+    def cells(self, rows: Segment, columns: Sequence[Segment]) -> list[tuple[Integers, Errors]]:
+        """Errors of blending linearly between the four corners of wider cells.
 
         Parameters
         ----------
-        rows, columns : (int, int)
-            First and last node of the cell along speed and force; twice the same of a cell without
-            an extent.
+        rows : (int, int)
+            First and last node of the cells along speed; twice the same of one without an extent.
+        columns : sequence of (int, int)
+            Likewise along force, one for each cell.
 
         Returns
         -------
-        (k,) ndarray, Errors
-            The nodes in the cell, and the errors there.
+        list of (k,) ndarray and Errors
+            For each cell the nodes in it, and the errors there.
         """
-        key = rows, columns
-        if key not in self._cells:
-            across, along = (np.arange(a, b + 1) for a, b in key)
-            self._cells[key] = self._blended(key, across, along)
-        return self._cells[key]
-
-    def centre(self, rows: Segment, columns: Segment) -> tuple[int, Errors]:
-        """As `cell`, but in its middle alone: one that fails there need not be looked at."""
-        key = rows, columns
-        across, along = (np.array([(a + b) // 2]) for a, b in key)
-        if key not in self._centres:
-            self._centres[key] = self._blended(key, across, along)[1]
-        return int(across[0] * self.shape[1] + along[0]), self._centres[key]
+        unknown = [column for column in columns if (rows, column) not in self._cells]
+        if unknown:
+            across = np.arange(rows[0], rows[1] + 1)
+            parts = [(a, b, np.arange(a, b + 1)) for a, b in unknown]
+            places, errors = self._blended(rows, across, parts)
+            ends = np.cumsum([across.size * along.size for _, _, along in parts])
+            for column, end, (_, _, along) in zip(unknown, ends, parts, strict=True):
+                own = np.arange(end - across.size * along.size, end)
+                self._cells[rows, column] = places[own], errors.at(own)
+        return [self._cells[rows, column] for column in columns]
 
     def _blended(
-        self, key: tuple[Segment, Segment], across: Integers, along: Integers
+        self, rows: Segment, across: Integers, parts: Sequence[tuple[int, int, Integers]]
     ) -> tuple[Integers, Errors]:
-        (row, next_row), (column, next_column) = key
-        x = _shares(self._speeds, row, next_row, across)[:, None]
-        y = _shares(self._forces, column, next_column, along)[None, :]
-        corners = self._index[np.ix_([row, next_row], [column, next_column])]
-        weights = np.array([[(1 - x) * (1 - y), (1 - x) * y], [x * (1 - y), x * y]])
-        flat = weights.reshape(4, -1)
-        blended = Parameters(
-            *(np.tensordot(flat, part[corners.ravel()], (0, 0)) for part in self._at)
-        )
-        places = (across[:, None] * self.shape[1] + along[None, :]).ravel()
-        ours = self.yardstick.features(blended)
-        return places, errors_between(ours, self.truth.at(places))
+        """Errors at nodes `across` speeds and along forces, of one cell after the other."""
+        x = _shares(self._speeds, *rows, across)[:, None]
+        corners, weights, places = [], [], []
+        for first, last, along in parts:
+            y = _shares(self._forces, first, last, along)[None, :]
+            four = np.array([[(1 - x) * (1 - y), (1 - x) * y], [x * (1 - y), x * y]])
+            weights.append(four.reshape(4, -1))
+            nodes = self._index[np.ix_(rows, (first, last))].ravel()
+            corners.append(np.repeat(nodes[:, None], weights[-1].shape[1], axis=1))
+            places.append((across[:, None] * self.shape[1] + along[None, :]).ravel())
+        corner, weight = np.concatenate(corners, axis=1), np.concatenate(weights, axis=1)
+        at = np.concatenate(places)
+        blended = [np.einsum("kn,kn...->n...", weight, part[corner]) for part in self._at]
+        found = []
+        for start in range(0, at.size, AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            ours = self.yardstick.features(Parameters(*(part[some] for part in blended)))
+            found.append(errors_between(ours, self.truth.at(at[some])))
+        return at, Errors(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
     def of_nodes(self, rows: tuple[int, ...], columns: tuple[int, ...]) -> Errors:
         """Errors of the table with these nodes alone, at all nodes; 0 beyond them."""
         errors = Errors.none(self._index.size)
         for row, column in product(segments_of(rows), segments_of(columns)):
-            places, found = self.cell(row, column)
+            [(places, found)] = self.cells(row, [column])
             for part, values in zip(errors, found, strict=True):
                 part[places] = np.maximum(part[places], values)
         return errors

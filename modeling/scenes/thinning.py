@@ -9,12 +9,12 @@ cells. All choices of speeds are looked at that could still be cheaper: the resu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from functools import cache, partial
+from collections.abc import Callable, Container, Iterator, Sequence
+from functools import cache
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
+from modeling.arrays import Bools, Floats, Integers
 from modeling.scenes.error_maps import ErrorMaps, Segment, segments_of
 from modeling.scenes.measures import Errors
 from modeling.scenes.places import Places, enclosing
@@ -49,14 +49,11 @@ def fewest_nodes(
     width = 1 + 3 * maps.model.n_layers
     best: tuple[int, Nodes, Nodes] | None = None
 
-    def viable(row: Segment) -> bool:
-        return forces.shortest(lambda column: good(row, column)) is not None
-
-    for rows in speeds.choices(viable):
+    for rows in speeds.choices(lambda row: forces.shortest(good.columns([row])) is not None):
         size = speeds.size_of(rows)
         if best is not None and _numbers(size, forces.least, width) >= best[0]:
             break  # those to come are no smaller
-        columns = forces.shortest(partial(_all_good, good, segments_of(rows)))
+        columns = _fewest_columns(forces, good, segments_of(rows))
         if columns is not None:
             numbers = _numbers(size, forces.size_of(columns), width)
             if best is None or numbers < best[0]:
@@ -64,15 +61,17 @@ def fewest_nodes(
     return None if best is None else best[1:]
 
 
+def _fewest_columns(forces: _Axis, good: _Cells, rows: list[Segment]) -> Nodes | None:
+    """The fewest forces with which all cells are good: of those that seem so, until they are."""
+    while True:
+        columns = forces.shortest(good.columns(rows))
+        if columns is None or good.are_good(rows, segments_of(columns)):
+            return columns
+
+
 def _numbers(speeds: int, forces: int, width: int) -> int:
     """Of a table with these axes; one of a single value is stored twice."""
     return max(speeds, 2) * max(forces, 2) * width + max(speeds, 2) + max(forces, 2)
-
-
-def _all_good(
-    good: Callable[[Segment, Segment], bool], rows: list[Segment], column: Segment
-) -> bool:
-    return all(good(row, column) for row in rows)
 
 
 class _Axis:
@@ -109,22 +108,18 @@ class _Axis:
                 if path[-1] < node and good((path[-1], node))
             ]
 
-    def shortest(self, good: Callable[[Segment], bool]) -> Nodes | None:
+    def shortest(self, good: Container[Segment]) -> Nodes | None:
         """The fewest nodes, all segments between which are good; None where there are none."""
-        paths: dict[int, Nodes] = {start: (start,) for start in self.starts}
         for node in self.starts:
-            if node in self.ends and good((node, node)):
+            if node in self.ends and (node, node) in good:
                 return (node,)
+        paths: dict[int, Nodes] = {start: (start,) for start in self.starts}
         found: list[Nodes] = []
-        for node in sorted({*self.inner, *self.ends}):
-            reached = [
-                (*paths[other], node)
-                for other in sorted(paths, key=lambda other: (len(paths[other]), other))
-                if other < node
-            ]
-            path = next((p for p in _by_length(reached) if good((p[-2], p[-1]))), None)
-            if path is None:
+        for node in [*self.inner, *self.ends]:
+            reached = [path for last, path in paths.items() if last < node and (last, node) in good]
+            if not reached:
                 continue
+            path = (*min(reached, key=len), node)
             if node in self.ends:
                 found.append(path)
             else:
@@ -132,32 +127,37 @@ class _Axis:
         return min(found, key=len, default=None)
 
 
-def _by_length(paths: list[Nodes]) -> list[Nodes]:
-    return sorted(paths, key=lambda path: (len(path), -path[-2]))
-
-
 class _Cells:
-    """Which cells keep the bound, looked at when it is asked for."""
+    """Which cells keep the bound: all that do so in their middle, until they are looked at."""
 
     def __init__(self, maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors) -> None:
         self._maps, self._bound, self._taken = maps, bound, taken
         self._counts = places.counts.ravel()
-        self._known: dict[tuple[Segment, Segment], bool] = {}
+        self._likely: dict[Segment, set[Segment]] = {}
 
-    def __call__(self, rows: Segment, columns: Segment) -> bool:
-        key = rows, columns
-        if key not in self._known:
-            self._known[key] = self._centre(*key) and self._all(*key)
-        return self._known[key]
+    def columns(self, rows: Sequence[Segment]) -> set[Segment]:
+        """The segments of forces with which all of these segments of speeds seem good."""
+        return set[Segment].intersection(*(self._columns(row) for row in rows))
 
-    def _centre(self, rows: Segment, columns: Segment) -> bool:
-        place, errors = self._maps.centre(rows, columns)
-        return not self._counts[place] or self._kept(np.array([place]), errors)
+    def are_good(self, rows: Sequence[Segment], columns: Sequence[Segment]) -> bool:
+        """Whether cells are good everywhere; those that are not seem so no longer."""
+        good = True
+        for row in rows:
+            for column, cell in zip(columns, self._maps.cells(row, columns), strict=True):
+                if not self._kept(*cell).all():
+                    self._likely[row].discard(column)
+                    good = False
+        return good
 
-    def _all(self, rows: Segment, columns: Segment) -> bool:
-        places, errors = self._maps.cell(rows, columns)
-        there = self._counts[places]
-        return self._kept(places[there], errors.at(there))
+    def _columns(self, row: Segment) -> set[Segment]:
+        if row not in self._likely:
+            kept = self._kept(*self._maps.centres(row))
+            segments = zip(self._maps.column_segments, kept, strict=True)
+            self._likely[row] = {segment for segment, good in segments if good}
+        return self._likely[row]
 
-    def _kept(self, places: Integers, errors: Errors) -> bool:
-        return bool(errors.within(self._bound, taken=self._taken.at(places)).all())
+    def _kept(self, places: Integers, errors: Errors) -> Bools:
+        """Where the bound is kept, or does not count."""
+        within = errors.within(self._bound, taken=self._taken.at(places))
+        kept: Bools = within | ~self._counts[places]
+        return kept
