@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -72,11 +72,35 @@ def compile_scene(
         For a texture without a model; for a scene beyond the recorded grid; for a bound that the
         actuator's limits or a budget do not allow, with the nearest that can be kept.
     """
+    return compile_scenes([scene], models, progress=lambda scene, texture: progress(texture))[0]
+
+
+def compile_scenes(
+    scenes: Sequence[Scene],
+    models: Mapping[str, TextureModel],
+    *,
+    progress: Callable[[Scene, str], None] = lambda scene, texture: None,
+) -> list[CompiledScene]:
+    """`compile_scene` of several scenes, which share what is known of the models' errors.
+
+    Parameters and errors as there; `progress` is told the scene, too.
+    """
+    known = Known({}, {})
+    return [_compiled(scene, models, known, progress=partial(progress, scene)) for scene in scenes]
+
+
+def _compiled(
+    scene: Scene,
+    models: Mapping[str, TextureModel],
+    known: Known,
+    *,
+    progress: Callable[[str], None],
+) -> CompiledScene:
     names = scene.textures or tuple(models)
     _check_models(scene, names, models)
     searches = []
     for name in names:
-        searches.append(_Search(models[name], scene))
+        searches.append(_Search(models[name], scene, known))
         searches[-1].candidates(scene.bound)
         progress(name)
     chosen = _within_budget(searches, scene, scene.bound)
@@ -133,6 +157,13 @@ class Candidate:
         )
 
 
+class Known(NamedTuple):
+    """What is known of models whatever the scene: errors by band, and by rate those of rounding."""
+
+    maps: dict[tuple[Any, ...], ErrorMaps]
+    roundings: dict[tuple[Any, ...], Errors | None]
+
+
 def _holds_in_single(candidate: Candidate) -> bool:
     """Whether single precision can hold the model's numbers and tell them apart."""
     try:
@@ -145,8 +176,8 @@ def _holds_in_single(candidate: Candidate) -> bool:
 class _Search:
     """Everything that may become of one texture in a scene."""
 
-    def __init__(self, full: TextureModel, scene: Scene) -> None:
-        self.full, self.scene = full, scene
+    def __init__(self, full: TextureModel, scene: Scene, known: Known) -> None:
+        self.full, self.scene, self._known = full, scene, known
         self.places = places_of(full, scene.hand)
         self._narrowest_hz = float(full.bandwidths_hz.min(initial=full.rate_hz))
         self.yardstick = Yardstick(
@@ -154,8 +185,6 @@ class _Search:
         )
         self.rate_hz = scene.actuator.rate_hz or full.rate_hz
         self.kept = kept_layers(full, scene, self.places)
-        self._maps: dict[tuple[int, ...], ErrorMaps] = {}
-        self._roundings: dict[tuple[int, ...], Errors | None] = {}
         self._regressions: dict[tuple[int, ...], list[tuple[Way, RegressedModel, Errors]]] = {}
         self._counted: dict[tuple[int, int], float] = {}
         self._found: dict[tuple[Any, ...], Candidate | None] = {}
@@ -168,22 +197,25 @@ class _Search:
         return self.maps(layers).model
 
     def maps(self, layers: tuple[int, ...]) -> ErrorMaps:
-        if layers not in self._maps:
+        key = self.full.texture, layers, self.scene.actuator.band_hz
+        if key not in self._known.maps:
             felt = with_signs_chosen_again(self.full, list(layers))
-            self._maps[layers] = ErrorMaps(felt, self.yardstick)
-        return self._maps[layers]
+            self._known.maps[key] = ErrorMaps(felt, self.yardstick)
+        return self._known.maps[key]
 
     def _rounding(self, layers: tuple[int, ...]) -> Errors | None:
         """Of single precision, at all places; None where it cannot be rendered."""
-        if layers not in self._roundings:
+        key = self.full.texture, layers, self.scene.actuator.band_hz, self.rate_hz
+        if key not in self._known.roundings:
             try:
                 worst = self.maps(layers).rounding(self.rate_hz)
             except InputError:  # numbers that single precision cannot hold or tell apart
                 worst = None
-            if worst is not None:
-                worst = Errors(*(np.full(self.places.counts.size, part[0]) for part in worst))
-            self._roundings[layers] = worst
-        return self._roundings[layers]
+            self._known.roundings[key] = worst
+        worst = self._known.roundings[key]
+        if worst is None:
+            return None
+        return Errors(*(np.full(self.places.counts.size, part[0]) for part in worst))
 
     def _regressed(self, layers: tuple[int, ...]) -> list[tuple[Way, RegressedModel, Errors]]:
         if layers not in self._regressions:
