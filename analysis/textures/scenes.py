@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import asdict
+from typing import Any
 
 import pandas as pd
 
@@ -14,8 +15,11 @@ from modeling.rendering.cost import Cost
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.cost import stored_numbers
 
-_MEASURES = (("gfc30", "GFC30", ""), ("bands_db", "error in nine bands", "dB"))
-_MEASURES += (("level_db", "level error", "dB"),)
+_MEASURES = (
+    ("gfc30", "GFC30", ""),
+    ("bands_db", "error in nine bands", "dB"),
+    ("level_db", "level error", "dB"),
+)
 BEFORE_AFTER_COLUMNS = (
     TEXTURE,
     Column("layers_before", "layers before"),
@@ -86,9 +90,9 @@ def before_after_table(compiled: CompiledScene) -> pd.DataFrame:
     return pd.DataFrame([*rows, total])[names(BEFORE_AFTER_COLUMNS)]
 
 
-def _row(compiled: CompiledScene, texture: CompiledTexture) -> dict[str, object]:
+def _row(compiled: CompiledScene, texture: CompiledTexture) -> dict[str, Any]:
     plan = texture.plan
-    row: dict[str, object] = {
+    row: dict[str, Any] = {
         "texture": texture.texture,
         "layers_before": texture.full.n_layers,
         "layers_after": texture.model.n_layers,
