@@ -56,7 +56,7 @@ def plot_tradeoff(compiled: CompiledScene, cost: Cost, *, ax: Axes | None = None
     ax.axhline(1.0, color=VERMILLION, lw=1)
     ax.annotate(
         "bound broken", (0.99, 1.03), xycoords=("axes fraction", "data"), color=VERMILLION,
-        fontsize=9,
+        fontsize=9, ha="right",
     )  # fmt: skip
     for number, texture in enumerate(compiled.textures):
         _plot_texture(ax, texture, cost, number)
@@ -81,13 +81,10 @@ def _plot_texture(ax: Axes, texture: CompiledTexture, cost: Cost, number: int) -
     ax.plot(costs[1:-1], shares[1:-1], color=colour, marker=marker, ms=3.5, lw=0)
     ax.plot(costs[:1], shares[:1], color=colour, marker=marker, ms=7, mfc="white", lw=0)
     ax.plot(costs[-1:], shares[-1:], color=colour, marker=marker, ms=8, mec=BLACK, lw=0)
-    refused = [each for each in texture.alternatives if each.share > 1]
-    if refused and cost == "operations":
-        next_longer = refused[-1]
-        end = (next_longer.operations, min(next_longer.share, HIGHEST_SHARE * 0.99))
-        ax.plot(
-            [costs[-1], end[0]], [shares[-1], end[1]], color=colour, lw=0.8, ls=":", clip_on=False
-        )
+    refused = texture.refused
+    if refused is not None and cost == "operations":
+        end = (refused.operations, min(refused.share, HIGHEST_SHARE))
+        ax.plot([costs[-1], end[0]], [shares[-1], end[1]], color=colour, lw=0.8, ls=":")
         ax.plot(*end, color=colour, marker="x", ms=6, lw=0, clip_on=False)
 
 

@@ -79,14 +79,10 @@ class Step:
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another update interval: what the cheapest table costs with it, and how much it takes.
-
-    `share` is that of the bound; above 1 the bound is broken.
-    """
+    """A longer update interval: what it would cost per sample, and take of the bound (above 1)."""
 
     update_ms: float
     operations: float
-    bytes: int
     share: float
 
 
@@ -112,7 +108,8 @@ class CompiledTexture:
         precision; and as the compiler chose.
     measures : tuple of Measured
     steps : tuple of Step
-    alternatives : tuple of Alternative
+    refused : Alternative, optional
+        The next longer update interval; None where there is none.
     """
 
     full: TextureModel
@@ -124,7 +121,7 @@ class CompiledTexture:
     plan: RenderPlan
     measures: tuple[Measured, ...]
     steps: tuple[Step, ...]
-    alternatives: tuple[Alternative, ...]
+    refused: Alternative | None
 
     @property
     def texture(self) -> str:

@@ -38,9 +38,9 @@ from modeling.scenes.error_maps import ErrorMaps
 from modeling.scenes.felt import at_places, kept_layers
 from modeling.scenes.measures import Errors, Yardstick
 from modeling.scenes.places import places_of
-from modeling.scenes.restricting import cut, thinned
+from modeling.scenes.restricting import cut, played, thinned
 from modeling.scenes.scene import Bound, Scene
-from modeling.scenes.thinning import fewest_nodes
+from modeling.scenes.thinning import NO_LIMIT, fewest_nodes, table_numbers
 
 # A hand that touches, turns or lifts off is noticed at most so late.
 UPDATES_MS = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
@@ -101,7 +101,7 @@ def _compiled(
     searches = []
     for name in names:
         searches.append(_Search(models[name], scene, known))
-        searches[-1].candidates(scene.bound)
+        searches[-1].cheapest(scene.bound)
         progress(name)
     chosen = _within_budget(searches, scene, scene.bound)
     if chosen is None:
@@ -157,6 +157,12 @@ class Candidate:
         )
 
 
+def _table_numbers(model: TextureModel | RegressedModel) -> int:
+    if isinstance(model, RegressedModel):
+        return table_numbers(2, 2, model.n_layers)
+    return table_numbers(model.speeds_mm_s.size, model.forces_n.size, model.n_layers)
+
+
 class Known(NamedTuple):
     """What is known of models whatever the scene: errors by band, and by rate those of rounding."""
 
@@ -178,6 +184,7 @@ class _Search:
 
     def __init__(self, full: TextureModel, scene: Scene, known: Known) -> None:
         self.full, self.scene, self._known = full, scene, known
+        self.played = played(full)
         self.places = places_of(full, scene.hand)
         self._narrowest_hz = float(full.bandwidths_hz.min(initial=full.rate_hz))
         self.yardstick = Yardstick(
@@ -193,14 +200,22 @@ class _Search:
     # --- What is known of a choice of layers
 
     def felt(self, layers: tuple[int, ...]) -> TextureModel:
-        """The full model with these layers alone."""
+        """The full model with these layers alone, as it is played."""
         return self.maps(layers).model
+
+    def _played(self, layers: tuple[int, ...]) -> TextureModel:
+        """The same as it is played, between the nodes of the full model's table."""
+        if len(layers) == self.full.n_layers:
+            return self.played
+        chosen = with_signs_chosen_again(self.full, list(layers))
+        fewer = self.played.with_layers(list(layers))
+        signs = np.sign(chosen.gains.sum(axis=(0, 1)))
+        return replace(fewer, gains=np.abs(fewer.gains) * np.where(signs < 0, -1.0, 1.0))
 
     def maps(self, layers: tuple[int, ...]) -> ErrorMaps:
         key = self.full.texture, layers, self.scene.actuator.band_hz
         if key not in self._known.maps:
-            felt = with_signs_chosen_again(self.full, list(layers))
-            self._known.maps[key] = ErrorMaps(felt, self.yardstick)
+            self._known.maps[key] = ErrorMaps(self._played(layers), self.yardstick)
         return self._known.maps[key]
 
     def _rounding(self, layers: tuple[int, ...]) -> Errors | None:
@@ -257,12 +272,12 @@ class _Search:
 
     def candidates(self, bound: Bound) -> list[Candidate]:
         """The cheapest one, and behind it those with the same layers and shorter intervals."""
-        first = self._cheapest(bound)
+        first = self.cheapest(bound)
         shorter = [u for u in self.intervals if u < first.plan.update_samples]
         others = [self._best(first.layers, samples, bound) for samples in shorter]
         return [first, *(other for other in others if other is not None)]
 
-    def _cheapest(self, bound: Bound) -> Candidate:
+    def cheapest(self, bound: Bound) -> Candidate:
         """The cheapest candidate that keeps a bound: there is one, the felt model itself."""
         choices = sorted(
             (self._operations(layers, samples), layers, samples)
@@ -290,16 +305,21 @@ class _Search:
         """The one with the fewest bytes; None where even the felt model breaks the bound."""
         key = layers, samples, bound
         if key not in self._found:
-            late = self._late(layers, samples)
-            roundings = [(True, self._rounding(layers)), (False, Errors.none(late.angle.size))]
-            found = [
-                candidate
-                for single, rounding in roundings
-                if rounding is not None and self._keeps(late + rounding, bound)
-                for candidate in self._driven(layers, samples, late, rounding, bound, single)
-            ]
-            self._found[key] = min(found, key=lambda each: each.key, default=None)
+            self._found[key] = self._smallest(layers, samples, bound)
         return self._found[key]
+
+    def _smallest(self, layers: tuple[int, ...], samples: int, bound: Bound) -> Candidate | None:
+        late, rounding = self._late(layers, samples), self._rounding(layers)
+        best = None
+        if rounding is not None and self._keeps(late + rounding, bound):
+            best = self._driven(layers, samples, late, rounding, bound)
+        if self._keeps(late, bound):
+            # Twice the bytes of a number are worth it only for less than half the numbers.
+            below = NO_LIMIT if best is None else -(-_table_numbers(best.model) // 2)
+            double = self._driven(layers, samples, late, None, bound, below=below)
+            if double is not None and (best is None or double.key < best.key):
+                best = double
+        return best
 
     def _late(self, layers: tuple[int, ...], samples: int) -> Errors:
         # Of an update at every sample nothing is late.
@@ -315,19 +335,27 @@ class _Search:
         layers: tuple[int, ...],
         samples: int,
         late: Errors,
-        rounding: Errors,
+        rounding: Errors | None,
         bound: Bound,
-        single: bool,
-    ) -> list[Candidate]:
-        """Of one interval and precision: of each way the smallest that keeps the bound."""
-        plan = self.plan(samples, single=single)
-        taken = late + rounding
+        *,
+        below: int = NO_LIMIT,
+    ) -> Candidate | None:
+        """Of one interval and precision the smallest way; None where it takes `below` numbers.
 
-        maps = self.maps(layers)
+        Without errors by `rounding` it is in double precision.
+        """
+        maps, plan = self.maps(layers), self.plan(samples, single=rounding is not None)
+        if rounding is None:
+            rounding = Errors.none(late.angle.size)
+        taken = late + rounding
         ways: list[tuple[Way, Any, Errors]] = [
-            driven for driven in self._regressed(layers) if self._keeps(taken + driven[2], bound)
+            driven
+            for driven in self._regressed(layers)
+            if self._keeps(taken + driven[2], bound) and _table_numbers(driven[1]) < below
         ]
-        nodes = fewest_nodes(maps, self.places, bound=bound, taken=taken)
+        # A grid is worth it only where it is smaller than a regression.
+        below = min([below, *(_table_numbers(model) for _, model, _ in ways)])
+        nodes = fewest_nodes(maps, self.places, bound=bound, taken=taken, below=below)
         if nodes is not None:
             fewer = thinned(maps.model, self.places, *nodes)
             ways.append(("grid", fewer, maps.of_nodes(*nodes)))
@@ -336,7 +364,8 @@ class _Search:
             Candidate(layers, replace(model, compiled_for=note), way, plan, late, rounding, at_rest)
             for way, model, at_rest in ways
         ]
-        return [each for each in found if not single or _holds_in_single(each)]
+        held = [each for each in found if not plan.single or _holds_in_single(each)]
+        return min(held, key=lambda each: each.key, default=None)
 
     def _note(self, plan: RenderPlan) -> CompiledFor:
         return CompiledFor(
@@ -363,7 +392,7 @@ class _Search:
             plan=candidate.plan,
             measures=self._measures(candidate),
             steps=self._steps(candidate),
-            alternatives=self._alternatives(candidate),
+            refused=self._refused(candidate),
         )
 
     def share_of_bound(self, errors: Errors) -> float:
@@ -399,19 +428,18 @@ class _Search:
 
     def _steps(self, candidate: Candidate) -> tuple[Step, ...]:
         """What each step brings, in the order of the compiler."""
-        felt, every_ms = (
-            self.felt(candidate.layers),
-            plan_for(self.full.rate_hz, rate_hz=self.rate_hz),
-        )
+        felt = with_signs_chosen_again(self.full, list(candidate.layers))
+        shorter = cut(felt, self.places)
+        every_ms = plan_for(self.full.rate_hz, rate_hz=self.rate_hz)
         usual = replace(every_ms, limits=candidate.plan.limits)
-        usual_late = self._late(candidate.layers, usual.update_samples)
         longer = replace(usual, update_samples=candidate.plan.update_samples)
-        at_rest = candidate.at_rest
+        maps, at_rest = self.maps(candidate.layers), candidate.at_rest
+        late = self._late(candidate.layers, usual.update_samples)
         stages: list[tuple[str, TextureModel | RegressedModel, RenderPlan, Errors]] = [
-            ("full model", self.full, usual, usual_late),
-            ("layers not felt dropped", felt, usual, usual_late),
-            ("grid cut to the scene", cut(felt, self.places), usual, usual_late),
-            (_DRIVEN[candidate.way], candidate.model, usual, usual_late + at_rest),
+            ("full model", self.full, usual, late),
+            ("layers not felt dropped", felt, usual, late + maps.of_model(felt)),
+            ("grid cut to the scene", shorter, usual, late + maps.of_model(shorter)),
+            (_DRIVEN[candidate.way], candidate.model, usual, late + at_rest),
             ("update interval", candidate.model, longer, candidate.late + at_rest),
             ("precision", candidate.model, candidate.plan, candidate.together),
         ]
@@ -430,23 +458,15 @@ class _Search:
             share=self.share_of_bound(errors),
         )
 
-    def _alternatives(self, candidate: Candidate) -> tuple[Alternative, ...]:
-        """The same layers at every update interval, the one that breaks the bound included."""
-        found = []
-        for samples in self.intervals:
-            best = self._best(candidate.layers, samples, self.scene.bound)
-            ms = 1e3 * samples / self.rate_hz
-            if best is not None:
-                operations, size, _ = best.key
-                share = self.share_of_bound(best.together)
-            else:
-                plan = replace(candidate.plan, update_samples=samples)
-                cost = plan.cost(candidate.model)
-                operations, size = cost.operations, cost.table_bytes + cost.state_bytes
-                late = self._late(candidate.layers, samples)
-                share = self.share_of_bound(late)
-            found.append(Alternative(ms, operations, size, share))
-        return tuple(found)
+    def _refused(self, candidate: Candidate) -> Alternative | None:
+        """The next longer update interval, with which the same layers would break the bound."""
+        longer = [u for u in self.intervals if u > candidate.plan.update_samples]
+        if not longer:
+            return None
+        plan = replace(candidate.plan, update_samples=longer[-1])
+        share = self.share_of_bound(self._late(candidate.layers, plan.update_samples))
+        ms = 1e3 * plan.update_samples / plan.rate_hz
+        return Alternative(ms, plan.cost(candidate.model).operations, share)
 
     # --- What the actuator does not allow
 
@@ -522,15 +542,16 @@ def _within_budget(
     searches: Sequence[_Search], scene: Scene, bound: Bound
 ) -> list[Candidate] | None:
     """One candidate of each texture, with the fewest operations in sum that a budget allows."""
-    allowed = []
-    for search in searches:
-        most = scene.budget.most_operations(search.rate_hz)
-        allowed.append([each for each in search.candidates(bound) if each.key[0] <= most])
-    if not all(allowed):
+    most = [scene.budget.most_operations(search.rate_hz) for search in searches]
+    cheapest = [search.cheapest(bound) for search in searches]
+    if any(each.key[0] > limit for each, limit in zip(cheapest, most, strict=True)):
         return None
-    first = [each[0] for each in allowed]
-    if _bytes(first) <= scene.budget.most_bytes:
-        return first
+    if _bytes(cheapest) <= scene.budget.most_bytes:
+        return cheapest
+    allowed = [
+        [each for each in search.candidates(bound) if each.key[0] <= limit]
+        for search, limit in zip(searches, most, strict=True)
+    ]
     return _fewest_operations(allowed, scene.budget.most_bytes)
 
 

@@ -16,18 +16,20 @@ from modeling.scenes.scene import Range
 from modeling.scenes.thinning import Nodes
 
 
-def cut(model: TextureModel, places: Places) -> TextureModel:
-    """The model from the scene's lowest to its highest speed and force, and no further.
+def played(model: TextureModel) -> TextureModel:
+    """The model as a renderer plays it: blended linearly between the nodes of its table."""
+    return _on_axes(model, *nodes_of(model))
 
-    What it tells within them stays as it is. A model that blends in logarithms gets the nodes of
-    its table, between which the renderer blends linearly anyway.
-    """
-    every = tuple(tuple(range(axis.size)) for axis in nodes_of(model))
-    return thinned(model, places, every[0], every[1])
+
+def cut(model: TextureModel, places: Places) -> TextureModel:
+    """The model from the scene's lowest to its highest speed and force, blended as it was."""
+    speeds = _within(model.speeds_mm_s, places.speed_range)
+    forces = _within(model.forces_n, places.force_range)
+    return replace(_on_axes(model, speeds, forces), blending=model.blending)
 
 
 def thinned(model: TextureModel, places: Places, rows: Nodes, columns: Nodes) -> TextureModel:
-    """The model on some nodes of its table alone, blended linearly and cut off as by `cut`."""
+    """The model on some nodes of its table alone, blended linearly, as far as the scene reaches."""
     chosen = [
         axis[list(nodes)] for axis, nodes in zip(nodes_of(model), (rows, columns), strict=True)
     ]

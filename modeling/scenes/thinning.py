@@ -2,15 +2,18 @@
 
 docs/method/scenes.md#fewest-nodes
 
-An error in a cell depends on its four corners alone. So a choice of speeds and of forces is good
-where each of its cells is, and the fewest forces for a choice of speeds are a shortest path through
-cells. All choices of speeds are looked at that could still be cheaper: the result is the cheapest.
+An error in a cell depends on its four corners alone, so that a choice of speeds and of forces is
+good where each of its cells is. Choices of speeds grow node by node; each knows the segments of
+forces with which all its cells are good, and the fewest forces are a shortest path through these.
+What can no longer become the smallest is dropped: a choice that ends at the same node as another
+one which is no longer and leaves no fewer segments, and one that is too long already. The result is
+the smallest of all.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterator, Sequence
-from functools import cache
+from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,10 +24,11 @@ from modeling.scenes.places import Places, enclosing
 from modeling.scenes.scene import Bound, Range
 
 Nodes = tuple[int, ...]
+NO_LIMIT = 2**62
 
 
 def fewest_nodes(
-    maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors
+    maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors, below: int = NO_LIMIT
 ) -> tuple[Nodes, Nodes] | None:
     """Speeds and forces of a table, as indices, that keep a bound with the fewest numbers.
 
@@ -36,42 +40,33 @@ def fewest_nodes(
     bound : Bound
     taken : Errors
         What of it is taken already at each node, (P,).
+    below : int
+        How many numbers (`table_numbers`) are too many.
 
     Returns
     -------
     two tuples of int, or None
         The first may be below the scene and the last above it. None where what is taken breaks the
-        bound.
+        bound, or where it takes too many numbers.
     """
-    good = _Cells(maps, places, bound=bound, taken=taken)
-    speeds = _Axis(places.speeds_mm_s, places.speed_range)
-    forces = _Axis(places.forces_n, places.force_range)
-    width = 1 + 3 * maps.model.n_layers
-    best: tuple[int, Nodes, Nodes] | None = None
-
-    for rows in speeds.choices(lambda row: forces.shortest(good.columns([row])) is not None):
-        size = speeds.size_of(rows)
-        if best is not None and _numbers(size, forces.least, width) >= best[0]:
-            break  # those to come are no smaller
-        columns = _fewest_columns(forces, good, segments_of(rows))
-        if columns is not None:
-            numbers = _numbers(size, forces.size_of(columns), width)
-            if best is None or numbers < best[0]:
-                best = numbers, rows, columns
-    return None if best is None else best[1:]
+    search = _Search(maps, places, bound=bound, taken=taken, below=below)
+    while True:  # cells that only seem good are struck out, until none is left among the chosen
+        found = search.smallest()
+        if found is None or search.are_good(*found):
+            return found
 
 
-def _fewest_columns(forces: _Axis, good: _Cells, rows: list[Segment]) -> Nodes | None:
-    """The fewest forces with which all cells are good: of those that seem so, until they are."""
-    while True:
-        columns = forces.shortest(good.columns(rows))
-        if columns is None or good.are_good(rows, segments_of(columns)):
-            return columns
-
-
-def _numbers(speeds: int, forces: int, width: int) -> int:
+def table_numbers(speeds: int, forces: int, layers: int) -> int:
     """Of a table with these axes; one of a single value is stored twice."""
-    return max(speeds, 2) * max(forces, 2) * width + max(speeds, 2) + max(forces, 2)
+    speeds, forces = max(speeds, 2), max(forces, 2)
+    return speeds * forces * (1 + 3 * layers) + speeds + forces
+
+
+class _Choice(NamedTuple):
+    """Speeds from below the scene up to some node, and the segments of forces that are left."""
+
+    nodes: Nodes
+    columns: int  # a bit for each segment
 
 
 class _Axis:
@@ -84,77 +79,121 @@ class _Axis:
         self.starts = list(range(first, -1, -1))
         self.ends = list(range(last, nodes.size))
         self.inner = list(range(first + 1, last))
-        self.least = 1 if self._single else 2
 
-    def size_of(self, nodes: Nodes) -> int:
-        """How many values are left once the axis is cut off at the scene's ends."""
-        return 1 if self._single else max(len(nodes), 2)
+    def size_of(self, nodes: int) -> int:
+        """How many values are left of so many once the axis is cut off at the scene's ends."""
+        return 1 if self._single else max(nodes, 2)
 
-    def choices(self, viable: Callable[[Segment], bool]) -> Iterator[Nodes]:
-        """All choices of nodes that enclose the scene by viable segments, smallest first."""
-        for start in self.starts:
-            if start in self.ends and viable((start, start)):
-                yield (start,)
-        good = cache(viable)
-        paths: list[Nodes] = [(start,) for start in self.starts]
-        while paths:
-            yield from (
-                (*path, end) for path in paths for end in self.ends if good((path[-1], end))
-            )
-            paths = [
-                (*path, node)
-                for path in paths
-                for node in self.inner
-                if path[-1] < node and good((path[-1], node))
-            ]
 
-    def shortest(self, good: Container[Segment]) -> Nodes | None:
-        """The fewest nodes, all segments between which are good; None where there are none."""
-        for node in self.starts:
-            if node in self.ends and (node, node) in good:
+class _Search:
+    """The smallest choice of nodes, as far as it is known which cells are good."""
+
+    def __init__(
+        self, maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors, below: int
+    ) -> None:
+        self._maps, self._bound, self._taken, self._below = maps, bound, taken, below
+        self._counts = places.counts.ravel()
+        self._speeds = _Axis(places.speeds_mm_s, places.speed_range)
+        self._forces = _Axis(places.forces_n, places.force_range)
+        self._bits = {s: 1 << bit for bit, s in enumerate(maps.column_segments)}
+        self._every = (1 << len(self._bits)) - 1
+        self._likely: dict[Segment, int] = {}
+        self._paths: dict[int, Nodes | None] = {}
+
+    def smallest(self) -> tuple[Nodes, Nodes] | None:
+        """The fewest numbers with which all cells seem good."""
+        best: tuple[Nodes, Nodes] | None = None
+        least = self._below
+        growing = [_Choice((node,), self._every) for node in self._speeds.starts]
+        kept: dict[int, list[int]] = {}
+        whole = [
+            _Choice((node,), self._columns((node, node)))
+            for node in self._speeds.starts
+            if node in self._speeds.ends
+        ]
+        while growing or whole:
+            ended = [*whole, *self._longer(growing, self._speeds.ends)]
+            for choice in ended:
+                numbers, forces = self._fewest(choice)
+                if forces is not None and numbers < least:
+                    best, least = (choice.nodes, forces), numbers
+            longer, whole = self._longer(growing, self._speeds.inner), []
+            growing = [each for each in longer if self._may_win(each, kept, least=least)]
+        return best
+
+    def _longer(self, choices: list[_Choice], nodes: list[int]) -> list[_Choice]:
+        return [
+            _Choice((*choice.nodes, node), choice.columns & self._columns((choice.nodes[-1], node)))
+            for choice in choices
+            for node in nodes
+            if node > choice.nodes[-1]
+        ]
+
+    def _may_win(self, choice: _Choice, kept: dict[int, list[int]], *, least: int) -> bool:
+        """Whether a choice could, with one more speed, be the smallest: no other one beats it."""
+        numbers, _ = self._fewest(choice, more=1)
+        others = kept.setdefault(choice.nodes[-1], [])
+        if numbers >= least or any(choice.columns & ~other == 0 for other in others):
+            return False
+        others.append(choice.columns)
+        return True
+
+    def _fewest(self, choice: _Choice, *, more: int = 0) -> tuple[int, Nodes | None]:
+        """The fewest forces for a choice of speeds, and the numbers with so many more speeds."""
+        forces = self._fewest_forces(choice.columns)
+        if forces is None:
+            return NO_LIMIT, None
+        return self._numbers(len(choice.nodes) + more, forces), forces
+
+    def _numbers(self, speeds: int, forces: Nodes) -> int:
+        sizes = self._speeds.size_of(speeds), self._forces.size_of(len(forces))
+        return table_numbers(*sizes, self._maps.model.n_layers)
+
+    def _fewest_forces(self, columns: int) -> Nodes | None:
+        """A shortest path through segments of forces that encloses the scene; None without any."""
+        if columns not in self._paths:
+            self._paths[columns] = self._shortest(columns)
+        return self._paths[columns]
+
+    def _shortest(self, columns: int) -> Nodes | None:
+        axis, bits = self._forces, self._bits
+        for node in axis.starts:
+            if node in axis.ends and columns & bits[node, node]:
                 return (node,)
-        paths: dict[int, Nodes] = {start: (start,) for start in self.starts}
+        paths: dict[int, Nodes] = {start: (start,) for start in axis.starts}
         found: list[Nodes] = []
-        for node in [*self.inner, *self.ends]:
-            reached = [path for last, path in paths.items() if last < node and (last, node) in good]
+        for node in [*axis.inner, *axis.ends]:
+            reached = [
+                path for last, path in paths.items() if last < node and columns & bits[last, node]
+            ]
             if not reached:
                 continue
             path = (*min(reached, key=len), node)
-            if node in self.ends:
+            if node in axis.ends:
                 found.append(path)
             else:
                 paths[node] = path
         return min(found, key=len, default=None)
 
+    # --- Cells
 
-class _Cells:
-    """Which cells keep the bound: all that do so in their middle, until they are looked at."""
-
-    def __init__(self, maps: ErrorMaps, places: Places, *, bound: Bound, taken: Errors) -> None:
-        self._maps, self._bound, self._taken = maps, bound, taken
-        self._counts = places.counts.ravel()
-        self._likely: dict[Segment, set[Segment]] = {}
-
-    def columns(self, rows: Sequence[Segment]) -> set[Segment]:
-        """The segments of forces with which all of these segments of speeds seem good."""
-        return set[Segment].intersection(*(self._columns(row) for row in rows))
-
-    def are_good(self, rows: Sequence[Segment], columns: Sequence[Segment]) -> bool:
-        """Whether cells are good everywhere; those that are not seem so no longer."""
-        good = True
-        for row in rows:
-            for column, cell in zip(columns, self._maps.cells(row, columns), strict=True):
-                if not self._kept(*cell).all():
-                    self._likely[row].discard(column)
-                    good = False
-        return good
-
-    def _columns(self, row: Segment) -> set[Segment]:
+    def _columns(self, row: Segment) -> int:
+        """The segments of forces with which a segment of speeds seems good."""
         if row not in self._likely:
             kept = self._kept(*self._maps.centres(row))
-            segments = zip(self._maps.column_segments, kept, strict=True)
-            self._likely[row] = {segment for segment, good in segments if good}
+            self._likely[row] = sum(compress(self._bits.values(), kept))
         return self._likely[row]
+
+    def are_good(self, speeds: Nodes, forces: Nodes) -> bool:
+        """Whether all cells are good everywhere; those that are not seem so no longer."""
+        good = True
+        columns = segments_of(forces)
+        for row in segments_of(speeds):
+            for column, cell in zip(columns, self._maps.cells(row, columns), strict=True):
+                if not self._kept(*cell).all():
+                    self._likely[row] &= ~self._bits[column]
+                    good = False
+        return good
 
     def _kept(self, places: Integers, errors: Errors) -> Bools:
         """Where the bound is kept, or does not count."""
