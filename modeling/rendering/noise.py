@@ -29,16 +29,22 @@ def _mix(z: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return mixed
 
 
+def seed_mix(seed: int) -> np.uint64:
+    """What a seed, 0 … 2⁶⁴ − 1 (else InputError), adds to the keys of all its streams."""
+    _check_word("seed", seed)
+    return np.uint64(_mix(np.array([seed], dtype=np.uint64) + _GOLDEN)[0])
+
+
 def stream_key(seed: int, stream: int = 0) -> np.uint64:
     """The key of one noise stream; `seed` and `stream` are 0 … 2⁶⁴ − 1, else InputError."""
-    for name, value in (("seed", seed), ("stream", stream)):
-        if not (is_whole(value) and 0 <= value < 2**64):
-            raise InputError(
-                f"expected a {name} of 0 … 2⁶⁴ − 1, got {shown(value)}; choose another."
-            )
-    pair = np.array([seed, stream], dtype=np.uint64)
-    first = _mix(pair[:1] + _GOLDEN)
-    return np.uint64(_mix((first ^ pair[1:]) + _GOLDEN)[0])
+    first = seed_mix(seed)
+    _check_word("stream", stream)
+    return np.uint64(_mix((first ^ np.array([stream], dtype=np.uint64)) + _GOLDEN)[0])
+
+
+def _check_word(name: str, value: int) -> None:
+    if not (is_whole(value) and 0 <= value < 2**64):
+        raise InputError(f"expected a {name} of 0 … 2⁶⁴ − 1, got {shown(value)}; choose another.")
 
 
 def white_noise(key: np.uint64, start: int, count: int) -> Floats:

@@ -1,10 +1,39 @@
-from dataclasses import dataclass
+"""Micro-controllers by name: their clock, their memory, and what an operation costs them."""
 
-from modeling.errors import InputError
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+
+from modeling.checks import check_rate
+from modeling.errors import InputError, shown
+from modeling.files.tables import number, read_table, whole_number
+
+_COLUMNS = ("name", "core", "clock_hz", "memory_bytes", "cycles_per_operation", "source")
 
 
 @dataclass(frozen=True)
 class MicroController:
+    """What a micro-controller has for rendering in single precision.
+
+    Parameters
+    ----------
+    name : str
+    core : str
+        Its processor, with a floating-point unit.
+    clock_hz : float
+        The highest clock of the data sheet.
+    memory_bytes : int
+        RAM; constants may stay in its flash memory.
+    cycles_per_operation : float
+        Of a floating-point operation that `RenderPlan.cost` counts, all else included: instructions
+        of an exported header, each taken as one cycle
+        (docs/method/rendering.md#instructions-per-operation).
+    source : str
+        The data sheet.
+    """
+
     name: str
     core: str
     clock_hz: float
@@ -13,10 +42,41 @@ class MicroController:
     source: str
 
     def operations_per_sample(self, rate_hz: float) -> float:
-        return self.clock_hz / self.cycles_per_operation / rate_hz
+        """How many operations it has time for from one sample to the next, with nothing else to do.
+
+        Raises
+        ------
+        InputError
+            For what is no sampling rate.
+        """
+        check_rate(rate_hz)
+        return self.clock_hz / (rate_hz * self.cycles_per_operation)
 
     @staticmethod
-    def named(name: str) -> "MicroController":
-        if name == "stm32l432":
-            return MicroController(name, "Cortex-M4F", 80e6, 65536, 3.0, "stub")
-        raise InputError(f"expected a micro-controller among stm32l432, got {name!r}; choose one.")
+    def named(name: str) -> MicroController:
+        """One of those that come along; InputError, with all their names, for another."""
+        known = _shipped()
+        if not (isinstance(name, str) and name in known):
+            raise InputError(
+                f"expected a micro-controller among {', '.join(known)}, got {shown(name)}; give "
+                "one of them."
+            )
+        return known[name]
+
+
+@cache
+def _shipped() -> dict[str, MicroController]:
+    folder = resources.files("modeling.scenes") / "shipped"
+    with resources.as_file(folder / "microcontrollers.tsv") as path:
+        rows = read_table(path, _COLUMNS)
+    return {
+        row["name"]: MicroController(
+            name=row["name"],
+            core=row["core"],
+            clock_hz=number(row["clock_hz"], "clock_hz"),
+            memory_bytes=whole_number(row["memory_bytes"], "memory_bytes"),
+            cycles_per_operation=number(row["cycles_per_operation"], "cycles_per_operation"),
+            source=row["source"],
+        )
+        for row in rows
+    }

@@ -1,12 +1,13 @@
 /* A texture rendered on a micro-controller without an operating system: the hand comes in over the
    serial port, samples go out. For ARM's boards MPS2 as QEMU knows them; mps2.ld is their memory.
 
-   Define HEADER, the exported header, and TEXTURE, its name. In comes a request, out goes an answer,
-   all little-endian:
+   Define HEADER, the exported header, and TEXTURE, its name; or SCENE, that of a scene, whose last texture
+   the hand is switched to before sample SWITCH_AT, the first of a call. In comes a request, out goes an answer, all little-endian:
        request   tq_real's size, samples, samples per reading, samples per call (4 bytes each), key
-                 (8 bytes), then for every reading speed in 1/64 mm/s and force in 1/4096 N (2 bytes
+                 (8 bytes; of a scene the texture to begin with), then for every reading speed in 1/64 mm/s and force in 1/4096 N (2 bytes
                  each, signed; a speed of -32768 is none)
-       answer    ticks of 25 MHz that the calls took (4 bytes), samples, the CRC-32 of all before */
+       answer    ticks of 25 MHz that a loop of a million instructions took, and that the calls of the
+                 renderer took (4 bytes each), samples, the CRC-32 of all before */
 
 #include HEADER
 
@@ -88,6 +89,14 @@ static uint32_t ticks_since(uint32_t before)
     return (before - TICK_NOW) & 0xFFFFFF;
 }
 
+/* A million instructions: a subtraction and a jump, half a million times. */
+static uint32_t ticks_of_a_million(void)
+{
+    uint32_t left = 500000, before = TICK_NOW;
+    __asm volatile("1: subs %0, %0, #1\nbne 1b" : "+r"(left) : : "cc");
+    return ticks_since(before);
+}
+
 /* --- Rendering --------------------------------------------------------------------------------- */
 
 typedef struct {
@@ -97,14 +106,42 @@ typedef struct {
 
 static int16_t hand[MOST_SAMPLES][2];
 static tq_real out[MOST_SAMPLES], speed[MOST_PER_CALL], force[MOST_PER_CALL];
+
+#ifdef SCENE
+static tq_real memory[NAMED(SCENE, _memory)];
+static tq_scene_hand state;
+
+static void begin(uint64_t key)
+{
+    tq_scene_start(&state, &SCENE, memory, 0, (int)key);
+}
+
+static void play(uint32_t done, uint32_t count)
+{
+    if (done == SWITCH_AT)
+        tq_scene_switch(&state, SCENE.count - 1);
+    tq_scene_render(&state, speed, force, out + done, count);
+}
+#else
 static tq_real memory[NAMED(TEXTURE, _memory)];
 static tq_state state;
+
+static void begin(uint64_t key)
+{
+    tq_start(&TEXTURE, &state, memory, key);
+}
+
+static void play(uint32_t done, uint32_t count)
+{
+    tq_render(&TEXTURE, &state, speed, force, out + done, count);
+}
+#endif
 
 /* All samples; the ticks that the calls of the renderer took. */
 static uint32_t render(const request *asked)
 {
     uint32_t done, i, ticks = 0, before;
-    tq_start(&TEXTURE, &state, memory, asked->key);
+    begin(asked->key);
     for (done = 0; done < asked->samples; done += asked->per_call) {
         uint32_t count = asked->samples - done;
         count = count < asked->per_call ? count : asked->per_call;
@@ -116,7 +153,7 @@ static uint32_t render(const request *asked)
                 speed[i] = (tq_real)__builtin_nanf("");
         }
         before = TICK_NOW;
-        tq_render(&TEXTURE, &state, speed, force, out + done, count);
+        play(done, count);
         ticks += ticks_since(before);
     }
     return ticks;
@@ -125,7 +162,7 @@ static uint32_t render(const request *asked)
 int main(void)
 {
     request asked;
-    uint32_t ticks, check;
+    uint32_t ticks[2], check;
     UART_DIVISOR = 16;
     UART_CONTROL = 3; /* both ways */
     TICK_RELOAD = 0xFFFFFF;
@@ -135,8 +172,9 @@ int main(void)
         || !asked.per_call || asked.per_call > MOST_PER_CALL)
         return 1;
     get(hand, (asked.samples + asked.hold - 1) / asked.hold * sizeof hand[0]);
-    ticks = render(&asked);
-    put(&ticks, sizeof ticks);
+    ticks[0] = ticks_of_a_million();
+    ticks[1] = render(&asked);
+    put(ticks, sizeof ticks);
     put(out, asked.samples * sizeof out[0]);
     check = ~crc;
     put(&check, sizeof check);

@@ -1,0 +1,159 @@
+/* A scene: one hand over several textures, switched without a click. docs/method/rendering.md#scenes
+
+   C99 or C++17; the lines of kernel.h on compiling and its macros hold here, too.
+
+   Each hand has one state and one memory, whatever it touches. After a switch the present texture fades
+   out as if the hand had lifted off: every gain is at 0 after 5 ms or one parameter update, whichever is
+   longer. Then the next texture starts, in silence for one parameter update, and its gains rise from 0
+   to those of the hand, the largest of them in 5 ms again. So it is heard after 6 ms with updates every
+   millisecond. In between nobody plays: a state renders one texture at a time, and the dearest sample
+   costs what tq_start and tq_render need for it.
+
+   All textures of a scene must have the same rate, compensation and limits. What the limits remember and
+   what rings in the compensation goes on over a switch, and so do the counters (hand->state.counters):
+   a limit of the actuator holds for what leaves, whatever played.
+
+   Noise: before the first switch stream (number of the hand) * 2^32, after switch n stream n more, all
+   of the scene's seed. Output depends on the blocks by nothing else than when switches are asked for:
+   with these at equal samples it has equal bits.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_SCENE_H
+#define TQ_SCENE_H
+
+#ifndef TQ_KERNEL_H
+#include "kernel.h"
+#endif
+
+#define TQ_LARGER(a, b) ((a) > (b) ? (a) : (b))
+
+/* What can be touched: constant while it plays. */
+typedef struct {
+    const tq_texture *textures;
+    int count;
+    uint64_t noise; /* of the seed: tq_scene_mix(seed + UINT64_C(0x9E3779B97F4A7C15)) */
+} tq_scene;
+
+typedef struct {
+    const tq_scene *scene;
+    uint64_t number, switches; /* of the hand; switches so far */
+    int now, wanted;           /* indices of the texture that plays, fades included, and of the next */
+    tq_state state;
+} tq_scene_hand;
+
+/* The mixing of SplitMix64. */
+TQ_INLINE uint64_t tq_scene_mix(uint64_t z)
+{
+    z = (z ^ (z >> 30)) * UINT64_C(0xBF58476D1CE4E5B9);
+    z = (z ^ (z >> 27)) * UINT64_C(0x94D049BB133111EB);
+    return z ^ (z >> 31);
+}
+
+TQ_INLINE const tq_texture *tq_scene_texture(const tq_scene_hand *h)
+{
+    return h->scene->textures + h->now;
+}
+
+/* The key of the noise until the next switch. */
+TQ_INLINE uint64_t tq_scene_key(const tq_scene_hand *h)
+{
+    uint64_t stream = (h->number << 32) + h->switches;
+    return tq_scene_mix((h->scene->noise ^ stream) + UINT64_C(0x9E3779B97F4A7C15));
+}
+
+/* Whether no gain is left, as at lift-off and in the first update after a switch. */
+TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
+{
+    const tq_texture *t = tq_scene_texture(h);
+    const tq_real *gain = tq_row(t, &h->state, TQ_GAIN);
+    int i;
+    for (i = 0; i < t->layers; i++)
+        if (gain[i] != 0)
+            return 0;
+    return h->state.floor_gain == 0;
+}
+
+/* The wanted texture, from its beginning, behind the same compensation and limits as before. */
+static void tq_scene_next(tq_scene_hand *h)
+{
+    tq_state before = h->state;
+    h->now = h->wanted;
+    h->switches++;
+    tq_start(tq_scene_texture(h), &h->state, before.memory, tq_scene_key(h));
+    h->state.notch_s1 = before.notch_s1;
+    h->state.notch_s2 = before.notch_s2;
+    h->state.mean_square = before.mean_square;
+    h->state.sounding = before.sounding;
+    h->state.silent = before.silent;
+    h->state.counters = before.counters;
+}
+
+/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
+static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_real *force, size_t step,
+                               tq_real *out, size_t count)
+{
+    tq_state *s = &h->state;
+    const tq_real off = 0;
+    while (count) {
+        const tq_texture *t = tq_scene_texture(h);
+        int left = s->position == 0 ? 0 : t->update_samples - s->since_update, changes, lifted;
+        size_t piece = count;
+        uint64_t lift_offs = s->counters.lift_offs;
+        if (left == 0 && h->wanted != h->now && tq_scene_silent(h)) {
+            tq_scene_next(h);
+            t = tq_scene_texture(h);
+        }
+        changes = h->wanted != h->now || (h->switches && s->position == 0);
+        lifted = changes && left == 0; /* as the next update reads the hand */
+        if (changes) {
+            size_t most = (size_t)(left ? left : t->update_samples);
+            piece = count < most ? count : most;
+        }
+        if (lifted)
+            lift_offs += tq_lift_offs(speed, force, step, (int)piece);
+        tq_render_by(t, s, speed, lifted ? &off : force, lifted ? 0 : step, out, piece);
+        if (lifted) /* those of the hand, not of what was read for it */
+            s->counters.lift_offs = lift_offs;
+        speed += step * piece, force += step * piece;
+        out += piece, count -= piece;
+    }
+}
+
+/* --- The calls --------------------------------------------------------------------------------- */
+
+/* A hand upon a texture of the scene, of which it takes the first where there is none of this index.
+   `memory` holds as many reals as the neediest texture's TQ_MEMORY and must live as long as the hand.
+   Hands of different numbers have different noise. */
+static inline void tq_scene_start(tq_scene_hand *h, const tq_scene *scene, tq_real *memory,
+                                  uint32_t number, int texture)
+{
+    h->scene = scene;
+    h->number = number;
+    h->switches = 0;
+    h->now = h->wanted = texture >= 0 && texture < scene->count ? texture : 0;
+    tq_start(tq_scene_texture(h), &h->state, memory, tq_scene_key(h));
+}
+
+/* What the hand shall touch from now on: asked for between two blocks, and at any time again. That which
+   plays rises again if it was fading out. An index of no texture changes nothing. */
+static inline void tq_scene_switch(tq_scene_hand *h, int texture)
+{
+    if (texture >= 0 && texture < h->scene->count)
+        h->wanted = texture;
+}
+
+/* The next samples, as of tq_render and tq_render_held. */
+static inline void tq_scene_render(tq_scene_hand *h, const tq_real *speed, const tq_real *force,
+                                   tq_real *out, size_t count)
+{
+    tq_scene_render_by(h, speed, force, 1, out, count);
+}
+
+static inline void tq_scene_render_held(tq_scene_hand *h, tq_real speed, tq_real force, tq_real *out,
+                                        size_t count)
+{
+    tq_scene_render_by(h, &speed, &force, 0, out, count);
+}
+
+#endif
