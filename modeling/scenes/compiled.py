@@ -18,7 +18,7 @@ from modeling.models.texture_model import TextureModel
 from modeling.rendering.cost import Cost
 from modeling.rendering.plan import RenderPlan
 from modeling.rendering.renderer import Renderer
-from modeling.scenes.cost import scene_bytes
+from modeling.scenes.cost import Rendered, in_one_precision, scene_bytes
 from modeling.scenes.scene import Scene
 
 FORMAT = "tactileq.compiled-scene"
@@ -178,7 +178,12 @@ class CompiledScene:
     @property
     def bytes_after(self) -> int:
         """Of the least models together: what they share and a hand's state are stored once."""
-        return scene_bytes((compiled.model, compiled.plan) for compiled in self.textures)
+        return scene_bytes(self.rendered)
+
+    @property
+    def rendered(self) -> list[Rendered]:
+        """Each least model with its plan, all in one precision, as one program renders them."""
+        return in_one_precision((compiled.model, compiled.plan) for compiled in self.textures)
 
     @property
     def operations_before(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,11 +14,18 @@ from modeling.rendering.plan import RenderPlan
 Rendered = tuple[TextureModel | RegressedModel, RenderPlan]
 
 
+def in_one_precision(rendered: Iterable[Rendered]) -> list[Rendered]:
+    """Models and plans of one program, which has one kind of numbers: single if all may have it."""
+    pairs = list(rendered)
+    single = all(plan.single for _, plan in pairs)
+    return [(model, replace(plan, single=single)) for model, plan in pairs]
+
+
 def scene_bytes(rendered: Iterable[Rendered]) -> int:
     """Bytes of a scene: arrays that are equal bit for bit are stored once, and so is the state."""
     arrays: dict[tuple[str, bytes], int] = {}
     states = [0]
-    for model, plan in rendered:
+    for model, plan in in_one_precision(rendered):
         for value in plan.texture(model).values():
             if np.ndim(value):
                 array = np.asarray(value)

@@ -19,10 +19,11 @@ from tactileq.workers import mapping
 if TYPE_CHECKING:
     from analysis.benches.atlas.edges import Examined
     from analysis.benches.chart.judging import Judged
+    from analysis.benches.scenes import CompiledExample, Surface
     from analysis.report.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
-    from modeling import Threshold
+    from modeling import ARModel, Threshold
     from stimuli.sets.recipe import Recipe
 
 JOBS = 2
@@ -51,7 +52,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
             made = list(_told(mapped(record, TEXTURES), advance, _texture))
         # Other processes check the models while this one presents them.
-        checked, benches = mapped(with_checks, made), Benches.begun(mapped)
+        checked, benches = mapped(with_checks, made), Benches.begun(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
             full={r.texture: r.model for r in made},
@@ -67,7 +68,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             seed=seed,
         )
         with progress("Predicting conditions that were left out", len(made)) as advance:
-            results = list(_told(checked, advance, _texture))
+            results, rivals = zip(*_told(checked, advance, lambda c: c[0].texture), strict=True)
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
@@ -82,7 +83,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         write_demo_report(
             fresh,
             results,
-            benches=benches.sections(),
+            benches=benches.sections(rivals),
             provenance=provenance,
             seed=seed,
             mapped=mapped,
@@ -125,53 +126,73 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     return TextureResult(records, full, simplification, truth)
 
 
-def with_checks(result: TextureResult) -> TextureResult:
-    """The result with what its model is judged by: the paper's own, and conditions left out."""
-    from analysis.textures.between import left_out_by_model
+def with_checks(result: TextureResult) -> tuple[TextureResult, ARModel]:
+    """The result with what its model is judged by, and an AR model of the same recordings.
+
+    That is the paper's own model, and conditions left out.
+    """
+    from analysis.textures.between import RIVAL_ORDER, left_out_by_model
+    from modeling.fitting.autoregressive import fit_ar_spectra
     from modeling.fitting.conditions import recording_spectra
     from modeling.fitting.texture import fit_spectra
 
     measured = recording_spectra(result.recordings)
-    return replace(
+    checked = replace(
         result,
         other_estimates=(fit_spectra(measured, estimator="paper"),),
         left_out=left_out_by_model(measured, result.model),
     )
+    return checked, fit_ar_spectra(measured, order=RIVAL_ORDER)
 
 
 class Benches(NamedTuple):
-    """The reduced chart's textures and the reduced atlas's columns, as other processes do them."""
+    """Scenes, the reduced chart's textures and the reduced atlas's columns, done by others."""
 
+    compiled: Iterable[list[CompiledExample]]
+    drawn: Iterable[tuple[CompiledExample, dict[str, Surface]]]
     judged: Iterable[Judged]
     examined: Iterable[Examined]
 
     @classmethod
-    def begun(cls, mapped: Mapped) -> Benches:
-        """Both, from now on."""
+    def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
+        """All of them, from now on."""
         from analysis.benches.atlas.cases import CASES
         from analysis.benches.chart.judging import judge
         from analysis.benches.chart.methods import BRIEF
         from analysis.benches.chart.surfaces import FEW, simulated_sources
+        from analysis.benches.scenes import DRAWN_SEEDS, compile_examples, drawn_example
 
         return cls(
+            mapped(compile_examples, [{result.texture: result.model for result in made}]),
+            mapped(drawn_example, [DRAWN_SEEDS]),
             mapped(partial(judge, methods=BRIEF), simulated_sources(FEW)),
             mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
         )
 
-    def sections(self) -> list[Section]:
-        """Speed against accuracy, and where methods fail, when all is done."""
+    def sections(self, rivals: Iterable[ARModel]) -> list[Section]:
+        """What scenes need, speed against accuracy, and where methods fail, when all is done.
+
+        `rivals` are the AR models of the planted textures' recordings.
+        """
         from analysis.benches.atlas.cases import CASES
         from analysis.benches.chart.chart import chart_of
         from analysis.benches.chart.surfaces import FEW
+        from analysis.benches.scenes import Surface
         from analysis.report.chart_page import chart_section
+        from analysis.report.section_scenes import scene_section
         from analysis.report.section_stability import stability_section
+        from stimuli.planted.textures import PlantedSurface
 
+        surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
+        [compiled], [drawn] = list(self.compiled), list(self.drawn)
+        scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
         with progress("Speed against accuracy", FEW.drawn) as advance:
             judged = list(_told(self.judged, advance, lambda one: one.source.name))
         with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
             examined = list(_told(self.examined, advance, lambda one: one.case.family))
         # Rendering is timed now that no other process works.
-        return [chart_section(chart_of(judged, turns=CHART_TURNS)), stability_section(examined)]
+        chart = chart_section(chart_of(judged, turns=CHART_TURNS))
+        return [scenes, chart, stability_section(examined)]
 
 
 def write_demo_report(
