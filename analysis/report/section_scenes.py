@@ -100,7 +100,12 @@ def scene_section(examples: Sequence[Example]) -> Section:
     return Section(
         "scenes",
         "No more model than the scene needs",
-        (picture, against, ablation, Fold("Each texture in each scene", (textures,))),
+        (
+            picture,
+            against,
+            Fold("What each step brings", (ablation,)),
+            Fold("Each texture in each scene", (textures,)),
+        ),
         outcomes=tuple(_outcomes(comparison)),
     )
 
@@ -124,8 +129,8 @@ def _outcomes(comparison: pd.DataFrame) -> list[Outcome]:
             else f"{1 / numbers:.1f} times more numbers"
         )
         sentences.append(
-            f"Scene {scene}: the least models take {counted} ({least['numbers']} of "
-            f"{full['numbers']}), {full['bytes'] / least['bytes']:.1f} times fewer bytes and "
+            f"Scene {scene}: the least models take {counted} ({least['numbers']} instead "
+            f"of {full['numbers']}), {full['bytes'] / least['bytes']:.1f} times fewer bytes and "
             f"{least['fewer_operations']:.1f} times fewer operations than the full ones; the bound "
             f"was kept in {least['windows']} seconds of random strokes. {RIVAL} takes "
             f"{rival['numbers'] / least['numbers']:.1f} times the numbers and "

@@ -184,7 +184,9 @@ class Benches(NamedTuple):
         from stimuli.planted.textures import PlantedSurface
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
-        [compiled], [drawn] = list(self.compiled), list(self.drawn)
+        with progress("Least models of scenes", 2) as advance:
+            [compiled] = _told(self.compiled, advance, lambda found: found[0].compiled.scene.name)
+            [drawn] = _told(self.drawn, advance, lambda found: found[0].compiled.scene.name)
         scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
         with progress("Speed against accuracy", FEW.drawn) as advance:
             judged = list(_told(self.judged, advance, lambda one: one.source.name))
