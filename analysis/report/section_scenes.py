@@ -30,18 +30,18 @@ from analysis.textures.scenes import (
 )
 
 SCENE = Column("scene", is_name=True)
+SCENE_TEXTURE_COLUMNS = (SCENE, *BEFORE_AFTER_COLUMNS)
+SCENE_STEP_COLUMNS = (SCENE, *STEP_COLUMNS)
 SHOWN_TEXTURES = (
-    SCENE,
     *chosen(
-        BEFORE_AFTER_COLUMNS,
-        *("texture", "layers_before", "layers_after", "numbers_before", "numbers_after"),
+        SCENE_TEXTURE_COLUMNS,
+        *("scene", "texture", "layers_before", "layers_after", "numbers_before", "numbers_after"),
         *("operations_before", "operations_after", "driven_by", "update_ms"),
         *("gfc30_worst", "bands_db_worst", "level_db_worst", "bands_db_place"),
     ),
 )
-SHOWN_STEPS = (
-    SCENE,
-    *chosen(STEP_COLUMNS, "step", "layers", "numbers", "bytes", "operations", "share"),
+SHOWN_STEPS = chosen(
+    SCENE_STEP_COLUMNS, "scene", "step", "layers", "numbers", "bytes", "operations", "share"
 )
 Example = tuple[CompiledExample, Mapping[str, Surface]]
 
@@ -111,11 +111,9 @@ def scene_section(examples: Sequence[Example]) -> Section:
 
 
 def _of_scenes(examples: Sequence[Example], tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    named = [
-        table.assign(scene=one.compiled.scene.name)
-        for (one, _), table in zip(examples, tables, strict=True)
-    ]
-    return pd.concat(named, ignore_index=True)
+    for (one, _), table in zip(examples, tables, strict=True):
+        table.insert(0, "scene", one.compiled.scene.name)
+    return pd.concat(tables, ignore_index=True)
 
 
 def _outcomes(comparison: pd.DataFrame) -> list[Outcome]:

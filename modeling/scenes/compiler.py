@@ -438,12 +438,25 @@ class _Search:
         stages: list[tuple[str, TextureModel | RegressedModel, RenderPlan, Errors]] = [
             ("full model", self.full, usual, late),
             ("layers not felt dropped", felt, usual, late + maps.of_model(felt)),
-            ("grid cut to the scene", shorter, usual, late + maps.of_model(shorter)),
+            ("grid cut to the scene", shorter, usual, late + self._within(maps.of_model(shorter))),
             (_DRIVEN[candidate.way], candidate.model, usual, late + at_rest),
             ("update interval", candidate.model, longer, candidate.late + at_rest),
             ("precision", candidate.model, candidate.plan, candidate.together),
         ]
         return tuple(self._step(*stage) for stage in stages)
+
+    def _within(self, errors: Errors) -> Errors:
+        """None at places that only enclose the scene, beyond which a cut model has nothing."""
+        axes = (
+            (self.places.speeds_mm_s, self.places.speed_range),
+            (
+                self.places.forces_n,
+                self.places.force_range,
+            ),
+        )
+        rows, columns = ((axis >= low) & (axis <= high) for axis, (low, high) in axes)
+        inside = (rows[:, None] & columns[None, :]).ravel()
+        return Errors(*(np.where(inside, part, 0.0) for part in errors))
 
     def _step(
         self, name: str, model: TextureModel | RegressedModel, plan: RenderPlan, errors: Errors

@@ -21,6 +21,8 @@ from analysis.benches.chart.chart import chart_of
 from analysis.benches.chart.judging import judge
 from analysis.benches.chart.summary import COMPARISON_COLUMNS, METHOD_COLUMNS
 from analysis.benches.chart.surfaces import Simulated, simulated_sources
+from analysis.benches.scenes import COMPARISON_COLUMNS as SCENE_COMPARISON_COLUMNS
+from analysis.benches.scenes import CompiledExample, Surface
 from analysis.columns import TEXTURE, Column, Columns, chosen, names, without
 from analysis.labels import ALL_TEXTURES
 from analysis.report.chart_page import chart_section
@@ -30,6 +32,11 @@ from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import PROVENANCE_COLUMNS
+from analysis.report.section_scenes import (
+    SCENE_STEP_COLUMNS,
+    SCENE_TEXTURE_COLUMNS,
+    scene_section,
+)
 from analysis.report.section_stability import stability_section
 from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.overall import OVERALL_COLUMNS
@@ -49,6 +56,10 @@ from analysis.textures.regressions import (
     driving_table,
 )
 from analysis.textures.results import VERDICT_COLUMNS
+from modeling import Scene, compile_scene, fit_ar
+from modeling.scenes.scene import HandRange
+from modeling.scenes.strokes import windows_kept
+from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 
 PAGE = Path(analysis.report.page.__file__)
 DECLARED = {
@@ -73,6 +84,9 @@ DECLARED = {
     "overall_tests": OVERALL_COLUMNS,
     "chart_comparisons": COMPARISON_COLUMNS,
     "chart_methods": METHOD_COLUMNS,
+    "scene_comparison": SCENE_COMPARISON_COLUMNS,
+    "scene_steps": SCENE_STEP_COLUMNS,
+    "scene_textures": SCENE_TEXTURE_COLUMNS,
     "stability_margins": MARGIN_COLUMNS,
     "stability_edges": EDGE_COLUMNS,
 }
@@ -93,6 +107,17 @@ def tables_in(items: Iterable[Item]) -> list[Table]:
         elif isinstance(item, Table):
             found.append(item)
     return found
+
+
+def compiled_example() -> tuple[CompiledExample, dict[str, Surface]]:
+    """A scene of one planted texture in a corner of its grid."""
+    planted = planted_texture("MDF")
+    hand = HandRange(speed_mm_s=(100.0, 150.0), force_n=(1.0, 1.5))
+    compiled = compile_scene(Scene(name="corner", hand=hand), {"MDF": planted})
+    rival = fit_ar(record_texture(planted, duration_s=0.2), order=4)
+    windows = windows_kept(compiled.textures[0], compiled.scene, count=2)
+    surface = Surface(PlantedSurface("MDF"), rival)
+    return CompiledExample(compiled, (windows,)), {"MDF": surface}
 
 
 @pytest.fixture(scope="module")
@@ -118,6 +143,7 @@ def tables(results, ratings, choices) -> list[Table]:
         choice_section(responses, rng=np.random.default_rng(1)),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
+        scene_section([compiled_example()]),
         stability_section([examine(case, next(iter(case.columns)), full=False)]),
     )
     return [table for section in sections for table in tables_in(section.items)]
