@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import product
-from typing import Any, NamedTuple
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -35,7 +35,7 @@ from modeling.scenes.compiled import (
 )
 from modeling.scenes.cost import scene_bytes, stored_numbers
 from modeling.scenes.error_maps import ErrorMaps
-from modeling.scenes.felt import at_places, kept_layers
+from modeling.scenes.felt import at_places, kept_layers, layer_groups
 from modeling.scenes.measures import Errors, Yardstick
 from modeling.scenes.places import places_of
 from modeling.scenes.restricting import cut, played, thinned
@@ -44,7 +44,8 @@ from modeling.scenes.thinning import NO_LIMIT, fewest_nodes, table_numbers
 
 # A hand that touches, turns or lifts off is noticed at most so late.
 UPDATES_MS = (16.0, 8.0, 4.0, 2.0, 1.0, 0.5, 0.25)
-REGRESSIONS: tuple[DrivenBy, ...] = ("conditions", "centroid")
+Found = TypeVar("Found")
+_WAYS: dict[DrivenBy, Way] = {"conditions": "regression", "centroid": "centroid"}
 WIDEST = 64.0  # times the bound, within which the nearest one is looked for
 HALVINGS = 8
 
@@ -85,7 +86,7 @@ def compile_scenes(
 
     Parameters and errors as there; `progress` is told the scene, too.
     """
-    known = Known({}, {})
+    known = Known()
     return [_compiled(scene, models, known, progress=partial(progress, scene)) for scene in scenes]
 
 
@@ -163,11 +164,18 @@ def _table_numbers(model: TextureModel | RegressedModel) -> int:
     return table_numbers(model.speeds_mm_s.size, model.forces_n.size, model.n_layers)
 
 
-class Known(NamedTuple):
-    """What is known of models whatever the scene: errors by band, and by rate those of rounding."""
+class Known:
+    """What is known of models whatever the scene."""
 
-    maps: dict[tuple[Any, ...], ErrorMaps]
-    roundings: dict[tuple[Any, ...], Errors | None]
+    def __init__(self) -> None:
+        self._found: dict[tuple[Any, ...], Any] = {}
+
+    def get(self, key: tuple[Any, ...], find: Callable[[], Found]) -> Found:
+        """What belongs to a key: found when it is first asked for."""
+        if key not in self._found:
+            self._found[key] = find()
+        found: Found = self._found[key]
+        return found
 
 
 def _holds_in_single(candidate: Candidate) -> bool:
@@ -184,15 +192,17 @@ class _Search:
 
     def __init__(self, full: TextureModel, scene: Scene, known: Known) -> None:
         self.full, self.scene, self._known = full, scene, known
-        self.played = played(full)
+        self.played = known.get(("played", full.texture), partial(played, full))
         self.places = places_of(full, scene.hand)
         self._narrowest_hz = float(full.bandwidths_hz.min(initial=full.rate_hz))
-        self.yardstick = Yardstick(
-            full.rate_hz, narrowest_hz=self._narrowest_hz, band_hz=scene.actuator.band_hz
+        band_hz, name = scene.actuator.band_hz, full.texture
+        self.yardstick = known.get(
+            ("yardstick", full.rate_hz, self._narrowest_hz, band_hz),
+            partial(Yardstick, full.rate_hz, narrowest_hz=self._narrowest_hz, band_hz=band_hz),
         )
         self.rate_hz = scene.actuator.rate_hz or full.rate_hz
-        self.kept = kept_layers(full, scene, self.places)
-        self._regressions: dict[tuple[int, ...], list[tuple[Way, RegressedModel, Errors]]] = {}
+        groups = known.get(("groups", name), partial(layer_groups, full))
+        self.kept = kept_layers(full, scene, self.places, groups=groups)
         self._counted: dict[tuple[int, int], float] = {}
         self._found: dict[tuple[Any, ...], Candidate | None] = {}
         self._check_limits()
@@ -213,37 +223,44 @@ class _Search:
         return replace(fewer, gains=np.abs(fewer.gains) * np.where(signs < 0, -1.0, 1.0))
 
     def maps(self, layers: tuple[int, ...]) -> ErrorMaps:
-        key = self.full.texture, layers, self.scene.actuator.band_hz
-        if key not in self._known.maps:
-            self._known.maps[key] = ErrorMaps(self._played(layers), self.yardstick)
-        return self._known.maps[key]
+        key = "maps", self.full.texture, layers, self.scene.actuator.band_hz
+        return self._known.get(key, lambda: ErrorMaps(self._played(layers), self.yardstick))
 
     def _rounding(self, layers: tuple[int, ...]) -> Errors | None:
         """Of single precision, at all places; None where it cannot be rendered."""
-        key = self.full.texture, layers, self.scene.actuator.band_hz, self.rate_hz
-        if key not in self._known.roundings:
+
+        def find() -> Errors | None:
             try:
-                worst = self.maps(layers).rounding(self.rate_hz)
+                return self.maps(layers).rounding(self.rate_hz)
             except InputError:  # numbers that single precision cannot hold or tell apart
-                worst = None
-            self._known.roundings[key] = worst
-        worst = self._known.roundings[key]
+                return None
+
+        band_hz = self.scene.actuator.band_hz
+        worst = self._known.get(
+            ("rounding", self.full.texture, layers, band_hz, self.rate_hz), find
+        )
         if worst is None:
             return None
         return Errors(*(np.full(self.places.counts.size, part[0]) for part in worst))
 
     def _regressed(self, layers: tuple[int, ...]) -> list[tuple[Way, RegressedModel, Errors]]:
-        if layers not in self._regressions:
-            maps, found = self.maps(layers), []
-            for by in REGRESSIONS:
+        """The felt model driven by regressions, as far as the scene reaches, and their errors."""
+
+        def find() -> list[tuple[Way, RegressedModel, Errors]]:
+            maps = self.maps(layers)
+            found: list[tuple[Way, RegressedModel, Errors]] = []
+            for by in _WAYS:
                 try:
                     model = regressed(maps.model, by=by)
                 except InputError:  # too few conditions, or no gain that has a centroid
                     continue
-                way: Way = "regression" if by == "conditions" else "centroid"
-                found.append((way, self._ending(model), maps.of_model(model)))
-            self._regressions[layers] = found
-        return self._regressions[layers]
+                found.append((_WAYS[by], model, maps.of_model(model)))
+            return found
+
+        key = "regressed", self.full.texture, layers, self.scene.actuator.band_hz
+        return [
+            (way, self._ending(model), errors) for way, model, errors in self._known.get(key, find)
+        ]
 
     def _ending(self, model: RegressedModel) -> RegressedModel:
         """Regressions from the lowest to the highest speed and force of the scene."""
@@ -297,7 +314,7 @@ class _Search:
         """Of any table with so many layers."""
         key = len(layers), samples
         if key not in self._counted:
-            model = self.full.with_layers(list(layers))
+            model = self.played.with_layers(list(layers))
             self._counted[key] = self.plan(samples, single=False).cost(model).operations
         return self._counted[key]
 

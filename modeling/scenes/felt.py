@@ -22,11 +22,14 @@ from modeling.scenes.scene import Range, Scene
 MOST_GROUPS = 10  # of layers, all subsets of which are looked at
 
 
-def kept_layers(model: TextureModel, scene: Scene, places: Places) -> list[tuple[int, ...]]:
+def kept_layers(
+    model: TextureModel, scene: Scene, places: Places, *, groups: list[list[int]]
+) -> list[tuple[int, ...]]:
     """Every choice of layers to keep that drops nothing that is felt, smallest first.
 
     As `modeling.simplify` decides, at the places of the scene instead of the whole grid, and of
     what the actuator plays. Of several choices of one size the one that drops least comes first.
+    `groups` are the model's `layer_groups`.
 
     Returns
     -------
@@ -49,7 +52,7 @@ def kept_layers(model: TextureModel, scene: Scene, places: Places) -> list[tuple
         _flips(model, above_db, places) < HIGHEST_FLIP_PROBABILITY
     )
     power = 10 ** (above_db / 10)
-    groups = [group for group in _groups(model) if droppable[group].all()]
+    groups = [group for group in groups if droppable[group].all()]
     choices: list[tuple[float, tuple[int, ...]]] = []
     for dropped in _unions(groups, power):
         together = float(power[:, dropped].sum(axis=1).max(initial=0.0))
@@ -115,7 +118,7 @@ def _flips(model: TextureModel, above_db: Floats, places: Places) -> Floats:
     return np.nan_to_num(flips, nan=1.0)
 
 
-def _groups(model: TextureModel) -> list[list[int]]:
+def layer_groups(model: TextureModel) -> list[list[int]]:
     """Layers that go together or not at all: a peak and those that fill its shape."""
     fills = own_peaks(model).fills.tolist()
     groups = {layer: [layer] for layer, peak in enumerate(fills) if peak < 0}
