@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from modeling import TextureModel
+from modeling.models.loading import Layered
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class TextureRig(Protocol):
     def simulated(self) -> bool:
         """Whether no real hand touches a real surface here."""
 
-    def present_model(self, model: TextureModel) -> None:
+    def present_model(self, model: Layered) -> None:
         """Render this model wherever the virtual surface is touched, from now on."""
 
     def present_real(self, texture: str) -> None:

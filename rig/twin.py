@@ -14,6 +14,7 @@ from modeling import InputError, Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.errors import shown
 from modeling.hand import Hand
+from modeling.models.loading import Layered
 from rig.interface import RigReading
 
 STEP_S = 0.01
@@ -40,7 +41,7 @@ class SimulatedRig:
         self._real = dict(real or {})
         self._seed = seed
         self._presentations = 0
-        self._presented: TextureModel | None = None
+        self._presented: Layered | None = None
         self._renderer: Renderer | None = (
             None  # made when the hand first moves on what is presented
         )
@@ -58,7 +59,7 @@ class SimulatedRig:
         """What the hand felt during the last reading's 10 ms, in g at the model's rate."""
         return self._last_vibration
 
-    def present_model(self, model: TextureModel) -> None:
+    def present_model(self, model: Layered) -> None:
         """Render this model under the hand, with fresh noise."""
         self._presentations += 1
         self._presented, self._renderer = model, None

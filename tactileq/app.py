@@ -19,6 +19,7 @@ COMMANDS = {
     "record": "record",
     "model": "model",
     "simplify": "simplify",
+    "scene": "scene",
     "stimuli": "stimuli",
     "vibrator": "vibrator",
     "session": "session",

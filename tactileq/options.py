@@ -33,5 +33,14 @@ StudyFile = Annotated[
     Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
 ]
 Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")]
-Simplified = Annotated[Path, typer.Option("--simplified", help="Folder of simplified models.")]
+Simplified = Annotated[
+    Path | None, typer.Option("--simplified", help="Folder of simplified models. [simplified]")
+]
+SceneModels = Annotated[
+    Path | None,
+    typer.Option(
+        "--scene",
+        help="Instead of --simplified: a scene file (TOML), or a folder of tactileq scene.",
+    ),
+]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]

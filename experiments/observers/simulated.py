@@ -21,6 +21,7 @@ from experiments.study.study import Study
 from modeling import InputError, TextureModel, Threshold
 from modeling.arrays import Floats
 from modeling.errors import shown
+from modeling.models.loading import Layered
 from modeling.seeds import generator
 
 SurfaceKind = Literal["real", "full", "simplified"]
@@ -31,7 +32,7 @@ STEP_HZ = 1.0
 
 
 def sensation_levels(
-    model: TextureModel,
+    model: Layered,
     threshold: Threshold,
     *,
     strokes: tuple[tuple[float, float], ...] = STROKES,
@@ -45,7 +46,7 @@ def sensation_levels(
 
     Parameters
     ----------
-    model : TextureModel
+    model : TextureModel or RegressedModel
         In g.
     threshold : Threshold
     strokes : tuple of (speed in mm/s, force in N)
@@ -190,7 +191,7 @@ class Perception:
                 f"expected the truth behind each real surface, got none for {', '.join(missing)}; "
                 "give a model for each."
             )
-        kinds: tuple[tuple[SurfaceKind, Mapping[str, TextureModel]], ...] = (
+        kinds: tuple[tuple[SurfaceKind, Mapping[str, Layered]], ...] = (
             ("real", real),
             ("full", models.full),
             ("simplified", models.simplified),

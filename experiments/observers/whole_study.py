@@ -12,6 +12,7 @@ from experiments.study.study import TASKS, Study
 from experiments.tasks import task_named
 from modeling import TextureModel, Threshold
 from modeling.checks import check_whole
+from modeling.models.loading import Layered
 from rig.interface import TextureRig
 
 Progress = Callable[[int, int, str], None]
@@ -22,7 +23,7 @@ def simulate_study(
     *,
     real: Mapping[str, TextureModel],
     full: Mapping[str, TextureModel],
-    simplified: Mapping[str, TextureModel],
+    simplified: Mapping[str, Layered],
     rig: TextureRig,
     data_folder: str | Path,
     seed: int,
@@ -38,7 +39,8 @@ def simulate_study(
         Fixes the orders, by its own seed.
     real : mapping of str to TextureModel
         The truth behind each real surface.
-    full, simplified : mapping of str to TextureModel
+    full : mapping of str to TextureModel
+    simplified : mapping of str to TextureModel or RegressedModel
         What the virtual surfaces present.
     rig : TextureRig
     data_folder : path

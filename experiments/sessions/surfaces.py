@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from experiments.study.design import ModelKind, Trial
-from modeling import InputError, TextureModel
+from modeling import InputError
+from modeling.models.loading import Layered
 from rig.interface import TextureRig
 
 HIGHEST_RATING = 100.0
@@ -55,7 +56,7 @@ class Surfaces:
     rig : TextureRig
     texture : str
         The real surface.
-    models : sequence of TextureModel
+    models : sequence of TextureModel or RegressedModel
         The virtual surfaces, one per button.
 
     Attributes
@@ -66,7 +67,7 @@ class Surfaces:
         Presentations of a virtual surface, repeated ones included.
     """
 
-    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[TextureModel]) -> None:
+    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[Layered]) -> None:
         self._rig = rig
         self._texture = texture
         self._models = tuple(models)

@@ -12,8 +12,8 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.study.design import Order, Trial
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
-from modeling import TextureModel
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from modeling.models.loading import Layered
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,7 @@ class Task:
     trial: type[Trial]
     repeated: bool
     trials: Callable[[Order, Study, np.random.Generator], list[dict[str, Any]]]
-    virtual: Callable[[ModelSets, Any], Sequence[TextureModel]]
+    virtual: Callable[[ModelSets, Any], Sequence[Layered]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]
 

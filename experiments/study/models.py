@@ -7,16 +7,27 @@ from dataclasses import dataclass
 
 from experiments.study.design import MODELS, ModelKind
 from modeling import InputError, TextureModel
+from modeling.models.compiled_for import CompiledFor
+from modeling.models.loading import Layered
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSets:
-    """Full and simplified models by the name of their texture."""
+    """Full and simplified models by the name of their texture.
+
+    In the place of simplified ones may stand those of a compiled scene.
+    """
 
     full: Mapping[str, TextureModel]
-    simplified: Mapping[str, TextureModel]
+    simplified: Mapping[str, Layered]
 
-    def of(self, texture: str, kind: ModelKind) -> TextureModel:
+    @property
+    def scene(self) -> CompiledFor | None:
+        """What the simplified models say of the scene that they were compiled for, if they were."""
+        notes = (model.compiled_for for model in self.simplified.values())
+        return next((note for note in notes if note), None)
+
+    def of(self, texture: str, kind: ModelKind) -> Layered:
         """The model of one texture."""
         return (self.full if kind == "full" else self.simplified)[texture]
 
@@ -42,6 +53,12 @@ class ModelSets:
         """
         for kind, models in (("full", self.full), ("simplified", self.simplified)):
             missing = [texture for texture in textures if texture not in models]
+            if missing and kind == "simplified" and self.scene:
+                raise InputError(
+                    f"expected each texture of the study in the scene {self.scene.scene}, got none "
+                    f"of {', '.join(missing)}; add what is missing to the scene, or remove it from "
+                    "the study."
+                )
             if missing:
                 raise InputError(
                     f"expected a {kind} model of each texture of the study, got none of "

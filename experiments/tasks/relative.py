@@ -19,7 +19,7 @@ from experiments.sessions.trial_loop import run_session
 from experiments.study.design import Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
-from modeling import TextureModel
+from modeling.models.loading import Layered
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ def _trials(order: Order, study: Study, rng: np.random.Generator) -> list[dict[s
     ]
 
 
-def _virtual(models: ModelSets, trial: RelativeTrial) -> list[TextureModel]:
+def _virtual(models: ModelSets, trial: RelativeTrial) -> list[Layered]:
     return [models.of(texture, trial.model) for texture in trial.layout]
 
 

@@ -11,12 +11,13 @@ from modeling.models.ar_model import ARModel
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.texture_model import TextureModel
 
-AnyModel = TextureModel | RegressedModel | ARModel
+Layered = TextureModel | RegressedModel
+AnyModel = Layered | ARModel
 _KINDS: dict[str, type[AnyModel]] = {
     kind.FORMAT: kind for kind in (TextureModel, RegressedModel, ARModel)
 }
 # What stands beside models and tells of them.
-_ABOUT_MODELS = "tactileq.simplification"
+_ABOUT_MODELS = ("tactileq.simplification", "tactileq.compiled-scene")
 
 
 def load_model(path: Path) -> AnyModel:
@@ -28,13 +29,14 @@ def load_model(path: Path) -> AnyModel:
 def models_among(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     """Which of these JSON files may be models, and which state that they are something else.
 
-    A file that states nothing may be a damaged model. Provenance and simplifications are neither.
+    A file that states nothing may be a damaged model. Provenance, simplifications and what
+    tells of a compiled scene are neither.
     """
     models: list[Path] = []
     others: list[Path] = []
     for path in paths:
         stated = _stated_format(path)
-        if stated != _ABOUT_MODELS and not path.name.endswith("provenance.json"):
+        if stated not in _ABOUT_MODELS and not path.name.endswith("provenance.json"):
             (models if stated is None or stated in _KINDS else others).append(path)
     return models, others
 

@@ -43,7 +43,7 @@ What stands in brackets applies where the key is left out; `version`, `name` and
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -355,6 +355,8 @@ class Scene:
     budget : Budget
     models : Path, optional
         Folder of the full models.
+    files : tuple of Path
+        Where all of this comes from: the scene's file, and those that it names.
 
     Raises
     ------
@@ -371,6 +373,7 @@ class Scene:
     bound: Bound = field(default_factory=Bound)
     budget: Budget = field(default_factory=Budget)
     models: Path | None = None
+    files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         check_name("name of the scene", self.name)
@@ -422,7 +425,7 @@ class Scene:
         file = Path(path)
         values = read_toml(file, "a scene")
         try:
-            return _scene_from(values, file.parent)
+            return replace(_scene_from(values, file.parent), files=_files(values, file))
         except InputError as error:
             raise InputError(f"{file}: {error}") from None
 
@@ -458,6 +461,12 @@ def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
         budget=Budget(**sections["budget"]),
         models=None if models is None else folder / _text(models, "models under [scene]"),
     )
+
+
+def _files(values: Mapping[str, Any], file: Path) -> tuple[Path, ...]:
+    """A scene file of good values and the hand and the threshold that it names."""
+    named = (values["hand"].get("file", ""), values["scene"].get("threshold", ""))
+    return file, *(file.parent / name for name in named if Path(name).suffix)
 
 
 def _section(values: Mapping[str, Any], name: str) -> dict[str, Any]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from modeling import ARModel, InputError, RegressedModel, TextureModel
+from modeling import ARModel, InputError
 from modeling.models.loading import AnyModel
-
-Layered = TextureModel | RegressedModel
+from modeling.models.loading import Layered as Layered
 
 
 def check_layered(model: AnyModel) -> Layered:

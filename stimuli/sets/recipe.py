@@ -25,6 +25,10 @@ A recipe is a TOML file; its paths are relative to it, and unknown keys are refu
     path = "models"                 # a model file, or a folder of them
     label = "full"                  # (name of the folder)
 
+    [[model]]
+    scene = "light.toml"            # instead of path: a scene, compiled from the models that it
+    label = "light"                 #   names, or the folder of a compiled one (name of the scene)
+
     [[trajectory]]
     speed_mm_s = 150
     force_n = 1.5
@@ -62,6 +66,7 @@ from modeling.checks import (
 from modeling.errors import shown
 from modeling.files.documents import read_toml
 from modeling.recordings.trajectory import LONGEST_S
+from modeling.scenes.loading import scene_name
 
 SampleFormat = Literal["float32", "pcm24"]
 Noise = Literal["independent", "frozen"]
@@ -86,20 +91,41 @@ _SECTIONS = {
         "vibrator",
     ),
     "level": ("mode", "rms_db", "threshold", "sensation_level_db", "full_scale_g"),
-    "model": ("path", "label"),
+    "model": ("path", "scene", "label"),
     "trajectory": ("name", "speed_mm_s", "force_n", "file"),
 }
 
 
 @dataclass(frozen=True)
 class ModelEntry:
-    """A model file or a folder of them, and the label under which the manifest lists them."""
+    """Models, and the label under which the manifest lists them.
 
-    path: Path
+    `path` is a model file or a folder of them; `scene` a scene file or the folder of a compiled
+    scene. One of the two is given.
+    """
+
+    path: Path | None
     label: str
+    scene: Path | None = None
 
     def __post_init__(self) -> None:
         check_name("label of a model", self.label)
+        _check_one_place(self.path, self.scene)
+
+    @property
+    def place(self) -> Path:
+        """The file or folder that it names, of either kind."""
+        place = self.scene if self.path is None else self.path
+        assert place is not None  # or it would have been refused
+        return place
+
+
+def _check_one_place(path: Path | None, scene: Path | None) -> None:
+    if (path is None) == (scene is None):
+        raise InputError(
+            "expected a path or a scene under each [[model]], got "
+            f"{'neither' if path is None else 'both'} in one; give one of the two."
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -281,7 +307,7 @@ class Recipe:
         InputError
             If the file is missing, no TOML or of another version, has unknown or missing keys, or
             values out of range. The files that it names are read later, by
-            `sources.load_sources`.
+            `sources.load_sources`, but for a scene without a label, whose name is one.
         """
         file = Path(path)
         values = read_toml(file, "a recipe")
@@ -292,7 +318,7 @@ class Recipe:
 
     def files(self) -> list[Path]:
         """Every file or folder that the recipe names."""
-        named: list[Path | str | None] = [entry.path for entry in self.models]
+        named: list[Path | str | None] = [entry.place for entry in self.models]
         named += [entry.file for entry in self.trajectories]
         named += [self.level.threshold, self.vibrator]
         return [path for path in named if isinstance(path, Path)]
@@ -347,16 +373,23 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
 
 
 def _model_entry(values: dict[str, Any], folder: Path) -> ModelEntry:
-    if "path" not in values:
-        raise InputError("expected a path under each [[model]], got one without; add it.")
-    path = folder / _text(values["path"], "path under [[model]]")
-    return ModelEntry(path, values["label"]) if "label" in values else model_entry(path)
+    path, scene = (
+        folder / _text(values[name], f"{name} under [[model]]") if name in values else None
+        for name in ("path", "scene")
+    )
+    _check_one_place(path, scene)
+    if "label" in values:
+        return ModelEntry(path, values["label"], scene)
+    if path is not None:
+        return model_entry(path)
+    assert scene is not None  # one of the two is given
+    return ModelEntry(None, scene_name(scene), scene)
 
 
 def model_entry(path: Path) -> ModelEntry:
     """A model file or a folder of them, labelled by the name of the folder."""
     place = Path(os.path.realpath(path))  # not resolve(), which raises for links in a circle
-    return ModelEntry(path, place.name if place.is_dir() else place.parent.name)
+    return ModelEntry(path, place.name if os.path.isdir(place) else place.parent.name)
 
 
 def _trajectory_entry(values: dict[str, Any], folder: Path) -> TrajectoryEntry:
@@ -410,7 +443,7 @@ def _text(value: object, name: str) -> str:
 
 
 def _shown(value: object) -> str:
-    return f"{value.path} ({value.label})" if isinstance(value, ModelEntry) else repr(value)
+    return f"{value.place} ({value.label})" if isinstance(value, ModelEntry) else repr(value)
 
 
 def _section(heading: str, values: Mapping[str, object]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -11,11 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from modeling import InputError, Threshold, Vibrator, compensation_for
+from modeling import InputError, Scene, Threshold, Vibrator, compensation_for
 from modeling.errors import shown
 from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
 from modeling.recordings.trajectory import Trajectory, load_trajectory
+from modeling.scenes.loading import scene_models
 from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
 FOLDER = "sources"
@@ -25,12 +27,19 @@ VIBRATOR = Path(FOLDER, "vibrator.json")
 
 @dataclass(frozen=True, eq=False)
 class LabelledModel:
-    """A model, its label in the set, and the file that it came from."""
+    """A model, its label in the set, and the file that it came from.
+
+    Of a scene that was compiled for the set, the one that it would have.
+    """
 
     label: str
     model: AnyModel
-    path: Path
-    sha256: str
+    file: bytes
+
+    @property
+    def sha256(self) -> str:
+        """Of the file."""
+        return hashlib.sha256(self.file).hexdigest()
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +91,25 @@ def load_sources(recipe: Recipe) -> Sources:
 
 def _models_of(recipe: Recipe) -> tuple[tuple[LabelledModel, ...], tuple[Path, ...]]:
     """The models of the recipe, and what its folders hold besides; a file that it names is one."""
-    found: list[tuple[str, Path]] = []
+    found: list[LabelledModel] = []
     passed_over: list[Path] = []
     for entry in recipe.models:
-        paths, others = models_in(entry.path) if entry.path.is_dir() else ([entry.path], [])
-        found += [(entry.label, path) for path in paths]
+        if entry.scene is not None:
+            least = scene_models(entry.scene).values()
+            found += [LabelledModel(entry.label, m, m.to_json().encode()) for m in least]
+            continue
+        place = entry.place
+        paths, others = models_in(place) if os.path.isdir(place) else ([place], [])
+        found += [LabelledModel(entry.label, load_model(p), p.read_bytes()) for p in paths]
         passed_over += others
-    models = (LabelledModel(label, load_model(path), path, _sha256(path)) for label, path in found)
-    return tuple(models), tuple(passed_over)
+    return tuple(found), tuple(passed_over)
+
+
+def files_behind(recipe: Recipe) -> list[Path]:
+    """Every file or folder that a recipe rests on: what it names, and what its scenes name."""
+    scenes = (Scene.load(e.scene) for e in recipe.models if e.scene and not os.path.isdir(e.scene))
+    named = [place for scene in scenes for place in (*scene.files, scene.models) if place]
+    return list(dict.fromkeys([*recipe.files(), *named]))
 
 
 def trajectory_of(entry: TrajectoryEntry, *, duration_s: float) -> Trajectory:
@@ -156,8 +176,10 @@ def _check_distinct(names: Iterable[str], *, what: str) -> None:
         seen.add(name)
 
 
-def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Path, Path]]:
-    """The recipe with copies of all that it names in the folder `sources`; which is of which.
+def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Path, Path | bytes]]:
+    """The recipe with copies of all that it names in the folder `sources`; what they are copies of.
+
+    That is a file, or of models what is in it.
 
     Rendering from that recipe gives the same set, wherever the folder is moved and whatever
     becomes of the originals.
@@ -172,10 +194,10 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
     named = recipe.level.threshold
     threshold = Path(FOLDER, file_stem(named.name)) if isinstance(named, Path) else named
     vibrator = None if recipe.vibrator is None else VIBRATOR
-    pairs: list[tuple[object, object]] = [(copy, m.path) for m, copy in models.items()]
+    pairs: list[tuple[object, object]] = [(copy, m.file) for m, copy in models.items()]
     pairs += [(copy.file, t.file) for t, copy in zip(recipe.trajectories, hands, strict=True)]
     pairs += [(threshold, named), (vibrator, recipe.vibrator)]
-    copies = [(a, b) for a, b in pairs if isinstance(a, Path) and isinstance(b, Path)]
+    copies = [(a, b) for a, b in pairs if isinstance(a, Path) and isinstance(b, Path | bytes)]
     _check_distinct((copy.name for copy, _ in copies), what="name for each source")
     copied = replace(
         recipe,
@@ -192,7 +214,10 @@ def copy_sources(recipe: Recipe, sources: Sources, *, folder: Path) -> None:
     copied, originals = recipe_of_copies(recipe, sources)
     (folder / FOLDER).mkdir()
     for copy, original in originals.items():
-        shutil.copyfile(original, folder / copy)
+        if isinstance(original, bytes):
+            (folder / copy).write_bytes(original)
+        else:
+            shutil.copyfile(original, folder / copy)
     write_text(folder / RECIPE, copied.to_toml())
 
 

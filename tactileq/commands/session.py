@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from modeling.files.answer_tables import ANSWER_TABLES
-from tactileq.options import Data, Models, Simplified, StudyFile
-from tactileq.telling import tell_controls
+from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
+from tactileq.telling import share_of, tell_controls
 
 if TYPE_CHECKING:
     TaskName = str
     from experiments.console.console import Console
+    from experiments.study.models import ModelSets
 else:
     TaskName = Literal[tuple(ANSWER_TABLES)]
 
@@ -22,7 +23,8 @@ def session(
     task: Annotated[TaskName, typer.Option(help="Which evaluation.")],
     subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")],
     models: Models = Path("models"),
-    simplified: Simplified = Path("simplified"),
+    simplified: Simplified = None,
+    scene: SceneModels = None,
     data: Data = Path("data"),
     number: Annotated[int, typer.Option("--session", min=1, help="Which day.")] = 1,
     study: StudyFile = None,
@@ -34,15 +36,13 @@ def session(
     Example: tactileq session --task absolute --subject 1 --data data
     """
     from experiments.sessions.trial_loop import run_session
-    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from experiments.tasks import task_named
     from modeling.files.provenance import write_provenance
-    from modeling.models.loading import load_models
     from rig.twin import SimulatedRig
 
     plan = Study.load(study)
-    sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
+    sets, inputs = models_to_compare(models, simplified, scene)
     sets.require(plan.textures)
     tell_controls(sets, plan.textures)
     print("note: the rig is the simulated one; its data are marked simulated.")
@@ -62,9 +62,43 @@ def session(
         "task": task,
         "study_sha256": plan.sha256,
         "models_sha256": sets.sha256(plan.textures),
+        **scene_settings(sets),
     }
-    write_provenance(note, "session", settings, inputs=[models, simplified])
+    write_provenance(note, "session", settings, inputs=inputs)
     print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
+
+
+def models_to_compare(
+    models: Path, simplified: Path | None, scene: Path | None
+) -> tuple[ModelSets, list[Path]]:
+    """Full models and those that a study compares them with, and all that was read for them.
+
+    The latter are simplified ones, or those of a scene; a scene file is compiled.
+    """
+    from experiments.study.models import ModelSets
+    from modeling.models.loading import load_models
+    from modeling.scenes.loading import scene_files, scene_models
+
+    full = load_models(models)
+    if scene is None:
+        fewer = simplified or Path("simplified")
+        return ModelSets(full=full, simplified=load_models(fewer)), [models, fewer]
+    if simplified is not None:
+        raise ValueError(
+            f"expected simplified models or a scene, got both ({simplified} and {scene}); remove "
+            "--simplified or --scene."
+        )
+    files = scene_files(scene)
+    with share_of("Compiling the scene") as tell:
+        least = scene_models(scene, full, progress=tell)
+    return ModelSets(full=full, simplified=least), [models, *files]
+
+
+def scene_settings(sets: ModelSets) -> dict[str, object]:
+    """What a provenance says of the scene whose models a study presents; nothing without one."""
+    if sets.scene is None:
+        return {}
+    return {"scene": sets.scene.scene, "scene_sha256": sets.scene.scene_sha256}
 
 
 def open_console(*, fullscreen: bool, screen: int) -> Console:

@@ -6,7 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactileq.options import Data, Models, Seed, Simplified, StudyFile, ThresholdName
+from tactileq.commands.session import models_to_compare, scene_settings
+from tactileq.options import (
+    Data,
+    Models,
+    SceneModels,
+    Seed,
+    Simplified,
+    StudyFile,
+    ThresholdName,
+)
 from tactileq.telling import progress, tell_controls
 
 if TYPE_CHECKING:
@@ -17,7 +26,8 @@ if TYPE_CHECKING:
 
 def simulate(
     models: Models = Path("models"),
-    simplified: Simplified = Path("simplified"),
+    simplified: Simplified = None,
+    scene: SceneModels = None,
     data: Data = Path("data"),
     study: StudyFile = None,
     threshold: ThresholdName = "codec",
@@ -29,11 +39,9 @@ def simulate(
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
-    from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import Threshold
     from modeling.files.provenance import write_provenance
-    from modeling.models.loading import load_models
     from stimuli.planted.textures import TEXTURES, planted_texture
 
     plan = Study.load(study)
@@ -43,7 +51,7 @@ def simulate(
             f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
         )
     real = {name: planted_texture(name) for name in plan.textures}
-    sets = ModelSets(full=load_models(models), simplified=load_models(simplified))
+    sets, inputs = models_to_compare(models, simplified, scene)
     sets.require(plan.textures)
     felt_above = Threshold.named(threshold)
     run_study(plan, real=real, models=sets, data=data, threshold=felt_above, seed=seed)
@@ -54,8 +62,9 @@ def simulate(
         "models_sha256": sets.sha256(plan.textures),
         "threshold": threshold,
         "threshold_sha256": felt_above.sha256,
+        **scene_settings(sets),
     }
-    write_provenance(note, "simulate", settings, seed=seed, inputs=[models, simplified])
+    write_provenance(note, "simulate", settings, seed=seed, inputs=inputs)
     print(f"simulated answers: {data}")
 
 

@@ -44,8 +44,9 @@ def stimuli(
     with copies of the models, from which it can be made again bit for bit.
 
     Start from docs/stimuli.toml. A recipe needs version = 1; a name under [set]; for each model, or
-    folder of them, a path under [[model]]; for each stroke under [[trajectory]] speed_mm_s and
-    force_n, or a file (CSV: time_s, speed_mm_s, force_n).
+    folder of them, a path under [[model]], or a scene there (a scene file, or a folder of tactileq
+    scene); for each stroke under [[trajectory]] speed_mm_s and force_n, or a file (CSV: time_s,
+    speed_mm_s, force_n).
 
     The options are for model files without a recipe; there the manifest's column model holds the
     folder that each model came from, and samples are g.
@@ -115,10 +116,11 @@ def tell_passed_over(others: Sequence[Path]) -> None:
 def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
     """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
     from modeling.files.provenance import write_provenance
+    from stimuli.sets.sources import files_behind
 
     def tell_origin(folder: Path) -> None:
         settings = {"recipe": recipe.to_toml()}
-        files = [*inputs, *recipe.files()]
+        files = [*inputs, *files_behind(recipe)]
         write_provenance(folder / "provenance.json", "stimuli", settings, inputs=files)
 
     sources, count = render_set(recipe, out, finish=tell_origin)
@@ -167,8 +169,9 @@ def tell_beyond_grid(sources: Sources) -> None:
         for trajectory in sources.trajectories:
             speed, force = trajectory.highest_speed_mm_s, trajectory.highest_force_n
             if speed > fastest or force > strongest:
+                done = "compiled" if getattr(model, "compiled_for", None) else "recorded"
                 print(
-                    f"note: {model.texture} ({labelled.label}) was recorded up to {fastest:g} mm/s "
+                    f"note: {model.texture} ({labelled.label}) was {done} up to {fastest:g} mm/s "
                     f"and {strongest:g} N; {trajectory.name} reaches {speed:g} mm/s and {force:g} "
                     "N, and what lies beyond is rendered as the nearest edge."
                 )

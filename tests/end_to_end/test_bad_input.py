@@ -194,6 +194,7 @@ READERS = {
     "v.json": ["export", "c", "good.json", "--vibrator", "v.json"],
     "set.toml": ["stimuli", "set.toml"],
     "study.toml": ["simulate", "--study", "study.toml"],
+    "scene.toml": ["scene", "scene.toml"],
     "t.tsv": ["simplify", "good.json", "--threshold", "t.tsv"],
     "labels.tsv": ["import", "wav", "a.wav", "--labels", "labels.tsv"],
     "a.wav": ["import", "wav", "a.wav", *LABELS],
@@ -228,6 +229,7 @@ def test_links_in_a_circle_are_no_place(main, tmp_path: Path) -> None:
 
 CONTENTS = {
     "deep JSON": ("m.json", b"[" * 100_000, "got values nested too deeply; fit it again"),
+    "deep scene": ("scene.toml", b"a = " + b"[" * 100_000, "got values nested too deeply"),
     "deep TOML": ("set.toml", b"a = " + b"[" * 100_000, "got values nested too deeply"),
     "JSON beyond numbers": ("m.json", b'{"a": ' + b"9" * 310 + b"}", "number too large"),
     "JSON beyond digits": ("m.json", b'{"a": ' + b"9" * 5000 + b"}", "number too large"),

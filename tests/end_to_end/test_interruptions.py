@@ -35,6 +35,7 @@ FOLDERS = ("--recordings", "recordings", "--models", "models", "--simplified", "
 LONG = {
     "import": ("import", "hatt", "{}.xml", *SPEEDS, "--duration", "2"),
     "model": ("model", "recordings", "--jobs", "2", "--layers", "{}"),
+    "scene": ("scene", "{light.toml|strong.toml}"),
     "stimuli": ("stimuli", "models/canvas.json", *SPEEDS, "--seed", "{}"),
     "record": ("record", "out", "--texture", "canvas", "--rate", "5000", "--seed", "{}"),
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
@@ -72,6 +73,10 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Pat
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
     (tmp_path / "study.toml").write_text(small_study)
+    for name, force_n in (("light", 1), ("strong", 3)):
+        hand = f"speed_mm_s = [100, 300], force_n = [1, {force_n}]"
+        scene = f'version = 1\nscene.name = "{name}"\nhand = {{{hand}}}\n'
+        (tmp_path / f"{name}.toml").write_text(scene)
     return tmp_path
 
 

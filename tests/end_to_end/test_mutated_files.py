@@ -7,6 +7,7 @@ import json
 import re
 import warnings
 from collections.abc import Callable, Iterable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +19,18 @@ from experiments.study.study import SHIPPED_STUDY, Study
 from experiments.tasks import plan_session
 from modeling import (
     ARModel,
+    CompiledScene,
     InputError,
     Recording,
     RecordingSet,
     Renderer,
+    Scene,
     Simplification,
     TextureModel,
     Threshold,
     Vibrator,
     compensation_for,
+    compile_scene,
     regressed,
     simplify,
 )
@@ -34,6 +38,9 @@ from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.fitting.conditions import recording_spectra
 from modeling.models.loading import AnyModel, load_model
 from modeling.recordings.trajectory import load_trajectory
+from modeling.scenes.compiled import load_compiled
+from modeling.scenes.places import places_of
+from modeling.scenes.scene import HandRange
 from rig.importing.files import Label, import_csv, import_wav, labels_from_table
 from rig.importing.hatt import load_hatt
 from stimuli.planted.textures import planted_texture
@@ -254,6 +261,20 @@ def use_recipe(path: Path) -> Iterable[object]:
     yield [trajectory.duration_s for trajectory in sources.trajectories]
 
 
+def use_scene(path: Path) -> Iterable[object]:
+    scene = Scene.load(path)
+    json.dumps(scene.to_dict(), allow_nan=False)
+    yield (len(scene.sha256), len(scene.files))
+    places = places_of(TEXTURE, scene.hand)
+    yield from (places.share, places.speed_change_mm_s2, places.force_change_n_s)
+    yield from (places.speed_range, places.force_range)
+
+
+def use_compiled_scene(path: Path) -> Iterable[object]:
+    for model in load_compiled(path.parent, {TEXTURE.texture: TEXTURE}).values():
+        yield Renderer(model).render(200.0, 2.0, samples=100)
+
+
 def use_study(path: Path) -> Iterable[object]:
     study = Study.load(path)
     assert Study.from_dict(json.loads(json.dumps(study.to_dict()))) == study
@@ -286,6 +307,13 @@ def use_threshold(path: Path) -> Iterable[object]:
 
 def use_trajectory(path: Path) -> Iterable[object]:
     yield load_trajectory(path, name="hand").duration_s
+
+
+@cache
+def compiled_scene() -> CompiledScene:
+    """Once for all kinds of files."""
+    hand = HandRange(speed_mm_s=(100.0, 250.0), force_n=(1.0, 2.5))
+    return compile_scene(Scene(name="light touch", hand=hand), {TEXTURE.texture: TEXTURE})
 
 
 def ar_model() -> ARModel:
@@ -362,6 +390,58 @@ force_n = 1.5
 [[trajectory]]
 file = "hand.csv"
 """
+SCENE = b"""version = 1
+[scene]
+name = "light touch"
+textures = ["wall paper"]
+threshold = "threshold.tsv"
+margin_db = 1
+[hand]
+speed_mm_s = [100, 250]
+force_n = [1, 2.5]
+stroke_hz = 1.5
+[actuator]
+band_hz = [40, 400]
+rate_hz = 8000
+peak_g = 5
+rms_g = 2
+[bound]
+gfc30 = 0.9
+bands_db = 1.5
+[budget]
+operations = 500
+bytes = 9999
+"""
+DISTRIBUTION = b"""version = 1
+scene = {name = "two places"}
+[[hand.place]]
+speed_mm_s = 150
+force_n = 1.5
+share = 0.7
+[[hand.place]]
+speed_mm_s = 250
+force_n = 2
+share = 0.3
+[budget]
+device = "stm32l432"
+"""
+RECORDED = b"""version = 1
+[scene]
+name = "recorded"
+[hand]
+file = "hand.csv"
+"""
+SCENE_RECIPE = b"""version = 1
+set = {name = "scene", rate_hz = 5000}
+[[model]]
+scene = "compiled"
+[[model]]
+path = "model.json"
+label = "full"
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.5
+"""
 HAND = b"time_s,speed_mm_s,force_n\n0,100,1\n0.5,150,1.5\n1,nan,2\n2,0,0\n"
 THRESHOLD = (
     b"# source: test\n# caveat: none\nfrequency_hz\tdisplacement_um\n10\t5\n100\t0.5\n600\t2\n"
@@ -378,6 +458,12 @@ KINDS: dict[str, tuple[str, Use]] = {
     "samples of a set": ("set/0001.csv", use_set),
     "toolkit": ("Models_Planted.xml", use_hatt),
     "recipe": ("set.toml", use_recipe),
+    "scene": ("scene.toml", use_scene),
+    "scene of a distribution": ("places.toml", use_scene),
+    "scene of a recorded hand": ("recorded.toml", use_scene),
+    "recipe of a scene": ("scene-set.toml", use_recipe),
+    "compiled scene": ("compiled/scene.json", use_compiled_scene),
+    "model of a compiled scene": ("compiled/wall-paper.json", use_compiled_scene),
     "trajectory": ("hand.csv", use_trajectory),
     "study": ("study.toml", use_study),
     "vibrator": ("vibrator.json", use_vibrator),
@@ -403,6 +489,10 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
         "labels.tsv": LABELS,
         "Models_Planted.xml": hatt_xml.encode(),
         "set.toml": RECIPE,
+        "scene.toml": SCENE,
+        "scene-set.toml": SCENE_RECIPE,
+        "places.toml": DISTRIBUTION,
+        "recorded.toml": RECORDED,
         "hand.csv": HAND,
         "study.toml": SHIPPED_STUDY.read_bytes(),
         "threshold.tsv": THRESHOLD,
@@ -411,6 +501,7 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
     for name, data in contents.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
+    compiled_scene().save(folder / "compiled")
 
 
 def complaint(use: Use, path: Path) -> str:

@@ -148,7 +148,8 @@ FOREIGN = {
 
 
 @pytest.mark.parametrize(
-    "command", ["analyze data", "demo", "bench render", "bench chart", "stability"]
+    "command",
+    ["analyze data", "demo", "bench render", "bench chart", "stability", "scene light.toml"],
 )
 @pytest.mark.parametrize("foreign", FOREIGN.values(), ids=FOREIGN)
 def test_folders_with_one_foreign_file_are_not_replaced(
@@ -157,7 +158,7 @@ def test_folders_with_one_foreign_file_are_not_replaced(
     made = tmp_path / "made"
     (made / "figures").mkdir(parents=True)
     (made / "figures/a.png").write_bytes(b"ours")
-    seal_folder(made, provenance_of(command.removesuffix(" data"), {}))
+    seal_folder(made, provenance_of(command.removesuffix(" data").removesuffix(" light.toml"), {}))
     path = made / foreign
     if foreign.endswith("/"):
         path.mkdir()

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer, TextureModel
+from modeling import InputError, Renderer, TextureModel, regressed
+from modeling.models.loading import Layered
 from rig.interface import RigReading, TextureRig
 from rig.twin import SimulatedRig
 
@@ -80,13 +81,14 @@ def test_nothing_is_felt_before_and_after_presenting() -> None:
     assert feel(rig, 3).size == 0
 
 
-def test_felt_vibration_is_the_renderers() -> None:
+@pytest.mark.parametrize("presented", [model(), regressed(model())], ids=["grid", "regressed"])
+def test_felt_vibration_is_the_renderers(presented: Layered) -> None:
     rig = SimulatedRig(seed=11)
     feel(rig, 13)  # presenting may begin anywhere in the stroke
-    rig.present_model(model())
+    rig.present_model(presented)
     felt = feel(rig, 60)
     moments = 13 * STEP_S + np.arange(1, 3001) / 5000
-    expected = Renderer(model(), seed=11, stream=1).render(*hand(moments))
+    expected = Renderer(presented, seed=11, stream=1).render(*hand(moments))
     assert felt == pytest.approx(expected, abs=1e-9)
     assert np.std(felt) > 0.005
 

@@ -95,6 +95,8 @@ def test_the_recipe_of_the_readme(tmp_path: Path, vibrator: Vibrator) -> None:
 
 paths = st.text().map(Path)  # whatever a file system holds
 names = st.text(st.characters(categories=("L", "N", "P", "S")), min_size=1)
+models = st.builds(ModelEntry, paths, names)
+scenes = st.builds(ModelEntry, st.none(), names, paths)
 numbers = st.floats(0, 1e4, allow_subnormal=False)
 constants = st.builds(TrajectoryEntry, name=names, speed_mm_s=numbers, force_n=numbers)
 hands = st.builds(TrajectoryEntry, name=names, file=paths)
@@ -118,7 +120,7 @@ CONTROLS = Recipe(name="x", models=(ModelEntry(Path("\x7f\x80\0\r\n"), "x"),), t
     recipe=st.builds(
         Recipe,
         name=names,
-        models=st.lists(st.builds(ModelEntry, paths, names), min_size=1, unique=True).map(tuple),
+        models=st.lists(models | scenes, min_size=1, unique=True).map(tuple),
         trajectories=st.lists(
             constants | hands, min_size=1, max_size=4, unique_by=lambda t: t.name
         ).map(tuple),
@@ -146,7 +148,14 @@ def below(recipe: Recipe, folder: Path) -> Recipe:
         threshold = folder / threshold
     return replace(
         recipe,
-        models=tuple(replace(entry, path=folder / entry.path) for entry in recipe.models),
+        models=tuple(
+            ModelEntry(
+                entry.path and folder / entry.path,
+                entry.label,
+                entry.scene and folder / entry.scene,
+            )
+            for entry in recipe.models
+        ),
         trajectories=tuple(
             entry if entry.file is None else replace(entry, file=folder / entry.file)
             for entry in recipe.trajectories
@@ -174,7 +183,10 @@ def refused(folder: Path, old: str, new: str) -> str:
         ("[[model]]", "[level]\nloud = 1\n[[model]]", "in [level], got loud"),
         ("force_n = 1.5", "force_n = 1.5\nforce = 1", "in [[trajectory]], got force"),
         ('path = "models"', 'path = "models"\nlayers = 2', "in [[model]], got layers"),
-        ('path = "models"', 'label = "full"', "expected a path under each [[model]]"),
+        ('path = "models"', 'label = "full"', "expected a path or a scene under each [[model]]"),
+        ('path = "models"', 'path = "models"\nscene = "s.toml"', "[[model]], got both in one"),
+        ('path = "models"', 'scene = "s.toml"', "expected a scene at"),
+        ('path = "models"', "scene = [1]", "expected text for scene under [[model]], got [1]"),
         ('path = "models"', "path = 3", "expected text for path under [[model]], got 3"),
         ('path = "models"', 'path = "models"\nlabel = ""', "as label of a model, got ''"),
         ('path = "models"', 'path = "m"\nlabel = "a\\tb"', "as label of a model"),
