@@ -22,6 +22,9 @@ from modeling.models.grid import Cells, within_grid
 # parts, which a layer that vanishes from one condition to the next would exceed.
 LARGEST_STEP = 0.35
 MOST_PARTS = 8
+# Where there is one speed or force alone, the second node: so near that a hand beyond it is beyond
+# the grid, but told apart in single precision.
+NEXT = 1 + 1e-6
 LOWEST_GAIN_SHARE = 1e-6  # of a layer's largest gain, where one of 0 is to be blended
 
 
@@ -116,7 +119,7 @@ def wide_enough(axis: Floats, values: Floats, *, along: int) -> tuple[Floats, Fl
     """
     if axis.size > 1:
         return axis, values
-    return axis[0] * np.array([1.0, 2.0]), np.repeat(values, 2, axis=along)
+    return axis[0] * np.array([1.0, NEXT]), np.repeat(values, 2, axis=along)
 
 
 def logarithmic_nodes(

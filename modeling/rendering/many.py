@@ -17,7 +17,14 @@ from modeling.models.parameter_table import ParameterTable
 from modeling.rendering.compiled import filled_texture, is_compiled, render_counters
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, RenderPlan, plan_for
+from modeling.rendering.plan import (
+    LayeredModel,
+    Notch,
+    RenderCounters,
+    RenderPlan,
+    plan_for,
+    usual_update_s,
+)
 from modeling.rendering.renderer import Renderer, as_floats
 from modeling.threads import in_order, usable_cores
 
@@ -45,8 +52,8 @@ def render_many(
 
     The same bits as `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
     one after the other, but side by side in the processor's vectors and on all cores that this
-    process may use (docs/method/rendering.md#many-streams). What shares a number of layers and
-    rates runs together; an ARModel is rendered alone.
+    process may use (docs/method/rendering.md#many-streams). What shares a number of layers, rates
+    and an update interval runs together; an ARModel is rendered alone.
 
     Parameters
     ----------
@@ -112,7 +119,8 @@ def rendered(
             results[number] = _alone(model, hand, which, options)
             continue
         if id(model) not in textures:
-            textures[id(model)] = _Texture(model, plan_for(model.rate_hz, **options))
+            plan = plan_for(model.rate_hz, update_s=usual_update_s(model), **options)
+            textures[id(model)] = _Texture(model, plan)
         texture = textures[id(model)]
         alike[texture.kind].append(_Stream(number, texture, stream_key(*which), hand))
     tasks = list(_tasks(alike.values(), lanes or lib.tq_widest()))
@@ -138,7 +146,7 @@ class _Texture:
         fields = plan.texture(model) | {"values": _rows(model.table)}
         self.filled, self._arrays = filled_texture(ffi, fields, np.float64)
         # What all streams of one vector have in common.
-        self.kind = (self.filled.layers, model.rate_hz, plan.rate_hz)
+        self.kind = (self.filled.layers, model.rate_hz, plan.rate_hz, plan.update_samples)
 
 
 def _rows(table: ParameterTable) -> Floats:

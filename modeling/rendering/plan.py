@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from modeling.arrays import Floats
 from modeling.checks import is_whole
 from modeling.errors import InputError, shown
+from modeling.models.compiled_for import CompiledFor
 from modeling.models.parameter_table import ParameterTable
 from modeling.rendering.cost import Cost, cost_of
 from modeling.rendering.limits import Limits
@@ -239,19 +240,29 @@ class RenderPlan:
         return 0 if np.isinf(seconds) else max(1, round(min(seconds * self.rate_hz, _FOR_EVER)))
 
 
+def usual_update_s(model: object) -> float:
+    """From one parameter update to the next by default: 1 ms, or what a model was compiled for."""
+    compiled_for = getattr(model, "compiled_for", None)
+    return compiled_for.update_s if isinstance(compiled_for, CompiledFor) else UPDATE_S
+
+
 def plan_for(
     model_rate_hz: float,
     *,
     rate_hz: float | None = None,
     update_samples: int | None = None,
+    update_s: float = UPDATE_S,
     limits: Limits | None = None,
     compensation: Notch | None = None,
     single: bool = False,
 ) -> RenderPlan:
-    """The plan of a `Renderer` with these arguments, of a model at this rate; refused as there."""
+    """The plan of a `Renderer` with these arguments, of a model at this rate; refused as there.
+
+    `update_s` applies where no `update_samples` are given (`usual_update_s`).
+    """
     rate_hz = model_rate_hz if rate_hz is None else float(rate_hz)
     if update_samples is None:
-        update_samples = max(1, round(UPDATE_S * rate_hz)) if np.isfinite(rate_hz) else 1
+        update_samples = max(1, round(update_s * rate_hz)) if np.isfinite(rate_hz) else 1
     return RenderPlan(
         rate_hz=rate_hz,
         update_samples=update_samples,

@@ -15,7 +15,13 @@ from modeling.models.ar_model import ARModel
 from modeling.rendering.compiled import CompiledEngine, is_compiled
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, Notch, RenderCounters, plan_for
+from modeling.rendering.plan import (
+    LayeredModel,
+    Notch,
+    RenderCounters,
+    plan_for,
+    usual_update_s,
+)
 from modeling.rendering.reference.bands import BandFilter
 from modeling.rendering.reference.engine import PythonEngine
 from modeling.rendering.reference.lattice import LatticeFilter
@@ -61,8 +67,9 @@ class Renderer:
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
         Samples from one reading of speed and force to the next, 1 … 1 000 000; by default one
-        millisecond (5 at 5 kHz, docs/method/rendering.md#moving-parameters). Where a device reads
-        less often, its period.
+        millisecond (5 at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was
+        compiled for a scene the interval that keeps the scene's bound. Where a device reads less
+        often, its period.
     limits : Limits, optional
         Peak, RMS and duration that the output does not exceed; none by default.
     compensation : Compensation, optional
@@ -98,6 +105,7 @@ class Renderer:
             model.rate_hz,
             rate_hz=rate_hz,
             update_samples=update_samples,
+            update_s=usual_update_s(model),
             limits=limits,
             compensation=compensation,
             single=single,

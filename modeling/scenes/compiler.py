@@ -19,6 +19,7 @@ import numpy as np
 from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.models.compiled_for import CompiledFor
+from modeling.models.parameter_table import NEXT
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.terms import DrivenBy
 from modeling.models.texture_model import TextureModel
@@ -36,7 +37,7 @@ from modeling.scenes.compiled import (
 from modeling.scenes.cost import scene_bytes, stored_numbers
 from modeling.scenes.error_maps import ErrorMaps
 from modeling.scenes.felt import at_places, kept_layers, layer_groups
-from modeling.scenes.measures import Errors, Yardstick
+from modeling.scenes.measures import Errors, Yardstick, errors_between
 from modeling.scenes.places import places_of
 from modeling.scenes.restricting import cut, played, thinned
 from modeling.scenes.scene import Bound, Scene
@@ -265,7 +266,7 @@ class _Search:
     def _ending(self, model: RegressedModel) -> RegressedModel:
         """Regressions from the lowest to the highest speed and force of the scene."""
         speeds, forces = (
-            np.array([low, high if high > low else 2 * low])
+            np.array([low, max(high, NEXT * low)])
             for low, high in (self.places.speed_range, self.places.force_range)
         )
         return replace(model, speeds_mm_s=speeds, forces_n=forces)
@@ -370,8 +371,8 @@ class _Search:
             for driven in self._regressed(layers)
             if self._keeps(taken + driven[2], bound) and _table_numbers(driven[1]) < below
         ]
-        # A grid is worth it only where it is smaller than a regression.
-        below = min([below, *(_table_numbers(model) for _, model, _ in ways)])
+        # A grid is worth it only where it is no larger than a regression.
+        below = min([below, *(_table_numbers(model) + 1 for _, model, _ in ways)])
         nodes = fewest_nodes(maps, self.places, bound=bound, taken=taken, below=below)
         if nodes is not None:
             fewer = thinned(maps.model, self.places, *nodes)
@@ -420,9 +421,8 @@ class _Search:
     def _measures(self, candidate: Candidate) -> tuple[Measured, ...]:
         counts, share = self.places.counts.ravel(), self.places.share.ravel()
         weights = np.where(counts, share, 0.0) / share[counts].sum()
-        whole = self.maps(tuple(range(self.full.n_layers)))
         at_rest, together = candidate.at_rest, candidate.together
-        of_full = whole.of_model(candidate.model) + candidate.late + candidate.rounding
+        of_full = self._of_full(candidate)
         bound = self.scene.bound
 
         def measured(name: Any, kind: int) -> Measured:
@@ -438,10 +438,24 @@ class _Search:
                 mean=mean if name == "gfc30" else float(np.sqrt(mean)),
                 worst=told(float(together[kind][place])),
                 place=self.places.name(place),
-                of_full=told(float(np.max(of_full[kind][counts]))),
+                of_full=told(float(np.max(of_full[kind]))),
             )
 
         return tuple(measured(name, kind) for kind, name in enumerate(bound.to_dict()))
+
+    def _of_full(self, candidate: Candidate) -> Errors:
+        """Errors against the full model at the places that count, moved into the scene."""
+        rows, columns = np.nonzero(self.places.counts)
+        hand = (
+            np.clip(self.places.speeds_mm_s[rows], *self.places.speed_range),
+            np.clip(self.places.forces_n[columns], *self.places.force_range),
+        )
+        ours, full = (
+            self.yardstick.features(model.parameters(*hand))
+            for model in (candidate.model, self.full)
+        )
+        driven = (candidate.late + candidate.rounding).at(self.places.counts.ravel())
+        return errors_between(ours, full) + driven
 
     def _steps(self, candidate: Candidate) -> tuple[Step, ...]:
         """What each step brings, in the order of the compiler."""
@@ -628,13 +642,22 @@ def _beyond_budget(searches: Sequence[_Search], scene: Scene) -> str:
     nearest = _nearest_bound(searches, scene)
     advice = "raise the budget, or take fewer textures"
     if nearest is not None:
-        told = ", ".join(f"{name} = {value:.3g}" for name, value in nearest.to_dict().items())
-        advice = f"the nearest bound that fits is {told}"
+        advice = f"the nearest bound that fits is {_told(nearest)}"
     return (
         f"expected the scene {scene.name} within {' and '.join(asked)}, got one that takes "
         f"{operations:.1f} operations per sample and {_bytes(smallest)} bytes at least to keep its "
         f"bound; {advice}."
     )
+
+
+def _told(bound: Bound) -> str:
+    """A bound in few digits, rounded so that it asks for no more."""
+    wider = {
+        "gfc30": np.floor(1e4 * bound.gfc30) / 1e4,
+        "bands_db": np.ceil(1e2 * bound.bands_db) / 1e2,
+        "level_db": np.ceil(1e2 * bound.level_db) / 1e2,
+    }
+    return ", ".join(f"{name} = {value:g}" for name, value in wider.items())
 
 
 def _nearest_bound(searches: Sequence[_Search], scene: Scene) -> Bound | None:

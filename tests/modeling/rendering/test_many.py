@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ import modeling.rendering.many
 from modeling import ARModel, InputError, Limits, Renderer, TextureModel, regressed, render_many
 from modeling.arrays import Floats
 from modeling.hand import Hand
+from modeling.models.compiled_for import CompiledFor
 from modeling.rendering.compiled import SWITCH
 from modeling.rendering.many import WIDTHS, lib, rendered
 from modeling.vibrators.compensation import Compensation
@@ -49,6 +51,11 @@ def wild_model(layers: int, seed: int = 0) -> TextureModel:
         level_sd_db=np.zeros(shape),
         estimator="planted",
     )
+
+
+def compiled_for(model: TextureModel, update_s: float) -> TextureModel:
+    note = CompiledFor("planted", "", "", {}, update_s, False)
+    return replace(model, compiled_for=note)
 
 
 def ar_model() -> ARModel:
@@ -171,6 +178,16 @@ def test_order_and_kinds_do_not_matter(rate_hz: float | None) -> None:
     found = render_many(models, hands, seeds=seeds, streams=streams, rate_hz=rate_hz)
     for model, hand, seed, stream, signal in zip(models, hands, seeds, streams, found, strict=True):
         alone = Renderer(model, seed=seed, stream=stream, rate_hz=rate_hz)
+        assert signal.tobytes() == alone.render(*hand).tobytes()
+
+
+def test_models_of_several_scenes_keep_their_own_update_intervals() -> None:
+    intervals = (1, 5, 20, 20, 80)
+    models = [compiled_for(wild_model(2, seed), n / 5000) for seed, n in enumerate(intervals)]
+    hands = strokes([400, 300, 500, 450, 333])
+    found = render_many(models, hands, seeds=range(5))
+    for seed, (model, hand, signal) in enumerate(zip(models, hands, found, strict=True)):
+        alone = Renderer(model, seed=seed, update_samples=intervals[seed])
         assert signal.tobytes() == alone.render(*hand).tobytes()
 
 

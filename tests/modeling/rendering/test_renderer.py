@@ -23,6 +23,7 @@ from modeling import (
     TextureModel,
 )
 from modeling.hand import Hand
+from modeling.models.compiled_for import CompiledFor
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import SWITCH, Call, is_compiled
 from stimuli.planted.textures import CATALOGUE, planted_texture
@@ -344,6 +345,17 @@ def test_mismatched_trajectories_are_refused(
 ) -> None:
     with pytest.raises(InputError, match="two arrays of one length"):
         Renderer(moving_model()).render(speed, force, samples=samples)
+
+
+def test_a_compiled_model_is_updated_as_its_scene_allows() -> None:
+    note = CompiledFor("planted", "", "", {}, 3e-3, False)
+    model = replace(moving_model(), compiled_for=note)
+    assert Renderer(moving_model()).update_samples == 5
+    assert Renderer(model).update_samples == 15
+    assert Renderer(model, rate_hz=48000.0).update_samples == 144
+    assert Renderer(model, update_samples=5).update_samples == 5
+    often = replace(model, compiled_for=replace(note, update_s=1e-9))
+    assert Renderer(often).update_samples == 1
 
 
 @pytest.mark.parametrize("update_samples", [0, -1, 2.5, 2**31])
