@@ -131,8 +131,8 @@ def _check_models(scene: Scene, names: Sequence[str], models: Mapping[str, Textu
 class Candidate:
     """One model that keeps a bound, and what it takes of it.
 
-    `late` and `rounding` are errors by late updates and by single precision, `at_rest` those by
-    fewer conditions or by a regression; each at all places of the lattice.
+    `late` and `rounding` are errors by late updates (and the actuator's limits) and by single
+    precision, `at_rest` those by fewer nodes or by a regression; each at all places.
     """
 
     layers: tuple[int, ...]
@@ -206,7 +206,7 @@ class _Search:
         self.kept = kept_layers(full, scene, self.places, groups=groups)
         self._counted: dict[tuple[int, int], float] = {}
         self._found: dict[tuple[Any, ...], Candidate | None] = {}
-        self._check_limits()
+        self._lost = self._lost_to_limits()
 
     # --- What is known of a choice of layers
 
@@ -283,6 +283,11 @@ class _Search:
         )
 
     @property
+    def usual_plan(self) -> RenderPlan:
+        """As models are rendered by default: an update every millisecond, double precision."""
+        return plan_for(self.full.rate_hz, rate_hz=self.rate_hz, limits=self.scene.actuator.limits)
+
+    @property
     def intervals(self) -> list[int]:
         """Update intervals in samples, longest first; the last one is every sample."""
         samples = {max(1, round(1e-3 * ms * self.rate_hz)) for ms in UPDATES_MS}
@@ -340,9 +345,9 @@ class _Search:
         return best
 
     def _late(self, layers: tuple[int, ...], samples: int) -> Errors:
-        # Of an update at every sample nothing is late.
-        update_s = (samples - 1) / self.rate_hz
-        return self.maps(layers).late(update_s, self.places)
+        """What an interval takes, with what the actuator's limits take of any model."""
+        update_s = (samples - 1) / self.rate_hz  # of an update at every sample nothing is late
+        return self.maps(layers).late(update_s, self.places) + self._lost
 
     def _keeps(self, errors: Errors, bound: Bound) -> bool:
         counts = self.places.counts.ravel()
@@ -406,7 +411,7 @@ class _Search:
             model=candidate.model,
             dropped=tuple(layer + 1 for layer in every if layer not in candidate.layers),
             way=candidate.way,
-            full_plan=plan_for(self.full.rate_hz, rate_hz=self.rate_hz),
+            full_plan=self.usual_plan,
             plan=candidate.plan,
             measures=self._measures(candidate),
             steps=self._steps(candidate),
@@ -461,8 +466,7 @@ class _Search:
         """What each step brings, in the order of the compiler."""
         felt = with_signs_chosen_again(self.full, list(candidate.layers))
         shorter = cut(felt, self.places)
-        every_ms = plan_for(self.full.rate_hz, rate_hz=self.rate_hz)
-        usual = replace(every_ms, limits=candidate.plan.limits)
+        usual = self.usual_plan
         longer = replace(usual, update_samples=candidate.plan.update_samples)
         maps, at_rest = self.maps(candidate.layers), candidate.at_rest
         late = self._late(candidate.layers, usual.update_samples)
@@ -514,21 +518,26 @@ class _Search:
 
     # --- What the actuator does not allow
 
-    def _check_limits(self) -> None:
-        """Refuse a bound on the level that the actuator's limits break, whatever the model."""
-        loss_db = self._loss_db()
+    def _lost_to_limits(self) -> Errors:
+        """What the actuator's limits take of the level, whatever the model, at all places.
+
+        Raises
+        ------
+        InputError
+            Where it is more than the bound on the level allows.
+        """
+        places, loss_db = self.places, np.zeros(self.places.counts.shape)
+        loss_db[places.counts] = self._loss_db()
         worst = int(np.argmax(loss_db))
-        if loss_db.max(initial=0.0) > self.scene.bound.level_db:
-            rows, columns = np.nonzero(self.places.counts)
-            where = self.places.name(
-                int(rows[worst] * self.places.counts.shape[1] + columns[worst])
-            )
+        largest = float(loss_db.ravel()[worst])
+        if largest > self.scene.bound.level_db:
             raise InputError(
                 f"expected a level_db under [bound] that the actuator's limits leave room for, got "
-                f"{self.scene.bound.level_db:g} dB, where they take {loss_db[worst]:.2f} dB from "
-                f"{self.full.texture} at {where} whatever the model; the nearest is level_db = "
-                f"{np.ceil(100 * loss_db[worst]) / 100:g}."
+                f"{self.scene.bound.level_db:g} dB, where they take {largest:.2f} dB from "
+                f"{self.full.texture} at {places.name(worst)} whatever the model; the nearest is "
+                f"level_db = {np.ceil(100 * largest) / 100:g}."
             )
+        return Errors.none(loss_db.size)._replace(level_db=loss_db.ravel())
 
     def _loss_db(self) -> Floats:
         """What peak and RMS limits take from the full model's level at the places that count."""

@@ -9,14 +9,12 @@ import numpy as np
 from modeling.arrays import Floats
 from modeling.equalizer.bands import band_rms, clamp_bands
 from modeling.errors import InputError, shown
-from modeling.hand import Hand
-from modeling.models.grid import Cells
 from modeling.models.own_peaks import own_peaks
 from modeling.models.parameter_table import Parameters
 from modeling.models.texture_model import TextureModel
 from modeling.perception.simplification import HIGHEST_FLIP_PROBABILITY, flip_probabilities
 from modeling.scenes.measures import Yardstick
-from modeling.scenes.places import Places
+from modeling.scenes.places import Places, enclosing
 from modeling.scenes.scene import Range, Scene
 
 MOST_GROUPS = 10  # of layers, all subsets of which are looked at
@@ -47,10 +45,9 @@ def kept_layers(
             "thresholds are in g, so calibrate the recordings (g per full scale) first."
         )
     every = tuple(range(model.n_layers))
-    above_db = levels_above_threshold_db(model, scene, places) + scene.margin_db
-    droppable = (above_db < 0).all(axis=0) & (
-        _flips(model, above_db, places) < HIGHEST_FLIP_PROBABILITY
-    )
+    above_db = levels_above_threshold_db(model, scene, at_places(model, places)) + scene.margin_db
+    flips = _flips(model, scene, places)
+    droppable = (above_db < 0).all(axis=0) & (flips < HIGHEST_FLIP_PROBABILITY)
     power = 10 ** (above_db / 10)
     groups = [group for group in groups if droppable[group].all()]
     choices: list[tuple[float, tuple[int, ...]]] = []
@@ -63,13 +60,12 @@ def kept_layers(
     return [kept for _, kept in choices] or [every]
 
 
-def levels_above_threshold_db(model: TextureModel, scene: Scene, places: Places) -> Floats:
-    """Level of every layer relative to the threshold at the places that count, (n, m), in dB.
+def levels_above_threshold_db(model: TextureModel, scene: Scene, at: Parameters) -> Floats:
+    """Level of every layer relative to the threshold at n places, (n, m), in dB.
 
     Of what the actuator plays of the layer, at the frequency in its band that is nearest to the
     layer's. NaN where no threshold is known.
     """
-    at = at_places(model, places)
     band_hz = scene.actuator.band_hz
     if band_hz is None:
         rms = band_rms(at.gains, at.bandwidths_hz, rate_hz=model.rate_hz)
@@ -103,19 +99,24 @@ def _power_in_band(at: Parameters, band_hz: Range, *, rate_hz: float) -> Floats:
     return power
 
 
-def _flips(model: TextureModel, above_db: Floats, places: Places) -> Floats:
-    """P(flip) of each layer's verdict, (m,), over the recorded conditions among the places.
+def _flips(model: TextureModel, scene: Scene, places: Places) -> Floats:
+    """P(flip) of each layer's verdict, (m,), over the recorded conditions that enclose the places.
 
-    Where there is none, over all places.
+    Conditions beyond the scene where a layer is felt say nothing of it here.
     """
     rows, columns = np.nonzero(places.counts)
-    speed, force = places.speeds_mm_s[rows], places.forces_n[columns]
-    recorded = np.isin(speed, model.speeds_mm_s) & np.isin(force, model.forces_n)
-    if not recorded.any():
-        recorded = np.ones(speed.size, dtype=bool)
-    cells = Cells(model.speeds_mm_s, model.forces_n, hand=Hand(speed[recorded], force[recorded]))
-    flips = flip_probabilities(above_db[recorded], cells.blend(model.level_sd_db))
-    return np.nan_to_num(flips, nan=1.0)
+    axes = (
+        (model.speeds_mm_s, places.speeds_mm_s[rows]),
+        (model.forces_n, places.forces_n[columns]),
+    )
+    inside = [
+        np.flatnonzero(enclosing(axis, (float(at.min()), float(at.max())))) for axis, at in axes
+    ]
+    row, column = (index.ravel() for index in np.meshgrid(*inside, indexing="ij"))
+    at = model.parameters(model.speeds_mm_s[row], model.forces_n[column])
+    above_db = levels_above_threshold_db(model, scene, at) + scene.margin_db
+    below_db = np.where(above_db < 0, above_db, -np.inf)
+    return flip_probabilities(below_db, model.level_sd_db[row, column])
 
 
 def layer_groups(model: TextureModel) -> list[list[int]]:
