@@ -80,7 +80,7 @@ class Errors(NamedTuple):
     def shares(self, bound: Bound) -> Floats:
         """Each error as a share of what the bound allows, (3, n); infinite where it allows none."""
         allowed = allowed_by(bound)
-        with np.errstate(divide="ignore", invalid="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             ratios = [e / a for e, a in zip(self, allowed, strict=True)]
         return np.array([np.where(np.isnan(ratio), 0.0, ratio) for ratio in ratios])
 

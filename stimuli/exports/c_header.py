@@ -11,7 +11,7 @@ from modeling import Compensation, Limits
 from modeling.files.writing import write_text
 from modeling.models.loading import AnyModel
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import RenderPlan, plan_for
+from modeling.rendering.plan import RenderPlan, plan_for, usual_update_s
 from stimuli.exports.c_source import (
     SINGLE_PRECISION,
     array,
@@ -109,6 +109,7 @@ def c_header(
     plan = plan_for(
         layered.rate_hz,
         rate_hz=rate_hz,
+        update_s=usual_update_s(layered),
         limits=limits,
         compensation=compensation,
         single=single,

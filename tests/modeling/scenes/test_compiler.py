@@ -21,8 +21,9 @@ from modeling.models.parameter_table import Parameters
 from modeling.perception.simplification import with_signs_chosen_again
 from modeling.rendering.plan import plan_for
 from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.compiler import clipped_loss_db, compile_scene
+from modeling.scenes.compiler import compile_scene
 from modeling.scenes.error_maps import ErrorMaps
+from modeling.scenes.limit_losses import clipped_loss_db
 from modeling.scenes.measures import Errors, Yardstick, errors_between
 from modeling.scenes.places import places_of
 from modeling.scenes.scene import Actuator, Bound, Budget, HandRange, Scene
@@ -267,9 +268,10 @@ def test_what_is_lost_against_the_full_model_is_judged_within_the_scene(
 
 
 SHARE = st.floats(0, 1)
+SPEED_GRIDS = st.sampled_from([(60.0, 150.0, 300.0), (100.0, 300.0)])
 
 
-@settings(max_examples=10)
+@settings(max_examples=12)
 @given(data=st.data())
 def test_a_narrower_scene_or_a_looser_bound_never_gets_a_dearer_model(
     data: st.DataObject,
@@ -279,7 +281,10 @@ def test_a_narrower_scene_or_a_looser_bound_never_gets_a_dearer_model(
 ) -> None:
     blending = data.draw(st.sampled_from(["linear", "logarithmic"]))
     seed = data.draw(st.integers(0, 9))
-    full = varied_model(seed, blending=blending, forces_n=(1.0, 1.5))
+    grid = {"speeds_mm_s": data.draw(SPEED_GRIDS), "forces_n": (1.0, 1.5)}
+    full = varied_model(seed, blending=blending, **grid)
+    level_sd_db = np.full(full.gains.shape, data.draw(st.sampled_from([0.0, 4.0, 11.0])))
+    full = replace(full, level_sd_db=level_sd_db)
     ends = [sorted(data.draw(st.tuples(*[SHARE] * 4))) for _ in range(2)]
     axes = [
         axis[0] + np.array(shares) * (axis[-1] - axis[0])
@@ -299,6 +304,18 @@ def test_a_narrower_scene_or_a_looser_bound_never_gets_a_dearer_model(
     reference = key_of(compile_one(full, make_scene(*wide, **bound)))
     assert key_of(compile_one(full, make_scene(*narrow, **bound)))[:2] <= reference[:2]
     assert key_of(compile_one(full, make_scene(*wide, **looser)))[:2] <= reference[:2]
+
+
+def test_a_layer_that_goes_in_a_scene_goes_in_a_narrower_one(
+    varied_model: ModelMaker, make_scene: SceneMaker, compile_one: Compile
+) -> None:
+    """Neither scene holds all recorded conditions, the narrower one none."""
+    full = varied_model(1, blending="logarithmic", speeds_mm_s=(100.0, 300.0), forces_n=(1.0, 1.5))
+    full = replace(full, level_sd_db=np.full(full.gains.shape, 11.0))
+    wide = compile_one(full, make_scene((100.0, 220.0), 1.0))
+    narrow = compile_one(full, make_scene((140.0, 220.0), 1.0))
+    assert set(wide.dropped) <= set(narrow.dropped)
+    assert narrow.after.operations <= wide.after.operations
 
 
 @settings(max_examples=12)
@@ -412,6 +429,26 @@ def test_a_level_that_the_limits_break_is_refused_with_the_nearest(
         compile_one(full, make_scene(actuator=actuator, level_db=nearest - 0.02))
     samples = compiled.renderer().render(300.0, 3.0, samples=20_000)
     assert np.abs(samples).max() <= np.float32(limits.get("peak_g", np.inf))
+
+
+def test_what_limits_take_counts_towards_the_level(
+    varied_model: ModelMaker, make_scene: SceneMaker, compile_one: Compile
+) -> None:
+    full, actuator = varied_model(1), Actuator(rms_g=0.08)
+    loss_db = float(20 * np.log10(full_rms(full) / 0.08))
+    tight = compile_one(full, make_scene(actuator=actuator, level_db=loss_db + 1e-3))
+    wide = compile_one(full, make_scene(actuator=actuator, level_db=loss_db + 0.2))
+    for compiled, bound in ((tight, loss_db + 1e-3), (wide, loss_db + 0.2)):
+        [level] = [m for m in compiled.measures if m.measure == "level_db"]
+        assert loss_db <= level.worst <= bound
+    assert key_of(wide) <= key_of(tight)
+
+
+def full_rms(full: TextureModel) -> float:
+    """RMS at the fastest and strongest condition, over the frequencies that are judged."""
+    yardstick = Yardstick(full.rate_hz, narrowest_hz=float(full.bandwidths_hz.min()), band_hz=None)
+    at = full.parameters([300.0], [3.0])
+    return float(np.sqrt(yardstick.power(at)[0]))
 
 
 # --- Budgets

@@ -11,7 +11,12 @@ import pytest
 from modeling import InputError, TextureModel, simplify
 from modeling.perception.thresholds import Threshold
 from modeling.scenes.compiled import CompiledTexture
-from modeling.scenes.felt import kept_layers, layer_groups, levels_above_threshold_db
+from modeling.scenes.felt import (
+    at_places,
+    kept_layers,
+    layer_groups,
+    levels_above_threshold_db,
+)
 from modeling.scenes.places import places_of
 from modeling.scenes.scene import Actuator, HandRange, Scene
 from stimuli.planted.textures import TEXTURES, planted_texture
@@ -65,7 +70,7 @@ def test_a_skirt_in_the_band_is_judged_at_the_bands_end(make_model: ModelMaker) 
     """Its power by the midpoint rule, against the threshold of the nearest frequency played."""
     model = make_model(0.0, [(60.0, 20.0, 1.0)])
     scene = Scene(name="skirt", hand=HAND, actuator=Actuator(band_hz=(150.0, 300.0)))
-    found = levels_above_threshold_db(model, scene, places_of(model, HAND))
+    found = levels_above_threshold_db(model, scene, at_places(model, places_of(model, HAND)))
     frequency = np.arange(150.0, 300.0, 0.1) + 0.05
     response = model.peq(100.0, 1.0).response(frequency)
     rms = np.sqrt(np.sum(response**2) * 0.1 / 2500)
