@@ -63,6 +63,11 @@ class Errors(NamedTuple):
         return Errors(*(part[places] for part in self))
 
     @property
+    def key(self) -> bytes:
+        """Equal exactly where errors are equal."""
+        return b"".join(np.asarray(part).tobytes() for part in self)
+
+    @property
     def gfc30(self) -> Floats:
         """Share of the attainable, which is 1."""
         return np.cos(np.minimum(self.angle, np.pi / 2))

@@ -64,7 +64,7 @@ from modeling.checks import (
     is_positive,
 )
 from modeling.errors import InputError, shown
-from modeling.files.documents import read_toml
+from modeling.files.documents import as_text, read_toml, toml_section
 from modeling.files.hashes import sha256_of, sha256_of_values
 from modeling.perception.thresholds import Threshold
 from modeling.recordings.trajectory import Trajectory, load_trajectory
@@ -438,7 +438,7 @@ def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
             f"expected version = {VERSION} at the top of a scene, got {shown(version)}; write that "
             "line, or update tactileq if the scene is newer."
         )
-    sections = {name: _section(values, name) for name in _SECTIONS}
+    sections = {name: toml_section(values, name, keys) for name, keys in _SECTIONS.items()}
     settings = sections["scene"]
     if "name" not in settings:
         raise InputError("expected a name under [scene], got none; name the scene.")
@@ -448,7 +448,7 @@ def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
             f"expected a list of textures under [scene], got {shown(textures)}; write textures = "
             '["…", "…"].'
         )
-    threshold = _text(settings.get("threshold", "codec"), "threshold under [scene]")
+    threshold = as_text(settings.get("threshold", "codec"), "threshold under [scene]")
     models = settings.get("models")
     return Scene(
         name=settings["name"],
@@ -459,7 +459,7 @@ def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
         actuator=Actuator(**sections["actuator"]),
         bound=Bound(**sections["bound"]),
         budget=Budget(**sections["budget"]),
-        models=None if models is None else folder / _text(models, "models under [scene]"),
+        models=None if models is None else folder / as_text(models, "models under [scene]"),
     )
 
 
@@ -467,16 +467,6 @@ def _files(values: Mapping[str, Any], file: Path) -> tuple[Path, ...]:
     """A scene file of good values and the hand and the threshold that it names."""
     named = (values["hand"].get("file", ""), values["scene"].get("threshold", ""))
     return file, *(file.parent / name for name in named if Path(name).suffix)
-
-
-def _section(values: Mapping[str, Any], name: str) -> dict[str, Any]:
-    table = values.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(
-            f"expected a table [{name}], got {shown(table)}; write [{name}] above its keys."
-        )
-    check_keys(table, _SECTIONS[name], where=f"[{name}]")
-    return dict(table)
 
 
 def _hand(values: dict[str, Any], folder: Path) -> HandUse:
@@ -494,7 +484,7 @@ def _hand(values: dict[str, Any], folder: Path) -> HandUse:
                 "expected no stroke_hz beside a recorded hand, whose strokes are known, got "
                 f"{shown(values['stroke_hz'])}; remove it."
             )
-        file = folder / _text(values["file"], "file under [hand]")
+        file = folder / as_text(values["file"], "file under [hand]")
         return recorded_hand(load_trajectory(file, name=file.stem))
     if "place" in values:
         return _distribution(values["place"], values.get("stroke_hz", STROKE_HZ))
@@ -536,9 +526,3 @@ def _range(what: str, value: object, highest: float) -> Range:
             "them."
         )
     return low, high
-
-
-def _text(value: object, name: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"expected text for {name}, got {shown(value)}; put it in quotes.")
-    return value

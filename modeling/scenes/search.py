@@ -288,7 +288,11 @@ class Search:
         ]
         # A grid is worth it only where it is no larger than a regression.
         below = min([below, *(_table_numbers(model) + 1 for _, model, _ in ways)])
-        nodes = fewest_nodes(maps, self.places, bound=bound, taken=taken, below=below)
+        key = "nodes", self.full.texture, layers, self.scene.actuator.band_hz
+        nodes = self._known.get(
+            (*key, repr(self.scene.hand.to_dict()), bound, plan.update_samples, taken.key, below),
+            partial(fewest_nodes, maps, self.places, bound=bound, taken=taken, below=below),
+        )
         if nodes is not None:
             fewer = thinned(maps.model, self.places, *nodes)
             ways.append(("grid", fewer, maps.of_nodes(*nodes)))

@@ -64,7 +64,7 @@ from modeling.checks import (
     is_whole,
 )
 from modeling.errors import shown
-from modeling.files.documents import read_toml
+from modeling.files.documents import as_text, read_toml, toml_section
 from modeling.recordings.trajectory import LONGEST_S
 from modeling.scenes.loading import scene_name
 
@@ -350,8 +350,8 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
             f"expected version = {VERSION} at the top of a recipe, got {shown(version)}; write "
             "that line, or update tactileq if the recipe is newer."
         )
-    settings = _table(values, "set")
-    level = _table(values, "level")
+    settings = toml_section(values, "set", _SECTIONS["set"])
+    level = toml_section(values, "level", _SECTIONS["level"])
     if "name" not in settings:
         raise InputError("expected a name under [set], got none; name the set.")
     if "rate_hz" in settings:
@@ -359,8 +359,8 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
     if "seeds" in settings:
         settings["seeds"] = _listed("seeds", settings["seeds"])
     if "vibrator" in settings:
-        settings["vibrator"] = folder / _text(settings["vibrator"], "vibrator under [set]")
-    if Path(_text(level.get("threshold", ""), "threshold")).suffix:
+        settings["vibrator"] = folder / as_text(settings["vibrator"], "vibrator under [set]")
+    if Path(as_text(level.get("threshold", ""), "threshold")).suffix:
         level["threshold"] = folder / level["threshold"]
     return Recipe(
         models=tuple(_model_entry(entry, folder) for entry in _tables(values, "model")),
@@ -374,7 +374,7 @@ def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
 
 def _model_entry(values: dict[str, Any], folder: Path) -> ModelEntry:
     path, scene = (
-        folder / _text(values[name], f"{name} under [[model]]") if name in values else None
+        folder / as_text(values[name], f"{name} under [[model]]") if name in values else None
         for name in ("path", "scene")
     )
     _check_one_place(path, scene)
@@ -394,23 +394,12 @@ def model_entry(path: Path) -> ModelEntry:
 
 def _trajectory_entry(values: dict[str, Any], folder: Path) -> TrajectoryEntry:
     if "file" in values:
-        file = folder / _text(values["file"], "file under [[trajectory]]")
+        file = folder / as_text(values["file"], "file under [[trajectory]]")
         return TrajectoryEntry(**{"name": file.stem, **values, "file": file})
     named = f"the trajectory {shown(values['name'])}" if "name" in values else "each [[trajectory]]"
     _check_given(values, where=named)
     entry = TrajectoryEntry.constant(values["speed_mm_s"], values["force_n"])
     return TrajectoryEntry(**{**vars(entry), "name": values.get("name", entry.name)})
-
-
-def _table(values: Mapping[str, Any], name: str) -> dict[str, Any]:
-    """A copy of the table [name], empty where there is none; unknown keys are refused."""
-    table = values.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(
-            f"expected a table [{name}], got {shown(table)}; write [{name}] above its keys."
-        )
-    check_keys(table, _SECTIONS[name], where=f"[{name}]")
-    return dict(table)
 
 
 def _tables(values: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
@@ -434,12 +423,6 @@ def _listed(name: str, value: object) -> tuple[int, ...]:
 def whole_or_as_it_is(value: Any) -> Any:
     """An int where a float is a whole number; anything else unchanged, for the check to refuse."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _text(value: object, name: str) -> str:
-    if not isinstance(value, str):
-        raise InputError(f"expected text for {name}, got {shown(value)}; put it in quotes.")
-    return value
 
 
 def _shown(value: object) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from tactileq.commands.simulate import run_study
 from tactileq.commands.stability import columns_of, examine_column
@@ -19,7 +19,6 @@ from tactileq.workers import mapping
 if TYPE_CHECKING:
     from analysis.benches.atlas.edges import Examined
     from analysis.benches.chart.judging import Judged
-    from analysis.benches.scenes import CompiledExample, Surface
     from analysis.report.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
@@ -148,8 +147,7 @@ def with_checks(result: TextureResult) -> tuple[TextureResult, ARModel]:
 class Benches(NamedTuple):
     """Scenes, the reduced chart's textures and the reduced atlas's columns, done by others."""
 
-    compiled: Iterable[list[CompiledExample]]
-    drawn: Iterable[tuple[CompiledExample, dict[str, Surface]]]
+    scenes: Iterable[Any]
     judged: Iterable[Judged]
     examined: Iterable[Examined]
 
@@ -160,11 +158,12 @@ class Benches(NamedTuple):
         from analysis.benches.chart.judging import judge
         from analysis.benches.chart.methods import BRIEF
         from analysis.benches.chart.surfaces import FEW, simulated_sources
-        from analysis.benches.scenes import DRAWN_SEEDS, compile_examples, drawn_example
+        from analysis.benches.scenes import compile_examples, drawn_example
 
+        models = {result.texture: result.model for result in made}
         return cls(
-            mapped(compile_examples, [{result.texture: result.model for result in made}]),
-            mapped(drawn_example, [DRAWN_SEEDS]),
+            # One call, as what has one item alone is done by this process.
+            mapped(_done, [partial(compile_examples, models), drawn_example]),
             mapped(partial(judge, methods=BRIEF), simulated_sources(FEW)),
             mapped(partial(examine_column, CASES, full=False), columns_of(CASES, full=False)),
         )
@@ -185,8 +184,9 @@ class Benches(NamedTuple):
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
         with progress("Least models of scenes", 2) as advance:
-            [compiled] = _told(self.compiled, advance, lambda found: found[0].compiled.scene.name)
-            [drawn] = _told(self.drawn, advance, lambda found: found[0].compiled.scene.name)
+            compiled, drawn = _told(
+                self.scenes, advance, lambda found: found[0].compiled.scene.name
+            )
         scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
         with progress("Speed against accuracy", FEW.drawn) as advance:
             judged = list(_told(self.judged, advance, lambda one: one.source.name))
@@ -221,6 +221,11 @@ def write_demo_report(
             progress=tell,
             mapped=mapped,
         )
+
+
+def _done(task: Any) -> Any:
+    """What a task gives; by name, so that another process can be sent it."""
+    return task()
 
 
 def _told(
