@@ -18,14 +18,13 @@ from analysis.benches.chart.fitted import predictor_cost
 from analysis.columns import SIMULATED, Column, names
 from analysis.textures.between import RIVAL_ORDER, Truth
 from modeling import ARModel, CompiledScene, Scene, TextureModel, fit_texture
-from modeling.arrays import Floats
 from modeling.fitting.autoregressive import fit_ar
 from modeling.rendering.cost import Cost
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scenes
 from modeling.scenes.cost import stored_numbers
 from modeling.scenes.measures import Errors, Yardstick, errors_between
-from modeling.scenes.places import Places, enclosing, places_of
+from modeling.scenes.places import enclosing, places_of
 from modeling.scenes.strokes import Windows, windows_kept
 from stimuli.planted.drawn import draw_surface
 
@@ -196,12 +195,8 @@ def _rival_costs(
 def _judged(texture: CompiledTexture, scene: Scene, surface: Surface) -> dict[str, Errors]:
     """Errors of each method against the truth, at the places of the scene that count."""
     places = places_of(texture.full, scene.hand)
-    yardstick = Yardstick(
-        texture.full.rate_hz,
-        narrowest_hz=float(texture.full.bandwidths_hz.min(initial=texture.full.rate_hz)),
-        band_hz=scene.actuator.band_hz,
-    )
-    speed, force = _where(places)
+    yardstick = Yardstick.of(texture.full, band_hz=scene.actuator.band_hz)
+    speed, force = places.visited
     conditions = list(zip(speed.tolist(), force.tolist(), strict=True))
     truth = yardstick.features_of(
         np.array(
@@ -218,15 +213,6 @@ def _judged(texture: CompiledTexture, scene: Scene, surface: Surface) -> dict[st
         RIVAL: yardstick.features_of(np.array(rival)),
     }
     return {method: errors_between(found, truth) for method, found in features.items()}
-
-
-def _where(places: Places) -> tuple[Floats, Floats]:
-    """Speed and force of the places that count, within what the scene covers."""
-    rows, columns = np.nonzero(places.counts)
-    return (
-        np.clip(places.speeds_mm_s[rows], *places.speed_range),
-        np.clip(places.forces_n[columns], *places.force_range),
-    )
 
 
 def _summary(errors: Sequence[Errors]) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import pandas as pd
 
@@ -28,6 +28,7 @@ from analysis.textures.scenes import (
     before_after_table,
     steps_table,
 )
+from modeling import CompiledScene
 
 SCENE = Column("scene", is_name=True)
 SCENE_TEXTURE_COLUMNS = (SCENE, *BEFORE_AFTER_COLUMNS)
@@ -54,19 +55,35 @@ def scene_section(examples: Sequence[Example]) -> Section:
     examples : sequence of (CompiledExample, mapping of texture to Surface)
     """
     comparison = comparison_table(examples)
-    compiled = [one.compiled for one, _ in examples]
     simulated = bool(comparison["simulated"].any())
-    steps = _of_scenes(examples, [steps_table(each) for each in compiled])
-    picture = Picture(
+    steps, textures = _step_table(examples, simulated), _texture_table(examples, simulated)
+    return Section(
+        "scenes",
+        "No more model than the scene needs",
+        (
+            _picture(examples[0][0].compiled, simulated),
+            _comparison(comparison, simulated),
+            Fold(steps.title, (steps,)),
+            Fold(textures.title, (textures,)),
+        ),
+        outcomes=tuple(_outcomes(comparison)),
+    )
+
+
+def _picture(compiled: CompiledScene, simulated: bool) -> Picture:
+    return Picture(
         "scene_tradeoff",
-        f"What the compiler walked: {compiled[0].scene.name}",
+        f"What the compiler walked: {compiled.scene.name}",
         "From the full model of each texture (open) by dropping layers that are not felt, thinning "
         "the grid, a longer update interval and single precision to the least model (outlined), "
         "which still keeps the bound. A cross: the next longer interval, which would break it.",
-        figure_tradeoff(compiled[0]),
+        figure_tradeoff(compiled),
         simulated,
     )
-    against = Table(
+
+
+def _comparison(comparison: pd.DataFrame, simulated: bool) -> Table:
+    return Table(
         "scene_comparison",
         "Full models, least ones and an AR model, scene by scene",
         "Numbers and bytes of all textures, operations of the one that takes most. GFC and errors "
@@ -79,7 +96,11 @@ def scene_section(examples: Sequence[Example]) -> Section:
         COMPARISON_COLUMNS[:-1],
         simulated,
     )
-    ablation = Table(
+
+
+def _step_table(examples: Sequence[Example], simulated: bool) -> Table:
+    steps = _of_scenes(examples, steps_table)
+    return Table(
         "scene_steps",
         "What each step brings",
         "All textures of a scene together, each step after those above it. The last column: the "
@@ -88,29 +109,24 @@ def scene_section(examples: Sequence[Example]) -> Section:
         SHOWN_STEPS,
         simulated,
     )
-    textures = Table(
+
+
+def _texture_table(examples: Sequence[Example], simulated: bool) -> Table:
+    return Table(
         "scene_textures",
         "Each texture in each scene",
         "Bounds: GFC30 ≥ 0.95 of the attainable, error in nine bands and level error ≤ 1 dB unless "
         "the scene says otherwise; each worst value has late updates and precision in it.",
-        _of_scenes(examples, [before_after_table(each) for each in compiled]),
+        _of_scenes(examples, before_after_table),
         SHOWN_TEXTURES,
         simulated,
     )
-    return Section(
-        "scenes",
-        "No more model than the scene needs",
-        (
-            picture,
-            against,
-            Fold("What each step brings", (ablation,)),
-            Fold("Each texture in each scene", (textures,)),
-        ),
-        outcomes=tuple(_outcomes(comparison)),
-    )
 
 
-def _of_scenes(examples: Sequence[Example], tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
+def _of_scenes(
+    examples: Sequence[Example], table_of: Callable[[CompiledScene], pd.DataFrame]
+) -> pd.DataFrame:
+    tables = [table_of(one.compiled) for one, _ in examples]
     for (one, _), table in zip(examples, tables, strict=True):
         table.insert(0, "scene", one.compiled.scene.name)
     return pd.concat(tables, ignore_index=True)

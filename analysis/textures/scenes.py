@@ -11,7 +11,6 @@ import pandas as pd
 from analysis.columns import SIMULATED, TEXTURE, Column, names
 from analysis.labels import ALL_TEXTURES
 from modeling import CompiledScene
-from modeling.rendering.cost import Cost
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.cost import stored_numbers
 
@@ -98,8 +97,8 @@ def _row(compiled: CompiledScene, texture: CompiledTexture) -> dict[str, Any]:
         "layers_after": texture.model.n_layers,
         "numbers_before": stored_numbers(texture.full),
         "numbers_after": stored_numbers(texture.model),
-        "bytes_before": _bytes(texture.before),
-        "bytes_after": _bytes(texture.after),
+        "bytes_before": texture.before.bytes,
+        "bytes_after": texture.after.bytes,
         "operations_before": texture.before.operations,
         "operations_after": texture.after.operations,
         "dropped": ", ".join(map(str, texture.dropped)) or "none",
@@ -122,10 +121,6 @@ def driven_by(texture: CompiledTexture) -> str:
         on = {"regression": "speed and force", "centroid": "the centroid"}[texture.way]
         return f"regression on {on}"
     return f"{texture.model.speeds_mm_s.size} × {texture.model.forces_n.size} conditions"
-
-
-def _bytes(cost: Cost) -> int:
-    return cost.table_bytes + cost.state_bytes
 
 
 def steps_table(compiled: CompiledScene) -> pd.DataFrame:

@@ -54,6 +54,11 @@ class Cost:
     bytes_per_update: int
 
     @property
+    def bytes(self) -> int:
+        """Of table and state."""
+        return self.table_bytes + self.state_bytes
+
+    @property
     def operations(self) -> float:
         """Operations per sample, updates included."""
         return self.per_sample.total + self.per_update.total / self.update_samples

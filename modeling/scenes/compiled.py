@@ -7,13 +7,11 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from modeling.checks import check_keys
 from modeling.errors import InputError, shown
 from modeling.files.documents import dump_json, read_json_object
 from modeling.files.hashes import sha256_of_values
 from modeling.files.writing import file_stem, write_text
-from modeling.models.loading import load_model
-from modeling.models.regressed_model import RegressedModel
+from modeling.models.loading import Layered, load_model
 from modeling.models.texture_model import TextureModel
 from modeling.rendering.cost import Cost
 from modeling.rendering.plan import RenderPlan
@@ -114,7 +112,7 @@ class CompiledTexture:
 
     full: TextureModel
     felt: TextureModel
-    model: TextureModel | RegressedModel
+    model: Layered
     dropped: tuple[int, ...]
     way: Way
     full_plan: RenderPlan
@@ -159,21 +157,14 @@ class CompiledScene:
     textures: tuple[CompiledTexture, ...]
 
     @property
-    def models(self) -> dict[str, TextureModel | RegressedModel]:
+    def models(self) -> dict[str, Layered]:
         """By the name of their texture."""
         return {compiled.texture: compiled.model for compiled in self.textures}
 
     @property
     def bytes_before(self) -> int:
         """Of the tables and states of all full models, each by itself."""
-        costs = [compiled.before for compiled in self.textures]
-        return sum(cost.table_bytes + cost.state_bytes for cost in costs)
-
-    @property
-    def bytes_apart(self) -> int:
-        """Of the tables and states of all least models, each by itself."""
-        costs = [compiled.after for compiled in self.textures]
-        return sum(cost.table_bytes + cost.state_bytes for cost in costs)
+        return sum(compiled.before.bytes for compiled in self.textures)
 
     @property
     def bytes_after(self) -> int:
@@ -244,7 +235,7 @@ def _texture_values(compiled: CompiledTexture) -> dict[str, Any]:
 
 def load_compiled(
     folder: str | Path, full: Mapping[str, TextureModel] | None = None
-) -> dict[str, TextureModel | RegressedModel]:
+) -> dict[str, Layered]:
     """The models of a scene that was compiled into a folder, by the name of their texture.
 
     Parameters
@@ -262,13 +253,11 @@ def load_compiled(
     """
     place = Path(folder) / FILE
     stated = _stated(place)
-    models: dict[str, TextureModel | RegressedModel] = {}
+    models: dict[str, Layered] = {}
     for texture, hashes in stated.items():
         file = Path(folder) / f"{file_stem(texture)}.json"
         model = load_model(file)
-        if not isinstance(model, TextureModel | RegressedModel) or (
-            model.sha256 != hashes["model_sha256"]
-        ):
+        if not isinstance(model, Layered) or model.sha256 != hashes["model_sha256"]:
             raise InputError(
                 f"expected {file} as tactileq scene wrote it, got something else; compile the "
                 "scene again."
@@ -312,6 +301,5 @@ def _stated(place: Path) -> dict[str, dict[str, str]]:
         )
     found = {}
     for entry in values["textures"]:
-        check_keys(entry, tuple(entry), where=str(place))
         found[entry["texture"]] = {name: entry[name] for name in texts}
     return found

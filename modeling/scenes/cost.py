@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from modeling.models.loading import Layered
 from modeling.models.regressed_model import RegressedModel
-from modeling.models.texture_model import TextureModel
 from modeling.rendering.plan import RenderPlan
 
-Rendered = tuple[TextureModel | RegressedModel, RenderPlan]
+Rendered = tuple[Layered, RenderPlan]
 
 
 def in_one_precision(rendered: Iterable[Rendered]) -> list[Rendered]:
@@ -34,7 +34,7 @@ def scene_bytes(rendered: Iterable[Rendered]) -> int:
     return sum(arrays.values()) + max(states)
 
 
-def stored_numbers(model: TextureModel | RegressedModel) -> int:
+def stored_numbers(model: Layered) -> int:
     """Of a grid S·F·(1 + 3m), of regressions the coefficients that are not 0."""
     if isinstance(model, RegressedModel):
         return model.n_parameters

@@ -16,8 +16,8 @@ from itertools import pairwise, product
 import numpy as np
 
 from modeling.arrays import Floats, Integers
+from modeling.models.loading import Layered
 from modeling.models.parameter_table import Parameters
-from modeling.models.regressed_model import RegressedModel
 from modeling.models.texture_model import TextureModel
 from modeling.rendering.compiled import is_compiled
 from modeling.rendering.renderer import Renderer
@@ -134,7 +134,7 @@ class ErrorMaps:
 
     # --- Another way of driving the parameters
 
-    def of_model(self, model: TextureModel | RegressedModel) -> Errors:
+    def of_model(self, model: Layered) -> Errors:
         """Errors of another model at all places."""
         ours = self.yardstick.features(model.parameters(self._speed, self._force))
         return errors_between(ours, self.truth)

@@ -7,6 +7,7 @@ up to a bound of their sum.
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import clamp_bands, rational_tan
 from modeling.errors import InputError
 from modeling.models.parameter_table import Parameters
+from modeling.models.texture_model import TextureModel
 from modeling.recordings.spectrum import smooth
 from modeling.scenes.scene import Bound, Range
 from modeling.similarity import BAND_EDGES_HZ, HIGHEST_SHARE, LOWEST_HZ, SIGMAS_HZ
@@ -150,15 +152,24 @@ class Yardstick:
         ]
         kept = [band / band.sum() for band in bands if band.any()]
         self._bands = np.reshape(kept, (len(kept), inside.size)).T
-        # A smoothed spectrum says all in steps of a third of what it is smoothed with.
-        every = max(1, round(SIGMAS_HZ[0] / 3 / self._step_hz))
-        chosen = np.flatnonzero(inside)[::every]
-        self._smoothing = smooth(np.eye(inside.size), SIGMAS_HZ[0], step_hz=self._step_hz)[
-            :, chosen
-        ]
         angle = np.pi / rate_hz * self.frequency_hz
         self._product = np.sin(angle) * np.cos(angle)
         self._sine_squared, self._cosine_squared = np.sin(angle) ** 2, np.cos(angle) ** 2
+
+    @staticmethod
+    def of(model: TextureModel, *, band_hz: Range | None) -> Yardstick:
+        """For a model and what is made of it; errors as above."""
+        narrowest_hz = float(model.bandwidths_hz.min(initial=model.rate_hz))
+        return Yardstick(model.rate_hz, narrowest_hz=narrowest_hz, band_hz=band_hz)
+
+    @cached_property
+    def _smoothing(self) -> Floats:
+        """What smooths magnitudes (f,) and thins them out: a smoothed spectrum says all in steps of
+        a third of what it is smoothed with."""
+        every = max(1, round(SIGMAS_HZ[0] / 3 / self._step_hz))
+        chosen = np.flatnonzero(self._inside)[::every]
+        unit = np.eye(self.frequency_hz.size)
+        return smooth(unit, SIGMAS_HZ[0], step_hz=self._step_hz)[:, chosen]
 
     def features(self, parameters: Parameters) -> Features:
         """Of the responses of n sets of parameters."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.errors import InputError
+from modeling.hand import Hand
 from modeling.models.texture_model import TextureModel
 from modeling.scenes.scene import HandPlaces, HandRange, HandUse, Range
 
@@ -46,6 +47,15 @@ class Places:
     force_change_n_s: Floats
     speed_range: Range
     force_range: Range
+
+    @property
+    def visited(self) -> Hand:
+        """The places that count, in C order, moved into what the scene covers."""
+        rows, columns = np.nonzero(self.counts)
+        return Hand(
+            np.clip(self.speeds_mm_s[rows], *self.speed_range),
+            np.clip(self.forces_n[columns], *self.force_range),
+        )
 
     def name(self, index: int) -> str:
         """A place, by its number in C order, as text."""

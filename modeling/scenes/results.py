@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from modeling.models.regressed_model import RegressedModel
-from modeling.models.texture_model import TextureModel
+from modeling.models.loading import Layered
 from modeling.perception.simplification import with_signs_chosen_again
 from modeling.rendering.plan import RenderPlan
 from modeling.scenes.compiled import Alternative, CompiledTexture, Measured, Step, Way
@@ -75,13 +74,8 @@ def _measures(search: Search, candidate: Candidate) -> tuple[Measured, ...]:
 
 def _of_full(search: Search, candidate: Candidate) -> Errors:
     """Errors against the full model at the places that count, moved into the scene."""
-    rows, columns = np.nonzero(search.places.counts)
-    hand = (
-        np.clip(search.places.speeds_mm_s[rows], *search.places.speed_range),
-        np.clip(search.places.forces_n[columns], *search.places.force_range),
-    )
     ours, full = (
-        search.yardstick.features(model.parameters(*hand))
+        search.yardstick.features(model.parameters(*search.places.visited))
         for model in (candidate.model, search.full)
     )
     driven = (candidate.late + candidate.rounding).at(search.places.counts.ravel())
@@ -96,7 +90,7 @@ def _steps(search: Search, candidate: Candidate) -> tuple[Step, ...]:
     longer = replace(usual, update_samples=candidate.plan.update_samples)
     maps, at_rest = search.maps(candidate.layers), candidate.at_rest
     late = search.late(candidate.layers, usual.update_samples)
-    stages: list[tuple[str, TextureModel | RegressedModel, RenderPlan, Errors]] = [
+    stages: list[tuple[str, Layered, RenderPlan, Errors]] = [
         ("full model", search.full, usual, late),
         ("layers not felt dropped", felt, usual, late + maps.of_model(felt)),
         ("grid cut to the scene", shorter, usual, late + _within(search, maps.of_model(shorter))),
@@ -124,7 +118,7 @@ def _within(search: Search, errors: Errors) -> Errors:
 def _step(
     search: Search,
     name: str,
-    model: TextureModel | RegressedModel,
+    model: Layered,
     plan: RenderPlan,
     errors: Errors,
 ) -> Step:
@@ -133,7 +127,7 @@ def _step(
         step=name,
         layers=model.n_layers,
         numbers=stored_numbers(model),
-        bytes=cost.table_bytes + cost.state_bytes,
+        bytes=cost.bytes,
         operations=cost.operations,
         share=share_of_bound(search, errors),
     )

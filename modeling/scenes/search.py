@@ -13,6 +13,7 @@ import numpy as np
 from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.models.compiled_for import CompiledFor
+from modeling.models.loading import Layered
 from modeling.models.parameter_table import NEXT
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.terms import DrivenBy
@@ -46,7 +47,7 @@ class Candidate:
     """
 
     layers: tuple[int, ...]
-    model: TextureModel | RegressedModel
+    model: Layered
     way: Way
     plan: RenderPlan
     late: Errors
@@ -62,14 +63,10 @@ class Candidate:
     def key(self) -> tuple[float, int, int]:
         """What it costs: operations per sample, bytes of its table and state, stored numbers."""
         cost = self.plan.cost(self.model)
-        return (
-            cost.operations,
-            cost.table_bytes + cost.state_bytes,
-            stored_numbers(self.model),
-        )
+        return cost.operations, cost.bytes, stored_numbers(self.model)
 
 
-def _table_numbers(model: TextureModel | RegressedModel) -> int:
+def _table_numbers(model: Layered) -> int:
     if isinstance(model, RegressedModel):
         return table_numbers(2, 2, model.n_layers)
     return table_numbers(model.speeds_mm_s.size, model.forces_n.size, model.n_layers)
@@ -105,11 +102,9 @@ class Search:
         self.full, self.scene, self._known = full, scene, known
         self.played = known.get(("played", full.texture), partial(played, full))
         self.places = places_of(full, scene.hand)
-        self._narrowest_hz = float(full.bandwidths_hz.min(initial=full.rate_hz))
         band_hz, name = scene.actuator.band_hz, full.texture
         self.yardstick = known.get(
-            ("yardstick", full.rate_hz, self._narrowest_hz, band_hz),
-            partial(Yardstick, full.rate_hz, narrowest_hz=self._narrowest_hz, band_hz=band_hz),
+            ("yardstick", name, band_hz), partial(Yardstick.of, full, band_hz=band_hz)
         )
         self.rate_hz = scene.actuator.rate_hz or full.rate_hz
         groups = known.get(("groups", name), partial(layer_groups, full))
@@ -290,7 +285,7 @@ class Search:
         below = min([below, *(_table_numbers(model) + 1 for _, model, _ in ways)])
         key = "nodes", self.full.texture, layers, self.scene.actuator.band_hz
         nodes = self._known.get(
-            (*key, repr(self.scene.hand.to_dict()), bound, plan.update_samples, taken.key, below),
+            (*key, repr(self.scene.hand.to_dict()), bound, taken.key, below),
             partial(fewest_nodes, maps, self.places, bound=bound, taken=taken, below=below),
         )
         if nodes is not None:
@@ -339,6 +334,6 @@ class Search:
 
     def _loss_db(self) -> Floats:
         """What peak and RMS limits take from the full model's level at the places that count."""
-        whole = Yardstick(self.full.rate_hz, narrowest_hz=self._narrowest_hz, band_hz=None)
+        whole = Yardstick.of(self.full, band_hz=None)
         rms = np.sqrt(whole.power(at_places(self.full, self.places)))
         return limit_loss_db(rms, self.scene.actuator.limits)

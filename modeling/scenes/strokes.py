@@ -49,11 +49,7 @@ def windows_kept(
         Of the stroke and the noise.
     """
     plan = compiled.plan
-    yardstick = Yardstick(
-        compiled.full.rate_hz,
-        narrowest_hz=float(compiled.full.bandwidths_hz.min(initial=compiled.full.rate_hz)),
-        band_hz=scene.actuator.band_hz,
-    )
+    yardstick = Yardstick.of(compiled.full, band_hz=scene.actuator.band_hz)
     settling, window = (round(s * plan.rate_hz) for s in (SETTLING_S, WINDOW_S))
     hand = random_stroke(scene.hand, settling + count * window, rate_hz=plan.rate_hz, seed=seed)
     truth = Renderer(compiled.felt, rate_hz=plan.rate_hz, seed=seed, update_samples=1)

@@ -114,4 +114,9 @@ def restraints(plan: RenderPlan, unit: str) -> str:
 
 def quoted(text: str) -> str:
     """Any text within quotes and within a comment in C."""
-    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", json.dumps(text))
+    return commentable(json.dumps(text))
+
+
+def commentable(text: str) -> str:
+    """Any text within a comment in C."""
+    return re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", text)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
@@ -20,6 +19,7 @@ from stimuli.exports.c_source import (
     arrays_of,
     check_output,
     check_rate,
+    commentable,
     identifier,
     initializer,
     licence,
@@ -261,6 +261,5 @@ def _program(file_name: str, scene: str, indices: Sequence[str], rendered: Rende
 
 def _commented(text: str) -> str:
     """Any text as lines of a comment in C."""
-    safe = re.sub(r"(?<=\*)(?=/)|(?<=/)(?=\*)", " ", text)
     fill = partial(textwrap.fill, width=97, initial_indent=" " * 3, subsequent_indent=" " * 3)
-    return "\n".join(map(fill, safe.splitlines()))
+    return "\n".join(map(fill, commentable(text).splitlines()))

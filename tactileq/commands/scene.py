@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import acos
 from pathlib import Path
 from time import perf_counter
@@ -103,16 +102,12 @@ def header_of(compiled: CompiledScene, name: str, *, seed: int) -> str:
     from stimuli.exports.scene_header import scene_header
 
     scene = compiled.scene
-    single = all(texture.plan.single for texture in compiled.textures)
-    rendered = [
-        (texture.model, replace(texture.plan, single=single)) for texture in compiled.textures
-    ]
     bound = ", ".join(f"{measure} {value:g}" for measure, value in scene.bound.to_dict().items())
     note = (
         f"Compiled for the scene of SHA-256 {scene.sha256}; bound: {bound}. Beyond the scene the "
         "nearest edge is rendered, and samples are counted (above_grid, below_grid)."
     )
-    return scene_header(name, scene.name, rendered, seed=seed, note=note)
+    return scene_header(name, scene.name, compiled.rendered, seed=seed, note=note)
 
 
 def tell_texture(texture: CompiledTexture) -> None:
@@ -125,7 +120,7 @@ def tell_texture(texture: CompiledTexture) -> None:
     print(
         f"{texture.texture}{simulated_note(full)}: {full.n_layers} → {model.n_layers} layers, "
         f"{stored_numbers(full)} → {stored_numbers(model)} numbers, "
-        f"{before.table_bytes + before.state_bytes} → {after.table_bytes + after.state_bytes} "
+        f"{before.bytes} → {after.bytes} "
         f"bytes, {before.operations:.1f} → {after.operations:.1f} operations per sample"
     )
     update_ms = 1e3 * plan.update_samples / plan.rate_hz

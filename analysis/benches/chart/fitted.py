@@ -20,6 +20,7 @@ from modeling.models.texture_model import BLENDINGS, first_peq
 from modeling.rendering.cost import Cost, Operations
 from modeling.rendering.plan import RenderPlan
 from modeling.rendering.reference.hand import Extrapolator
+from modeling.scenes.cost import stored_numbers
 from modeling.similarity import SpectralFilter
 from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
@@ -67,9 +68,7 @@ class Layered:
 
     @property
     def numbers(self) -> int:
-        if isinstance(self.model, RegressedModel):
-            return self.model.n_parameters
-        return self.model.noise_gains.size * self.model.n_parameters
+        return stored_numbers(self.model)
 
     def blendings(self) -> dict[str, Layered]:
         """By name; of a grid whose layers change their signs, and of regressions, one alone."""

@@ -247,5 +247,5 @@ def _costs(fitted: Fitted, update_ms: float, *, single: bool) -> dict[str, Any]:
     return known | {
         "operations": cost.operations,
         "most_operations": cost.most_operations,
-        "bytes": cost.table_bytes + cost.state_bytes,
+        "bytes": cost.bytes,
     }
