@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Protocol
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from math import sqrt
+from typing import Literal, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.arrays import Floats
 from modeling.models.loading import Layered
+from modeling.rendering.plan import RenderCounters
+
+Surface = Literal["none", "real", "virtual"]
+SURFACES: tuple[Surface, ...] = ("none", "real", "virtual")
+Range = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -33,21 +44,218 @@ class RigReading:
     simulated: bool
 
 
+@dataclass(frozen=True)
+class Fault:
+    """Something that went wrong.
+
+    Parameters
+    ----------
+    time_s : float
+        When it was noticed, on the rig's clock.
+    told : str
+        One sentence.
+    invalidates : bool
+        Whether the participant cannot have felt what was to be presented.
+    """
+
+    time_s: float
+    told: str
+    invalidates: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HandRows:
+    """What a hand did: n readings, 200 a second at least.
+
+    Parameters
+    ----------
+    time_s : (n,) ndarray
+        On the rig's clock, rising.
+    speed_mm_s : (n,) ndarray
+        Tangential, its sign the direction; NaN where nothing measures it.
+    force_n : (n,) ndarray
+        Normal, ≥ 0; NaN where nothing measures it.
+    surface : (n,) ndarray of int
+        What was presented then: a place in `SURFACES`.
+    presentation : (n,) ndarray of int
+        Number of the presentation, 0 where there was none.
+    force_assumed : (n,) ndarray of bool
+        Where no device measured the force.
+    """
+
+    time_s: Floats
+    speed_mm_s: Floats
+    force_n: Floats
+    surface: NDArray[np.int_]
+    presentation: NDArray[np.int_]
+    force_assumed: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return self.time_s.size
+
+    @staticmethod
+    def joined(parts: Sequence[HandRows]) -> HandRows:
+        """One after the other; no rows for no parts."""
+        kinds = {"surface": np.int_, "presentation": np.int_, "force_assumed": np.bool_}
+        columns = {
+            name: np.concatenate(
+                [np.zeros(0, dtype=kinds.get(name, np.float64))]
+                + [getattr(part, name) for part in parts]
+            )
+            for name in (f.name for f in fields(HandRows))
+        }
+        return HandRows(**columns)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PresentationRecord:
+    """What one presentation was, from its first sample to the last.
+
+    Parameters
+    ----------
+    number : int
+        From 1, since the rig was opened.
+    surface : {"real", "virtual"}
+    texture : str
+    model_sha256 : str
+        Of the model that was rendered; empty for a real surface.
+    start_s, end_s : float
+        On the rig's clock.
+    speeds_mm_s, forces_n : (float, float), optional
+        Lowest and highest condition of the model's grid.
+    counters : RenderCounters
+        What the renderer had to correct; samples that the limits touched.
+    played_s : float
+        Duration of the vibration that was played, silence under a resting hand included.
+    dose_g2_s : float
+        Its square (g²) over time, unweighted.
+    peak_g : float
+    misses : int
+        Blocks that the card had to do without.
+    stale_blocks : int
+        Blocks for which the hand was not read in time: rendered as lift-off.
+    """
+
+    number: int
+    surface: Surface
+    texture: str
+    model_sha256: str = ""
+    start_s: float
+    end_s: float
+    speeds_mm_s: Range | None = None
+    forces_n: Range | None = None
+    counters: RenderCounters = field(default_factory=RenderCounters)
+    played_s: float = 0.0
+    dose_g2_s: float = 0.0
+    peak_g: float = 0.0
+    misses: int = 0
+    stale_blocks: int = 0
+
+    @property
+    def rms_g(self) -> float:
+        """RMS of the vibration (g) over the time that it was played."""
+        return sqrt(self.dose_g2_s / self.played_s) if self.played_s else 0.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Acceleration:
+    """What an accelerometer at the pen measured, without a gap.
+
+    Parameters
+    ----------
+    start_s : float
+        When the first sample was measured, on the rig's clock.
+    rate_hz : float
+    samples_g : (n,) ndarray
+    """
+
+    start_s: float
+    rate_hz: float
+    samples_g: Floats
+
+
+@dataclass(frozen=True, kw_only=True)
+class RigHealth:
+    """How a rig is now.
+
+    Parameters
+    ----------
+    hand_age_s : float
+        Age of the last reading of the hand; infinite without one.
+    output_latency_s : float
+        From a block's rendering to its first sample, as the card states it.
+    misses, stale_blocks : int
+        As in `PresentationRecord`, since the rig was opened.
+    problems : tuple of str
+        One sentence each; none where all is well.
+    """
+
+    hand_age_s: float = 0.0
+    output_latency_s: float = 0.0
+    misses: int = 0
+    stale_blocks: int = 0
+    problems: tuple[str, ...] = ()
+
+
 class TextureRig(Protocol):
-    """A device that puts surfaces under a hand, one at a time."""
+    """A device that puts surfaces under a hand, one at a time.
+
+    All times are in seconds since it was opened. Between `open` and `close` it can be read; it is
+    silent before the first presentation.
+    """
 
     @property
     def simulated(self) -> bool:
         """Whether no real hand touches a real surface here."""
 
-    def present_model(self, model: Layered) -> None:
-        """Render this model wherever the virtual surface is touched, from now on."""
+    @property
+    def stated(self) -> Mapping[str, object]:
+        """What data say of the rig: plain values, such as its file's SHA-256; empty of a twin."""
 
-    def present_real(self, texture: str) -> None:
-        """Give way to the mounted real surface, whose texture is named."""
+    def open(self) -> None:
+        """Start whatever plays and reads; InputError, in one sentence, where it cannot."""
+
+    def close(self) -> None:
+        """Fall silent and stop everything; harmless when closed already."""
+
+    def now_s(self) -> float:
+        """The rig's clock."""
+
+    def health(self) -> RigHealth:
+        """How the rig is now."""
+
+    def present_model(self, model: Layered) -> float:
+        """Render this model wherever the virtual surface is touched, from now on.
+
+        Returns
+        -------
+        float
+            When the first sample left.
+        """
+
+    def present_real(self, texture: str) -> float:
+        """Give way to the mounted real surface, whose texture is named; returns when."""
 
     def silence(self) -> None:
         """Present nothing: no vibration and no virtual surface."""
 
     def read(self) -> RigReading:
         """The hand as it is now."""
+
+    def take_faults(self) -> tuple[Fault, ...]:
+        """What went wrong since the last call."""
+
+    def take_history(self) -> HandRows:
+        """What the hand did since the last call."""
+
+    def take_presentations(self) -> tuple[PresentationRecord, ...]:
+        """The presentations that ended since the last call."""
+
+    def take_acceleration(self) -> tuple[Acceleration, ...]:
+        """What was measured at the pen during them; nothing without an accelerometer."""
+
+
+def grid_of(model: Layered) -> tuple[Range, Range]:
+    """Lowest and highest speed (mm/s) and force (N) of the conditions of a model's grid."""
+    speeds, forces = model.table.speeds_mm_s, model.table.forces_n
+    return (float(speeds[0]), float(speeds[-1])), (float(forces[0]), float(forces[-1]))

@@ -7,6 +7,7 @@ so that tests and simulated studies do not wait.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,9 +16,20 @@ from modeling.arrays import Floats
 from modeling.errors import shown
 from modeling.hand import Hand
 from modeling.models.loading import Layered
-from rig.interface import RigReading
+from rig.interface import (
+    SURFACES,
+    Acceleration,
+    Fault,
+    HandRows,
+    PresentationRecord,
+    RigHealth,
+    RigReading,
+    Surface,
+    grid_of,
+)
 
 STEP_S = 0.01
+ROW_S = 0.002  # of the history
 STROKE_HZ = 1.0
 PEAK_SPEED_MM_S = 250.0
 MEAN_FORCE_N = 1.5
@@ -40,7 +52,7 @@ class SimulatedRig:
     def __init__(self, real: Mapping[str, TextureModel] | None = None, *, seed: int = 0) -> None:
         self._real = dict(real or {})
         self._seed = seed
-        self._presentations = 0
+        self._streams = 0
         self._presented: Layered | None = None
         self._renderer: Renderer | None = (
             None  # made when the hand first moves on what is presented
@@ -48,6 +60,11 @@ class SimulatedRig:
         self._steps = 0
         self._button = False
         self._last_vibration = np.zeros(0)
+        self._presentations = 0
+        self._now: PresentationRecord | None = None
+        self._ended: list[PresentationRecord] = []
+        self._rows: list[HandRows] = []
+        self._faults: list[Fault] = []
 
     @property
     def simulated(self) -> bool:
@@ -55,16 +72,66 @@ class SimulatedRig:
         return True
 
     @property
+    def stated(self) -> Mapping[str, object]:
+        """Nothing: a twin has no file."""
+        return {}
+
+    def open(self) -> None:
+        """Forget what was presented before; the hand strokes on."""
+        self.silence()
+        self._ended, self._rows, self._faults = [], [], []
+
+    def close(self) -> None:
+        """Fall silent."""
+        self.silence()
+
+    def now_s(self) -> float:
+        """How far the readings have moved the hand on."""
+        return self._steps * STEP_S
+
+    def health(self) -> RigHealth:
+        """All is well."""
+        return RigHealth()
+
+    def break_down(self, told: str) -> None:
+        """Let a fault happen that makes the trial invalid."""
+        self._faults.append(Fault(self.now_s(), told, invalidates=True))
+
+    def take_faults(self) -> tuple[Fault, ...]:
+        """What `break_down` was told since the last call."""
+        taken, self._faults = tuple(self._faults), []
+        return taken
+
+    def take_history(self) -> HandRows:
+        """The hand since the last call, 500 rows a second of its own time."""
+        taken, self._rows = HandRows.joined(self._rows), []
+        return taken
+
+    def take_presentations(self) -> tuple[PresentationRecord, ...]:
+        """The presentations that ended since the last call."""
+        taken, self._ended = tuple(self._ended), []
+        return taken
+
+    def take_acceleration(self) -> tuple[Acceleration, ...]:
+        """Nothing: a twin has no accelerometer."""
+        return ()
+
+    @property
     def last_vibration(self) -> Floats:
         """What the hand felt during the last reading's 10 ms, in g at the model's rate."""
         return self._last_vibration
 
-    def present_model(self, model: Layered) -> None:
+    def present_model(self, model: Layered) -> float:
         """Render this model under the hand, with fresh noise."""
-        self._presentations += 1
-        self._presented, self._renderer = model, None
+        self._begin("virtual", model.texture, model)
+        assert self._now is not None
+        speeds, forces = grid_of(model)
+        self._now = replace(
+            self._now, model_sha256=model.sha256, speeds_mm_s=speeds, forces_n=forces
+        )
+        return self.now_s()
 
-    def present_real(self, texture: str) -> None:
+    def present_real(self, texture: str) -> float:
         """Let the hand feel the truth that stands for this texture.
 
         Raises
@@ -72,19 +139,29 @@ class SimulatedRig:
         InputError
             Where truths were given, but none for this texture.
         """
-        if not self._real:
-            self.silence()
-            return
-        if texture not in self._real:
+        if self._real and texture not in self._real:
             raise InputError(
                 f"expected a mounted sample among {', '.join(self._real)}, got {shown(texture)}; "
                 "give the twin its truth."
             )
-        self.present_model(self._real[texture])
+        self._begin("real", texture, self._real.get(texture))
+        return self.now_s()
+
+    def _begin(self, surface: Surface, texture: str, felt: Layered | None) -> None:
+        self.silence()
+        self._presentations += 1
+        self._streams += felt is not None
+        self._presented, self._renderer = felt, None
+        now_s = self.now_s()
+        self._now = PresentationRecord(
+            number=self._presentations, surface=surface, texture=texture, start_s=now_s, end_s=now_s
+        )
 
     def silence(self) -> None:
         """Stop all vibration."""
-        self._presented = None
+        if self._now is not None:
+            self._ended.append(replace(self._now, end_s=self.now_s()))
+        self._presented = self._now = None
 
     def press_button(self) -> None:
         """Press the button; the next reading reports it once."""
@@ -92,21 +169,52 @@ class SimulatedRig:
 
     def read(self) -> RigReading:
         """Move the hand on by 10 ms and report where it is."""
+        self._rows.append(self._history())
         self._steps += 1
-        time_s = self._steps * STEP_S
+        time_s = self.now_s()
         speed, force = _hand(np.array([time_s]))
         self._last_vibration = self._felt(time_s)
+        self._log(self._last_vibration)
         pressed, self._button = self._button, False
         return RigReading(time_s, abs(float(speed[0])), float(force[0]), pressed, simulated=True)
+
+    def _history(self) -> HandRows:
+        """The rows of the next 10 ms."""
+        count = round(STEP_S / ROW_S)
+        time_s = self.now_s() + ROW_S * np.arange(1, count + 1, dtype=np.float64)
+        speed, force = _hand(time_s)
+        surface = "none" if self._now is None else self._now.surface
+        number = 0 if self._now is None else self._now.number
+        return HandRows(
+            time_s=time_s,
+            speed_mm_s=speed,
+            force_n=force,
+            surface=np.full(count, SURFACES.index(surface)),
+            presentation=np.full(count, number),
+            force_assumed=np.zeros(count, dtype=bool),
+        )
 
     def _felt(self, time_s: float) -> Floats:
         if self._presented is None:
             return np.zeros(0)
         if self._renderer is None:
-            self._renderer = Renderer(self._presented, seed=self._seed, stream=self._presentations)
+            self._renderer = Renderer(self._presented, seed=self._seed, stream=self._streams)
         samples = round(STEP_S * self._renderer.rate_hz)
         moments = time_s - STEP_S + np.arange(1, samples + 1) / self._renderer.rate_hz
         return self._renderer.render(*_hand(moments))
+
+    def _log(self, vibration: Floats) -> None:
+        """Add what the hand felt of a virtual surface to the record of its presentation."""
+        if self._now is None or self._renderer is None or self._now.surface != "virtual":
+            return
+        step_s = vibration.size / self._renderer.rate_hz
+        self._now = replace(
+            self._now,
+            counters=replace(self._renderer.counters),
+            played_s=self._now.played_s + step_s,
+            dose_g2_s=self._now.dose_g2_s + float(vibration @ vibration) / self._renderer.rate_hz,
+            peak_g=max(self._now.peak_g, float(np.abs(vibration).max())),
+        )
 
 
 def _hand(time_s: Floats) -> Hand:

@@ -17,11 +17,13 @@ from tactileq.telling import sentence_of, tell_warning
 # commands of that file's name; in the order of tactileq --help.
 COMMANDS = {
     "record": "record",
+    "rig": "rig",
     "model": "model",
     "simplify": "simplify",
     "scene": "scene",
     "stimuli": "stimuli",
     "vibrator": "vibrator",
+    "feel": "feel",
     "session": "session",
     "simulate": "simulate",
     "analyze": "analyze",

@@ -44,3 +44,4 @@ SceneModels = Annotated[
     ),
 ]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
+RigPath = Annotated[Path, typer.Option("--rig", help="Rig file (TOML).")]

@@ -1,11 +1,19 @@
-"""Shared by all tests: an option that forbids skipping, and files of a toolkit's layout."""
+"""Shared by all tests: no skipping on demand, an audio server, files of a toolkit's layout."""
 
 from __future__ import annotations
 
+import fcntl
+import os
 import resource
+import shutil
 import signal
+import subprocess
+import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
@@ -132,3 +140,152 @@ def _hatt_part(name: str, polynomial: NDArray[np.float64]) -> str:
 
 def _values(layout: str, numbers: Iterable[float]) -> str:
     return "".join(f"<value>{layout % number}</value>" for number in numbers)
+
+
+# --- An audio server ------------------------------------------------------------------------------
+
+
+class JackServer:
+    """A running server; clients started with `environment` talk to it, as does this process."""
+
+    def __init__(self, name: str, process: subprocess.Popen[bytes]) -> None:
+        self.name = name
+        self.process = process
+
+    @property
+    def environment(self) -> dict[str, str]:
+        return {**os.environ, "JACK_DEFAULT_SERVER": self.name, "JACK_NO_START_SERVER": "1"}
+
+    def _tool(self, *words: str) -> str:
+        run = subprocess.run(
+            words, env=self.environment, capture_output=True, text=True, check=True, timeout=20
+        )
+        return run.stdout
+
+    def ports(self) -> list[str]:
+        """Names of all ports."""
+        return self._tool("jack_lsp").split()
+
+    def wait_for_port(self, part: str, *, seconds: float = 20) -> str:
+        """The first port whose name contains this."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            found = [port for port in self.ports() if part in port]
+            if found:
+                return found[0]
+            time.sleep(0.05)
+        raise AssertionError(f"expected a port with {part!r} within {seconds} s: {self.ports()}")
+
+    def connect(self, source: str, target: str) -> None:
+        """Connect an output port to an input port."""
+        self._tool("jack_connect", source, target)
+
+    def disconnect(self, source: str, target: str) -> None:
+        """Undo a connection, where there is one."""
+        words = ("jack_disconnect", source, target)
+        subprocess.run(words, env=self.environment, capture_output=True, timeout=20)
+
+    def freewheel(self, on: bool) -> None:
+        """As fast as the clients can (on), or in real time."""
+        self._tool("jack_freewheel", "y" if on else "n")
+
+    def end(self) -> None:
+        """End it so that it leaves nothing behind: there is room for eight on a machine."""
+        self.process.terminate()
+        try:
+            self.process.wait(timeout=1)
+        except subprocess.TimeoutExpired:
+            self.kill()
+
+    def kill(self) -> None:
+        """End it without a word to its clients, as a crash does."""
+        self.process.kill()
+        self.process.wait()
+
+
+def _wait_for(server: JackServer, told: IO[bytes]) -> None:
+    words = ["jack_wait", "-s", server.name, "-w", "-t", "20"]
+    if subprocess.run(words, capture_output=True, env=server.environment, timeout=30).returncode:
+        server.process.kill()
+        server.process.wait()
+        told.seek(0)
+        said = told.read().decode(errors="replace")
+        raise AssertionError(f"expected an audio server within 20 s: {said[-2000:]}")
+
+
+@pytest.fixture
+def jack_server() -> Callable[..., AbstractContextManager[JackServer]]:
+    """`with jack_server(block=128) as server:` an audio server without a sound card; see
+    `JackServer`. This process and its children find it meanwhile."""
+    return _jack_server
+
+
+@contextmanager
+def _jack_server(*, rate_hz: int = 48000, block: int = 128) -> Iterator[JackServer]:
+    if shutil.which("jackd") is None:
+        pytest.skip("expected jackd for the tests of sound; install jackd2")
+    with _free_name() as name:
+        words = f"jackd --no-realtime --no-mlock -n {name} -d dummy -r {rate_hz} -p {block}"
+        # A pipe that nobody reads would be full after a thousand late blocks, and stop the server.
+        with tempfile.TemporaryFile() as told:
+            process = subprocess.Popen(words.split(), stdout=told, stderr=subprocess.STDOUT)
+            with _running(JackServer(name, process), told) as server:
+                yield server
+
+
+@contextmanager
+def _free_name() -> Iterator[str]:
+    """One of six names that nobody uses now.
+
+    JACK knows eight servers, killed ones included until one of the same name is started.
+    """
+    end = time.monotonic() + 200
+    while time.monotonic() < end:
+        for number in range(6):
+            path = Path(tempfile.gettempdir()) / f"tactileq-jack-{number}.lock"
+            with path.open("w") as file:
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    continue
+                yield f"tactileq{number}"
+                return
+        time.sleep(0.1)
+    raise AssertionError("expected a name for an audio server, got six in use for 200 s")
+
+
+@contextmanager
+def _running(server: JackServer, told: IO[bytes]) -> Iterator[JackServer]:
+    before = {key: os.environ.get(key) for key in ("JACK_DEFAULT_SERVER", "JACK_NO_START_SERVER")}
+    os.environ.update({key: server.environment[key] for key in before})
+    try:
+        _wait_for(server, told)
+        yield server
+    finally:
+        for key, value in before.items():
+            if value is None:
+                del os.environ[key]
+            else:
+                os.environ[key] = value
+        server.end()
+
+
+# --- A screen -------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="session")
+def display() -> Iterator[str]:
+    """A screen of 1920 x 1080 of its own, on whatever display number is free."""
+    reader, writer = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"],
+        pass_fds=[writer],
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(writer)
+    try:
+        with os.fdopen(reader) as numbers:
+            yield f":{numbers.readline().strip()}"
+    finally:
+        server.terminate()
+        server.wait(timeout=10)

@@ -1,7 +1,8 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
 `modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
-`_many` renders many streams side by side, `analysis.benches._rivals` is what the bench compares.
+`_many` renders many streams side by side, `analysis.benches._rivals` is what the bench compares,
+`rig.live._live` is the memory that processes of a rig share and the callback that plays.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ KERNEL = ROOT / "modeling" / "rendering" / "kernel.h"
 MANY = ROOT / "modeling" / "rendering" / "many.h"
 MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
 RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
+PLAYER = ROOT / "modeling" / "rendering" / "player.h"
+LIVE = ROOT / "rig" / "live" / "live.h"
+SOUND = ROOT / "rig" / "live" / "sound.h"
 # For GCC and Clang. A multiplication contracted with an addition would round otherwise than Python.
 COMPILER_ARGUMENTS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno"]
 # No result changes, but both ways of a choice may be computed, which vectors do.
@@ -68,3 +72,37 @@ many = binding(
     included=(MANY_LANES,),
     arguments=VECTOR_ARGUMENTS,
 )
+
+
+def live_binding() -> FFI:
+    """The builder of `rig.live._live`; what processes or threads share is opaque to Python."""
+    voice = re.search(
+        r"^typedef struct \{[^}]*\} tq_voice;$", PLAYER.read_text("utf-8"), re.MULTILINE
+    )
+    assert voice is not None
+    builder = FFI()
+    builder.cdef(
+        "\n".join(
+            (
+                "typedef double tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS, TQ_RING;",
+                "typedef struct tq_live tq_live; typedef struct tq_sound tq_sound;",
+                declarations(KERNEL),
+                voice[0],
+                declarations(LIVE),
+                declarations(SOUND),
+            )
+        )
+    )
+    headers = (KERNEL, PLAYER, LIVE, SOUND)
+    builder.set_source(
+        "rig.live._live",
+        f'#include "{SOUND.name}"',
+        include_dirs=[str(PLAYER.parent), str(SOUND.parent)],
+        depends=[str(header) for header in headers],
+        extra_compile_args=COMPILER_ARGUMENTS,
+        optional=True,  # no compiler: everything but a live rig works
+    )
+    return builder
+
+
+live = live_binding()

@@ -15,6 +15,7 @@ from analysis.answers.order import (
     check_stored,
     planned_trials,
     told_of_unordered,
+    with_repeats,
 )
 from analysis.labels import MODELS
 from modeling import InputError
@@ -135,7 +136,8 @@ def load_responses(data_folder: str | Path) -> Responses:
     -------
     Responses
         A last line cut short by a killed process is dropped and named in `warnings`; so is a
-        session with fewer answers than planned trials, and one without a stored order.
+        session with fewer answers than planned trials, one without a stored order, and how many
+        answers to invalid trials were left out.
 
     Raises
     ------
@@ -272,20 +274,35 @@ def _load_task(
             stored = _json_object(order)
             check_stored(stored, order, sidecar=sidecar, study=origin.get("StudySHA256"))
             planned = planned_trials(stored, (participant, session, task), path=order)
-            if len(table) < len(planned):
-                ended = f"answered {len(table)} of {len(planned)} trials (ended early)."
-                warnings.append(f"{what} {ended}")
         else:
             unordered.append(what)
+        if not table.columns.empty:
+            _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+            planned = None if planned is None else with_repeats(table, planned)
+        if planned is not None and len(table) < len(planned):
+            ended = f"answered {len(table)} of {len(planned)} trials (ended early)."
+            warnings.append(f"{what} {ended}")
         if table.columns.empty:
             continue
-        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
         check_order(table, planned, path=path)
+        table = _valid(table, what, warnings=warnings)
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)
     warnings += [*told_of_unordered(unordered), *_unanswered(folder, task)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
+
+
+def _valid(table: pd.DataFrame, what: str, *, warnings: list[str]) -> pd.DataFrame:
+    """The answers to trials in which the rig presented what was planned; tells of the others."""
+    failed = table["valid"] == 0
+    if failed.any():
+        again = int((failed & table["trial"].isin(table["repeats"])).sum())
+        warnings.append(
+            f"{what}: {int(failed.sum())} of {len(table)} answers left out, since the rig failed "
+            f"in their trials ({again} repeated)."
+        )
+    return table[~failed].reset_index(drop=True)
 
 
 def _checked_sidecar(path: Path, origin: Mapping[str, object]) -> Mapping[str, object]:
@@ -322,6 +339,9 @@ def _unanswered(folder: Path, task: str) -> list[str]:
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
     columns = ANSWER_TABLES[task]
+    for column in columns:
+        if column.before is not None and column.name not in table:
+            table[column.name] = np.nan if column.before == "n/a" else column.before
     _require_columns(table, tuple(column.name for column in columns), path=path)
     for column in columns:
         found = table[column.name]
@@ -335,6 +355,8 @@ def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: boo
             expected = f"{' or '.join(column.levels)} in column {column.name}"
             _refuse(~known, found, expected=expected, path=path)
     _check_simulated(table, simulated, path=path)
+    neither = ~table["valid"].isin([0.0, 1.0])
+    _refuse(neither, table["valid"], expected="1 or 0 in column valid", path=path)
     twice = table.duplicated(["phase", "trial"])
     _refuse(twice, table["trial"], expected="every trial once", path=path)
     if {"layout", "answer", "correct"} <= set(table):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -93,6 +95,35 @@ def told_of_unordered(sessions: Sequence[str]) -> list[str]:
     return [f"{who} answers could be compared."]
 
 
+def with_repeats(
+    table: pd.DataFrame, planned: Sequence[Mapping[str, object]]
+) -> list[Mapping[str, object]]:
+    """The trials that a session had to have, given which of its answers are not valid.
+
+    Each invalid trial is repeated once, with the next free number, at the end of its phase.
+
+    Parameters
+    ----------
+    table : DataFrame
+        The answers of one session, checked, in the order of the file.
+    planned : sequence of mapping
+        The trials of the stored order.
+    """
+    valid = table["valid"].tolist()
+    expected: list[Mapping[str, object]] = []
+    number = len(planned)
+    for _, phase in groupby(planned, key=lambda trial: trial.get("phase")):
+        failed = []
+        for trial in phase:
+            if len(expected) < len(valid) and valid[len(expected)] == 0:
+                failed.append(trial)
+            expected.append({**trial, "repeats": None})
+        for trial in failed:
+            number += 1
+            expected.append({**trial, "trial": number, "repeats": trial.get("trial")})
+    return expected
+
+
 def check_order(
     table: pd.DataFrame, planned: Sequence[Mapping[str, object]] | None, *, path: Path
 ) -> None:
@@ -103,8 +134,8 @@ def check_order(
     table : DataFrame
         The answers of one session, checked, a row per trial in the order of the file.
     planned : sequence of mapping, optional
-        The trials of the stored order: every column that a trial and its answer share. Nothing is
-        compared without it.
+        The trials of the stored order with those that were to be repeated (`with_repeats`): every
+        column that a trial and its answer share. Nothing is compared without it.
     path : Path
         The file of the answers, for what is said of them.
 
@@ -112,14 +143,15 @@ def check_order(
     ------
     InputError
         For more answers than trials, and for the first row that is not the answer to the trial
-        in its place: another number, phase, texture, model, tray, first surface or layout.
+        in its place: another number, phase, texture, model, tray, first surface or layout, or
+        another trial that it repeats.
     """
     if planned is None:
         return
     if len(table) > len(planned):
         raise InputError(
             f"expected at most {len(planned)} answers in {path}, as the session's stored order "
-            f"has trials, but found {len(table)}; restore the file."
+            f"has trials, repeated ones included, but found {len(table)}; restore the file."
         )
     rows = table.to_dict("records")
     for number, (row, trial) in enumerate(zip(rows, planned, strict=False), start=1):
@@ -132,13 +164,17 @@ def check_order(
                 )
 
 
-def _same(answered: object, planned: object) -> bool:
+def _same(answered: Any, planned: object) -> bool:
+    if planned is None:
+        return bool(pd.isna(answered))
     if isinstance(planned, list):  # a layout
         planned = "|".join(map(str, planned))
-    return answered == planned
+    return bool(answered == planned)
 
 
-def _shown(value: object) -> str:
+def _shown(value: Any) -> str:
     if isinstance(value, list):
         return "|".join(map(str, value))
+    if value is None or pd.isna(value):
+        return "n/a"
     return f"{value:g}" if isinstance(value, float) else str(value)

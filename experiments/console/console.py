@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping
 from types import TracebackType
 from typing import Any
 
-from experiments.console.screens import check_screen
+from experiments.console.screens import open_window
 from experiments.console.widgets import (
     BLUE,
     CARD,
     GREY,
     ORANGE,
     PALE,
-    PAPER,
     SMALL_HEIGHT,
     TITLE_HEIGHT,
     Button,
@@ -69,22 +68,7 @@ class Console:
         screen: int = 0,
         on_page: PageHook | None = None,
     ) -> None:
-        from psychopy import logging, visual
-
-        check_screen(screen)
-        logging.console.setLevel(logging.ERROR)  # no monitor calibration is needed: not a warning
-        self._window = visual.Window(
-            size=size,
-            fullscr=fullscreen,
-            screen=screen,
-            units="height",
-            color=PAPER,
-            winType="pyglet",
-            allowGUI=not fullscreen,
-            checkTiming=False,
-            multiSample=True,
-            title="tactileq",
-        )
+        self._window = open_window(size=size, fullscreen=fullscreen, screen=screen)
         self._mouse = Mouse(self._window)
         self._on_page = on_page
         self._done = False
@@ -163,11 +147,11 @@ class Console:
                 *self._cards((0.072, 0.2), (-0.153, 0.2)),
             ),
         )
-        seconds = self._show(page, surfaces=surfaces, update=update)
+        self._show(page, surfaces=surfaces, update=update)
         return Rating(
             magnitude_similarity=magnitude.rating,
             frequency_similarity=frequency.rating,
-            response_time_s=seconds,
+            response_time_s=surfaces.response_time_s,
         )
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
@@ -207,9 +191,9 @@ class Console:
                 picked,
             ),
         )
-        seconds = self._show(page, surfaces=surfaces, update=update)
+        self._show(page, surfaces=surfaces, update=update)
         assert surfaces.selected is not None
-        return Choice(button=surfaces.selected, response_time_s=seconds)
+        return Choice(button=surfaces.selected, response_time_s=surfaces.response_time_s)
 
     # --- Parts of the pages -----------------------------------------------------------------
 
@@ -292,26 +276,25 @@ class Console:
         *,
         surfaces: Surfaces | None = None,
         update: Callable[[], None] = lambda: None,
-    ) -> float:
-        """Run a page until it is finished; seconds from its first frame."""
+    ) -> None:
+        """Run a page until it is finished."""
         from psychopy import event
 
         self._done = False
         event.clearEvents()
         self._mouse.take()  # presses meant for the page before
-        began_s: float | None = None
+        first = True
         while not self._done:
             update()
             page.draw()
-            if began_s is None and self._on_page is not None:
+            if first and self._on_page is not None:
                 self._on_page(page.name, self._pixels(page))
+            first = False
             self._window.flip()
-            began_s = time.perf_counter() if began_s is None else began_s
             if "escape" in event.getKeys(["escape"]):
                 raise SessionAborted
             self._respond(page, surfaces, update=update)
             time.sleep(FRAME_PAUSE_S)
-        return time.perf_counter() - began_s if began_s is not None else 0.0
 
     def _respond(
         self, page: Page, surfaces: Surfaces | None, *, update: Callable[[], None]

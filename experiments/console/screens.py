@@ -1,10 +1,46 @@
-"""Which screens there are, numbered as PsychoPy's windows number them."""
+"""Screens, numbered as PsychoPy's windows number them, and a window on one of them."""
 
 from __future__ import annotations
 
 import sys
+from typing import Any
 
+from experiments.console.widgets import PAPER
 from modeling import InputError
+
+
+def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
+    """A PsychoPy window in the unit `height`.
+
+    Raises
+    ------
+    InputError
+        For a screen that does not exist, or where there is none at all.
+    """
+    try:
+        from psychopy import logging, visual
+
+        check_screen(screen)
+        logging.console.setLevel(logging.ERROR)  # no monitor calibration is needed: not a warning
+        return visual.Window(
+            size=size,
+            fullscr=fullscreen,
+            screen=screen,
+            units="height",
+            color=PAPER,
+            winType="pyglet",
+            allowGUI=not fullscreen,
+            checkTiming=False,
+            multiSample=True,
+            title="tactileq",
+        )
+    except InputError:
+        raise
+    except Exception as error:  # whatever the window system raises means the same to a user
+        raise InputError(
+            f"expected a screen for the window, got {error or type(error).__name__}; start a "
+            "graphical session (or Xvfb) and set DISPLAY."
+        ) from error
 
 
 def check_screen(screen: int) -> None:

@@ -109,6 +109,8 @@ class Button:
     action : callable
     color : str
         Of the button while it is lit.
+    height : float
+        Of the label.
     """
 
     def __init__(
@@ -121,6 +123,7 @@ class Button:
         size: Point,
         action: Callable[[], None],
         color: str = BLUE,
+        height: float = TEXT_HEIGHT,
     ) -> None:
         from psychopy import visual
 
@@ -134,7 +137,7 @@ class Button:
         self._shape = visual.ShapeStim(
             window, vertices=rounded(size, 0.014), pos=at, units="height", autoLog=False
         )
-        self._label = text(window, label, at=at, bold=True, wrap=size[0])
+        self._label = text(window, label, at=at, height=height, bold=True, wrap=size[0])
 
     def contains(self, point: Point) -> bool:
         """Whether the point lies on the enabled button."""

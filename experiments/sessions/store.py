@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -18,6 +18,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.sessions.traces import (
+    HAND_COLUMNS,
+    PRESENTATION_COLUMNS,
+    hand_table,
+    pen_file,
+    presentation_table,
+)
 from experiments.study.design import SessionPlan
 from experiments.study.study import Study
 from modeling import InputError
@@ -25,6 +32,8 @@ from modeling.errors import shown
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of
 from modeling.files.reading import read_text, reason_of
+from modeling.files.writing import write_bytes
+from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 BIDS_VERSION = "1.10.0"
 ORDER_FORMAT = "tactileq.session-order"
@@ -41,9 +50,11 @@ class StoreError(OSError):
 class SessionStore:
     """The files of one session; made by `SessionStore.create`, used in a `with` block."""
 
-    def __init__(self, responses: _Rows, log: _Rows) -> None:
+    def __init__(self, responses: _Rows, log: _Rows, *, hand: _Rows, shown: _Rows) -> None:
         self._responses = responses
         self._log = log
+        self._hand = hand
+        self._shown = shown
 
     @property
     def path(self) -> Path:
@@ -61,6 +72,7 @@ class SessionStore:
         models: Mapping[str, Mapping[str, str]],
         simulated_participant: bool,
         simulated_rig: bool,
+        rig: Mapping[str, object] | None = None,
     ) -> SessionStore:
         """Make the files of a session that has none yet, the order of its trials first.
 
@@ -78,6 +90,8 @@ class SessionStore:
             The models that are presented; one data set holds answers about one set of them.
         simulated_participant, simulated_rig : bool
             Whether they are simulated; one data set holds one kind.
+        rig : mapping, optional
+            What the sidecar says of the rig: its file's SHA-256, what is assumed.
 
         Raises
         ------
@@ -103,7 +117,8 @@ class SessionStore:
             _describe_data_set(root, plan.study, origin=origin)
             order = _order_text(plan)
             fixed = origin | {"OrderSHA256": sha256_of(order)}
-            sidecar = _sidecar_text(plan, columns, description=description, origin=fixed)
+            stated = fixed | ({"Rig": dict(rig)} if rig else {})
+            sidecar = _sidecar_text(plan, columns, description=description, origin=stated)
             store = cls._make_files(
                 root, plan, columns=tuple(columns), order=order, sidecar=sidecar, made=made
             )
@@ -138,6 +153,14 @@ class SessionStore:
             _write_new(source / f"{stem}_order.json", order, made=made)
             _write_new(beh / f"{stem}_beh.json", sidecar, made=made)
             log = _Rows.create(source / f"{stem}_log.tsv", LOG_COLUMNS, made=made)
+            traces = []
+            for name, described in (
+                ("hand", HAND_COLUMNS),
+                ("presentations", PRESENTATION_COLUMNS),
+            ):
+                _write_new(source / f"{stem}_{name}.json", _json(described), made=made)
+                path = source / f"{stem}_{name}.tsv"
+                traces.append(_Rows.create(path, tuple(described), made=made))
             rows = _Rows.create(beh / f"{stem}_beh.tsv", columns, made=made)
         except FileExistsError as error:
             raise InputError(
@@ -146,7 +169,8 @@ class SessionStore:
             ) from None
         for folder in (source, beh):
             _sync_folder(folder)
-        return cls(rows, log)
+        hand, shown = traces
+        return cls(rows, log, hand=hand, shown=shown)
 
     def append(self, row: Mapping[str, object]) -> None:
         """Write one answered trial and force it to disk.
@@ -159,6 +183,43 @@ class SessionStore:
             If the disk does not take it; the rows before it stay as they are.
         """
         self._responses.append(row)
+
+    def trace(
+        self,
+        trial: int,
+        rows: HandRows,
+        *,
+        presentations: Sequence[PresentationRecord],
+        faults: Sequence[Fault],
+    ) -> None:
+        """Write what the hand did in a trial, and what was presented to it.
+
+        Raises
+        ------
+        StoreError
+            If the disk does not take it.
+        """
+        self._shown.extend(presentation_table(trial, presentations, rows=rows, faults=faults))
+        self._hand.extend(hand_table(trial, rows))
+
+    def acceleration(self, trial: int, pieces: Sequence[Acceleration]) -> None:
+        """Write what was measured at the pen in a trial: a WAV file in g for each piece.
+
+        Raises
+        ------
+        StoreError
+            If the disk does not take it.
+        """
+        stem = self._hand.path.name.removesuffix("_hand.tsv")
+        for number, piece in enumerate(pieces, start=1):
+            path = self._hand.path.with_name(f"{stem}_trial-{trial:03d}_pen-{number}.wav")
+            try:
+                write_bytes(path, pen_file(piece))
+            except OSError as error:
+                raise _store_error(error, path, "The answers are safe") from error
+            self.log(
+                "pen recorded", f"{path.name}, first sample {piece.start_s:.6f} s after opening"
+            )
 
     def log(self, event: str, detail: str = MISSING) -> None:
         """Write one event with its time, and force it to disk.
@@ -173,8 +234,8 @@ class SessionStore:
 
     def close(self) -> None:
         """Close the files; everything in them is on disk already."""
-        self._responses.close()
-        self._log.close()
+        for table in (self._responses, self._log, self._hand, self._shown):
+            table.close()
 
     def __enter__(self) -> SessionStore:
         return self
@@ -211,7 +272,10 @@ def cell(value: object) -> str:
         if math.isinf(value):
             raise InputError(f"expected a finite number in a row, got {value}; present it again.")
         return MISSING if math.isnan(value) else f"{value:.10g}"
-    return "".join(_plain(character) for character in str(value))
+    text = str(value)
+    if text.isprintable() and "\\" not in text and '"' not in text:
+        return text  # as nearly all are
+    return "".join(_plain(character) for character in text)
 
 
 def _plain(character: str) -> str:
@@ -246,15 +310,24 @@ class _Rows:
         return cls(path, columns, handle)
 
     def append(self, row: Mapping[str, object]) -> None:
+        self._write(self._line(row), sync=True)
+
+    def extend(self, rows: Iterable[Mapping[str, object]]) -> None:
+        """Several rows, which the system writes to the disk when it gets round to it."""
+        self._write("".join(map(self._line, rows)), sync=False)
+
+    def _line(self, row: Mapping[str, object]) -> str:
         if set(row) != set(self._columns):
             raise InputError(
                 f"expected the columns {', '.join(self._columns)} in a row, got "
                 f"{', '.join(row)}; give each of them once."
             )
-        line = "\t".join(cell(row[column]) for column in self._columns) + "\n"
+        return "\t".join(cell(row[column]) for column in self._columns) + "\n"
+
+    def _write(self, text: str, *, sync: bool) -> None:
         end = os.fstat(self._handle).st_size
         try:
-            _write_all(self._handle, line)
+            _write_all(self._handle, text, sync=sync)
         except OSError as error:
             # Half a row would spoil the table for every reader: cut it off again.
             with suppress(OSError):
@@ -270,11 +343,12 @@ def _open_new(path: Path) -> int:
     return os.open(path, flags, 0o644)
 
 
-def _write_all(handle: int, text: str) -> None:
+def _write_all(handle: int, text: str, *, sync: bool = True) -> None:
     data = text.encode("utf-8")
     while data:
         data = data[os.write(handle, data) :]
-    os.fsync(handle)
+    if sync:
+        os.fsync(handle)
 
 
 def _write_new(path: Path, text: str, *, made: list[Path]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -65,6 +66,8 @@ class Surfaces:
         Changes between the real and a virtual surface, the first presentation not counted.
     presses : int
         Presentations of a virtual surface, repeated ones included.
+    first_sample_s : float or None
+        When the first sample of the first presentation left, on the rig's clock.
     """
 
     def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[Layered]) -> None:
@@ -75,6 +78,8 @@ class Surfaces:
         self._selected: int | None = None
         self.switches = 0
         self.presses = 0
+        self.first_sample_s: float | None = None
+        self._began_s: float | None = None
         rig.read()  # a press of the rig's button before the trial is not one in it
 
     @property
@@ -92,10 +97,14 @@ class Surfaces:
         """Number of virtual surfaces."""
         return len(self._models)
 
+    @property
+    def response_time_s(self) -> float:
+        """Time since the first sample of the first presentation left; 0 before."""
+        return 0.0 if self._began_s is None else time.perf_counter() - self._began_s
+
     def present_real(self) -> None:
         """Present the real surface (the virtual one is switched off)."""
-        self._rig.present_real(self._texture)
-        self._note("real")
+        self._note("real", self._rig.present_real(self._texture))
 
     def present_virtual(self, index: int = 0) -> None:
         """Present the virtual surface of a button (index from 0).
@@ -109,10 +118,10 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        self._rig.present_model(self._models[index])
+        left_s = self._rig.present_model(self._models[index])
         self._selected = index
         self.presses += 1
-        self._note("virtual")
+        self._note("virtual", left_s)
 
     def toggle(self) -> None:
         """Change between the real surface and the virtual one presented last, if any."""
@@ -128,7 +137,11 @@ class Surfaces:
         if self._rig.read().button:
             self.toggle()
 
-    def _note(self, shown: str) -> None:
+    def _note(self, shown: str, left_s: float) -> None:
+        if self.first_sample_s is None:
+            # The rig's clock may be its own, as a twin's is: only how long ago it was counts.
+            self.first_sample_s = left_s
+            self._began_s = time.perf_counter() - (self._rig.now_s() - left_s)
         if self._shown is not None and self._shown != shown:
             self.switches += 1
         self._shown = shown

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from modeling import InputError
-from modeling.checks import check_keys, check_whole
+from modeling.checks import check_keys, check_number, check_whole
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_toml
@@ -22,6 +22,8 @@ Schedule = Literal["by-day", "interleaved"]
 TASKS = tuple(ANSWER_TABLES)
 SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
 MOST_TEXTURES = 12
+CALIBRATION_DAYS = 90.0
+_SINCE: dict[str, object] = {"calibration_days": CALIBRATION_DAYS, "measured_force": False}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
 
@@ -111,6 +113,10 @@ class Study:
         What the participant saw of the surface.
     data_license : str
         Licence of the data, for the description of the data set.
+    calibration_days : float
+        How old the calibration of a rig may be, above 0.
+    measured_force : bool
+        Whether the rig must measure force: a mouse, of which it is assumed, is refused then.
 
     Raises
     ------
@@ -128,6 +134,8 @@ class Study:
     masking: str = "not stated"
     surface_visible: str = "not stated"
     data_license: str = "not stated"
+    calibration_days: float = CALIBRATION_DAYS
+    measured_force: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "textures", tuple(self.textures))
@@ -144,6 +152,13 @@ class Study:
         object.__setattr__(self, "tasks", in_order)
         check_whole("seed", self.seed, low=0, high=2**63)
         check_whole("repeats", self.repeats, low=1, high=100)
+        check_number("calibration_days", self.calibration_days, low=1.0, high=3650.0)
+        object.__setattr__(self, "calibration_days", float(self.calibration_days))
+        if not isinstance(self.measured_force, bool):
+            raise InputError(
+                f"expected true or false for measured_force, got {shown(self.measured_force)}; "
+                "correct it."
+            )
         self._check_texts()
         self._check_trays()
         check_whole("training_trials", self.training_trials, low=0, high=len(self.textures))
@@ -203,7 +218,8 @@ class Study:
         values: dict[str, Any] = {}
         for name, value in asdict(self).items():
             values |= value if name == "tasks" else {name: value}
-        return values
+        # Studies from before there were these keep their hash.
+        return {name: value for name, value in values.items() if value != _SINCE.get(name)}
 
     @property
     def sha256(self) -> str:

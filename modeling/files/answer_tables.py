@@ -26,6 +26,9 @@ class AnswerColumn:
     unit : str
     required : bool
         Whether every row has a value.
+    before : str, optional
+        What every row of a table holds that was written before there was this column; without it
+        such a table is refused.
     """
 
     name: str
@@ -34,6 +37,7 @@ class AnswerColumn:
     limits: tuple[float, float] | None = None
     unit: str = ""
     required: bool = False
+    before: str | None = None
 
     def sidecar(self) -> dict[str, Any]:
         """The column as a BIDS sidecar describes it."""
@@ -81,6 +85,21 @@ def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[Answer
         AnswerColumn(name="tray", description="Tray that held the sample"),
         *own,
         AnswerColumn(
+            name="valid",
+            description="Whether the rig presented what was planned",
+            levels={"1": "it did", "0": "it failed in this trial; the log says how"},
+            limits=(0, 1),
+            required=True,
+            before="1",
+        ),
+        AnswerColumn(
+            name="repeats",
+            description="Of a trial that was repeated at the end of its phase, since it was not "
+            "valid: its number; n/a for planned trials",
+            limits=(1, inf),
+            before="n/a",
+        ),
+        AnswerColumn(
             name="simulated",
             description="Whether the participant, the rig or both were simulated",
             levels={
@@ -94,7 +113,7 @@ def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[Answer
 
 RESPONSE_TIME = AnswerColumn(
     name="response_time_s",
-    description="From first presentation to answer",
+    description="From the first sample of the first presentation to the answer",
     limits=(0, inf),
     unit="s",
 )

@@ -10,6 +10,7 @@ import numpy as np
 from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.models.grid import Cells
+from modeling.models.parameter_table import NEXT
 from modeling.models.texture_model import TextureModel
 from modeling.scenes.places import Places, nodes_of
 from modeling.scenes.scene import Range
@@ -67,6 +68,12 @@ def _on_axes(model: TextureModel, speeds_mm_s: Floats, forces_n: Floats) -> Text
 
 
 def _within(axis: Floats, ends: Range) -> Floats:
-    """The values of an axis strictly within a range, and the range's ends."""
-    inside = axis[(axis > ends[0]) & (axis < ends[1])]
-    return np.unique(np.concatenate([[ends[0]], inside, [ends[1]]]))
+    """The values of an axis strictly within a range, and the range's ends.
+
+    Values that single precision may not tell apart count once.
+    """
+    low, high = ends
+    if high < NEXT * low:
+        return np.array([low])
+    inside = axis[(axis > NEXT * low) & (NEXT * axis < high)]
+    return np.concatenate([[low], inside, [high]])

@@ -1,4 +1,4 @@
-"""tactileq record: recordings of planted textures, in silico."""
+"""tactileq record: a surface under a hand, or planted textures in silico."""
 
 from __future__ import annotations
 
@@ -10,22 +10,88 @@ import typer
 from tactileq.options import Seed
 from tactileq.telling import progress
 
+SILICO_RATE_HZ = 22704.0
+
 
 def record(
-    folder: Annotated[Path, typer.Argument(help="New folder for the recordings.")],
-    texture: Annotated[str, typer.Option(help="Planted texture, such as canvas.")],
-    rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 22704.0,
+    folder: Annotated[Path, typer.Argument(help="Folder for the recordings.")],
+    texture: Annotated[
+        str, typer.Option(help="Name of the surface; in silico a planted one, such as canvas.")
+    ],
+    rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate", help="Sampling rate in Hz; the card's, or 22704 in silico."),
+    ] = None,
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 1.0,
     seed: Seed = 0,
+    audio: Annotated[
+        bool, typer.Option("--audio", help="Record an accelerometer at a sound card, by hand.")
+    ] = False,
+    rig: Annotated[Path | None, typer.Option("--rig", help="Rig file (TOML).")] = None,
+    grid: Annotated[
+        Path | None,
+        typer.Option("--grid", help="Grid (TOML) from tactileq rig range; 7 x 7 without it."),
+    ] = None,
+    repeat: Annotated[int, typer.Option(min=1, help="Which repeat of each condition.")] = 1,
+    device: Annotated[
+        str | None, typer.Option(help="Input device: its name or a part of it.")
+    ] = None,
+    channel: Annotated[int | None, typer.Option(min=1, help="Input channel, from 1.")] = None,
+    g_per_fullscale: Annotated[
+        float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
+    ] = None,
+    simulated: Annotated[
+        bool, typer.Option("--simulated", help="The input is a simulation: mark the recordings.")
+    ] = False,
+    hand: Annotated[
+        str | None,
+        typer.Option("--hand", help="Without --rig: tablet, mouse, serial or scripted."),
+    ] = None,
+    hand_device: Annotated[str | None, typer.Option(help="Device of the hand.")] = None,
+    counts_per_mm: Annotated[float | None, typer.Option(help="Of a mouse or tablet.")] = None,
+    force: Annotated[
+        float | None, typer.Option("--force", help="Force of a hand that measures none, N.")
+    ] = None,
 ) -> None:
-    """Record a planted texture in silico, 7 speeds x 7 forces; no device is driven yet.
+    """Record a surface by hand (--audio), or a planted texture in silico, 7 speeds x 7 forces.
+
+    With --audio you stroke the surface freely; strokes are cut into the conditions of the grid, and
+    a map shows what is missing. Ctrl-C ends it; run it again to go on.
+
+    Example: tactileq record recordings/oak --audio --texture oak --rig rig.toml --grid grid.toml
 
     Example: tactileq record recordings/canvas --texture canvas
     """
+    from tactileq.commands.record_audio import (
+        HandOptions,
+        HandRecording,
+        InputOptions,
+        record_by_hand,
+    )
+
+    by_hand = HandOptions(hand, hand_device, counts_per_mm, force)
+    heard = InputOptions(device, channel, rate_hz if audio else None, g_per_fullscale, simulated)
+    if audio:
+        options = HandRecording(texture, duration_s, repeat, grid, rig, by_hand, heard)
+        record_by_hand(folder, options)
+        return
+    if rig or grid or repeat > 1 or (by_hand, heard) != (HandOptions(), InputOptions()):
+        raise ValueError(
+            "expected --audio with options of the hand, the input, the grid or the repeat, got "
+            "them without it; add --audio, or leave them out to record in silico."
+        )
+    record_in_silico(folder, texture, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
+
+
+def record_in_silico(
+    folder: Path, texture: str, *, rate_hz: float | None, duration_s: float, seed: int
+) -> None:
+    """Record a planted texture, 7 speeds x 7 forces."""
     from modeling.files.folders import folder_behind, replace_folder
     from modeling.files.provenance import write_provenance
     from stimuli.planted.textures import planted_texture, record_texture
 
+    rate_hz = SILICO_RATE_HZ if rate_hz is None else rate_hz
     folder_behind(folder)
     if folder.exists() and (folder.is_file() or any(folder.iterdir())):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     TaskName = str
     from experiments.console.console import Console
     from experiments.study.models import ModelSets
+    from experiments.study.study import Study
+    from rig.interface import TextureRig
 else:
     TaskName = Literal[tuple(ANSWER_TABLES)]
 
@@ -28,24 +30,34 @@ def session(
     data: Data = Path("data"),
     number: Annotated[int, typer.Option("--session", min=1, help="Which day.")] = 1,
     study: StudyFile = None,
+    rig: Annotated[
+        Path | None, typer.Option(help="Rig file (TOML); the simulated rig without it.")
+    ] = None,
+    override: Annotated[
+        str | None,
+        typer.Option(help="Reason to use a rig of a latency above 40 ms; it is stored."),
+    ] = None,
     fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
     screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
 ) -> None:
-    """Run one participant's session at the console, with the simulated rig.
+    """Run one participant's session at the console.
 
-    Example: tactileq session --task absolute --subject 1 --data data
+    A trial in which the rig fails is stored, marked and repeated once at the end of its phase.
+
+    Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
     from experiments.sessions.trial_loop import run_session
     from experiments.study.study import Study
     from experiments.tasks import task_named
     from modeling.files.provenance import write_provenance
-    from rig.twin import SimulatedRig
 
     plan = Study.load(study)
     sets, inputs = models_to_compare(models, simplified, scene)
     sets.require(plan.textures)
     tell_controls(sets, plan.textures)
-    print("note: the rig is the simulated one; its data are marked simulated.")
+    device, rig_files, rig_settings = rig_of(plan, sets, rig=rig, override=override)
+    if device.simulated:
+        print("note: the rig is simulated; its data are marked so.")
     with open_console(fullscreen=fullscreen, screen=screen) as console:
         result = run_session(
             task_named(task),
@@ -53,7 +65,7 @@ def session(
             subject=subject,
             session=number,
             models=sets,
-            rig=SimulatedRig(),
+            rig=device,
             respondent=console,
             data_folder=data,
         )
@@ -63,9 +75,56 @@ def session(
         "study_sha256": plan.sha256,
         "models_sha256": sets.sha256(plan.textures),
         **scene_settings(sets),
+        **rig_settings,
     }
-    write_provenance(note, "session", settings, inputs=inputs)
+    write_provenance(note, "session", settings, inputs=[*inputs, *rig_files])
+    if result.invalid:
+        print(f"note: the rig failed in {result.invalid} trials; the log says how.")
     print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
+
+
+def rig_of(
+    plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None
+) -> tuple[TextureRig, list[Path], dict[str, object]]:
+    """The rig that a session presents on, its files, and what a provenance says of it.
+
+    Parameters
+    ----------
+    plan : Study
+        With what it requires of a rig.
+    sets : ModelSets
+        What is presented.
+    rig : Path, optional
+        A rig file; the simulated rig without it.
+    override : str, optional
+        Reason to use a rig that is too slow.
+
+    Raises
+    ------
+    InputError
+        For a rig file that is none, and for a rig that does not do for this study.
+    """
+    from modeling.checks import check_name
+    from rig.desk.checks import Requirements, check_models
+    from rig.desk.desk_rig import DeskRig
+    from rig.setup.rig_file import RigFile
+    from rig.twin import SimulatedRig
+
+    if override is not None:
+        check_name("the reason of --override", override)
+    if rig is None:
+        if override is not None:
+            raise ValueError("expected --rig with --override, got none; name the rig file.")
+        return SimulatedRig(), [], {}
+    file = RigFile.load(rig)
+    wanted = Requirements(
+        calibration_days=plan.calibration_days, measured_force=plan.measured_force
+    )
+    device = DeskRig(file, requirements=wanted, override=override)
+    check_models(
+        file, [kind[texture] for kind in (sets.full, sets.simplified) for texture in plan.textures]
+    )
+    return device, [rig, *file.files], {"rig_sha256": file.sha256, "override": override}
 
 
 def models_to_compare(

@@ -41,8 +41,14 @@ from modeling.recordings.trajectory import load_trajectory
 from modeling.scenes.compiled import load_compiled
 from modeling.scenes.places import places_of
 from modeling.scenes.scene import HandRange
+from rig.capture.grid import StrokeGrid
+from rig.capture.pieces import PieceStore, Plan
+from rig.desk.parts import hand_settings
+from rig.hand.scripted import Trajectory
 from rig.importing.files import Label, import_csv, import_wav, labels_from_table
 from rig.importing.hatt import load_hatt
+from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
@@ -275,6 +281,21 @@ def use_compiled_scene(path: Path) -> Iterable[object]:
         yield Renderer(model).render(200.0, 2.0, samples=100)
 
 
+def use_rig_file(path: Path) -> Iterable[object]:
+    rig = RigFile.load(path)
+    json.dumps(rig.to_dict(), allow_nan=False)
+    yield (len(rig.sha256), len(rig.files), rig.fullscale_per_g)
+    yield list(vars(rig.safe_limits).values())
+    yield [figure.value for figure in rig.figures().values() if isinstance(figure, Figure)]
+    points = hand_settings(rig).pressure_points
+    yield [] if points is None else points
+
+
+def use_simulated_vibrator(path: Path) -> Iterable[object]:
+    accelerometer = SimulatedAccelerometer(SimulatedVibrator.load(path), rate_hz=48_000.0)
+    yield accelerometer.give(NOISE[:80])
+
+
 def use_study(path: Path) -> Iterable[object]:
     study = Study.load(path)
     assert Study.from_dict(json.loads(json.dumps(study.to_dict()))) == study
@@ -309,6 +330,23 @@ def use_trajectory(path: Path) -> Iterable[object]:
     yield load_trajectory(path, name="hand").duration_s
 
 
+def use_positions(path: Path) -> Iterable[object]:
+    script = Trajectory.load(path)
+    yield [script.at(time_s) for time_s in (0.0, 0.3, 1e9)]
+
+
+def use_stroke_grid(path: Path) -> Iterable[object]:
+    grid = StrokeGrid.load(path)
+    yield from grid.bounds()
+    yield grid.cells([80.0, np.nan], [1.0, 1.0])
+
+
+def use_pieces(path: Path) -> Iterable[object]:
+    grid = StrokeGrid([80.0, 160.0], [1.0])
+    store = PieceStore(path.parents[1], Plan("oak", grid, 5000.0, wanted_s=0.5))
+    yield store.coverage.seconds
+
+
 @cache
 def compiled_scene() -> CompiledScene:
     """Once for all kinds of files."""
@@ -333,6 +371,14 @@ def wav_bytes() -> bytes:
     return buffer.getvalue()
 
 
+def rig_bytes() -> bytes:
+    """The shipped rig file with a vibrator and a calibration."""
+    text = SHIPPED_RIG_FILE.read_text(encoding="utf-8")
+    text = text.replace('# file = "vibrator.json"', 'file = "vibrator.json"')
+    calibration = '[calibration]\ndate = 2026-11-22\nrig = "desk rig"\nserials = []\n'
+    return (text + calibration).encode()
+
+
 def csv_bytes() -> bytes:
     rows = (f"{n / 5000:.4f},{x:.6f},{x / 2:.6f}" for n, x in enumerate(NOISE[:100]))
     return "\n".join(["time (s),x (g),y (g)", *rows, ""]).encode()
@@ -348,7 +394,7 @@ def answer_rows() -> str:
         given = {"trial": str(trial), "phase": "main" if trial > 1 else "training"}
         given |= {"texture": texture, "model": "full", "tray": "A", "first_surface": "real"}
         given |= {"magnitude_similarity": "50", "frequency_similarity": "70", "toggles": "3"}
-        given |= {"response_time_s": "12.5", "simulated": "false"}
+        given |= {"response_time_s": "12.5", "valid": "1", "repeats": "n/a", "simulated": "false"}
         rows.append("\t".join((cells | given).values()))
     return "\n".join([*rows, ""])
 
@@ -443,10 +489,23 @@ speed_mm_s = 100
 force_n = 1.5
 """
 HAND = b"time_s,speed_mm_s,force_n\n0,100,1\n0.5,150,1.5\n1,nan,2\n2,0,0\n"
+POSITIONS = b"time_s\tx_mm\ty_mm\tforce_n\n0\t0\t0\t1\n0.5\t40\t-2.5\t1.5\n1\t10\t0\t0\n"
 THRESHOLD = (
     b"# source: test\n# caveat: none\nfrequency_hz\tdisplacement_um\n10\t5\n100\t0.5\n600\t2\n"
 )
 LABELS = b"file\tspeed_mm_s\tforce_n\trepeat\na.wav\t50\t1.5\t1\nb.wav\t100\t1.5\t1\n"
+STROKES = b"""speeds_mm_s = [80, 160.5]
+forces_n = [1]
+speed_tolerance = 0.2
+[exploration]
+seconds = 20.5
+"""
+PIECES = (
+    b"file\ttexture\tspeed_mm_s\tforce_n\trepeat\trate_hz\tsamples\tmean_speed_mm_s\t"
+    b"speed_sd_mm_s\tmean_force_n\tforce_sd_n\tsimulated\tforce_assumed\n"
+    b"00001.wav\toak\t80.0\t1.0\t1\t5000.0\t1000\t81\t2\t1\t0.1\tfalse\tfalse\n"
+    b"00002.wav\toak\t80.0\t1.0\t1\t5000.0\t900\t81\t2\t1\t0.1\ttrue\tfalse\n"
+)
 KINDS: dict[str, tuple[str, Use]] = {
     "model": ("model.json", use_model),
     "regressed model": ("regressed.json", use_model),
@@ -465,7 +524,12 @@ KINDS: dict[str, tuple[str, Use]] = {
     "compiled scene": ("compiled/scene.json", use_compiled_scene),
     "model of a compiled scene": ("compiled/wall-paper.json", use_compiled_scene),
     "trajectory": ("hand.csv", use_trajectory),
+    "scripted hand": ("positions.tsv", use_positions),
     "study": ("study.toml", use_study),
+    "rig file": ("rig.toml", use_rig_file),
+    "simulated vibrator": ("in_silico.toml", use_simulated_vibrator),
+    "grid of strokes": ("grid.toml", use_stroke_grid),
+    "pieces of strokes": ("strokes/pieces/pieces.tsv", use_pieces),
     "vibrator": ("vibrator.json", use_vibrator),
     "simplification": ("x_simplification.json", use_simplification),
     "threshold": ("threshold.tsv", use_threshold),
@@ -494,7 +558,12 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
         "places.toml": DISTRIBUTION,
         "recorded.toml": RECORDED,
         "hand.csv": HAND,
+        "positions.tsv": POSITIONS,
         "study.toml": SHIPPED_STUDY.read_bytes(),
+        "rig.toml": rig_bytes(),
+        "in_silico.toml": b"frequency_hz = 90.0\nheight = 3.5\nhum_g = 0.01\nseed = 4\n",
+        "grid.toml": STROKES,
+        "strokes/pieces/pieces.tsv": PIECES,
         "threshold.tsv": THRESHOLD,
         **{name: text.encode() for name, text in DATA.items()},
     }

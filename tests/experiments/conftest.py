@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -12,31 +13,49 @@ from experiments.study.study import Study, TaskPlan
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.relative import RelativeTrial
 from modeling import TextureModel, Threshold, simplify
-from rig.interface import RigReading
+from rig.interface import Acceleration, Fault, HandRows, PresentationRecord, RigHealth, RigReading
 from stimuli.planted.textures import planted_texture
 
 TEXTURES = ("canvas", "MDF", "PVC")
 
 
 class NotingRig:
-    """Notes every command; may be told to fail at presenting."""
+    """Notes what it presents; may be told to fail at presenting, or of faults to tell."""
 
     simulated = True
+    stated: Mapping[str, object] = {}
 
     def __init__(self) -> None:
         self.notes: list[tuple[str, object]] = []
         self.presses = 0
         self.broken = False
+        self.opened = False
+        self.faults: list[Fault] = []
 
-    def present_model(self, model: TextureModel) -> None:
+    def open(self) -> None:
+        self.opened = True
+
+    def close(self) -> None:
+        self.opened = False
+
+    def now_s(self) -> float:
+        return 0.0
+
+    def health(self) -> RigHealth:
+        return RigHealth()
+
+    def present_model(self, model: TextureModel) -> float:
+        self._note("virtual", model)
+        return 0.0
+
+    def present_real(self, texture: str) -> float:
+        self._note("real", texture)
+        return 0.0
+
+    def _note(self, what: str, shown: object) -> None:
         if self.broken:
             raise RuntimeError("the vibrator is gone")
-        self.notes.append(("virtual", model))
-
-    def present_real(self, texture: str) -> None:
-        if self.broken:
-            raise RuntimeError("the vibrator is gone")
-        self.notes.append(("real", texture))
+        self.notes.append((what, shown))
 
     def silence(self) -> None:
         self.notes.append(("silence", None))
@@ -44,6 +63,19 @@ class NotingRig:
     def read(self) -> RigReading:
         pressed, self.presses = self.presses > 0, max(self.presses - 1, 0)
         return RigReading(0.0, 0.0, 0.0, pressed, simulated=True)
+
+    def take_faults(self) -> tuple[Fault, ...]:
+        taken, self.faults = tuple(self.faults), []
+        return taken
+
+    def take_history(self) -> HandRows:
+        return HandRows.joined([])
+
+    def take_acceleration(self) -> tuple[Acceleration, ...]:
+        return ()
+
+    def take_presentations(self) -> tuple[PresentationRecord, ...]:
+        return ()
 
 
 class Script:

@@ -7,7 +7,7 @@ import pytest
 
 from modeling import InputError, Renderer, TextureModel, regressed
 from modeling.models.loading import Layered
-from rig.interface import RigReading, TextureRig
+from rig.interface import SURFACES, RigReading, TextureRig
 from rig.twin import SimulatedRig
 
 STEP_S = 0.01
@@ -133,3 +133,61 @@ def test_without_truth_real_surfaces_are_still() -> None:
     rig.present_model(model())
     rig.present_real("felt")
     assert feel(rig, 3).size == 0
+
+
+def test_its_history_has_500_rows_a_second_and_says_what_was_presented() -> None:
+    rig = SimulatedRig({"felt": model()})
+    rig.open()
+    rig.read()
+    rig.present_real("felt")
+    rig.read()
+    rig.present_model(model())
+    rig.read()
+    rows = rig.take_history()
+    assert rows.time_s == pytest.approx(0.002 * np.arange(1, 16))
+    speed, force = hand(rows.time_s)
+    assert rows.speed_mm_s == pytest.approx(speed)  # with its sign
+    assert rows.force_n == pytest.approx(force)
+    assert [SURFACES[k] for k in rows.surface] == ["none"] * 5 + ["real"] * 5 + ["virtual"] * 5
+    assert rows.presentation.tolist() == [0] * 5 + [1] * 5 + [2] * 5
+    assert not rows.force_assumed.any()
+    assert len(rig.take_history()) == 0
+
+
+def test_presentations_are_told_once_they_end_with_times_dose_and_counters() -> None:
+    rig = SimulatedRig(seed=4)
+    rig.open()
+    feel(rig, 2)
+    shown = model()
+    start_s = rig.present_model(shown)
+    felt = feel(rig, 50)
+    assert rig.take_presentations() == ()
+    rig.present_real("felt")
+    rig.read()
+    rig.silence()
+    virtual, real = rig.take_presentations()
+    assert (virtual.number, virtual.surface, virtual.texture) == (1, "virtual", "planted")
+    assert (virtual.start_s, virtual.end_s) == (start_s, pytest.approx(0.52))
+    assert virtual.model_sha256 == shown.sha256
+    assert (virtual.speeds_mm_s, virtual.forces_n) == ((50.0, 350.0), (0.5, 3.5))
+    assert virtual.dose_g2_s == pytest.approx(np.sum(felt**2) / 5000)
+    assert virtual.rms_g == pytest.approx(np.sqrt(np.mean(felt**2)))
+    assert virtual.peak_g == pytest.approx(np.abs(felt).max())
+    speed, _ = hand(0.02 + np.arange(1, 2501) / 5000)
+    slow = np.count_nonzero(np.abs(speed) < 50)
+    assert virtual.counters.below_grid == pytest.approx(slow, abs=20)
+    assert (real.number, real.surface, real.texture) == (2, "real", "felt")
+    assert (real.dose_g2_s, real.rms_g, real.model_sha256) == (0.0, 0.0, "")
+    assert rig.take_presentations() == ()
+
+
+def test_a_fault_is_told_once_and_opening_forgets_what_was_before() -> None:
+    rig = SimulatedRig()
+    rig.present_model(model())
+    rig.read()
+    rig.break_down("expected a vibrator, got none; plug it in.")
+    (fault,) = rig.take_faults()
+    assert (fault.time_s, fault.invalidates) == (rig.now_s(), True)
+    assert rig.take_faults() == ()
+    rig.open()
+    assert (len(rig.take_history()), rig.take_presentations()) == (0, ())

@@ -31,12 +31,14 @@ class NotedText(visual.TextStim):
 
 class TellingRig(SimulatedRig):
     def present_model(self, model):
-        super().present_model(model)
+        left_s = super().present_model(model)
         tell(presented=["virtual", model.texture])
+        return left_s
 
     def present_real(self, texture):
         self.silence()
         tell(presented=["real", texture])
+        return self.now_s()
 
     def read(self):
         if select.select([sys.stdin], [], [], 0)[0] and sys.stdin.readline():

@@ -73,8 +73,10 @@ def test_after_sigkill_every_answered_trial_is_on_disk(tmp_path: Path, rows: Row
     assert [row["magnitude_similarity"] for row in answers] == ["10", "20", "30"]
     assert [row["texture"] for row in answers] == [t["texture"] for t in order["trials"][:3]]
     log = rows(source / "sub-01_ses-01_task-absolute_log.tsv")
-    assert log[-1]["event"] == "mount confirmed"
+    assert log[-1]["event"] == "surfaces presented"
     assert "trial 4" in log[-1]["detail"]
+    shown = rows(source / "sub-01_ses-01_task-absolute_presentations.tsv")
+    assert {row["trial"] for row in shown} == {"1", "2", "3"}
 
 
 def test_a_session_is_made_once_whoever_asks_at_the_same_time(tmp_path: Path, study: Study) -> None:

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from scipy.io import wavfile
 
 from experiments.sessions.store import SessionStore, StoreError
 from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
@@ -15,6 +19,8 @@ from experiments.study.study import Study
 from experiments.tasks.absolute import run_absolute
 from experiments.tasks.relative import run_relative
 from modeling import InputError
+from rig.interface import Acceleration, Fault
+from rig.twin import SimulatedRig
 
 
 def session(study: Study, folder: Path, task: str = "absolute", **parts: Any) -> Any:
@@ -226,3 +232,185 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
 def test_impossible_ratings_are_refused(value: float) -> None:
     with pytest.raises(InputError, match="from 0 to 100"):
         Rating(magnitude_similarity=value, frequency_similarity=50.0, response_time_s=1.0)
+
+
+def test_the_rig_is_open_during_the_session_only_and_one_that_refuses_leaves_nothing(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any
+) -> None:
+    class Watchful(misbehaving):
+        def confirm_mount(self, tray: str) -> None:
+            assert rig.opened
+
+    session(study, tmp_path / "data", models=models, rig=rig, respondent=Watchful())
+    assert not rig.opened
+
+    def refuse() -> None:
+        raise InputError("expected a card, got none; plug it in.")
+
+    rig.open = refuse
+    with pytest.raises(InputError, match="expected a card"):
+        session(study, tmp_path / "none", models=models, rig=rig, respondent=Watchful())
+    assert not (tmp_path / "none").exists()
+
+
+def failing(misbehaving: Any, rig: Any, *, at: set[int], invalidates: bool = True) -> Any:
+    """A respondent in some of whose answers (from 1) the rig fails."""
+
+    class Unlucky(misbehaving):
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            if self.answered + 1 in at:
+                told = "expected a sound process that plays, got none; it was started again."
+                rig.faults.append(Fault(1.5, told, invalidates))
+            rating: Rating = super().rate(trial, surfaces)
+            return rating
+
+    return Unlucky()
+
+
+def test_trials_in_which_the_rig_failed_are_stored_and_repeated_once_at_the_end_of_their_phase(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+) -> None:
+    # The training trial, the second main trial, and the repeat of the latter.
+    unlucky = failing(misbehaving, rig, at={1, 4, 9})
+    result = session(study, tmp_path, models=models, rig=rig, respondent=unlucky)
+    assert (result.planned, result.answered, result.invalid) == (9, 9, 3)
+    assert result.completed
+    stored = rows(result.path)
+    places = [(row["trial"], row["phase"], row["valid"], row["repeats"]) for row in stored]
+    assert places == [
+        ("1", "training", "0", "n/a"),
+        ("8", "training", "1", "1"),
+        ("2", "main", "1", "n/a"),
+        ("3", "main", "0", "n/a"),
+        *((str(number), "main", "1", "n/a") for number in (4, 5, 6, 7)),
+        ("9", "main", "0", "3"),
+    ]
+    for again, before in ((stored[1], stored[0]), (stored[8], stored[3])):
+        same = ("texture", "model", "tray", "first_surface")
+        assert [again[name] for name in same] == [before[name] for name in same]
+    assert unlucky.heard.count("Please call the experimenter") == 3
+    told = [detail for event, detail in log_of(tmp_path, rows) if event == "fault"]
+    assert [detail.split(":")[0] for detail in told] == [
+        "trial 1, 1.5000 s after opening",
+        "trial 3, 1.5000 s after opening",
+        "trial 9, 1.5000 s after opening",
+    ]
+
+
+def test_a_fault_that_changed_nothing_for_the_hand_and_one_between_trials_are_only_logged(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+) -> None:
+    class Unlucky(misbehaving):
+        def confirm_mount(self, tray: str) -> None:
+            rig.faults.append(Fault(0.5, "expected a process, got none.", invalidates=True))
+
+    harmless = failing(misbehaving, rig, at={2}, invalidates=False)
+    for number, respondent in enumerate((harmless, Unlucky())):
+        folder = tmp_path / str(number)
+        result = session(study, folder, models=models, rig=rig, respondent=respondent)
+        assert {row["valid"] for row in rows(result.path)} == {"1"}
+        assert "fault" in [event for event, _ in log_of(folder, rows)]
+
+
+class Stroking(SimulatedRig):
+    """Its participant feels each presentation for half a second."""
+
+    def present_model(self, model: Any) -> float:
+        return self._felt_for(super().present_model(model))
+
+    def present_real(self, texture: str) -> float:
+        return self._felt_for(super().present_real(texture))
+
+    def _felt_for(self, began_s: float) -> float:
+        for _ in range(50):
+            self.read()
+        return began_s
+
+
+def test_the_hands_history_and_the_presentations_of_each_trial_are_kept(
+    tmp_path: Path, study: Study, models: ModelSets, respondent: Any, rows: Any
+) -> None:
+    result = session(study, tmp_path, models=models, rig=Stroking(), respondent=respondent)
+    stem = str(result.path.name).removesuffix("_beh.tsv")
+    source = tmp_path / "sourcedata/sub-01/ses-01"
+    hand = rows(source / f"{stem}_hand.tsv")
+    shown = rows(source / f"{stem}_presentations.tsv")
+    for name, table in (("hand", hand), ("presentations", shown)):
+        described = json.loads((source / f"{stem}_{name}.json").read_text())
+        assert list(described) == list(table[0])
+        assert all(column["Description"] for column in described.values())
+    answers = rows(result.path)
+    assert [row["trial"] for row in shown] == [row["trial"] for row in answers for _ in range(3)]
+    for answer in answers:
+        trial = [row for row in hand if row["trial"] == answer["trial"]]
+        times = [float(row["time_s"]) for row in trial]
+        assert len(trial) >= 3 * 250
+        assert all(0 < b - a < 0.005 for a, b in pairwise(times))
+        assert {row["surface"] for row in trial} >= {"real", "virtual"}
+        assert {row["force_assumed"] for row in trial} == {"0"}
+    speeds = {float(row["speed_mm_s"]) for row in hand}
+    assert min(speeds) < -200
+    assert max(speeds) > 200
+    for row in shown:
+        assert float(row["end_s"]) > float(row["start_s"])
+        if row["surface"] == "virtual":
+            assert float(row["dose_g2_s"]) > 0
+            assert 0 < float(row["outside_share"]) < 0.5
+            assert len(row["model_sha256"]) == 64
+        else:
+            assert (row["dose_g2_s"], row["outside_share"]) == ("0", "n/a")
+
+
+def test_what_was_measured_at_the_pen_is_kept_in_g(
+    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
+) -> None:
+    samples = np.linspace(-3.0, 3.0, 480)
+    pieces = [(), ()]  # before and after each trial; something was measured in the second one only
+    measured = Acceleration(start_s=12.25, rate_hz=48000.0, samples_g=samples)
+    told = iter([*pieces, (), (measured, measured)])
+    rig.take_acceleration = lambda: next(told, ())
+    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
+    found = sorted(tmp_path.rglob("*.wav"))
+    stem = "sub-01_ses-01_task-absolute_trial-002_pen"
+    assert [path.name for path in found] == [f"{stem}-1.wav", f"{stem}-2.wav"]
+    rate_hz, kept = wavfile.read(found[0])
+    assert rate_hz == 48000
+    assert kept == pytest.approx(samples, abs=1e-6)
+    logged = [detail for event, detail in log_of(tmp_path, rows) if event == "pen recorded"]
+    assert logged[0] == f"{stem}-1.wav, first sample 12.250000 s after opening"
+
+
+def test_who_strokes_outside_the_models_grid_is_told_after_the_trial(
+    tmp_path: Path, study: Study, models: ModelSets, respondent: Any, rows: Any
+) -> None:
+    slow = {
+        name: {texture: at_speeds(model, 1e-4) for texture, model in kinds.items()}
+        for name, kinds in (("full", models.full), ("simplified", models.simplified))
+    }
+    session(study, tmp_path, models=ModelSets(**slow), rig=Stroking(), respondent=respondent)
+    assert respondent.heard.count("Your strokes") == 7
+    told = [d for event, d in log_of(tmp_path, rows) if event == "hand outside the grid"]
+    assert len(told) == 7
+    assert "mostly too fast; please stroke more slowly" in told[0]
+
+
+def at_speeds(model: Any, factor: float) -> Any:
+    """The model as if it had been recorded at other speeds."""
+    return replace(model, speeds_mm_s=model.speeds_mm_s * factor)
+
+
+def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
+    models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host = [100.0]
+    monkeypatch.setattr("experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
+    rig.now_s = lambda: 7.0
+    rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
+    surfaces = Surfaces(rig, texture="PVC", models=[models.full["PVC"]])
+    assert surfaces.response_time_s == 0.0
+    surfaces.present_real()
+    assert surfaces.first_sample_s == 6.75
+    host[0] += 2.0
+    assert surfaces.response_time_s == pytest.approx(2.25)
+    surfaces.present_virtual()  # a later presentation changes nothing
+    assert surfaces.response_time_s == pytest.approx(2.25)

@@ -28,6 +28,20 @@ def test_a_changed_file_is_followed(tmp_path: Path) -> None:
     assert study.plan("relative").participants == 6
 
 
+def test_what_a_study_wants_of_a_rig_changes_its_hash_only_where_it_is_stated(
+    tmp_path: Path,
+) -> None:
+    shipped = Study.load()
+    assert not {"calibration_days", "measured_force"} & set(shipped.to_dict())
+    wanted = "seed = 1\ncalibration_days = 30\nmeasured_force = true"
+    strict = Study.load(edited(tmp_path, "seed = 1", wanted))
+    assert (strict.calibration_days, strict.measured_force) == (30.0, True)
+    assert strict.sha256 != shipped.sha256
+    assert Study.from_dict(strict.to_dict()) == strict
+    usual = "seed = 1\ncalibration_days = 90\nmeasured_force = false"
+    assert Study.load(edited(tmp_path, "seed = 1", usual)).sha256 == shipped.sha256
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -50,6 +64,8 @@ def test_a_changed_file_is_followed(tmp_path: Path) -> None:
         ("textures = [", 'textures = "PVC" #', "a list of textures"),
         ("[relative]", "[[relative]]", r"expected a table \[relative\]"),
         ("seed = 1", "seed = ", "expected TOML"),
+        ("seed = 1", "seed = 1\ncalibration_days = 0", "for calibration_days, got 0"),
+        ("seed = 1", "seed = 1\nmeasured_force = 1", "true or false for measured_force, got 1"),
     ],
 )
 def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:

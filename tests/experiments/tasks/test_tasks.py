@@ -43,6 +43,8 @@ def test_an_absolute_session_is_stored_as_it_went(
         "frequency_similarity",
         "toggles",
         "response_time_s",
+        "valid",
+        "repeats",
         "simulated",
     ]
     for row, trial in zip(stored, trials, strict=True):
@@ -100,6 +102,8 @@ def test_a_relative_session_is_stored_as_it_went(
         "correct",
         "presses",
         "response_time_s",
+        "valid",
+        "repeats",
         "simulated",
     ]
     for row, trial in zip(stored, trials, strict=True):

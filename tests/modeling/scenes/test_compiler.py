@@ -271,6 +271,19 @@ SHARE = st.floats(0, 1)
 SPEED_GRIDS = st.sampled_from([(60.0, 150.0, 300.0), (100.0, 300.0)])
 
 
+def test_a_range_that_is_next_to_nothing_costs_no_more_than_a_wide_one(
+    varied_model: ModelMaker, make_scene: SceneMaker, compile_one: Compile
+) -> None:
+    """Its ends are one number in single precision."""
+    full = varied_model(0, blending="linear", speeds_mm_s=(60.0, 150.0, 300.0), forces_n=(1.0, 1.5))
+    full = replace(full, level_sd_db=np.zeros(full.gains.shape))
+    bound = {"gfc30": 0.99, "bands_db": 1.0, "level_db": 1.0}
+    wide = key_of(compile_one(full, make_scene((60.0, 300.0), (1.0, 1.5), **bound)))
+    for low in (1.0, 1.25):
+        narrow = make_scene((60.0, 300.0), (low, low + 3e-8), **bound)
+        assert key_of(compile_one(full, narrow))[:2] <= wide[:2]
+
+
 @settings(max_examples=12)
 @given(data=st.data())
 def test_a_narrower_scene_or_a_looser_bound_never_gets_a_dearer_model(

@@ -1,0 +1,148 @@
+"""A rig for visitors, of the parts that a desk rig is made of: hand, sound, shared memory."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+
+import numpy as np
+
+from experiments.feel.rigs import NO_HAND, HandNow, OutputNow
+from modeling import InputError
+from modeling.models.loading import Layered
+from modeling.rendering.plan import RenderCounters
+from rig.hand.reader import HandReader
+from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, Live, now_s
+from rig.sound.output import SoundLost, SoundOutput
+
+STALE_S = 0.1  # an older hand counts as lifted off, as in the audio callback
+LEVEL_S = 0.25
+MASKING_LEVEL = 0.1  # RMS, share of full scale
+_LIMITS = {"peak": "limited_peak", "RMS": "limited_rms", "duration": "limited_duration"}
+
+
+class LiveRig:
+    """Hand and sound of a rig, both open, as `experiments.feel.rigs.FeltRig` wants them.
+
+    Parameters
+    ----------
+    live : Live
+    hand : HandReader
+    sound : SoundOutput, optional
+        Without it nothing is played.
+    pointed : bool
+        Whether the window's pointer is the hand (kind "window").
+    notes : iterable of str
+        What of the rig is simulated, assumed or missing.
+    masking_level : float
+        RMS of the noise, share of full scale.
+    """
+
+    def __init__(
+        self,
+        live: Live,
+        hand: HandReader,
+        sound: SoundOutput | None,
+        *,
+        pointed: bool,
+        notes: Iterable[str],
+        masking_level: float = MASKING_LEVEL,
+    ) -> None:
+        self._live, self._hand, self._sound = live, hand, sound
+        self._pointed, self._masking_level = pointed, masking_level
+        self._notes = tuple(notes)
+        self._faults: list[str] = []
+        self._seen = live.blocks_written
+        self._played: deque[tuple[float, float, int, float]] = deque()
+        self._counters = RenderCounters()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of it is simulated, assumed or missing."""
+        return self._notes
+
+    def present_model(self, model: Layered) -> None:
+        """Render this model under the hand; a fault is told by `take_faults`."""
+        self._counters = RenderCounters()
+        if self._sound is None:
+            return
+        try:
+            self._sound.play(model)
+        except (SoundLost, InputError) as fault:
+            self._faults.append(str(fault))
+
+    def silence(self) -> None:
+        """Render nothing."""
+        if self._sound is not None:
+            self._sound.silence()
+
+    def mask(self, on: bool) -> None:
+        """Masking noise on or off; a fault is told by `take_faults`."""
+        if self._sound is None:
+            return
+        try:
+            self._sound.masking(self._masking_level if on else 0.0)
+        except (SoundLost, InputError) as fault:
+            self._faults.append(str(fault))
+
+    def point(self, x: float, y: float, *, inside: bool) -> None:
+        """Move the hand by the window's pointer, where that is the hand."""
+        if self._pointed:
+            self._hand.push(x, y, down=inside)
+
+    def hand(self) -> HandNow:
+        """The latest reading."""
+        reading = self._live.latest()
+        if reading is None or reading["flags"] & GONE or now_s() - reading["time_s"] > STALE_S:
+            return NO_HAND
+        touches = bool(reading["flags"] & CONTACT)
+        return HandNow(
+            speed_mm_s=float(reading["speed_mm_s"]),
+            force_n=float(reading["force_n"]) if touches else 0.0,
+            force_assumed=bool(reading["flags"] & FORCE_ASSUMED),
+        )
+
+    def output(self) -> OutputNow | None:
+        """Level of the last quarter of a second, limits, misses and latency."""
+        if self._sound is None:
+            return None
+        self._seen, rows = self._live.blocks_since(self._seen)
+        self._played.extend(
+            zip(
+                rows["time_s"].tolist(),
+                rows["square_sum_g2"].tolist(),
+                rows["frames"].tolist(),
+                rows["peak_g"].tolist(),
+                strict=True,
+            )
+        )
+        oldest_s = now_s() - LEVEL_S
+        while self._played and self._played[0][0] < oldest_s:
+            self._played.popleft()
+        _, squares, frames, peaks = zip(*self._played, strict=True) if self._played else [()] * 4
+        return OutputNow(
+            rms_g=float(np.sqrt(sum(squares) / max(sum(frames), 1))),
+            peak_g=max(peaks, default=0.0),
+            limits=self._touched(),
+            misses=self._sound.misses,
+            latency_s=self._sound.latency_s,
+        )
+
+    def _touched(self) -> tuple[str, ...]:
+        """Limits that more samples touched than when this was last asked."""
+        assert self._sound is not None
+        counted = self._sound.counted()
+        if counted is None:
+            return ()
+        before, self._counters = self._counters, counted.counters
+        return tuple(
+            name
+            for name, field in _LIMITS.items()
+            if getattr(self._counters, field) > getattr(before, field)
+        )
+
+    def take_faults(self) -> tuple[str, ...]:
+        """What went wrong since the last call."""
+        told, self._faults = tuple(self._faults), []
+        sound = () if self._sound is None else self._sound.faults()
+        return (*told, *sound, *self._hand.faults())

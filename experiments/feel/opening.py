@@ -1,0 +1,130 @@
+"""Opens what a visitor feels with: the rig of a rig file, or what any computer has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from math import inf
+from pathlib import Path
+
+from experiments.feel.live_rig import MASKING_LEVEL, LiveRig
+from experiments.feel.view import short
+from modeling import Compensation, InputError, Limits, Vibrator, compensation_for
+from rig.desk.checks import HIGHEST_LATENCY_MS
+from rig.desk.lock import rig_locked
+from rig.desk.parts import hand_settings, sound_output
+from rig.hand.reader import HandReader
+from rig.hand.settings import HandSettings
+from rig.live.memory import Live
+from rig.setup.rig_file import RigFile
+from rig.sound.devices import SoundDevice, find_device
+from rig.sound.output import SoundLost, SoundOutput
+
+BLOCK = 256
+PIXELS_PER_MM = 3.78  # of a screen with 96 dots per inch
+FORCE_N = 1.5
+# A window draws some twenty pictures a second at least, and knows of its pointer as often.
+POINTER_DELAY_S = 0.05
+FULLSCALE_PER_G = 1 / 3
+PEAK_G = 3.0
+NO_SOUND = "no sound device: nothing is played"
+
+
+@contextmanager
+def desk(path: Path) -> Iterator[LiveRig]:
+    """The rig of a rig file, which nobody else uses meanwhile.
+
+    Raises
+    ------
+    InputError
+        For a rig file that is none, a part that is not there, or a rig in use.
+    """
+    rig = RigFile.load(path)
+    with ExitStack() as opened:
+        opened.enter_context(rig_locked(rig.rig.name))
+        live = opened.enter_context(Live.create())
+        hand = opened.enter_context(HandReader(live, hand_settings(rig)))
+        try:
+            sound = opened.enter_context(sound_output(rig, live))
+        except SoundLost as lost:
+            raise InputError(str(lost)) from None
+        yield LiveRig(
+            live,
+            hand,
+            sound,
+            pointed=rig.hand.kind == "window",
+            masking_level=rig.sound.masking_level or MASKING_LEVEL,
+            notes=notes_on(rig),
+        )
+
+
+def notes_on(rig: RigFile) -> tuple[str, ...]:
+    """What a visitor should know of a rig: what is simulated, assumed, or too late."""
+    scale = (rig.sound.fullscale_v, rig.vibrator.g_per_volt)
+    late = rig.latency is not None and rig.latency.p95_ms.value > HIGHEST_LATENCY_MS
+    told = {
+        "simulated hand": rig.hand.kind == "scripted",
+        "simulated sound card": rig.sound.simulated,
+        "force assumed": not rig.hand.measures_force,
+        "level not calibrated": any(figure.assumed for figure in scale),
+        f"later than {HIGHEST_LATENCY_MS:g} ms, which changes textures": late,
+    }
+    return tuple(note for note, holds in told.items() if holds)
+
+
+@contextmanager
+def demonstration(vibrator: Vibrator | None = None) -> Iterator[LiveRig]:
+    """The window's pointer as the hand, and the system's usual sound device where there is one.
+
+    Parameters
+    ----------
+    vibrator : Vibrator, optional
+        Compensate its resonance.
+    """
+    settings = HandSettings(
+        kind="window",
+        counts_per_mm=PIXELS_PER_MM,
+        filter_delay_s=POINTER_DELAY_S,
+        assumed_force_n=FORCE_N,
+    )
+    pointer = f"hand: mouse pointer ({PIXELS_PER_MM:g} px/mm, {FORCE_N:g} N assumed)"
+    with ExitStack() as opened:
+        live = opened.enter_context(Live.create())
+        sound, told = _usual_sound(live, vibrator, opened)
+        hand = opened.enter_context(HandReader(live, settings))
+        yield LiveRig(live, hand, sound, pointed=True, notes=(pointer, told))
+
+
+def _usual_sound(
+    live: Live, vibrator: Vibrator | None, opened: ExitStack
+) -> tuple[SoundOutput | None, str]:
+    """The open sound output, None where none can be opened, and what a visitor is told of it."""
+    try:
+        device = find_device(None, "output")
+    except InputError:
+        return None, NO_SOUND
+    sound = _sound_on(device, live, vibrator)
+    try:
+        opened.enter_context(sound)
+    except (InputError, SoundLost):
+        return None, NO_SOUND
+    return sound, f"sound: {short(device.name, 24)}, not calibrated"
+
+
+def _sound_on(device: SoundDevice, live: Live, vibrator: Vibrator | None) -> SoundOutput:
+    two = device.outputs > 1
+    return SoundOutput(
+        live,
+        device=device.name,
+        rate_hz=device.rate_hz,
+        block=BLOCK,
+        channels=2 if two else 1,
+        masking_channel=1 if two else None,
+        fullscale_per_g=FULLSCALE_PER_G,
+        limits=Limits(peak=PEAK_G, rms=1.0, duration_s=inf),
+        compensation=_compensation(vibrator, device.rate_hz),
+    )
+
+
+def _compensation(vibrator: Vibrator | None, rate_hz: float) -> Compensation | None:
+    return None if vibrator is None else compensation_for(vibrator, rate_hz=rate_hz)

@@ -1,0 +1,135 @@
+"""What a session keeps beside its answers: the hand's history, and what was presented."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from experiments.sessions.strokes import Outside, outside_grid
+from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
+
+_CLOCK = "seconds since the rig was opened"
+HAND_COLUMNS: dict[str, dict[str, Any]] = {
+    "trial": {"Description": "Number of the trial"},
+    "presentation": {"Description": "Number of the presentation; 0 where nothing was presented"},
+    "time_s": {"Description": f"Time of the reading, {_CLOCK}", "Units": "s"},
+    "speed_mm_s": {
+        "Description": "Tangential speed, its sign the direction; n/a where nothing measures it",
+        "Units": "mm/s",
+    },
+    "force_n": {"Description": "Normal force; n/a where nothing measures it", "Units": "N"},
+    "surface": {
+        "Description": "What was presented",
+        "Levels": {
+            "none": "nothing",
+            "real": "the mounted real surface",
+            "virtual": "a virtual surface",
+        },
+    },
+    "force_assumed": {
+        "Description": "Whether the force was not measured but assumed",
+        "Levels": {"1": "assumed", "0": "measured, or n/a"},
+    },
+}
+_OUTSIDE = {
+    "outside_share": "outside the model's grid of speeds and forces",
+    "too_slow_share": "slower than its slowest condition",
+    "too_fast_share": "faster than its fastest condition",
+    "too_light_share": "lighter than its lightest condition (n/a where the force is assumed)",
+    "too_hard_share": "harder than its hardest condition (n/a where the force is assumed)",
+}
+_COUNTERS = {
+    "lift_offs": "Samples with a speed or force that is no number",
+    "above_grid": "Samples while the hand was faster or harder than the highest condition",
+    "below_grid": "Samples while the hand was slower or lighter than the lowest condition",
+    "clamped": "Parameters that were moved into the legal range",
+    "limited_peak": "Samples that the limit of the peak touched",
+    "limited_rms": "Samples that the limit of the RMS touched",
+    "limited_duration": "Samples that the limit of the duration muted",
+}
+PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
+    "trial": {"Description": "Number of the trial"},
+    "presentation": {"Description": "Number of the presentation, since the rig was opened"},
+    "surface": {"Description": "real or virtual"},
+    "texture": {"Description": "Of the real surface, or of the model"},
+    "model_sha256": {"Description": "Of the model; n/a of a real surface"},
+    "start_s": {"Description": f"When its first sample left, {_CLOCK}", "Units": "s"},
+    "end_s": {"Description": f"When its last sample left, {_CLOCK}", "Units": "s"},
+    **{
+        name: {"Description": f"Share of the time with a moving hand on the surface, {what}"}
+        for name, what in _OUTSIDE.items()
+    },
+    **{name: {"Description": what} for name, what in _COUNTERS.items()},
+    "played_s": {"Description": "Duration of the vibration that was played", "Units": "s"},
+    "dose_g2_s": {"Description": "Its square over time, unweighted", "Units": "g²·s"},
+    "rms_g": {"Description": "Its RMS", "Units": "g"},
+    "peak_g": {"Description": "Its largest absolute value", "Units": "g"},
+    "misses": {"Description": "Blocks that the sound card had to do without"},
+    "stale_blocks": {"Description": "Blocks for which the hand was not read in time"},
+    "faults": {"Description": "What went wrong until the next presentation, separated by |"},
+}
+
+
+def hand_table(trial: int, rows: HandRows) -> Iterator[Mapping[str, object]]:
+    """The rows of a trial's history as the table holds them."""
+    columns = zip(
+        rows.presentation.tolist(),
+        rows.time_s.tolist(),
+        rows.speed_mm_s.tolist(),
+        rows.force_n.tolist(),
+        rows.surface.tolist(),
+        rows.force_assumed.tolist(),
+        strict=True,
+    )
+    for presentation, time_s, speed_mm_s, force_n, surface, assumed in columns:
+        yield {
+            "trial": trial,
+            "presentation": presentation,
+            "time_s": round(time_s, 6),
+            "speed_mm_s": round(speed_mm_s, 4),
+            "force_n": round(force_n, 5),
+            "surface": SURFACES[surface],
+            "force_assumed": int(assumed),
+        }
+
+
+def presentation_table(
+    trial: int, records: Sequence[PresentationRecord], *, rows: HandRows, faults: Sequence[Fault]
+) -> Iterator[Mapping[str, object]]:
+    """The presentations of a trial as the table holds them."""
+    next_s = [*(record.start_s for record in records[1:]), inf]
+    for record, until_s in zip(records, next_s, strict=False):
+        outside = outside_grid(rows, [record]) or Outside()
+        # A fault may be noticed when a presentation has ended.
+        told = [fault.told for fault in faults if record.start_s <= fault.time_s < until_s]
+        yield {
+            "trial": trial,
+            "presentation": record.number,
+            "surface": record.surface,
+            "texture": record.texture,
+            "model_sha256": record.model_sha256,
+            "start_s": round(record.start_s, 6),
+            "end_s": round(record.end_s, 6),
+            **{f"{name}_share": share for name, share in vars(outside).items()},
+            **vars(record.counters),
+            "played_s": record.played_s,
+            "dose_g2_s": record.dose_g2_s,
+            "rms_g": record.rms_g,
+            "peak_g": record.peak_g,
+            "misses": record.misses,
+            "stale_blocks": record.stale_blocks,
+            "faults": " | ".join(told),
+        }
+
+
+def pen_file(piece: Acceleration) -> bytes:
+    """A WAV file of 32-bit floats in g."""
+    from scipy.io import wavfile  # late: takes longer to load than all of modeling
+
+    buffer = io.BytesIO()
+    wavfile.write(buffer, round(piece.rate_hz), piece.samples_g.astype(np.float32))
+    return buffer.getvalue()

@@ -1,0 +1,77 @@
+"""Parts of a rig that only its calibration needs, as the rig file describes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+
+from modeling.errors import InputError
+from rig.capture.input import AudioInput, InputSettings
+from rig.desk.lock import rig_locked
+from rig.desk.parts import hand_settings, sound_output
+from rig.hand.reader import HandReader
+from rig.live.memory import Live
+from rig.setup.rig_file import RigFile
+from rig.sound.output import SoundLost, SoundOutput
+
+# With these points a pen's "force" is its pressure, as a share of its range.
+PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))
+
+
+@contextmanager
+def opened_sound(rig: RigFile, live: Live) -> Iterator[SoundOutput]:
+    """The open sound of a rig that nobody else uses meanwhile.
+
+    Raises
+    ------
+    InputError
+        For a rig in use, and where nothing can be played, now or later in the block.
+    """
+    try:
+        with rig_locked(rig.rig.name), sound_output(rig, live) as sound:
+            yield sound
+    except SoundLost as lost:
+        raise InputError(str(lost)) from None
+
+
+def accelerometer_input(rig: RigFile) -> AudioInput:
+    """The accelerometer, not yet open.
+
+    Raises
+    ------
+    InputError
+        Where the rig has none.
+    """
+    section = rig.accelerometer
+    if section is None:
+        raise InputError(
+            f"expected an [accelerometer] in {rig.path}, got none; nothing is calibrated without "
+            "one, so fix one to the pen and describe it there."
+        )
+    return AudioInput(
+        InputSettings(
+            g_per_fullscale=section.g_per_fullscale.value,
+            device=section.device,
+            channel=section.channel,
+            rate_hz=section.rate_hz,
+        )
+    )
+
+
+def pressure_reader(rig: RigFile, live: Live) -> HandReader:
+    """A hand whose force is the pen's pressure, as a share of its range.
+
+    Raises
+    ------
+    InputError
+        For a hand without pressure.
+    """
+    settings = hand_settings(rig)
+    if settings.kind not in ("tablet", "scripted"):
+        raise InputError(
+            f"expected a pen tablet, got a {settings.kind}, which measures no pressure; a serial "
+            "sensor says newtons itself."
+        )
+    raw = replace(settings, pressure_points=PRESSURE_ITSELF, assumed_force_n=None, contact_n=0.0)
+    return HandReader(live, raw)

@@ -1,0 +1,349 @@
+"""Pieces of strokes on the disk, and the recordings that they fill: nothing kept is lost.
+
+docs/method/strokes.md#files
+"""
+
+from __future__ import annotations
+
+import io
+import tempfile
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from modeling import Recording, RecordingSet
+from modeling.arrays import Floats
+from modeling.checks import check_duration, check_texture_name
+from modeling.errors import InputError, shown
+from modeling.files.folders import folder_behind
+from modeling.files.places import locked
+from modeling.files.provenance import PROVENANCE_NAME, provenance_text
+from modeling.files.tables import number, read_table, table_text, whole_number, write_table
+from modeling.files.wav import read_wav
+from modeling.files.writing import write_files
+from modeling.models.grid import Condition
+from modeling.recordings.appending import WavSource, append
+from modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed
+from rig.capture.coverage import Coverage
+from rig.capture.cutting import SHORTEST_S, Piece
+from rig.capture.grid import StrokeGrid
+from rig.capture.joining import joined, joined_samples
+
+PIECES = "pieces"
+TABLE_NAME = "pieces.tsv"
+COLUMNS = (
+    *("file", "texture", "speed_mm_s", "force_n", "repeat", "rate_hz", "samples"),
+    *("mean_speed_mm_s", "speed_sd_mm_s", "mean_force_n", "force_sd_n"),
+    *("simulated", "force_assumed"),
+)
+_NEEDED = ("file", "texture", "speed_mm_s", "force_n", "repeat", "rate_hz", "samples", "simulated")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a folder is to hold.
+
+    Parameters
+    ----------
+    texture : str
+    grid : StrokeGrid
+    rate_hz : float
+    wanted_s : float
+        Of each condition, at least twice the shortest piece (0.2 s).
+    repeat : int
+        1 for the first record of each condition.
+    simulated : bool
+        Whether the input is a simulation, whatever the hand is.
+    """
+
+    texture: str
+    grid: StrokeGrid
+    rate_hz: float
+    wanted_s: float = 1.0
+    repeat: int = 1
+    simulated: bool = False
+
+    def __post_init__(self) -> None:
+        check_texture_name(self.texture)
+        check_duration(self.wanted_s, self.rate_hz)
+        if self.wanted_s < 2 * SHORTEST_S:
+            raise InputError(
+                f"expected at least {2 * SHORTEST_S:g} s of each condition, got "
+                f"{self.wanted_s:g} s; record longer."
+            )
+
+    @property
+    def wanted_samples(self) -> int:
+        """Length of each recording."""
+        return round(self.wanted_s * self.rate_hz)
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A row of the table of pieces: of this texture, repeat and rate."""
+
+    file: str
+    condition: Condition
+    samples: int
+    simulated: bool
+
+
+class PieceStore:
+    """A folder of recordings that fills as one strokes; opened again, it goes on.
+
+    Each piece is a file of its own as soon as it is cut. Once the pieces of a condition suffice,
+    they are joined into its recording, so that the folder is a recording set at any time.
+
+    Parameters
+    ----------
+    folder : str or Path
+        A new one, one that was filled so before, or another recording set.
+    plan : Plan
+    provenance : mapping
+        Of this run; it goes beside the recordings.
+
+    Raises
+    ------
+    InputError
+        For a folder that holds something else, or pieces at another rate.
+    """
+
+    def __init__(
+        self, folder: str | Path, plan: Plan, *, provenance: Mapping[str, Any] | None = None
+    ) -> None:
+        self.folder = folder_behind(folder)
+        self.plan = plan
+        self._provenance = dict(provenance or {})
+        self._kept: list[_Kept] = []
+        self.counts = Counter(kept=0, clipped=0, silent=0, surplus=0)
+        _check_folder(self.folder)
+        self._read()
+        # A run that was killed may have ended between a last piece and its recording.
+        for condition in self._filled():
+            self._record(condition)
+
+    @property
+    def coverage(self) -> Coverage:
+        """Seconds of every cell; a recorded one is full."""
+        seconds = {
+            condition: joined_samples(sizes, self.plan.rate_hz) / self.plan.rate_hz
+            for condition, sizes in self._sizes().items()
+        }
+        full = dict.fromkeys(self._recorded, self.plan.wanted_s)
+        return Coverage(self.plan.grid, self.plan.wanted_s, seconds=seconds | full)
+
+    @property
+    def conditions_recorded(self) -> int:
+        """How many cells of the grid have their recording."""
+        return len(self._recorded & set(self.plan.grid.conditions))
+
+    @property
+    def simulated(self) -> bool:
+        """Whether any piece of this repeat is."""
+        return self.plan.simulated or any(one.simulated for one in self._kept)
+
+    def add(self, piece: Piece) -> bool:
+        """Keep a piece; its condition's recording is made once there is enough of it.
+
+        Returns
+        -------
+        bool
+            False where the condition is full already, or the piece clipped or silent: it is not
+            kept.
+        """
+        surplus = piece.condition in self._recorded
+        if piece.clipped or piece.silent or surplus:
+            why = "clipped" if piece.clipped else "silent" if piece.silent else "surplus"
+            self.counts[why] += 1
+            return False
+        self._begin_index()
+        with locked(self.folder / PIECES / TABLE_NAME) as table:
+            rows = _rows(table)
+            file = _new_name(rows)
+            rows.append(self._row(file, piece))
+            text = table_text(COLUMNS, [[row.get(name, "") for name in COLUMNS] for row in rows])
+            # The table last: a file that it does not list is written over.
+            write_files(
+                {
+                    table.with_name(file): _wav(piece.samples_g, self.plan.rate_hz),
+                    table: text.encode(),
+                }
+            )
+        self.counts["kept"] += 1
+        self._kept.append(
+            _Kept(
+                file,
+                piece.condition,
+                piece.samples_g.size,
+                simulated=piece.simulated or self.plan.simulated,
+            )
+        )
+        if piece.condition in self._filled():
+            self._record(piece.condition)
+        return True
+
+    def finish(self, about: Mapping[str, Any]) -> None:
+        """Write this run's counts, and more about it, beside the recordings that it made."""
+        note = self.folder / PROVENANCE_NAME
+        if self.counts["kept"] and note.is_file():
+            write_files({note: self._note(about)})
+
+    def _note(self, about: Mapping[str, Any] | None = None) -> bytes:
+        told = {**self._provenance, "pieces": dict(self.counts), **(about or {})}
+        return provenance_text(told).encode()
+
+    def _begin_index(self) -> None:
+        """Make the folder a recording set, as yet of none, so that recordings can be added."""
+        if not (self.folder / INDEX_NAME).is_file():
+            with locked(self.folder / INDEX_NAME) as index:
+                write_table(index, INDEX_COLUMNS, [])
+
+    def _read(self) -> None:
+        table = self.folder / PIECES / TABLE_NAME
+        for row in _rows(table):
+            if row["texture"] != self.plan.texture:
+                continue
+            rate_hz = number(row["rate_hz"], f"rate_hz of {row['file']}")
+            if rate_hz != self.plan.rate_hz:
+                raise InputError(
+                    f"expected pieces of {self.plan.rate_hz:g} Hz in {self.folder}, got some of "
+                    f"{rate_hz:g} Hz; go on at that rate (--rate {rate_hz:g}), or choose another "
+                    "folder."
+                )
+            if whole_number(row["repeat"], f"repeat of {row['file']}") == self.plan.repeat:
+                self._kept.append(_kept(row))
+        self._recorded = self._listed_conditions()
+
+    def _listed_conditions(self) -> set[Condition]:
+        """Conditions of which the set holds this repeat."""
+        if not (self.folder / INDEX_NAME).is_file():
+            return set()
+        return {
+            _condition(row)
+            for row in listed(self.folder)
+            if row["texture"] == self.plan.texture
+            and whole_number(row.get("repeat") or "1", f"repeat of {row['file']}")
+            == self.plan.repeat
+        }
+
+    def _sizes(self) -> dict[Condition, list[int]]:
+        sizes: dict[Condition, list[int]] = {}
+        for one in self._kept:
+            sizes.setdefault(one.condition, []).append(one.samples)
+        return sizes
+
+    def _filled(self) -> list[Condition]:
+        """Conditions with enough pieces, and no recording yet."""
+        return [
+            condition
+            for condition, sizes in self._sizes().items()
+            if condition not in self._recorded
+            and joined_samples(sizes, self.plan.rate_hz) >= self.plan.wanted_samples
+        ]
+
+    def _record(self, condition: Condition) -> None:
+        """Join the pieces of a condition, and add its recording to the set."""
+        chosen = [one for one in self._kept if one.condition == condition]
+        samples = self._joined(chosen)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "joined.wav"
+            path.write_bytes(_wav(samples, self.plan.rate_hz))
+            record = Recording(
+                read_wav(path)[0],
+                self.plan.rate_hz,
+                *condition,
+                self.plan.texture,
+                simulated=any(one.simulated for one in chosen),
+                repeat=self.plan.repeat,
+                clipped_share=0.0,  # clipped pieces are not kept
+            )
+            beside = {PROVENANCE_NAME: self._note()}
+            source = WavSource(path, 1, 1.0)
+            append(self.folder, RecordingSet([record]), [source], beside=beside)
+        self._recorded.add(condition)
+
+    def _joined(self, chosen: Sequence[_Kept]) -> Floats:
+        pieces = [read_wav(self.folder / PIECES / one.file)[0] for one in chosen]
+        for one, piece in zip(chosen, pieces, strict=True):
+            if piece.size != one.samples:
+                raise InputError(
+                    f"expected {one.samples} samples in {PIECES}/{one.file}, got {piece.size}; "
+                    f"the file was changed, remove its line from {PIECES}/{TABLE_NAME}."
+                )
+        return joined(pieces, self.plan.rate_hz)[: self.plan.wanted_samples]
+
+    def _row(self, name: str, piece: Piece) -> dict[str, str]:
+        values = (
+            *(name, self.plan.texture, *map(repr, piece.condition), self.plan.repeat),
+            *(repr(self.plan.rate_hz), piece.samples_g.size),
+            *(f"{piece.mean_speed_mm_s:.4g}", f"{piece.speed_sd_mm_s:.4g}"),
+            *(f"{piece.mean_force_n:.4g}", f"{piece.force_sd_n:.4g}"),
+            *(_word(piece.simulated or self.plan.simulated), _word(piece.force_assumed)),
+        )
+        return dict(zip(COLUMNS, map(str, values), strict=True))
+
+
+def _check_folder(folder: Path) -> None:
+    """Refuse a folder that is neither a recording set nor one that pieces are collected in."""
+    if not folder.exists():
+        return
+    ours = {INDEX_NAME, PIECES}
+    if not folder.is_dir() or (
+        not ours & {path.name for path in folder.iterdir()} and any(folder.iterdir())
+    ):
+        raise InputError(
+            f"expected a new folder, or one of recordings to go on with, got {folder}, which is "
+            "something else; choose another name."
+        )
+
+
+def _rows(table: Path) -> list[dict[str, str]]:
+    rows = read_table(table, _NEEDED) if table.is_file() else []
+    for row in rows:
+        _check_name(row["file"])
+    return rows
+
+
+def _new_name(rows: Sequence[Mapping[str, str]]) -> str:
+    last = max((int(Path(row["file"]).stem) for row in rows), default=0)
+    return f"{last + 1:05d}.wav"
+
+
+def _kept(row: Mapping[str, str]) -> _Kept:
+    return _Kept(
+        row["file"],
+        _condition(row),
+        whole_number(row["samples"], f"samples of {row['file']}"),
+        simulated=row["simulated"] != "false",
+    )
+
+
+def _check_name(name: str) -> None:
+    """Refuse a file that no piece can be in: names are numbers, and lead nowhere else."""
+    if not (name.endswith(".wav") and name.removesuffix(".wav").isdecimal()):
+        raise InputError(
+            f"expected a file such as 00001.wav in {PIECES}/{TABLE_NAME}, got {shown(name)}; "
+            "remove the line."
+        )
+
+
+def _condition(row: Mapping[str, str]) -> Condition:
+    speed, force = (number(row[n], f"{n} of {row['file']}") for n in ("speed_mm_s", "force_n"))
+    return speed, force
+
+
+def _word(value: bool) -> str:
+    return str(value).lower()
+
+
+def _wav(samples: Floats, rate_hz: float) -> bytes:
+    """A WAV file of single precision, as the card gives it."""
+    from scipy.io import wavfile
+
+    buffer = io.BytesIO()
+    wavfile.write(buffer, round(rate_hz), samples.astype(np.float32))
+    return buffer.getvalue()

@@ -1,0 +1,122 @@
+"""What has to hold of a rig before people use it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import date
+
+from modeling import InputError
+from modeling.errors import shown
+from modeling.models.loading import Layered
+from rig.setup.rig_file import RigFile
+
+HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Requirements:
+    """What a study wants of a rig.
+
+    Parameters
+    ----------
+    calibration_days : float
+        Greatest age of the calibration.
+    measured_force : bool
+        Whether the force must be measured.
+    """
+
+    calibration_days: float
+    measured_force: bool
+
+
+def check_rig(
+    rig: RigFile, requirements: Requirements | None, *, today: date, override: str | None = None
+) -> None:
+    """Refuse a rig that is too slow, or that is not what a study requires.
+
+    Parameters
+    ----------
+    rig : RigFile
+    requirements : Requirements, optional
+        Without them only the latency is checked.
+    today : date
+    override : str, optional
+        Reason to use it although its latency is too long.
+
+    Raises
+    ------
+    InputError
+        For a p95 of the latency above 40 ms without an override; for no calibration, one of another
+        rig, or an older one than allowed; for an assumed force where it must be measured; for a
+        window's pointer as the hand in a study.
+    """
+    _check_latency(rig, override)
+    if requirements is None:
+        return
+    _check_calibration(rig, requirements, today)
+    if rig.hand.kind == "window":
+        raise InputError(
+            f'expected a hand with a device of its own in a study, got kind = "window" under [hand]'
+            f" in {rig.path}, whose pointer the participant needs to answer; use a tablet, a mouse "
+            "or a serial sensor."
+        )
+    if requirements.measured_force and not rig.hand.measures_force:
+        raise InputError(
+            f"expected a rig that measures force, as the study requires, got a {rig.hand.kind} "
+            f"under [hand] in {rig.path}, of which it is assumed; use a device that measures it."
+        )
+
+
+def check_models(rig: RigFile, models: Iterable[Layered]) -> None:
+    """Refuse models that a rig cannot play at their level and rate.
+
+    Raises
+    ------
+    InputError
+        For one that is not in g, or of a higher rate than the card's.
+    """
+    for model in models:
+        if model.unit != "g":
+            raise InputError(
+                f"expected models in g for the rig in {rig.path}, got {model.texture} in unit "
+                f"{shown(model.unit)}; record it with a calibrated sensor."
+            )
+        if model.rate_hz > rig.sound.rate_hz:
+            raise InputError(
+                f"expected models of at most sound.rate_hz, {rig.sound.rate_hz:g} Hz in {rig.path},"
+                f" got {model.texture} of {model.rate_hz:g} Hz; choose a higher rate of the card."
+            )
+
+
+def _check_latency(rig: RigFile, override: str | None) -> None:
+    if rig.latency is None or override is not None:
+        return
+    p95 = rig.latency.p95_ms.value
+    if p95 > HIGHEST_LATENCY_MS:
+        raise InputError(
+            f"expected at most {HIGHEST_LATENCY_MS:g} ms from hand to vibration, got latency.p95_ms"
+            f" of {p95:g} ms in {rig.path}; make blocks smaller, or give --override with a reason, "
+            "which is stored."
+        )
+
+
+def _check_calibration(rig: RigFile, requirements: Requirements, today: date) -> None:
+    calibration, again = rig.calibration, "calibrate it (tactileq rig calibrate)"
+    if calibration is None:
+        raise InputError(f"expected a calibrated rig, got no [calibration] in {rig.path}; {again}.")
+    if calibration.rig != rig.rig.name or set(calibration.serials) != set(rig.rig.serials):
+        raise InputError(
+            f"expected a calibration of {_named(rig.rig.name, rig.rig.serials)} in {rig.path}, got "
+            f"that of {_named(calibration.rig, calibration.serials)}; {again}."
+        )
+    age = (today - calibration.date).days
+    if not 0 <= age <= requirements.calibration_days:
+        raise InputError(
+            f"expected a calibration of the last {requirements.calibration_days:g} days in "
+            f"{rig.path}, as the study requires, got one of {calibration.date}; {again}."
+        )
+
+
+def _named(name: str, serials: tuple[str, ...]) -> str:
+    return f"the rig {shown(name)}" + (f" ({', '.join(sorted(serials))})" if serials else "")

@@ -1,0 +1,45 @@
+"""Opens whatever measures the hand, as the settings say."""
+
+from __future__ import annotations
+
+import sys
+
+from modeling.errors import InputError
+from rig.hand.sample import ConnectedDevice, Device
+from rig.hand.scripted import ScriptedHand
+from rig.hand.settings import HandSettings
+
+
+def open_device(settings: HandSettings) -> Device:
+    """The device of these settings, open.
+
+    Raises
+    ------
+    InputError
+        Where it is not there, may not be read, or cannot be used.
+    """
+    if settings.kind == "scripted":
+        return ScriptedHand.open(settings)
+    if settings.kind == "serial":
+        from rig.hand.serial_sensor import SerialSensor  # pyserial, which others do not need
+
+        return SerialSensor.open(settings)
+    if settings.kind in ("tablet", "mouse") and sys.platform == "linux":
+        from rig.hand.evdev import EventDevice  # which needs calls that only Linux has
+
+        return EventDevice.open(settings)
+    raise InputError(
+        f"expected a hand that this system can read, got a {settings.kind} on {sys.platform}; take "
+        'kind = "window" or "serial".'
+    )
+
+
+def connected_devices() -> tuple[ConnectedDevice, ...]:
+    """What is connected that may measure a hand: input devices of Linux, and serial ports."""
+    from rig.hand.serial_sensor import serial_ports
+
+    if sys.platform != "linux":
+        return serial_ports()
+    from rig.hand.evdev import input_devices
+
+    return input_devices() + serial_ports()

@@ -1,0 +1,193 @@
+"""A sensor at a serial port that sends lines (docs/serial-sensor.md)."""
+
+from __future__ import annotations
+
+import os
+import select
+import time
+
+import serial
+from serial.tools import list_ports
+
+from modeling.errors import InputError, shown
+from rig.hand.sample import ConnectedDevice, DeviceLost, Sample
+from rig.hand.serial_line import LineReader, SensorClock, SensorLine
+from rig.hand.settings import HandSettings
+from rig.live.memory import now_s
+
+FIRST_LINE_S = 3.0  # many boards start anew when their port is opened
+LOST_S = 0.1
+_POLL_S = 0.001
+
+
+class SerialSensor:
+    """A serial port from which lines come.
+
+    Parameters
+    ----------
+    port : serial.Serial
+        Open, without waiting (timeout 0).
+    """
+
+    rest_s = LOST_S
+
+    def __init__(self, port: serial.Serial) -> None:
+        self.name = f"serial sensor at {port.port}"
+        self._port = port
+        self._lines = LineReader()
+        self._clock = SensorClock()
+        self._last_s = now_s()
+
+    @classmethod
+    def open(cls, settings: HandSettings) -> SerialSensor:
+        """The sensor of these settings, once it has sent a line.
+
+        Raises
+        ------
+        InputError
+            Without the port, permission, or a line; or where another program reads it.
+        """
+        sensor = cls(_opened(settings.device or _only_port(), settings.baud))
+        try:
+            sensor._wait_for_first(settings.baud)
+        except BaseException:
+            sensor.close()
+            raise
+        return sensor
+
+    def wait(self, seconds: float) -> None:
+        """Until bytes come."""
+        if os.name == "posix":
+            select.select([self._port.fileno()], [], [], seconds)
+        else:
+            time.sleep(min(seconds, _POLL_S))
+
+    def read(self) -> list[Sample]:
+        """The samples of all whole lines; DeviceLost where no good one came for 0.1 s.
+
+        Likewise where the sensor's clock has fallen so far behind.
+        """
+        lines = self._lines.feed(self._received())
+        arrived_s = now_s()
+        if lines:
+            self._last_s = arrived_s
+        elif arrived_s - self._last_s > LOST_S:
+            raise DeviceLost(
+                f"expected good lines from the {self.name}, got none for {LOST_S:g} s "
+                f"({self._lines.bad} were damaged so far); check its cable, its power and its baud "
+                "rate."
+            )
+        samples = [_sample(line, self._clock.time_s(line.time_us, arrived_s)) for line in lines]
+        if samples and arrived_s - samples[-1].time_s > LOST_S:
+            raise DeviceLost(
+                f"expected a clock within {SensorClock.DRIFT:.1%} from the {self.name}, got one "
+                "that falls behind; have TIME count microseconds of a crystal."
+            )
+        return samples
+
+    def counts(self) -> dict[str, int]:
+        """Lines that were read, were damaged, are missing."""
+        return {"lines": self._lines.good, "bad": self._lines.bad, "missing": self._lines.missing}
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._port.close()
+
+    def _received(self) -> bytes:
+        try:
+            return bytes(self._port.read(65536))
+        except (OSError, serial.SerialException):
+            raise DeviceLost(f"the {self.name} was unplugged.") from None
+
+    def _wait_for_first(self, baud: int) -> None:
+        end_s = now_s() + FIRST_LINE_S
+        while not self._lines.good:
+            if now_s() > end_s:
+                raise self._refused(baud)
+            self.wait(0.05)
+            try:
+                self._lines.feed(self._received())
+            except DeviceLost as lost:
+                raise InputError(
+                    f"expected a sensor that stays at its port, got an end: {lost}"
+                ) from None
+        self._last_s = now_s()
+
+    def _refused(self, baud: int) -> InputError:
+        if self._lines.bad:
+            return InputError(
+                f"expected lines with a matching CRC from the {self.name}, got "
+                f"{self._lines.bad} without; check that it sends {baud} baud and the lines of "
+                "docs/serial-sensor.md."
+            )
+        return InputError(
+            f"expected lines from the {self.name} within {FIRST_LINE_S:g} s, got none; check its "
+            f"program, its power and that it sends {baud} baud."
+        )
+
+
+def serial_ports() -> tuple[ConnectedDevice, ...]:
+    """All serial ports, whatever is connected to them."""
+    ports = sorted(list_ports.comports(), key=lambda port: str(port.device))
+    return tuple(
+        ConnectedDevice(
+            port.device, port.description or "unknown", "serial", os.access(port.device, os.R_OK)
+        )
+        for port in ports
+    )
+
+
+def _sample(line: SensorLine, time_s: float) -> Sample:
+    force_n = None if line.force_mn is None else line.force_mn / 1000
+    sample = Sample(time_s, force_n=force_n, contact=line.contact, button=line.button)
+    moved_mm = [value / 1000 for value in line.moved_um]
+    if len(moved_mm) == 1:
+        return sample._replace(speed_mm_s=moved_mm[0])
+    return sample._replace(x_mm=moved_mm[0], y_mm=moved_mm[1])
+
+
+def _only_port() -> str:
+    ports = serial_ports()
+    if len(ports) != 1:
+        raise InputError(
+            f"expected one serial port, or device under [hand], got {_listed(ports)}; plug the "
+            "sensor in or name its port."
+        )
+    return ports[0].path
+
+
+def _opened(path: str, baud: int) -> serial.Serial:
+    try:
+        port = serial.Serial(path, baud, timeout=0, write_timeout=1, exclusive=True)
+        port.reset_input_buffer()  # what waited there has no moment of arrival
+    except Exception as error:  # pyserial lets those of the system's layers through (termios.error)
+        raise _not_opened(path, baud, error) from None
+    return port
+
+
+def _not_opened(path: str, baud: int, error: Exception) -> InputError:
+    text = str(error)
+    if not os.path.exists(path):
+        return InputError(
+            f"expected a serial port at {shown(path)}, got nothing there; there are "
+            f"{_listed(serial_ports())}."
+        )
+    if "lock port" in text:
+        return InputError(
+            f"expected the serial port {path} for this program alone, got one that another program "
+            "reads; end that program."
+        )
+    if isinstance(error, OSError) and error.errno == 13:
+        return InputError(
+            f"expected permission to read {path}, got none; run `sudo usermod -aG dialout $USER` "
+            "and log in again."
+        )
+    if isinstance(error, ValueError | OverflowError) or "baud" in text:
+        return InputError(
+            f"expected a baud rate that {path} can do, got {baud}; take 115200 or 460800."
+        )
+    return InputError(f"expected a serial port at {path}, got a refusal ({text}); check the path.")
+
+
+def _listed(ports: tuple[ConnectedDevice, ...]) -> str:
+    return ", ".join(f"{port.path} ({port.name})" for port in ports) or "none"

@@ -1,0 +1,232 @@
+"""What a rig consists of, and what is missing before a study could run on it.
+
+Nothing is played or moved to find that out.
+"""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Literal
+
+from modeling.errors import InputError
+from modeling.rendering.compiled import is_compiled
+from rig.live.memory import compiled
+from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
+from rig.sound.devices import (
+    Direction,
+    SoundDevice,
+    check_rate,
+    find_device,
+    portaudio,
+    sound_devices,
+)
+
+State = Literal["ok", "note", "fault"]
+PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
+INPUT_FOLDER = Path("/dev/input")
+INPUT_NAMES = Path("/sys/class/input")
+OLD_DAYS = 90  # a study may ask for less
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Parameters
+    ----------
+    name : str
+    told : str
+        What it is; where it is a fault or a note, what to do.
+    state : {"ok", "note", "fault"}
+        A note lowers what a study may claim; with a fault none can run.
+    """
+
+    name: str
+    told: str
+    state: State = "ok"
+
+
+def versions() -> list[Finding]:
+    """Programs and libraries, and whether the compiled parts are there."""
+    found = [Finding("Python", f"{platform.python_version()}, {platform.platform(terse=True)}")]
+    found += [Finding(name, metadata.version(name)) for name in PACKAGES]
+    found.append(_tried("PortAudio", lambda: portaudio().get_portaudio_version()[1].split(",")[0]))
+    rendering = Finding("rendering kernel", "compiled")
+    if not is_compiled():
+        told = "expected the compiled kernel, got none; install a C compiler, then tactileq."
+        rendering = Finding("rendering kernel", told, "fault")
+    return [*found, rendering, _tried("audio callback", lambda: str(compiled() and "compiled"))]
+
+
+def connected_sound() -> list[Finding]:
+    """All sound devices: channels, usual rate."""
+    try:
+        devices = sound_devices()
+    except InputError as error:
+        return [Finding("sound", str(error), "fault")]
+    if not devices:
+        told = "expected a sound device, got none; connect one, or start the sound server."
+        return [Finding("sound", told, "fault")]
+    return [Finding(device.name, _described(device)) for device in devices]
+
+
+def connected_input() -> list[Finding]:
+    """What may measure a hand: pens, mice and the like on Linux, and serial ports."""
+    from serial.tools import list_ports
+
+    files = sorted(INPUT_FOLDER.glob("event*"), key=lambda file: int(file.name[5:] or 0))
+    found = [_input_device(file) for file in files]
+    for port in sorted(list_ports.comports()):
+        found.append(Finding(port.device, f"serial port, {port.description}"))
+    return found
+
+
+def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
+    """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
+    if not file.exists():
+        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and correct what is yours."
+        return None, [Finding(str(file), told, "fault")]
+    try:
+        rig = RigFile.load(file)
+    except InputError as error:
+        return None, [Finding(str(file), str(error), "fault")]
+    found = [
+        Finding("rig", f"{rig.rig.name}{' (simulated)' if rig.simulated else ''}"),
+        _sound(rig),
+        _hand(rig),
+        _accelerometer(rig),
+        _calibration(rig, today),
+        _latency(rig, today),
+    ]
+    assumed = rig.assumed()
+    if assumed:
+        told = f"{len(assumed)} of {len(rig.figures())} figures are assumed, see below"
+        found.append(Finding("figures", told, "note"))
+    return rig, found
+
+
+def remedies(findings: Iterable[Finding]) -> list[str]:
+    """One line each for a shell, to install what is missing on Debian and its like."""
+    faults = " ".join(finding.told for finding in findings if finding.state == "fault")
+    packages = [name for name in ("libportaudio2", "jackd2") if name in faults]
+    lines = [f"sudo apt-get install {' '.join(packages)}"] if packages else []
+    if "group input" in faults:
+        lines.append('sudo usermod -aG input "$USER"   # then log in again')
+    return lines
+
+
+def _tried(name: str, version: Callable[[], str]) -> Finding:
+    try:
+        return Finding(name, version())
+    except InputError as error:
+        return Finding(name, str(error), "fault")
+
+
+def _described(device: SoundDevice) -> str:
+    return f"{device.host}: {device.inputs} in, {device.outputs} out, usually {device.rate_hz:g} Hz"
+
+
+def _input_device(file: Path) -> Finding:
+    name_file = INPUT_NAMES / file.name / "device" / "name"
+    name = name_file.read_text().strip() if name_file.exists() else "input device"
+    if os.access(file, os.R_OK):
+        return Finding(str(file), name)
+    return Finding(str(file), f"{name}: not readable; it needs the group input", "note")
+
+
+def _sound(rig: RigFile) -> Finding:
+    sound = rig.sound
+    return _card("sound", sound.device, "output", rate_hz=sound.rate_hz, channels=sound.channels)
+
+
+def _card(
+    what: str, name: str | None, direction: Direction, *, rate_hz: float, channels: int
+) -> Finding:
+    try:
+        device = find_device(name, direction, channels=channels)
+        check_rate(device, direction, rate_hz=rate_hz, channels=channels)
+    except InputError as error:
+        return Finding(what, str(error), "fault")
+    return Finding(
+        what, f"{device.name} does {rate_hz:g} Hz with {channels} {direction} channel(s)"
+    )
+
+
+def _hand(rig: RigFile) -> Finding:
+    hand = rig.hand
+    told = f"{hand.kind}{f', {hand.device}' if hand.device else ''}"
+    if hand.kind in ("scripted", "window"):
+        return Finding("hand", told)
+    if hand.kind == "serial":
+        return _present("hand", Path(hand.device or ""), told)
+    if hand.device is not None and hand.device.startswith("/"):
+        return _present("hand", Path(hand.device), told)
+    readable = [file for file in INPUT_FOLDER.glob("event*") if os.access(file, os.R_OK)]
+    if not readable:
+        told = (
+            f"expected a readable {hand.kind}, got none; connect it, and have the group input "
+            "(usermod -aG input)."
+        )
+        return Finding("hand", told, "fault")
+    return Finding("hand", told)
+
+
+def _present(what: str, file: Path, told: str) -> Finding:
+    if not file.exists():
+        return Finding(what, f"expected {file}, got no such device; connect it.", "fault")
+    if not os.access(file, os.R_OK):
+        told = f"expected to read {file}, got no permission; have the group input."
+        return Finding(what, told, "fault")
+    return Finding(what, told)
+
+
+def _accelerometer(rig: RigFile) -> Finding:
+    section = rig.accelerometer
+    if section is None:
+        told = "none under [accelerometer]: the rig cannot be calibrated"
+        return Finding("accelerometer", told, "note")
+    return _card(
+        "accelerometer",
+        section.device,
+        "input",
+        rate_hz=section.rate_hz,
+        channels=section.channel,
+    )
+
+
+def _calibration(rig: RigFile, today: datetime.date) -> Finding:
+    done = rig.calibration
+    if done is None or rig.vibrator.g_per_volt.assumed:
+        told = "never: levels are assumed (tactileq rig calibrate level)"
+        return Finding("calibration", told, "note")
+    now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
+    if now != then:
+        told = (
+            f"expected the calibration of {rig.rig.name}, got that of {done.rig} with the serial "
+            f"numbers {', '.join(done.serials) or 'none'}; calibrate this one."
+        )
+        return Finding("calibration", told, "fault")
+    return _aged("calibration", done.date, today)
+
+
+def _latency(rig: RigFile, today: datetime.date) -> Finding:
+    done = rig.latency
+    if done is None:
+        return Finding("latency", "never measured (tactileq rig latency)", "note")
+    told = f"median {done.median_ms.value:.1f} ms, 95 % within {done.p95_ms.value:.1f} ms"
+    if done.measured_on is None:
+        return Finding("latency", f"{told}, of no known day", "note")
+    aged = _aged("latency", done.measured_on, today)
+    return Finding("latency", f"{told}, {aged.told}", aged.state)
+
+
+def _aged(what: str, day: datetime.date, today: datetime.date) -> Finding:
+    days = (today - day).days
+    ago = "today" if days == 0 else f"{days} days ago"
+    return Finding(what, f"{day.isoformat()}, {ago}", "note" if days > OLD_DAYS else "ok")

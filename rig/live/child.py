@@ -1,0 +1,135 @@
+"""A process of a rig that is driven by lines of JSON, watched and killed.
+
+docs/method/live.md#processes
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+from modeling.errors import InputError
+
+ANSWER_S = 5.0
+START_S = 15.0
+END_S = 2.0
+
+
+class ChildLost(RuntimeError):
+    """The process has ended, or does not answer; the message is a part of a sentence."""
+
+
+class Child:
+    """`python -m MODULE SETTINGS`, which answers one line for each line that it gets.
+
+    Parameters
+    ----------
+    module : str
+    settings : mapping
+        For the command line, as JSON.
+
+    Raises
+    ------
+    InputError
+        Where it refuses its settings: its own sentence.
+    ChildLost
+        Where it ends or does not answer.
+    """
+
+    def __init__(self, module: str, settings: Mapping[str, Any]) -> None:
+        self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as this)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module, json.dumps(settings)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=self._complaints,
+            text=True,
+        )
+        self._answers: queue.Queue[str] = queue.Queue()
+        threading.Thread(target=self._listen, daemon=True).start()
+        try:
+            self.ready = self._answer(START_S)
+        except (InputError, ChildLost):
+            self.kill()
+            raise
+
+    @property
+    def pid(self) -> int:
+        """Number of the process."""
+        return self._process.pid
+
+    @property
+    def runs(self) -> bool:
+        """Whether it has not ended."""
+        return self._process.poll() is None
+
+    def ask(self, wanted: Mapping[str, Any], *, within_s: float = ANSWER_S) -> dict[str, Any]:
+        """Its answer to one line.
+
+        Raises
+        ------
+        InputError
+            Where it refuses: its own sentence.
+        ChildLost
+            Where it has ended, or does not answer in time.
+        """
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(wanted) + "\n")
+            self._process.stdin.flush()
+        except (OSError, ValueError):
+            raise ChildLost(f"it has ended{self._last_complaint()}") from None
+        return self._answer(within_s)
+
+    def close(self) -> None:
+        """End it by the end of its input; kill it where it does not."""
+        with suppress(OSError, ValueError):
+            assert self._process.stdin is not None
+            self._process.stdin.close()
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(END_S)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            with suppress(OSError, ValueError):
+                assert pipe is not None
+                pipe.close()
+
+    def _listen(self) -> None:
+        """Pass its lines on; an empty one is its end."""
+        assert self._process.stdout is not None
+        with suppress(ValueError, OSError):  # closed by `kill`
+            for line in self._process.stdout:
+                self._answers.put(line)
+        self._answers.put("")
+
+    def _last_complaint(self) -> str:
+        """The last line that it has written to its standard error."""
+        self._complaints.seek(0)
+        lines = self._complaints.read().decode(errors="replace").split("\n")
+        last = [line.strip() for line in lines if line.strip()][-1:]
+        return f" ({last[0]})" if last else ""
+
+    def _answer(self, within_s: float) -> dict[str, Any]:
+        try:
+            line = self._answers.get(timeout=within_s)
+        except queue.Empty:
+            raise ChildLost(f"it has not answered for {within_s:g} s") from None
+        if not line:
+            self._answers.put("")  # for who asks next
+            raise ChildLost(f"it has ended{self._last_complaint()}")
+        answer: dict[str, Any] = json.loads(line)
+        if "error" in answer:
+            raise InputError(answer["error"])
+        return answer

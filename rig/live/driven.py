@@ -1,0 +1,22 @@
+"""The other end of a `rig.live.child.Child`: a process that is driven by lines of JSON."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+
+def settings_from_parent() -> dict[str, Any]:
+    """What the parent said when it started this process; Ctrl-C is the parent's to answer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    settings: dict[str, Any] = json.loads(sys.argv[1])
+    return settings
+
+
+def tell(line: Mapping[str, Any]) -> None:
+    """Tell the parent."""
+    sys.stdout.write(json.dumps(line) + "\n")
+    sys.stdout.flush()

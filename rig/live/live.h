@@ -1,0 +1,204 @@
+/* What the processes of a rig share: readings of the hand, and what was played.
+   docs/method/live.md#shared-memory
+
+   One process writes readings, the audio callback of another one writes blocks; anybody reads. Nobody
+   waits for anybody. Both are rings: whoever writes fills the next slot, then counts it. Who reads
+   copies a slot and looks at the count again: a slot that was overwritten meanwhile is noticed.
+
+   C11, or C99 with GCC or Clang; 64-bit words are read and written whole.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_LIVE_H
+#define TQ_LIVE_H
+
+#include <stdint.h>
+#include <string.h>
+#ifdef _WIN32
+#include <windows.h>
+#elif defined __APPLE__
+#include <mach/mach_time.h>
+#else
+#include <time.h>
+#endif
+
+#define TQ_LIVE_FORMAT 0x7471000000000001u /* changes with anything in this file */
+#define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
+
+/* Flags of a reading. */
+enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16 };
+/* Flags of a block. */
+enum { TQ_STALE = 1, TQ_UNDERFLOW = 2 };
+
+/* A reading of the hand; NaN where nothing measures. */
+typedef struct {
+    double time_s; /* of tq_now */
+    double x_mm, y_mm, speed_mm_s, force_n;
+    uint32_t flags, spare;
+} tq_reading;
+
+/* One call of the audio callback. */
+typedef struct {
+    double time_s;                         /* of tq_now, when it was called */
+    double dac_time_s;                     /* when its first sample leaves, as the driver states */
+    double speed_mm_s, force_n;            /* the hand that was rendered */
+    double square_sum_g2;                  /* of all its samples */
+    uint64_t position;                     /* samples since the stream began */
+    uint32_t frames, presentation;         /* what played in it last, 0 for nothing */
+    float peak_g, seconds;                 /* largest absolute value; how long the call took */
+    uint32_t flags, spare;
+} tq_block;
+
+#define TQ_WORDS(type) (sizeof(type) / sizeof(uint64_t))
+
+struct tq_live {
+    uint64_t format;
+    uint64_t readings, blocks; /* how many were ever written */
+    uint64_t spare[5];
+    uint64_t reading[TQ_RING][TQ_WORDS(tq_reading)];
+    uint64_t block[TQ_RING][TQ_WORDS(tq_block)];
+};
+typedef struct tq_live tq_live;
+
+/* Seconds on the one clock of all processes: that of Python's time.perf_counter. */
+static inline double tq_now(void)
+{
+#ifdef _WIN32
+    LARGE_INTEGER now, rate;
+    QueryPerformanceCounter(&now);
+    QueryPerformanceFrequency(&rate);
+    return (double)now.QuadPart / (double)rate.QuadPart;
+#elif defined __APPLE__
+    mach_timebase_info_data_t base;
+    mach_timebase_info(&base);
+    return (double)mach_absolute_time() * base.numer / base.denom * 1e-9;
+#else
+    struct timespec now; /* no system call, but a page that the kernel maps */
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+#endif
+}
+
+static inline void tq_put(uint64_t *slot, const void *row, size_t words)
+{
+    size_t i;
+    for (i = 0; i < words; i++) {
+        uint64_t word;
+        memcpy(&word, (const char *)row + 8 * i, 8);
+        __atomic_store_n(&slot[i], word, __ATOMIC_RELAXED);
+    }
+}
+
+static inline void tq_take(const uint64_t *slot, void *row, size_t words)
+{
+    size_t i;
+    for (i = 0; i < words; i++) {
+        uint64_t word = __atomic_load_n(&slot[i], __ATOMIC_RELAXED);
+        memcpy((char *)row + 8 * i, &word, 8);
+    }
+}
+
+/* Writes the next row of a ring: `count` says of a slot that it is being written before it is. */
+static inline void tq_append(uint64_t *ring, uint64_t *count, const void *row, size_t words)
+{
+    uint64_t n = __atomic_load_n(count, __ATOMIC_RELAXED);
+    __atomic_thread_fence(__ATOMIC_RELEASE); /* who sees this row's words sees the count before it */
+    tq_put(ring + (n & (TQ_RING - 1)) * words, row, words);
+    __atomic_store_n(count, n + 1, __ATOMIC_RELEASE);
+}
+
+/* Copies rows from number `from` on, at most `most`, to `rows`; how many. Rows that are no longer there
+   are left out, and *first says which row the first copied one is. */
+static inline size_t tq_copy(const uint64_t *ring, const uint64_t *count, size_t words, uint64_t from,
+                             void *rows, size_t most, uint64_t *first)
+{
+    uint64_t end = __atomic_load_n(count, __ATOMIC_ACQUIRE), lost, n, i;
+    if (from > end)
+        from = end;
+    if (end - from > TQ_RING - 1)
+        from = end - (TQ_RING - 1);
+    n = end - from < most ? end - from : most;
+    for (i = 0; i < n; i++)
+        tq_take(ring + ((from + i) & (TQ_RING - 1)) * words, (char *)rows + 8 * words * i, words);
+    __atomic_thread_fence(__ATOMIC_ACQUIRE);
+    /* Row r shares its slot with row r + TQ_RING, which may be under way once the count is that. */
+    end = __atomic_load_n(count, __ATOMIC_RELAXED);
+    lost = end >= from + TQ_RING ? end - TQ_RING - from + 1 : 0;
+    if (lost > n)
+        lost = n;
+    if (lost)
+        memmove(rows, (char *)rows + 8 * words * lost, 8 * words * (n - lost));
+    *first = from + lost;
+    return n - lost;
+}
+
+/* The size of the shared memory in bytes. */
+static inline size_t tq_live_size(void)
+{
+    return sizeof(tq_live);
+}
+
+/* Fresh memory, all zeros before. */
+static inline void tq_live_start(tq_live *live)
+{
+    __atomic_store_n(&live->format, TQ_LIVE_FORMAT, __ATOMIC_RELEASE);
+}
+
+static inline int tq_live_fits(const tq_live *live)
+{
+    return __atomic_load_n(&live->format, __ATOMIC_ACQUIRE) == TQ_LIVE_FORMAT;
+}
+
+static inline void tq_write_reading(tq_live *live, double time_s, double x_mm, double y_mm,
+                                    double speed_mm_s, double force_n, uint32_t flags)
+{
+    tq_reading row;
+    row.time_s = time_s, row.x_mm = x_mm, row.y_mm = y_mm;
+    row.speed_mm_s = speed_mm_s, row.force_n = force_n;
+    row.flags = flags, row.spare = 0;
+    tq_append(live->reading[0], &live->readings, &row, TQ_WORDS(tq_reading));
+}
+
+static inline void tq_write_block(tq_live *live, const tq_block *row)
+{
+    tq_append(live->block[0], &live->blocks, row, TQ_WORDS(tq_block));
+}
+
+static inline size_t tq_readings(const tq_live *live, uint64_t from, tq_reading *rows, size_t most,
+                                 uint64_t *first)
+{
+    return tq_copy(live->reading[0], &live->readings, TQ_WORDS(tq_reading), from, rows, most, first);
+}
+
+static inline size_t tq_blocks(const tq_live *live, uint64_t from, tq_block *rows, size_t most,
+                               uint64_t *first)
+{
+    return tq_copy(live->block[0], &live->blocks, TQ_WORDS(tq_block), from, rows, most, first);
+}
+
+/* How many readings and blocks were ever written. */
+static inline uint64_t tq_readings_written(const tq_live *live)
+{
+    return __atomic_load_n(&live->readings, __ATOMIC_ACQUIRE);
+}
+
+static inline uint64_t tq_blocks_written(const tq_live *live)
+{
+    return __atomic_load_n(&live->blocks, __ATOMIC_ACQUIRE);
+}
+
+/* The latest reading; 0 where there is none yet. */
+static inline int tq_latest(const tq_live *live, tq_reading *row)
+{
+    int tries;
+    for (tries = 0; tries < 4; tries++) { /* overwritten only by a whole ring of readings meanwhile */
+        uint64_t n = tq_readings_written(live), first;
+        if (n == 0)
+            return 0;
+        if (tq_readings(live, n - 1, row, 1, &first) == 1)
+            return 1;
+    }
+    return 0;
+}
+
+#endif

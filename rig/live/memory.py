@@ -1,0 +1,218 @@
+"""The memory that the processes of a rig share: readings of the hand, blocks that were played.
+
+docs/method/live.md#shared-memory
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modeling.errors import InputError, shown
+
+try:
+    import rig.live._live as _live
+except ImportError:  # no compiler at installation
+    _live = None
+
+# Flags of a reading, and of a block.
+CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
+STALE, UNDERFLOW = 1, 2
+
+READING = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("x_mm", "f8"),
+        ("y_mm", "f8"),
+        ("speed_mm_s", "f8"),
+        ("force_n", "f8"),
+        ("flags", "u4"),
+        ("spare", "u4"),
+    ]
+)
+BLOCK = np.dtype(
+    [
+        ("time_s", "f8"),
+        ("dac_time_s", "f8"),
+        ("speed_mm_s", "f8"),
+        ("force_n", "f8"),
+        ("square_sum_g2", "f8"),
+        ("position", "u8"),
+        ("frames", "u4"),
+        ("presentation", "u4"),
+        ("peak_g", "f4"),
+        ("seconds", "f4"),
+        ("flags", "u4"),
+        ("spare", "u4"),
+    ]
+)
+_MOST_ROWS = 16384
+Rows = NDArray[np.void]
+
+
+def compiled() -> Any:
+    """The module of the compiled parts.
+
+    Raises
+    ------
+    InputError
+        Where there is none: nothing in Python keeps the time of an audio callback.
+    """
+    if _live is None:
+        raise InputError(
+            "expected the compiled parts of tactileq, which a rig needs, got none; install a C "
+            "compiler (gcc or clang), then tactileq again."
+        )
+    return _live
+
+
+def now_s() -> float:
+    """Seconds on the one clock of all processes of a rig (monotonic; its zero means nothing)."""
+    return float(compiled().lib.tq_now())
+
+
+class Live:
+    """Shared memory of one rig; made by `create`, found again by `attach`.
+
+    A file in memory where the system has such, else in the temporary folder. Close it, or use it in
+    a `with` block; who made it removes the file.
+    """
+
+    def __init__(self, path: Path, memory: mmap.mmap, *, own: bool) -> None:
+        self.path = path
+        self._memory: mmap.mmap | None = memory
+        self._own = own
+        self._lib, ffi = compiled().lib, compiled().ffi
+        self._ffi = ffi
+        self._buffer = ffi.from_buffer(memory, require_writable=True)
+        self.address = ffi.cast("tq_live *", self._buffer)
+
+    @classmethod
+    def create(cls) -> Live:
+        """New memory, empty."""
+        lib = compiled().lib
+        in_memory = Path("/dev/shm")
+        folder = in_memory if os.access(in_memory, os.W_OK) else Path(tempfile.gettempdir())
+        handle, name = tempfile.mkstemp(prefix="tactileq-rig-", dir=folder)
+        try:
+            os.truncate(handle, lib.tq_live_size())
+            memory = mmap.mmap(handle, lib.tq_live_size())
+        except OSError:
+            Path(name).unlink()
+            raise
+        finally:
+            os.close(handle)
+        live = cls(Path(name), memory, own=True)
+        lib.tq_live_start(live.address)
+        return live
+
+    @classmethod
+    def attach(cls, path: str | Path) -> Live:
+        """Memory that another process has made.
+
+        Raises
+        ------
+        InputError
+            For a file that is none.
+        """
+        lib, path = compiled().lib, Path(path)
+        with open(path, "r+b") as file:
+            if os.fstat(file.fileno()).st_size != lib.tq_live_size():
+                raise _no_memory(path)
+            memory = mmap.mmap(file.fileno(), 0)
+        live = cls(path, memory, own=False)
+        if not lib.tq_live_fits(live.address):
+            live.close()
+            raise _no_memory(path)
+        return live
+
+    def close(self) -> None:
+        """Give the memory back; nothing of it may be used afterwards."""
+        if self._memory is None:
+            return
+        self.address = None
+        self._ffi.release(self._buffer)
+        self._memory.close()
+        self._memory = None
+        if self._own:
+            self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def write_reading(
+        self,
+        time_s: float,
+        x_mm: float,
+        *,
+        y_mm: float,
+        speed_mm_s: float,
+        force_n: float,
+        flags: int,
+    ) -> None:
+        """Add a reading of the hand; only one process may.
+
+        Parameters
+        ----------
+        time_s : float
+            By `now_s`.
+        x_mm, y_mm : float
+            Position; NaN where it is not measured.
+        speed_mm_s : float
+            With its sign.
+        force_n : float
+            ≥ 0.
+        flags : int
+            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE.
+        """
+        self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
+
+    def latest(self) -> np.void | None:
+        """The latest reading (READING), None before the first."""
+        row = np.zeros(1, dtype=READING)
+        found = self._lib.tq_latest(self.address, self._ffi.from_buffer("tq_reading *", row))
+        return row[0] if found else None
+
+    @property
+    def readings_written(self) -> int:
+        """How many readings there ever were."""
+        return int(self._lib.tq_readings_written(self.address))
+
+    @property
+    def blocks_written(self) -> int:
+        """How many blocks there ever were."""
+        return int(self._lib.tq_blocks_written(self.address))
+
+    def readings_since(self, count: int) -> tuple[int, Rows]:
+        """The readings (READING) after the first `count`, and how many there ever were with them.
+
+        Where nobody has asked for so long that the oldest are overwritten (16 384 of them), they
+        are left out: then the new count less the old one is more than there are rows.
+        """
+        return self._since(self._lib.tq_readings, READING, "tq_reading *", count)
+
+    def blocks_since(self, count: int) -> tuple[int, Rows]:
+        """The same of the blocks (BLOCK) that the audio callback has played."""
+        return self._since(self._lib.tq_blocks, BLOCK, "tq_block *", count)
+
+    def _since(self, copy: Any, kind: np.dtype[Any], pointer: str, count: int) -> tuple[int, Rows]:
+        rows: Rows = np.zeros(_MOST_ROWS, dtype=kind)
+        first = self._ffi.new("uint64_t *")
+        taken = copy(self.address, count, self._ffi.from_buffer(pointer, rows), rows.size, first)
+        return int(first[0]) + int(taken), rows[:taken].copy()
+
+
+def _no_memory(path: Path) -> InputError:
+    return InputError(
+        f"expected the shared memory of a rig of this version in {shown(str(path))}, got another "
+        "file; start both processes from one installation."
+    )

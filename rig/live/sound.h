@@ -1,0 +1,266 @@
+/* The audio callback of a rig: the texture under the hand as it is now, prepared signals, masking
+   noise. docs/method/live.md#callback
+
+   PortAudio calls tq_sound_callback with a tq_sound. The hand comes from shared memory; what is played
+   is logged there. In the callback there is no Python, no allocation, no lock and no system call (the
+   clock is a page that the kernel maps).
+
+   One control thread prepares sources and says which one it wants, as of player.h, on which this rests.
+   A source is a voice (a texture) or a signal. Signals begin when no voice plays any more, and voices
+   when no signal does: all changes pass through silence.
+
+   Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
+
+#ifndef TQ_SOUND_H
+#define TQ_SOUND_H
+
+#include "player.h"
+
+#include "live.h"
+
+#define TQ_PIECE 256     /* samples that are rendered in one go */
+#define TQ_UNDERFLOWED 4 /* of PortAudio: paOutputUnderflow */
+
+/* A voice with a number, by which the log knows it. */
+typedef struct {
+    tq_voice voice; /* first, so that both have one address */
+    uint32_t presentation;
+} tq_surface;
+
+/* A signal in g that plays once; its samples must stay as they are while it is in use. */
+typedef struct {
+    const float *samples;
+    size_t count, position;
+    int level; /* steps of its fade: it begins as it is, and fades where it is stopped */
+    uint32_t presentation;
+} tq_signal;
+
+struct tq_sound {
+    tq_player player; /* what it shall play is said by the callback */
+    TQ_SHARED(tq_surface *) surface_wanted; /* written by the control thread */
+    TQ_SHARED(tq_signal *) signal_wanted;   /* written by the control thread */
+    TQ_SHARED(tq_signal *) signal_playing;  /* written by the callback */
+    uint64_t masking_wanted; /* RMS of the masking noise, in millionths of full scale */
+    tq_live *live;
+    int channels, vibration, masking; /* channels count from 0; masking is -1 for none */
+    float scale;                      /* full scale per g */
+    double stale_s;                   /* a hand older than this counts as lifted off */
+    /* The callback's own. */
+    tq_real masking_level;
+    uint64_t masking_key, position, signal_samples;
+};
+typedef struct tq_sound tq_sound;
+
+/* --- The control thread ------------------------------------------------------------------------ */
+
+static inline size_t tq_sound_size(void)
+{
+    return sizeof(tq_sound);
+}
+
+/* Silence. Before the callback is first called. Fades take `fade` samples. */
+static inline void tq_sound_start(tq_sound *s, tq_live *live, int fade, int channels, int vibration,
+                                  int masking, float scale, double stale_s, uint64_t masking_key)
+{
+    TQ_FILL(s, 0, sizeof *s);
+    tq_player_start(&s->player, fade);
+    s->live = live;
+    s->channels = channels, s->vibration = vibration, s->masking = masking;
+    s->scale = scale, s->stale_s = stale_s;
+    s->masking_key = masking_key;
+}
+
+/* Prepares a surface that is not in use; see tq_start. */
+static inline void tq_surface_start(tq_surface *u, const tq_texture *t, tq_real *memory, uint64_t key,
+                                    uint32_t presentation)
+{
+    tq_voice_start(&u->voice, t, memory, key);
+    u->presentation = presentation;
+}
+
+/* Prepares a signal that is not in use. */
+static inline void tq_signal_start(tq_signal *c, const float *samples, size_t count,
+                                   uint32_t presentation)
+{
+    c->samples = samples, c->count = count, c->position = 0;
+    c->level = 0, c->presentation = presentation;
+}
+
+/* What shall play from now on: a surface, a signal, or silence where both are NULL. */
+static inline void tq_sound_want(tq_sound *s, tq_surface *surface, tq_signal *signal)
+{
+    TQ_SET(&s->surface_wanted, surface);
+    TQ_SET(&s->signal_wanted, signal);
+}
+
+/* The RMS of the masking noise from now on, in millionths of full scale; 0 for none. */
+static inline void tq_sound_mask(tq_sound *s, uint64_t millionths)
+{
+    __atomic_store_n(&s->masking_wanted, millionths, __ATOMIC_RELAXED);
+}
+
+/* Whether the callback uses a source or may yet; once it does not, it may be freed or prepared again.
+   It takes sources as tq_player_uses says. */
+static inline int tq_sound_uses_surface(tq_sound *s, tq_surface *u)
+{
+    return TQ_GET(&s->surface_wanted) == u || tq_player_uses(&s->player, &u->voice);
+}
+
+static inline int tq_sound_uses_signal(tq_sound *s, tq_signal *c)
+{
+    return TQ_GET(&s->signal_wanted) == c || TQ_GET(&s->signal_playing) == c;
+}
+
+/* Whether anything plays. */
+static inline int tq_sound_plays(tq_sound *s)
+{
+    return tq_player_playing(&s->player) || TQ_GET(&s->signal_playing);
+}
+
+/* --- The callback ------------------------------------------------------------------------------ */
+
+/* The hand as it is now; 1 where it is too old, or gone, and counts as lifted off. */
+TQ_INLINE int tq_hand_now(const tq_sound *s, double now_s, double *speed, double *force)
+{
+    tq_reading hand;
+    *speed = *force = 0;
+    if (!tq_latest(s->live, &hand) || hand.flags & TQ_GONE || !(now_s - hand.time_s <= s->stale_s))
+        return 1;
+    *speed = hand.speed_mm_s, *force = hand.force_n;
+    return 0;
+}
+
+/* Tells the player what is wanted, which is silence while a signal plays. */
+TQ_INLINE void tq_sound_tell(tq_sound *s)
+{
+    tq_surface *u = TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);
+    tq_player_want(&s->player, (tq_voice *)u);
+    if (u && TQ_GET(&s->surface_wanted) != u) /* perhaps freed before it was seen to be wanted */
+        tq_player_want(&s->player, NULL);
+}
+
+/* The signal that plays, or begins now; NULL while a voice plays. */
+TQ_INLINE tq_signal *tq_signal_now(tq_sound *s)
+{
+    tq_signal *c = TQ_GET(&s->signal_playing);
+    if (c || tq_player_playing(&s->player))
+        return c;
+    c = TQ_GET(&s->signal_wanted);
+    if (!c)
+        return NULL;
+    TQ_SET(&s->signal_playing, c);
+    if (TQ_GET(&s->signal_wanted) != c || c->position == c->count) { /* freed, or over */
+        TQ_SET(&s->signal_playing, NULL);
+        return NULL;
+    }
+    c->level = s->player.fade;
+    return c;
+}
+
+/* The next samples of a signal, into zeros: up to its end, or to that of its fade. */
+TQ_INLINE void tq_signal_render(tq_sound *s, tq_signal *c, float *out, size_t count)
+{
+    int leaves = TQ_GET(&s->signal_wanted) != c;
+    size_t n = 0;
+    for (; n < count && c->position < c->count && c->level > 0; n++) {
+        c->level -= leaves;
+        out[n] = c->samples[c->position++];
+        if (c->level < s->player.fade)
+            out[n] *= (float)((tq_real)c->level * s->player.step);
+    }
+    s->signal_samples += n;
+    if (c->position == c->count || c->level == 0) {
+        c->position = c->count; /* over: the same signal does not begin again */
+        /* For the limits of the voice that follows: as if the mean square were at its limit now. */
+        s->player.mean_square = (tq_real)1e30;
+        s->player.sounding += s->signal_samples;
+        s->player.silent = s->player.idle = 0;
+        s->signal_samples = 0;
+        TQ_SET(&s->signal_playing, NULL);
+    }
+}
+
+/* The next samples of the masking noise, which reaches its level within a fade. */
+TQ_INLINE void tq_masking_render(tq_sound *s, float *out, size_t count)
+{
+    tq_real wanted = (tq_real)1e-6 * (tq_real)__atomic_load_n(&s->masking_wanted, __ATOMIC_RELAXED);
+    size_t n;
+    for (n = 0; n < count; n++) {
+        s->masking_level += tq_within(wanted - s->masking_level, -s->player.step, s->player.step);
+        if (s->masking_level != 0) {
+            tq_real noise = s->masking_level * tq_noise(s->masking_key, s->position + n);
+            out[n * (size_t)s->channels] = (float)tq_within(noise, -1, 1);
+        }
+    }
+}
+
+/* The number of the surface that plays, 0 for none. */
+TQ_INLINE uint32_t tq_surface_now(tq_sound *s)
+{
+    const tq_surface *u = (const tq_surface *)tq_player_playing(&s->player);
+    return u ? u->presentation : 0;
+}
+
+/* The next samples, at most a piece, with the block's hand; `block` collects what the log says of them. */
+TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t count)
+{
+    float piece[TQ_PIECE];
+    tq_signal *signal;
+    uint32_t before = tq_surface_now(s), after;
+    size_t n;
+    tq_sound_tell(s);
+    tq_player_render(&s->player, block->speed_mm_s, block->force_n, piece, count);
+    after = tq_surface_now(s);
+    if (before || after)
+        block->presentation = after ? after : before;
+    signal = tq_signal_now(s);
+    if (signal) {
+        block->presentation = signal->presentation;
+        tq_signal_render(s, signal, piece, count);
+    }
+    for (n = 0; n < count; n++) {
+        float size = piece[n] < 0 ? -piece[n] : piece[n];
+        block->peak_g = size > block->peak_g ? size : block->peak_g;
+        block->square_sum_g2 += (double)piece[n] * (double)piece[n];
+        /* A peak limit at full scale may be rounded to above it, which a card may take for its
+           opposite. */
+        out[n * (size_t)s->channels + (size_t)s->vibration]
+            = (float)tq_within(piece[n] * s->scale, -1, 1);
+    }
+    if (s->masking >= 0)
+        tq_masking_render(s, out + s->masking, count);
+    s->position += count;
+}
+
+/* For PortAudio (PaStreamCallback): 32-bit floats, interleaved; `user` is the tq_sound. */
+static int tq_sound_callback(const void *in, void *out, unsigned long frames, const void *times,
+                             unsigned long flags, void *user)
+{
+    tq_sound *s = (tq_sound *)user;
+    const double *moments = (const double *)times; /* of input, of the call, of output */
+    double latency_s = moments ? moments[2] - moments[1] : 0;
+    tq_block block;
+    float *to = (float *)out;
+    size_t left = frames;
+    (void)in;
+    TQ_FILL(&block, 0, sizeof block);
+    block.time_s = tq_now();
+    block.dac_time_s = block.time_s + (latency_s > 0 && latency_s < 10 ? latency_s : 0);
+    block.position = s->position, block.frames = (uint32_t)frames;
+    if (tq_hand_now(s, block.time_s, &block.speed_mm_s, &block.force_n))
+        block.flags |= TQ_STALE;
+    if (flags & TQ_UNDERFLOWED)
+        block.flags |= TQ_UNDERFLOW;
+    TQ_FILL(to, 0, frames * (size_t)s->channels * sizeof *to);
+    while (left) {
+        size_t count = left < TQ_PIECE ? left : TQ_PIECE;
+        tq_piece_render(s, &block, to, count);
+        to += count * (size_t)s->channels;
+        left -= count;
+    }
+    block.seconds = (float)(tq_now() - block.time_s);
+    tq_write_block(s->live, &block);
+    return 0;
+}
+
+#endif

@@ -1,0 +1,56 @@
+"""A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread SETTINGS`.
+
+What it misses, the machine misses: its figures stand beside those of the audio callback. To each
+line on standard input it answers how often it woke up and how often too late.
+"""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+
+from rig.live.driven import settings_from_parent, tell
+
+
+class BareThread:
+    """Wakes up every period; it misses where it wakes up later than the next one is due.
+
+    Parameters
+    ----------
+    period_s : float
+        Above 0.
+    """
+
+    def __init__(self, period_s: float) -> None:
+        self._period_s = period_s
+        self.periods = 0
+        self.misses = 0
+
+    def run(self) -> None:
+        """Wake up until the process ends."""
+        due_s = time.monotonic()
+        while True:
+            due_s += self._period_s
+            time.sleep(max(0.0, due_s - time.monotonic()))
+            due_s += self.woke(time.monotonic() - due_s)
+
+    def woke(self, late_s: float) -> float:
+        """Count one wake-up; gives the time of the periods that were slept over."""
+        over = max(0, int(late_s / self._period_s))
+        self.periods += 1 + over
+        self.misses += over
+        return over * self._period_s
+
+
+def main() -> None:
+    """Wake up until standard input ends."""
+    thread = BareThread(float(settings_from_parent()["period_s"]))
+    threading.Thread(target=thread.run, daemon=True).start()
+    tell({"running": True})
+    for _ in sys.stdin:
+        tell({"periods": thread.periods, "misses": thread.misses})
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The file in which one rig is described."""

@@ -1,0 +1,63 @@
+"""Starts the simulated vibrator as a process of its own, and ends it."""
+
+from __future__ import annotations
+
+from modeling.errors import InputError
+from rig.live.child import Child, ChildLost
+from rig.simulated.vibrator import SimulatedVibrator
+
+DEVICE = "simulated-vibrator"
+
+
+class SimulatedCard:
+    """A sound card in silico on which a simulated vibrator hangs; use it in a `with` block.
+
+    It needs a running JACK server. Play on the device called `name`, and record from it: its first
+    input is the accelerometer.
+
+    Parameters
+    ----------
+    vibrator : SimulatedVibrator, optional
+    name : str
+        By which PortAudio lists it.
+    """
+
+    def __init__(self, vibrator: SimulatedVibrator | None = None, *, name: str = DEVICE) -> None:
+        self.vibrator = vibrator or SimulatedVibrator()
+        self.name = name
+        self._child: Child | None = None
+
+    def open(self) -> None:
+        """Start it, and wait until it runs.
+
+        Raises
+        ------
+        InputError
+            Without a JACK server.
+        """
+        settings = {"vibrator": self.vibrator.to_dict(), "name": self.name}
+        try:
+            self._child = Child("rig.simulated.process", settings)
+        except ChildLost as lost:
+            raise InputError(
+                f"expected the simulated vibrator to start, got: {lost}; look whether a JACK "
+                "server runs."
+            ) from None
+
+    def close(self) -> None:
+        """End it; closing twice does nothing."""
+        if self._child is not None:
+            self._child.close()
+            self._child = None
+
+    @property
+    def runs(self) -> bool:
+        """Whether it was started and has not ended."""
+        return self._child is not None and self._child.runs
+
+    def __enter__(self) -> SimulatedCard:
+        self.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,89 @@
+"""The simulated vibrator as a client of JACK: `python -m rig.simulated.process SETTINGS`.
+
+It answers with a line of JSON once it runs, and ends with its standard input. To PortAudio it is a
+device of its own: what is played on it comes back as its input, shaken and measured.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from typing import Any
+
+import numpy as np
+
+from modeling.arrays import Floats
+from modeling.errors import InputError, shown
+from rig.live.driven import settings_from_parent, tell
+from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.sound.devices import SoundDevice, portaudio, sound_devices
+
+CHANNELS = 2
+
+
+def main() -> None:
+    """Run until standard input ends."""
+    settings = settings_from_parent()
+    try:
+        stream = _stream(SimulatedVibrator(**settings["vibrator"]), name=settings["name"])
+        stream.start()
+    except InputError as error:
+        tell({"error": str(error)})
+        return
+    tell({"running": True})
+    sys.stdin.read()
+
+
+def _stream(vibrator: SimulatedVibrator, *, name: str) -> Any:
+    """A stream that shakes the vibrator by the first channel and gives its accelerometer there.
+
+    The other channel comes back as it is played.
+    """
+    library = portaudio()
+    _name_client(library, name)
+    card = _jack_device()
+    accelerometer = SimulatedAccelerometer(vibrator, rate_hz=card.rate_hz)
+
+    def shake(played: Floats, measured: Floats, *_: object) -> None:
+        measured[:] = played
+        measured[:, 0] = accelerometer.give(played[:, 0])
+
+    return library.Stream(
+        samplerate=card.rate_hz,
+        device=card.index,
+        channels=CHANNELS,
+        dtype=np.float32,
+        blocksize=0,  # as the server has it: no delay of its own
+        callback=shake,
+    )
+
+
+def _name_client(library: Any, name: str) -> None:
+    """Under this name the server, and PortAudio in other programs, list this process."""
+    portaudio_itself = ctypes.CDLL(library._libname)
+    if not hasattr(portaudio_itself, "PaJack_SetClientName"):
+        raise InputError(
+            "expected PortAudio with JACK, got one without; the simulated vibrator runs on Linux "
+            "with libportaudio2 and jackd2."
+        )
+    if portaudio_itself.PaJack_SetClientName(name.encode()) != 0:
+        raise InputError(
+            f"expected a short name of the simulated vibrator, got {shown(name)}; shorten it."
+        )
+    library._terminate()  # the client is opened when PortAudio starts
+    library._initialize()
+
+
+def _jack_device() -> SoundDevice:
+    """The server's own device."""
+    for device in sound_devices():
+        if "JACK" in device.host and device.name == "system":
+            return device
+    raise InputError(
+        "expected a JACK server for the simulated vibrator, got none; start one: jackd -d dummy -r "
+        "48000 -p 128."
+    )
+
+
+if __name__ == "__main__":
+    main()

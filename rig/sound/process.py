@@ -1,0 +1,207 @@
+"""The process that plays: `python -m rig.sound.process SETTINGS`, driven by lines of JSON.
+
+A process of its own, so that nothing that the experiment does delays it and it can be killed when a
+sound server hangs. PortAudio calls `tq_sound_callback` (`rig/live/sound.h`); Python here only
+prepares what shall play. When its input ends, which means that its parent is gone, it fades to
+silence and ends. docs/method/live.md#processes
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import os
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from modeling.errors import InputError
+from modeling.rendering.compiled import filled_texture, render_counters
+from rig.live.driven import settings_from_parent, tell
+from rig.live.memory import Live, compiled
+from rig.sound.devices import check_rate, find_device, portaudio
+
+STALE_S = 0.1
+FADE_S = 5e-3
+LONGEST_END_S = 1.0  # PortAudio hangs where its server has died
+_MILLION = 1_000_000
+
+
+@dataclass
+class _Source:
+    """What plays, and all memory that the callback reads of it."""
+
+    kind: str
+    address: Any
+    kept: tuple[Any, ...]
+
+
+class Playing:
+    """The stream and its sources."""
+
+    def __init__(self, settings: Mapping[str, Any]) -> None:
+        module = compiled()
+        self._ffi, self._lib = module.ffi, module.lib
+        self._live = Live.attach(settings["live"])
+        self._sources: dict[int, _Source] = {}
+        rate_hz, channels = float(settings["rate_hz"]), int(settings["channels"])
+        device = find_device(settings["device"], "output", channels=channels)
+        check_rate(device, "output", rate_hz=rate_hz, channels=channels)
+        self._memory = self._ffi.new("char[]", self._lib.tq_sound_size())
+        self._sound = self._ffi.cast("tq_sound *", self._memory)
+        masking = settings["masking_channel"]
+        self._lib.tq_sound_start(
+            self._sound,
+            self._live.address,
+            max(1, round(FADE_S * rate_hz)),
+            channels,
+            settings["vibration_channel"],
+            -1 if masking is None else masking,
+            settings["fullscale_per_g"],
+            STALE_S,
+            settings["masking_key"],
+        )
+        self._stream = self._open(device.index, rate_hz, channels, int(settings["block"]))
+        self._stream.start()
+
+    def _open(self, device: int, rate_hz: float, channels: int, block: int) -> Any:
+        library = portaudio()
+        outside = library._ffi
+        callback = self._ffi.addressof(self._lib, "tq_sound_callback")
+        try:
+            return library._StreamBase(
+                kind="output",
+                samplerate=rate_hz,
+                blocksize=block,
+                device=device,
+                channels=channels,
+                dtype="float32",
+                latency="low",
+                clip_off=True,
+                dither_off=True,
+                callback=outside.cast("PaStreamCallback *", self._address(callback)),
+                userdata=outside.cast("void *", self._address(self._sound)),
+            )
+        except library.PortAudioError as error:
+            raise InputError(
+                f"expected a sound device that opens, got {error}; close other programs that use "
+                "it, or choose another rate or block."
+            ) from None
+
+    def _address(self, pointer: Any) -> int:
+        return int(self._ffi.cast("uintptr_t", pointer))
+
+    @property
+    def latency_s(self) -> float:
+        """Of the output, as PortAudio states it."""
+        return float(self._stream.latency)
+
+    def surface(self, wanted: Mapping[str, Any]) -> None:
+        """Play a texture from now on."""
+        real = np.float64
+        fields = {
+            name: np.array(value, dtype=real) if isinstance(value, list) else value
+            for name, value in wanted["texture"].items()
+        }
+        texture, arrays = filled_texture(self._ffi, fields, real)
+        row = -(-texture.layers // self._lib.TQ_LANES) * self._lib.TQ_LANES
+        reals = self._lib.TQ_ROWS * row + texture.taps - 1 + self._lib.TQ_CHUNK  # TQ_MEMORY
+        memory = self._ffi.new("tq_real[]", reals)
+        source = self._ffi.new("tq_surface *")
+        number = wanted["presentation"]
+        self._lib.tq_surface_start(source, texture, memory, wanted["key"], number)
+        self._sources[number] = _Source("surface", source, (texture, arrays, memory))
+        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+
+    def signal(self, wanted: Mapping[str, Any]) -> None:
+        """Play a signal once."""
+        samples = np.frombuffer(base64.b64decode(wanted["samples"]), dtype="<f4").astype("=f4")
+        held = self._ffi.from_buffer("float[]", samples)
+        source = self._ffi.new("tq_signal *")
+        number = wanted["presentation"]
+        self._lib.tq_signal_start(source, held, samples.size, number)
+        self._sources[number] = _Source("signal", source, (samples, held))
+        self._lib.tq_sound_want(self._sound, self._ffi.NULL, source)
+
+    def silence(self) -> None:
+        """Fade to silence."""
+        self._lib.tq_sound_want(self._sound, self._ffi.NULL, self._ffi.NULL)
+
+    def mask(self, level: float) -> None:
+        """Masking noise of this RMS, in shares of full scale."""
+        self._lib.tq_sound_mask(self._sound, round(level * _MILLION))
+
+    def counted(self, number: int) -> dict[str, int]:
+        """What rendering a surface had to correct so far; of a signal nothing."""
+        source = self._sources.get(number)
+        if source is None or source.kind != "surface":
+            return {}
+        return vars(render_counters(source.address.voice.state.counters))
+
+    def forget(self) -> None:
+        """Free what is not used any more, but the latest."""
+        for number in sorted(self._sources)[:-1]:
+            source = self._sources[number]
+            uses = getattr(self._lib, f"tq_sound_uses_{source.kind}")
+            if not uses(self._sound, source.address):
+                del self._sources[number]
+
+    def close(self) -> None:
+        """Fade to silence and end; the process ends even where PortAudio hangs."""
+        threading.Thread(target=_end_after, args=(LONGEST_END_S,), daemon=True).start()
+        self.silence()
+        self.mask(0)
+        end = time.monotonic() + LONGEST_END_S / 2
+        while self._lib.tq_sound_plays(self._sound) and time.monotonic() < end:
+            time.sleep(0.002)
+        time.sleep(FADE_S + min(self.latency_s, LONGEST_END_S / 4))
+        self._stream.stop()
+        self._stream.close()
+        self._live.close()
+
+
+def _end_after(seconds: float) -> None:
+    time.sleep(seconds)
+    os._exit(1)
+
+
+def _answer(playing: Playing, wanted: Mapping[str, Any]) -> dict[str, Any]:
+    match wanted["do"]:
+        case "surface":
+            playing.surface(wanted)
+        case "signal":
+            playing.signal(wanted)
+        case "silence":
+            playing.silence()
+        case "mask":
+            playing.mask(wanted["level"])
+        case "counted":
+            return {"counters": playing.counted(wanted["presentation"])}
+    playing.forget()
+    return {}
+
+
+def main() -> None:
+    """Play what the lines on the standard input say, until they end."""
+    try:
+        playing = Playing(settings_from_parent())
+    except InputError as error:
+        tell({"error": str(error)})
+        return
+    tell({"latency_s": playing.latency_s})
+    try:
+        for line in sys.stdin:
+            tell(_answer(playing, json.loads(line)))
+    except BrokenPipeError:
+        pass
+    finally:
+        playing.close()
+
+
+if __name__ == "__main__":
+    main()

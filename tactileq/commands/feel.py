@@ -1,0 +1,80 @@
+"""tactileq feel: models under the hand, without an experiment."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.options import Criterion, HoldAbove, ThresholdName, VibratorFile
+
+if TYPE_CHECKING:
+    from experiments.feel.live_rig import LiveRig
+
+
+def feel(
+    models: Annotated[
+        list[Path],
+        typer.Argument(metavar="MODEL…", help="Full models: files (JSON), or folders of them."),
+    ],
+    rig: Annotated[
+        Path | None,
+        typer.Option("--rig", help="Rig file (TOML); without it, mouse pointer and usual sound."),
+    ] = None,
+    simplified: Annotated[
+        Path | None, typer.Option("--simplified", help="Folder of simplified models.")
+    ] = None,
+    threshold: ThresholdName = "codec",
+    criterion: Criterion = "energy",
+    hold_above: HoldAbove = True,
+    vibrator: VibratorFile = None,
+    fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
+    screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
+) -> None:
+    """Feel models under your hand, and see what plays and which layers are felt.
+
+    A window shows the spectrum at the hand's speed and force, each layer against the detection
+    threshold, the hand on the model's grid, level and limits. Keys: 1–9 and arrows switch textures,
+    F full and simplified, Space stops and plays, M masking noise, Escape ends.
+
+    Without a rig file the mouse pointer is the hand, its force is assumed, and the system's usual
+    sound device plays, not calibrated; where there is none, nothing is played. The window says so.
+
+    Example: tactileq feel models --simplified simplified --rig rig.toml
+
+    Example: tactileq feel models/canvas.json
+    """
+    from experiments.feel.textures import load_textures
+    from experiments.feel.view import Yardstick
+    from experiments.feel.visit import Visit
+    from experiments.feel.window import FeelWindow
+    from modeling import Threshold
+
+    textures = load_textures(models, simplified)
+    yardstick = Yardstick(
+        threshold=Threshold.named(threshold), criterion=criterion, hold_above=hold_above
+    )
+    with (
+        opened_rig(rig, vibrator) as felt,
+        FeelWindow(
+            Visit(textures, felt), yardstick, fullscreen=fullscreen, screen=screen
+        ) as window,
+    ):
+        window.run()
+
+
+def opened_rig(rig: Path | None, vibrator: Path | None) -> AbstractContextManager[LiveRig]:
+    """The rig of this file, or what any computer has."""
+    from experiments.feel.opening import demonstration, desk
+    from modeling import Vibrator
+
+    if rig is None:
+        return demonstration(None if vibrator is None else Vibrator.load(vibrator))
+    if vibrator is not None:
+        raise ValueError(
+            f"expected the vibrator in the rig file {rig}, got --vibrator beside it; name its file "
+            "under [vibrator] there."
+        )
+    return desk(rig)

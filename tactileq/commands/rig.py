@@ -1,0 +1,26 @@
+"""tactileq rig: what one does with a rig before and beside an experiment."""
+
+from __future__ import annotations
+
+import typer
+
+from tactileq.commands.rig_calibrate import rig_calibrate
+from tactileq.commands.rig_check import rig_check
+from tactileq.commands.rig_latency import rig_latency
+from tactileq.commands.rig_monitor import rig_monitor
+from tactileq.commands.rig_play import rig_play
+from tactileq.commands.rig_range import rig_range
+from tactileq.commands.rig_twin import rig_twin
+
+rig = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="A rig for real hands: what is there, how it does, its calibration and latency.",
+)
+rig.command("check")(rig_check)
+rig.command("monitor")(rig_monitor)
+rig.command("calibrate")(rig_calibrate)
+rig.command("latency")(rig_latency)
+rig.command("range")(rig_range)
+rig.command("play")(rig_play)
+rig.command("twin")(rig_twin)

@@ -1,0 +1,147 @@
+"""tactileq rig latency: from the hand to the vibration, end to end."""
+
+from __future__ import annotations
+
+from datetime import date
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.options import RigPath, Seed
+from tactileq.telling import share_of
+
+if TYPE_CHECKING:
+    from rig.calibration.latency import LatencySummary, Part
+    from rig.calibration.trials import Watched
+    from rig.setup.rig_file import RigFile
+
+
+def rig_latency(
+    rig: RigPath = Path("rig.toml"),
+    trials: Annotated[int, typer.Option(min=50, max=1000, help="How many.")] = 60,
+    hand: Annotated[
+        bool,
+        typer.Option(
+            "--hand", help="Your own strokes, instead of a scripted hand that starts suddenly."
+        ),
+    ] = False,
+    level_g: Annotated[
+        float | None,
+        typer.Option("--level", help="RMS of the vibration, in g; half the limits without it."),
+    ] = None,
+    accept: Annotated[
+        str | None,
+        typer.Option("--accept", help="Why more than 40 ms may be; kept in the rig file."),
+    ] = None,
+    seed: Seed = 0,
+) -> None:
+    """Measure the latency from hand to vibration, and write it into the rig file.
+
+    A scripted hand steps from rest to a stroke; its readings pass the same process, filter, shared
+    memory and audio callback as any hand's, and the accelerometer (or a cable from output to input)
+    shows when the vibration begins. With --hand you stroke, and the vibration's level is compared
+    with your speed. More than 40 ms in 95 % of trials is refused without --accept.
+
+    Example: tactileq rig latency --rig rig.toml
+    """
+    from rig.calibration.latency import check_latency, parts_of, summary_of
+    from rig.calibration.signals import usual_rms_g
+    from rig.calibration.steps import latency_figures
+    from rig.setup.rig_file import RigFile
+
+    loaded = RigFile.load(rig)
+    rms_g = usual_rms_g(loaded.safe_limits) if level_g is None else level_g
+    with TemporaryDirectory() as folder:
+        seen, latencies, loop_s = _measured(
+            loaded, Path(folder), trials=trials, hand=hand, rms_g=rms_g, seed=seed
+        )
+    summary = summary_of(latencies, seed=seed)
+    parts = parts_of(seen.readings["time_s"], seen.blocks, rate_hz=loaded.sound.rate_hz)
+    _show(summary, parts, loop_s=loop_s, filter_s=loaded.hand.filter_delay_s.value)
+    check_latency(summary, accepted=accept)
+    how = "strokes by hand" if hand else "a scripted hand that steps"
+    figures = latency_figures(loaded, summary, how=how, accepted=accept, today=date.today())
+    RigFile.updated(rig, figures)
+    print(f"{', '.join(figures)}: {rig}")
+
+
+def _measured(
+    rig: RigFile, folder: Path, *, trials: int, hand: bool, rms_g: float, seed: int
+) -> tuple[Watched, list[float | None], float]:
+    """What was seen, each trial's latency, and the loop-back's."""
+    from dataclasses import replace
+
+    from rig.calibration.measuring import Accelerometer
+    from rig.calibration.opening import accelerometer_input, opened_sound
+    from rig.calibration.trials import (
+        STROKE_S,
+        loop_back_s,
+        probe_texture,
+        step_latencies_s,
+        stroke_latencies_s,
+        watched,
+        write_steps,
+    )
+    from rig.desk.parts import hand_settings
+    from rig.hand.reader import HandReader
+    from rig.live.memory import Live
+
+    settings = hand_settings(rig)
+    if not hand:
+        seconds = write_steps(folder / "steps.tsv", trials, seed=seed)
+        settings = replace(settings, kind="scripted", script=str(folder / "steps.tsv"))
+    else:
+        seconds = 1.5 * trials * STROKE_S
+    with (
+        accelerometer_input(rig) as source,
+        Live.create() as live,
+        opened_sound(rig, live) as sound,
+    ):
+        accelerometer = Accelerometer(source)
+        loop_s = loop_back_s(sound, accelerometer, rate_hz=rig.sound.rate_hz, rms_g=rms_g)
+        floor = accelerometer.record(0.5)
+        sound.play(probe_texture(rms_g))
+        if hand:
+            print(f"Stroke to and fro, about 10 cm wide and once a second, for {seconds:.0f} s.")
+        with HandReader(live, settings), share_of("Trials") as tell:
+            seen = watched(live, accelerometer, seconds, tick=lambda share: tell(share, ""))
+        sound.silence()
+    if not hand:
+        return seen, step_latencies_s(seen), loop_s
+    from rig.calibration.latency import high_passed
+
+    quiet = high_passed(floor.samples_g, rate_hz=floor.rate_hz)
+    delay_s = rig.hand.filter_delay_s.value
+    lags = stroke_latencies_s(seen, floor_g2=float((quiet**2).mean()))
+    return seen, [None if lag is None else lag + delay_s for lag in lags], loop_s
+
+
+def _show(summary: LatencySummary, parts: list[Part], *, loop_s: float, filter_s: float) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from rig.calibration.latency import AIM_MS
+
+    table = Table(box=None, pad_edge=False)
+    table.add_column("ms")
+    table.add_column("median", justify="right")
+    table.add_column("95 % within", justify="right")
+    table.add_row("filter of the hand, as stated", f"{1e3 * filter_s:.1f}", "")
+    for part in parts:
+        table.add_row(part.name, f"{part.median_ms:.1f}", f"{part.p95_ms:.1f}")
+    table.add_row("output to record (loop-back)", f"{1e3 * loop_s:.1f}", "")
+    table.add_row(
+        "hand to vibration, all of it", f"{summary.median_ms:.1f}", f"{summary.p95_ms:.1f}"
+    )
+    Console().print(table)
+    low, high = summary.median_within_ms
+    low95, high95 = summary.p95_within_ms
+    missed = f", {summary.missed} without a vibration" if summary.missed else ""
+    print(
+        f"{summary.trials} trials{missed}; median within {low:.1f} to {high:.1f} ms, 95th "
+        f"percentile within {low95:.1f} to {high95:.1f} ms (95 %). The loop-back is included."
+    )
+    if summary.p95_ms > AIM_MS:
+        print(f"note: {AIM_MS:g} ms is the aim; smaller blocks and a faster device come nearer.")

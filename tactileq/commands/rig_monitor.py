@@ -1,0 +1,152 @@
+"""tactileq rig monitor: a running rig, live in the terminal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tactileq.interruption import Interrupted
+from tactileq.options import RigPath
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from modeling.models.loading import Layered
+    from modeling.rendering.plan import RenderCounters
+    from rig.monitoring.figures import Range, Snapshot
+    from rig.setup.rig_file import RigFile
+
+_EVERY_S = 0.1
+
+
+def rig_monitor(
+    model: Annotated[
+        Path | None,
+        typer.Argument(metavar="[MODEL]", help="What plays under the hand; silence without it."),
+    ] = None,
+    rig: RigPath = Path("rig.toml"),
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.")
+    ] = None,
+) -> None:
+    """Show a rig live: hand, level, limits, missed blocks, latency, time that the callback takes.
+
+    Beside it the misses of a thread that only wakes up once per block: what it misses is the
+    machine's, not the rig's. Ctrl-C ends it with one line.
+
+    Example: tactileq rig monitor models/canvas.json --rig rig.toml
+    """
+    from modeling.models.ar_model import ARModel
+    from modeling.models.loading import load_model
+    from rig.setup.rig_file import RigFile
+
+    loaded = RigFile.load(rig)
+    if model is None:
+        return _watch(loaded, None, seconds)
+    playing = load_model(model)
+    if isinstance(playing, ARModel):
+        raise ValueError(f"expected a model of layers, got an AR model in {model}; choose another.")
+    return _watch(loaded, playing, seconds)
+
+
+def _watch(rig: RigFile, model: Layered | None, seconds: float | None) -> None:
+    """Open the rig and show it until it is ended; the last line sums up."""
+    from rich.live import Live as Screen
+
+    from rig.calibration.opening import opened_sound
+    from rig.desk.parts import hand_settings
+    from rig.hand.reader import HandReader
+    from rig.live.child import Child
+    from rig.live.memory import Live
+    from rig.monitoring.figures import Monitor
+
+    rate_hz, period_s = rig.sound.rate_hz, rig.sound.block / rig.sound.rate_hz
+    with (
+        Live.create() as live,
+        HandReader(live, hand_settings(rig)) as hand,
+        opened_sound(rig, live) as sound,
+    ):
+        monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
+        bare = Child("rig.monitoring.bare_thread", {"period_s": period_s})
+        if model is not None:
+            sound.play(model)
+        start = time.monotonic()
+        faults: list[str] = []
+        snapshot, missed = monitor.look(), bare.ask({})
+        try:
+            with Screen(auto_refresh=False, transient=True) as screen:
+                while seconds is None or time.monotonic() - start < seconds:
+                    time.sleep(_EVERY_S)
+                    faults += [*hand.faults(), *sound.faults()]
+                    snapshot, missed = monitor.look(), bare.ask({})
+                    screen.update(_table(snapshot, missed, faults[-3:]), refresh=True)
+        except Interrupted as end:
+            if end.signal_name != "SIGINT":
+                raise
+        finally:
+            bare.close()
+        counted = sound.silence()
+    for fault in faults:
+        print(f"fault: {fault}")
+    limited = 0 if counted is None else _limited(counted.counters)
+    print(_summary(snapshot, missed, time.monotonic() - start, limited=limited))
+
+
+def _grid(model: Layered | None) -> tuple[Range, Range] | None:
+    """Speeds and forces of a model's conditions, lowest and highest."""
+    if model is None:
+        return None
+    speeds, forces = model.speeds_mm_s, model.forces_n
+    return (float(speeds[0]), float(speeds[-1])), (float(forces[0]), float(forces[-1]))
+
+
+def _table(now: Snapshot, bare: Mapping[str, int], faults: Sequence[str]) -> Table:
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(show_header=False, box=None, pad_edge=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column(overflow="fold")
+    grid = {None: "", True: ", in the grid", False: ", outside the grid"}[now.in_grid]
+    hand = f"{now.speed_mm_s:8.1f} mm/s  {now.force_n:6.2f} N{grid}"
+    table.add_row("hand", hand + (f" ({now.hand})" if now.hand else ""))
+    bar = "█" * min(40, round(40 * now.peak_g / max(now.limit_g, 1e-9)))
+    table.add_row("level", f"{now.rms_g:8.4f} g RMS  {now.peak_g:6.3f} g peak  {bar}")
+    table.add_row("at the limit", f"{now.limited_blocks} of {now.blocks} blocks")
+    table.add_row("without hand", f"{now.stale_blocks} of {now.blocks} blocks")
+    table.add_row(
+        "missed", f"{now.misses} of {now.blocks} blocks; a bare thread {_bare(bare)} wake-ups"
+    )
+    table.add_row("callback", _callback(now))
+    table.add_row(
+        "delay", f"reading {now.reading_ms:.1f} ms old, output {now.output_ms:.1f} ms, as stated"
+    )
+    for fault in faults:
+        table.add_row(Text("fault", style="red"), Text(fault))
+    return table
+
+
+def _limited(counters: RenderCounters) -> int:
+    return counters.limited_peak + counters.limited_rms + counters.limited_duration
+
+
+def _bare(bare: Mapping[str, int]) -> str:
+    return f"{bare['misses']} of {bare['periods']}"
+
+
+def _callback(now: Snapshot) -> str:
+    return (
+        f"takes {now.share_p50:.1%} of a block (median), {now.share_p999:.1%} in 99.9 % of blocks"
+    )
+
+
+def _summary(now: Snapshot, bare: Mapping[str, int], seconds: float, *, limited: int) -> str:
+    return (
+        f"{seconds:.0f} s: {now.misses} of {now.blocks} blocks missed (a bare thread "
+        f"{_bare(bare)} wake-ups), {now.stale_blocks} without a fresh hand, {limited} samples at a "
+        f"limit; the callback {_callback(now)}"
+    )

@@ -1,0 +1,121 @@
+"""tactileq rig play: a tone burst, or a file of a stimulus set, at a resting hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rig.setup.rig_file import RigFile
+    from rig.sound.signals import PreparedSignal
+
+
+def rig_play(
+    rig: Annotated[Path, typer.Option("--rig", help="Rig file (TOML).")],
+    stimuli: Annotated[
+        Path | None, typer.Option("--set", help="Folder of tactileq stimuli.")
+    ] = None,
+    which: Annotated[
+        str | None, typer.Option("--file", help="Name or SHA-256 of one of its files.")
+    ] = None,
+    tone_hz: Annotated[float | None, typer.Option("--tone", help="A sinusoid instead, Hz.")] = None,
+    amplitude_g: Annotated[
+        float, typer.Option("--amplitude", help="Of the sinusoid at the pen, g.")
+    ] = 0.1,
+    duration_s: Annotated[float, typer.Option("--duration", help="Of the sinusoid, s.")] = 1.0,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="How often.")] = 1,
+) -> None:
+    """Play a calibrated tone burst, or a file of a stimulus set, at a resting hand.
+
+    Example: tactileq rig play --rig rig.toml --tone 250 --amplitude 0.1
+
+    Example: tactileq rig play --rig rig.toml --set stimuli-set --file canvas_full_1.wav
+    """
+    from rig.setup.rig_file import RigFile
+
+    loaded = RigFile.load(rig)
+    signal = chosen_signal(
+        loaded, stimuli, which, tone_hz, amplitude_g=amplitude_g, duration_s=duration_s
+    )
+    play(loaded, signal, times=times)
+    simulated = "simulated " if signal.simulated else ""
+    seconds = signal.samples_g.size / signal.rate_hz
+    print(f"{simulated}signal of {seconds:.3g} s played {times} times on {loaded.rig.name}")
+
+
+def chosen_signal(
+    rig: RigFile,
+    stimuli: Path | None,
+    which: str | None,
+    tone_hz: float | None,
+    *,
+    amplitude_g: float,
+    duration_s: float,
+) -> PreparedSignal:
+    """The signal that the options name, fit for the rig.
+
+    Raises
+    ------
+    ValueError
+        For neither or both; another rate than the card's; another vibrator than the rig's.
+    """
+    from rig.sound.signals import stimulus, tone_burst
+
+    if (tone_hz is None) == (stimuli is None) or (stimuli is None) != (which is None):
+        raise ValueError(
+            "expected a tone (--tone) or a file of a set (--set and --file), got neither or both; "
+            "give one."
+        )
+    if tone_hz is not None:
+        return tone_burst(tone_hz, amplitude_g, duration_s=duration_s, rate_hz=rig.sound.rate_hz)
+    assert stimuli is not None
+    assert which is not None
+    signal = stimulus(stimuli, which)
+    if signal.rate_hz != rig.sound.rate_hz:
+        raise ValueError(
+            f"expected a file at {rig.sound.rate_hz:g} Hz, the rate of the card, got {which} at "
+            f"{signal.rate_hz:g} Hz; make the set with that rate_hz."
+        )
+    check_vibrator(rig, signal, which)
+    return signal
+
+
+def check_vibrator(rig: RigFile, signal: PreparedSignal, which: str) -> None:
+    """Refuse a file that is compensated for another vibrator than the rig's."""
+    import hashlib
+
+    from modeling.files.reading import read_bytes
+
+    wanted = signal.vibrator_sha256
+    if wanted is None:
+        return
+    file = rig.vibrator.file
+    own = None
+    if file is not None:
+        own = hashlib.sha256(read_bytes(rig.path.parent / file, "the vibrator")).hexdigest()
+    if own != wanted:
+        raise ValueError(
+            f"expected a file for the vibrator of {rig.path}, got {which}, which is compensated "
+            "for another one; make the set with the rig's vibrator, or without any."
+        )
+
+
+def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
+    """Play a signal so often, one after the other."""
+    from rig.desk.lock import rig_locked
+    from rig.desk.parts import sound_output
+    from rig.live.memory import Live
+    from tactileq.telling import progress
+
+    compensated = signal.vibrator_sha256 is not None
+    with rig_locked(rig.rig.name), Live.create() as live:
+        sound = sound_output(rig, live)
+        sound.checked(signal.samples_g, compensated=compensated)  # before anything is opened
+        with sound, progress("Playing", times) as advance:
+            for _ in range(times):
+                sound.play_signal(signal.samples_g, compensated=compensated, wait=True)
+                advance("")
+        for fault in sound.faults():
+            typer.echo(f"warning: {fault}", err=True)

@@ -1,0 +1,120 @@
+"""Answers to trials that were repeated because the rig had failed."""
+
+from __future__ import annotations
+
+import pytest
+
+from analysis.answers.loading import load_responses
+from modeling import InputError
+
+COLUMNS = (
+    *("trial", "phase", "texture", "model", "tray", "first_surface", "magnitude_similarity"),
+    *("frequency_similarity", "toggles", "response_time_s", "valid", "repeats", "simulated"),
+)
+VALID, REPEATS = COLUMNS.index("valid"), COLUMNS.index("repeats")
+
+
+def answers(rows):
+    """The rows with two more columns: all valid, no repeats."""
+    return [[*row[:-1], "1", "n/a", row[-1]] for row in rows]
+
+
+def repeat(row, *, number, valid="1"):
+    again = list(row)
+    again[0], again[VALID], again[REPEATS] = str(number), valid, row[0]
+    return again
+
+
+@pytest.fixture
+def write(write_task, write_order, absolute_rows):
+    """Writes answers, and the order of the fifteen planned trials."""
+
+    def written(rows):
+        path = write_task("absolute", rows, columns=COLUMNS)
+        write_order("absolute", absolute_rows)
+        return path
+
+    return written
+
+
+@pytest.fixture
+def failed(absolute_rows):
+    """A training trial and two main ones failed; the second main one again in its repeat."""
+    training, *main = answers(absolute_rows)
+    for row in (training, main[2], main[6]):
+        row[VALID] = "0"
+    return [
+        training,
+        repeat(training, number=16),
+        *main,
+        repeat(main[2], number=17),
+        repeat(main[6], number=18, valid="0"),
+    ]
+
+
+def test_repeats_replace_what_failed_and_what_failed_is_counted(study_folder, write, failed):
+    write(failed)
+    responses = load_responses(study_folder)
+    (told,) = responses.warnings
+    assert told == (
+        "sub-01 absolute ses-01: 4 of 18 answers left out, since the rig failed in their trials "
+        "(3 repeated)."
+    )
+    main = responses.absolute
+    assert len(main) == 13
+    assert 17 in main["trial"].tolist()
+    assert not {3, 7, 18} & set(main["trial"])
+    assert responses.training["absolute"]["trial"].tolist() == [16]
+
+
+def test_a_session_that_ended_before_its_repeats_is_noticed(study_folder, write, failed):
+    write(failed[:-1])
+    told = load_responses(study_folder).warnings
+    assert "sub-01 absolute ses-01 answered 17 of 18 trials (ended early)." in told
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda rows: [*rows, repeat(rows[3], number=19)], "at most 18 answers"),
+        (lambda rows: rows[:1] + rows[2:], "expected trial 16 in answer 2"),
+        (lambda rows: [*rows[:-2], rows[-1], rows[-2]], "expected trial 17 in answer 17"),
+        (lambda rows: [*rows[:-2], repeat(rows[5], number=17)], "in answer 17"),
+        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "n/a", "false"]], "expected repeats 7"),
+        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "6", "false"]], "expected repeats 7"),
+    ],
+    ids=["again", "left out", "swapped", "of a valid trial", "unnamed", "of another"],
+)
+def test_any_other_order_of_repeats_is_refused(study_folder, write, failed, change, told):
+    write(change(failed))
+    with pytest.raises(InputError, match=told):
+        load_responses(study_folder)
+
+
+def test_a_planned_trial_that_is_called_a_repeat_is_refused(study_folder, write, absolute_rows):
+    rows = answers(absolute_rows)
+    rows[4][REPEATS] = "2"
+    write(rows)
+    with pytest.raises(InputError, match="expected repeats n/a in answer 5"):
+        load_responses(study_folder)
+
+
+def test_a_table_from_before_there_were_repeats_has_valid_answers_only(
+    study_folder, write_task, absolute_rows
+):
+    write_task("absolute", absolute_rows)
+    responses = load_responses(study_folder)
+    assert responses.warnings == ()
+    assert set(responses.absolute["valid"]) == {1.0}
+    assert responses.absolute["repeats"].isna().all()
+
+
+@pytest.mark.parametrize(
+    ("value", "told"), [("2", "from 0 to 1"), ("0.5", "1 or 0"), ("n/a", "a value in column")]
+)
+def test_what_is_neither_valid_nor_not_is_refused(study_folder, write, absolute_rows, value, told):
+    rows = answers(absolute_rows)
+    rows[3][VALID] = value
+    write(rows)
+    with pytest.raises(InputError, match=told):
+        load_responses(study_folder)

@@ -1,0 +1,97 @@
+"""Shows a visit on a rig that only notes, and tells the test what happens.
+
+Standard output: one JSON object per line: {"asked": …} for what the rig is asked, {"frame": …} with
+handles (pixels of the screen) and all words for the first frame and for each line of the standard
+input, which is the path of a picture of that frame, or "close" for the window's own button.
+"""
+
+import json
+import select
+import sys
+
+import numpy as np
+
+from experiments.feel import panels, window
+from experiments.feel.plots import LiveText
+from experiments.feel.rigs import HandNow, OutputNow
+from experiments.feel.textures import Texture
+from experiments.feel.view import Yardstick
+from experiments.feel.visit import Visit
+from modeling import Threshold, simplify
+from stimuli.planted.textures import planted_texture
+
+size = tuple(map(int, sys.argv[1:3]))
+live_texts = []
+pointed = set()
+
+
+def tell(**what):
+    print(json.dumps(what), flush=True)
+
+
+class NotedText(LiveText):
+    def __init__(self, *arguments, **options):
+        super().__init__(*arguments, **options)
+        live_texts.append(self)
+
+
+class NotingRig:
+    notes = ("simulated hand", "force assumed")
+    steps = 0
+    faults = ()
+
+    def present_model(self, model):
+        tell(asked=[model.texture, model.n_layers])
+
+    def silence(self):
+        self.faults = ("the tablet is gone.",)
+        tell(asked=["silence"])
+
+    def mask(self, on):
+        tell(asked=["mask", on])
+
+    def point(self, x, y, *, inside):
+        if inside:
+            pointed.add((x, y))
+
+    def hand(self):
+        self.steps += 1
+        phase = 0.1 * self.steps
+        speed, force = 200 * np.sin(phase), 1.5 + 0.5 * np.cos(phase)
+        return HandNow(speed_mm_s=speed, force_n=force, force_assumed=True)
+
+    def output(self):
+        return OutputNow(rms_g=0.1, peak_g=0.4, limits=("peak",), misses=2, latency_s=0.005)
+
+    def take_faults(self):
+        told, self.faults = self.faults, ()
+        return told
+
+
+def on_frame(shown):
+    global first
+    if not (first or select.select([sys.stdin], [], [], 0)[0]):
+        return
+    wanted = "" if first else sys.stdin.readline().strip()
+    first = False
+    if wanted == "close":
+        shown.window.winHandle.dispatch_event("on_close")
+    elif wanted:
+        shown.window.getMovieFrame(buffer="back")
+        shown.window.saveMovieFrames(wanted)
+    left, top = shown.window.winHandle.get_location()
+    handles = {name: (left + x, top + y) for name, (x, y) in shown.handles().items()}
+    tell(frame=handles, words=[text.content for text in live_texts])
+
+
+first = True
+window.LiveText = panels.LiveText = NotedText
+threshold = Threshold.shipped("codec")
+canvas, leather = planted_texture("canvas"), planted_texture("leather")
+textures = [Texture(full=canvas, simplified=simplify(canvas, threshold).model)]
+textures.append(Texture(full=leather))
+visit = Visit(textures, NotingRig())
+yardstick = Yardstick(threshold=threshold)
+with window.FeelWindow(visit, yardstick, size=size, on_frame=on_frame) as shown:
+    shown.run()
+tell(ended=True, pointed=sorted(pointed))

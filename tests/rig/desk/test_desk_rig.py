@@ -1,0 +1,187 @@
+"""The desk rig with its real processes: a scripted hand, and JACK's server without a card."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from modeling import InputError, TextureModel
+from rig.desk.checks import Requirements
+from rig.desk.desk_rig import DeskRig
+from rig.interface import SURFACES, TextureRig
+from stimuli.planted.textures import planted_texture
+from tests.rig.desk.rig_files import failures, rig_file
+
+Jack = Callable[..., AbstractContextManager[Any]]
+
+
+@pytest.fixture(scope="module")
+def model() -> TextureModel:
+    return planted_texture("PVC")
+
+
+@pytest.fixture
+def server(jack_server: Jack) -> Iterator[Any]:
+    with jack_server(block=128) as running:
+        yield running
+
+
+def wait(rig: DeskRig, seconds: float) -> None:
+    end_s = rig.now_s() + seconds
+    while rig.now_s() < end_s:
+        rig.read()
+        time.sleep(0.01)
+
+
+def test_what_was_presented_and_what_the_hand_did_is_told(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    file = rig_file(tmp_path)
+    with DeskRig(file, override="a pilot", seed=5) as rig:
+        stated = rig.stated
+        as_protocol: TextureRig = rig
+        assert as_protocol.simulated
+        assert rig.health().hand_age_s < 5
+        began_s = rig.now_s()
+        first_s = rig.present_model(model)
+        wait(rig, 0.6)
+        real_s = rig.present_real("PVC")
+        wait(rig, 0.2)
+        rig.silence()
+        virtual, real = rig.take_presentations()
+        rows = rig.take_history()
+    assert (stated["SHA256"], stated["Override"]) == (file.sha256, "a pilot")
+    assert set(stated["Assumed"]) == set(dict(file.assumed()))  # type: ignore[call-overload]
+    assert stated["Assumed"]["limits.peak_g"]["value"] == 5.0  # type: ignore[index]
+    assert stated["File"] == file.to_dict()
+    assert began_s < first_s == virtual.start_s < virtual.end_s < real_s == real.start_s
+    assert (virtual.surface, virtual.texture, virtual.number) == ("virtual", "PVC", 1)
+    assert virtual.model_sha256 == model.sha256
+    assert 0.1 < virtual.played_s < virtual.end_s - virtual.start_s + 0.1
+    assert 0 < virtual.rms_g < virtual.peak_g < 5.0
+    assert virtual.dose_g2_s == pytest.approx(virtual.rms_g**2 * virtual.played_s)
+    assert (real.surface, real.number, real.dose_g2_s, real.model_sha256) == ("real", 2, 0.0, "")
+    assert np.all(np.diff(rows.time_s) >= 0)
+    assert len(rows) / np.ptp(rows.time_s) >= 200
+    of = {name: rows.surface == SURFACES.index(name) for name in SURFACES}
+    assert all(mask.any() for mask in of.values())
+    assert set(rows.presentation[of["virtual"]]) == {1}
+    assert (
+        np.nanmax(rows.speed_mm_s) - np.nanmin(rows.speed_mm_s) > 50
+    )  # to and fro, so with its sign
+    assert np.isfinite(rows.force_n[of["virtual"]]).mean() > 0.5
+    assert np.isnan(rows.speed_mm_s[of["real"]]).all()  # nothing measures the hand there
+    assert np.isnan(rows.force_n[of["real"]]).all()
+
+
+def test_a_killed_sound_process_is_a_fault_and_the_next_presentation_plays(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(model)
+        pid = rig.parts.sound.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        wait(rig, 0.1)
+        rig.silence()
+        (told,) = failures(rig.take_faults())
+        assert "sound process" in told
+        rig.present_model(model)
+        wait(rig, 0.2)
+        rig.silence()
+        assert rig.parts.sound.pid != pid
+        assert failures(rig.take_faults()) == []
+        assert [record.played_s > 0.1 for record in rig.take_presentations()] == [False, True]
+
+
+def test_a_dead_server_is_a_fault_of_each_presentation_and_no_exception(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(model)
+        server.kill()
+        rig.present_real("PVC")
+        for _ in range(2):
+            rig.present_model(model)
+            rig.silence()
+            assert failures(rig.take_faults())
+
+
+def test_an_unplugged_hand_is_a_fault_and_its_rows_are_not_available(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(model)
+        rig.parts.reader.unplug()
+        wait(rig, 0.4)
+        assert (rig.read().speed_mm_s, rig.read().force_n) == (0.0, 0.0)
+        assert any("plug" in told for told in rig.health().problems)
+        rig.silence()
+        told = [fault.told for fault in rig.take_faults() if fault.invalidates]
+        assert any("unplugged" in sentence for sentence in told)
+        assert any("reading of the hand" in sentence for sentence in told)
+        (record,) = rig.take_presentations()
+        assert record.stale_blocks > 0
+        rows = rig.take_history()
+        assert np.isnan(rows.speed_mm_s[-10:]).all()
+
+
+def test_a_killed_reader_is_a_fault_and_is_replaced(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(model)
+        pid = rig.parts.reader.pid
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        end = time.monotonic() + 20
+        while rig.parts.reader.pid in (pid, None) or rig.health().problems:
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        rig.silence()
+        assert failures(rig.take_faults())
+        rig.present_model(model)
+        wait(rig, 0.1)
+        rig.silence()
+        assert failures(rig.take_faults()) == []
+
+
+def test_what_cannot_be_opened_is_refused_in_one_sentence_and_leaves_the_rig_free(
+    server: Any, tmp_path: Path
+) -> None:
+    for change, told in (
+        (("rate_hz = 48000", "rate_hz = 44100"), "expected a rate that 'system' does"),
+        (('device = "system"', 'device = "no such card"'), "'no such card', got none"),
+        (("g_per_volt = { value = 20.0", "g_per_volt = { value = 0.01"), "full scale"),
+        (('kind = "scripted"', 'kind = "scripted"\nscript = "none.csv"'), "none.csv"),
+    ):
+        with pytest.raises(InputError, match=told) as refused:
+            DeskRig(rig_file(tmp_path, change)).open()
+        assert "\n" not in str(refused.value)
+    rig = DeskRig(rig_file(tmp_path))
+    for _ in range(2):  # it can be opened again, and closing twice is harmless
+        rig.open()
+        assert rig.health().hand_age_s < 5
+        assert rig.present_real("PVC") < 5
+        rig.close()
+        rig.close()
+
+
+def test_two_sessions_on_one_rig_are_refused(server: Any, tmp_path: Path) -> None:
+    file = rig_file(tmp_path)
+    told = f"in use by process {os.getpid()}"
+    with DeskRig(file) as rig:
+        with pytest.raises(InputError, match=told):
+            DeskRig(file).open()
+        assert rig.health().hand_age_s < 5
+    old = Requirements(calibration_days=-1, measured_force=False)
+    with pytest.raises(InputError, match="calibration of the last"):
+        DeskRig(file, requirements=old)

@@ -1,0 +1,258 @@
+"""The hand's process and who watches it: readings, faults, and every way to end."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from modeling import InputError
+from modeling.files.tables import write_table
+from rig.hand.following import Follower
+from rig.hand.reader import HandReader
+from rig.hand.sample import Sample
+from rig.hand.settings import HandSettings
+from rig.hand.window import Pointer
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live, now_s
+
+HOLD = HandSettings(kind="scripted", script="hold", speed_mm_s=120.0, force_n=2.0)
+
+
+@pytest.fixture
+def live() -> Iterator[Live]:
+    with Live.create() as memory:
+        yield memory
+
+
+def wait_until(holds: Callable[[], bool], *, seconds: float = 20) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "expected it to happen"
+        time.sleep(0.01)
+
+
+def is_gone(live: Live) -> bool:
+    latest = live.latest()
+    return latest is not None and bool(latest["flags"] & GONE)
+
+
+def moves(live: Live) -> bool:
+    latest = live.latest()
+    return latest is not None and abs(latest["speed_mm_s"]) > 100
+
+
+def test_a_held_hand_is_read_with_its_speed_and_force(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: live.readings_written > 300)
+        _, rows = live.readings_since(0)
+        assert reader.faults() == ()
+        assert reader.device_name == "scripted hand"
+    settled = rows[20:]  # 40 ms
+    np.testing.assert_allclose(settled["speed_mm_s"], 120, rtol=1e-6)
+    assert set(settled["force_n"]) == {2.0}
+    assert set(settled["flags"]) == {CONTACT | SIMULATED}
+    assert (np.diff(rows["time_s"]) >= 0).all()
+    assert np.median(np.diff(rows["time_s"])) <= 0.005  # 200 a second or more, by their own clock
+    assert abs(rows["time_s"][-1] - now_s()) < 20
+
+
+def test_strokes_to_and_fro_change_their_sign(live: Live) -> None:
+    strokes = HandSettings(kind="scripted", speed_mm_s=200.0, force_n=1.0, strokes_per_s=4.0)
+    with HandReader(live, strokes):
+        wait_until(lambda: live.readings_written > 500)
+        _, rows = live.readings_since(0)
+    assert rows["speed_mm_s"].max() == pytest.approx(200, rel=0.05)
+    assert rows["speed_mm_s"].min() == pytest.approx(-200, rel=0.05)
+
+
+def test_closing_leaves_behind_that_nobody_touches(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        pid = reader.pid
+    assert is_gone(live)
+    latest = live.latest()
+    assert latest is not None
+    assert (latest["speed_mm_s"], latest["force_n"]) == (0, 0)
+    assert pid is not None
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+def test_unplugged_it_is_gone_with_one_fault_and_comes_back(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        reader.unplug()
+        wait_until(lambda: is_gone(live))
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 100)  # the heart goes on beating
+        assert reader.faults() == ("the device of the hand was unplugged on request.",)
+        reader.unplug(False)
+        wait_until(lambda: moves(live))
+        assert reader.faults() == ()
+
+
+def test_killed_it_is_gone_at_once_and_started_again(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first = reader.pid
+        assert first is not None
+        os.kill(first, signal.SIGKILL)
+        wait_until(lambda: is_gone(live))
+        wait_until(lambda: moves(live))
+        assert reader.pid != first
+        assert reader.faults() == (
+            "the process that reads the hand ended by SIGKILL and is started again.",
+        )
+
+
+def test_stopped_it_is_killed_and_replaced(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first = reader.pid
+        assert first is not None
+        os.kill(first, signal.SIGSTOP)
+        wait_until(lambda: is_gone(live))
+        wait_until(lambda: moves(live))
+        assert reader.pid != first
+        told = reader.faults()
+        assert told[0] == "the process that reads the hand has not written for 1 s and is killed."
+        assert len(told) == 2
+
+
+def test_the_hand_is_read_on_while_this_process_holds_pythons_lock(live: Live) -> None:
+    sleep_us = ctypes.PyDLL(None).usleep  # a C function that keeps the lock meanwhile
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first, written = reader.pid, live.readings_written
+        sleep_us(1_500_000)
+        meanwhile = live.readings_written - written
+        time.sleep(0.3)  # who watches wakes up, and finds a process that lives
+        assert meanwhile > 100
+        assert (reader.pid, reader.faults()) == (first, ())
+
+
+def test_ctrl_c_at_the_terminal_does_not_end_it(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first = reader.pid
+        assert first is not None
+        os.kill(first, signal.SIGINT)
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 200)
+        assert reader.faults() == ()
+        assert reader.pid == first
+
+
+def test_started_again_without_its_device_it_waits_for_it_and_is_watched(
+    live: Live, tmp_path: Path
+) -> None:
+    table = tmp_path / "hand.tsv"
+    rows = [(0.0, 0.0, 0.0, 1.0), (1000.0, 150_000.0, 0.0, 1.0)]
+    write_table(table, ("time_s", "x_mm", "y_mm", "force_n"), rows)
+    with HandReader(live, HandSettings(kind="scripted", script=str(table))) as reader:
+        wait_until(lambda: moves(live))
+        table.rename(tmp_path / "away.tsv")
+        os.kill(reader.pid or 0, signal.SIGKILL)
+        faults: list[str] = []
+        wait_until(lambda: bool(faults.extend(reader.faults()) or len(faults) == 2))
+        assert faults[1].startswith(f"expected a table at {table}, got nothing there")
+        second = reader.pid
+        os.kill(second or 0, signal.SIGSTOP)
+        wait_until(lambda: reader.pid not in (second, None))
+        assert is_gone(live)
+        (tmp_path / "away.tsv").rename(table)
+        wait_until(lambda: moves(live))
+
+
+def test_the_process_ends_when_its_parent_is_killed(live: Live) -> None:
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "import sys, time\n"
+            "from rig.hand.reader import HandReader\n"
+            "from rig.hand.settings import HandSettings\n"
+            "from rig.live.memory import Live\n"
+            "live = Live.attach(sys.argv[1])\n"
+            "reader = HandReader(live, HandSettings(kind='scripted', script='hold'))\n"
+            "reader.open()\n"
+            "print(reader.pid, flush=True)\n"
+            "time.sleep(600)\n",
+            str(live.path),
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    wait_until(lambda: moves(live))
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    wait_until(lambda: is_gone(live))
+    wait_until(lambda: not runs(pid))
+
+
+def runs(pid: int) -> bool:
+    """Whether a process does anything; one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_what_cannot_be_opened_is_refused_in_the_process_own_sentence(live: Live) -> None:
+    missing = HandSettings(kind="scripted", script="/no/such/table.tsv")
+    with pytest.raises(InputError, match=r"expected a table at /no/such/table.tsv, got nothing"):
+        HandReader(live, missing).open()
+    assert live.latest() is None
+
+
+def test_it_can_be_opened_again(live: Live) -> None:
+    reader = HandReader(live, HOLD)
+    for _ in range(2):
+        reader.open()
+        wait_until(lambda: moves(live))
+        reader.close()
+        assert is_gone(live)
+    reader.close()
+
+
+def test_a_window_pushes_pixels_and_force_is_assumed(live: Live) -> None:
+    window = HandSettings(kind="window", counts_per_mm=4.0, assumed_force_n=1.0)
+    with HandReader(live, window) as reader:
+        start_s = now_s()
+        while now_s() < start_s + 0.3:
+            reader.push(1000 * (now_s() - start_s), 0.0, button=True)
+            time.sleep(0.005)
+        _, rows = live.readings_since(0)
+        touching = rows[rows["flags"] == CONTACT | BUTTON | FORCE_ASSUMED]
+        assert np.median(touching["speed_mm_s"][20:]) == pytest.approx(250, rel=0.05)
+        assert set(touching["force_n"]) == {1.0}
+        reader.push(5000.0, 0.0, down=False)
+        wait_until(lambda: live.latest()["flags"] == FORCE_ASSUMED)  # type: ignore[index]
+        assert live.latest()["force_n"] == 0  # type: ignore[index]
+        wait_until(lambda: live.latest()["speed_mm_s"] == 0)  # type: ignore[index]
+    assert is_gone(live)
+
+
+def test_two_missed_frames_of_a_window_change_no_speed() -> None:
+    settings = HandSettings(kind="window", counts_per_mm=4.0, assumed_force_n=1.0)
+    follower = Follower(settings, rest_s=Pointer.rest_s)
+    for frame in (*range(20), *range(22, 40)):
+        follower.update(Sample(frame / 60, 100 * frame / 60, 0.0))
+        if frame > 2:
+            assert follower.at(frame / 60 + 0.049).speed_mm_s == pytest.approx(100)
+
+
+def test_only_a_window_is_pushed_to(live: Live) -> None:
+    with pytest.raises(InputError, match='expected a hand of kind "window" to push positions'):
+        HandReader(live, HOLD).push(1.0, 2.0)

@@ -1,0 +1,293 @@
+"""A serial sensor at a pseudo-terminal: lines to readings, and every way to be lost."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import tty
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from itertools import count
+
+import numpy as np
+import pytest
+
+from modeling import InputError
+from rig.hand import serial_sensor
+from rig.hand.loop import HandLoop
+from rig.hand.reader import HandReader
+from rig.hand.sample import ConnectedDevice, DeviceLost
+from rig.hand.serial_line import SensorLine, encode
+from rig.hand.serial_sensor import SerialSensor
+from rig.hand.settings import HandSettings
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+
+PERIOD_US = 2000
+
+
+def at_constant_speed(number: int) -> bytes:
+    """100 mm/s, 1.5 N; the clock wraps around after half a second."""
+    time_us = (2**32 - 500_000 + number * PERIOD_US) % 2**32
+    line = SensorLine(
+        number % 2**16, time_us, (number * 200, 0), 1500, contact=True, button=number % 100 > 50
+    )
+    return encode(line)
+
+
+class Board:
+    """A micro-controller that sends lines at the other end of a pseudo-terminal."""
+
+    def __init__(self) -> None:
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self.path = os.ttyname(self._slave)
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def write(self, text: bytes) -> None:
+        os.write(self._master, text)
+
+    def send(self, line: Callable[[int], bytes]) -> None:
+        """Send line 0, 1, 2 … every 2 ms, until `quiet` or `unplug`."""
+        self.quiet()
+        self._stop.clear()
+        self._thread = threading.Thread(target=self._run, args=(line,), daemon=True)
+        self._thread.start()
+
+    def _run(self, line: Callable[[int], bytes]) -> None:
+        start_s = time.monotonic()
+        for number in count():
+            wait_s = start_s + number * PERIOD_US * 1e-6 - time.monotonic()
+            if self._stop.wait(max(wait_s, 0)):
+                return
+            self.write(line(number))
+
+    def quiet(self) -> None:
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def unplug(self) -> None:
+        self.quiet()
+        for end in (self._master, self._slave):
+            with suppress(OSError):
+                os.close(end)
+
+
+@pytest.fixture
+def board() -> Iterator[Board]:
+    board = Board()
+    yield board
+    board.unplug()
+
+
+@pytest.fixture
+def live() -> Iterator[Live]:
+    with Live.create() as memory:
+        yield memory
+
+
+def settings_of(board: Board, **others: float) -> HandSettings:
+    return HandSettings.from_dict({"kind": "serial", "device": board.path, **others})
+
+
+def wait_until(holds: Callable[[], bool], *, seconds: float = 20) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "expected it to happen"
+        time.sleep(0.01)
+
+
+def is_gone(live: Live) -> bool:
+    latest = live.latest()
+    return latest is not None and bool(latest["flags"] & GONE)
+
+
+def test_a_clock_that_falls_behind_is_told_instead_of_a_hand_that_is_late(board: Board) -> None:
+    def at_four_fifths(number: int) -> bytes:
+        time_us = number * PERIOD_US * 4 // 5
+        return encode(SensorLine(number % 2**16, time_us, (0, 0), 1500, contact=True, button=False))
+
+    def read_on(sensor: SerialSensor) -> None:
+        end = time.monotonic() + 20
+        while time.monotonic() < end:
+            sensor.wait(0.002)
+            sensor.read()
+
+    board.send(at_four_fifths)
+    sensor = SerialSensor.open(settings_of(board))
+    with pytest.raises(DeviceLost, match="expected a clock within 0.5%"):
+        read_on(sensor)
+    sensor.close()
+
+
+def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
+    board: Board, live: Live
+) -> None:
+    board.send(at_constant_speed)
+    with HandReader(live, settings_of(board)) as reader:
+        assert reader.device_name == f"serial sensor at {board.path}"
+        wait_until(lambda: reader.counts().get("lines", 0) > 700)
+        _, rows = live.readings_since(0)
+        assert reader.counts()["bad"] == 0
+        assert reader.counts()["missing"] == 0
+    rows = rows[rows["flags"] & GONE == 0]  # a board that is held up for 0.1 s counts as gone
+    after = rows[rows["time_s"] > rows["time_s"][0] + 0.6]  # the clock has wrapped around
+    assert np.median(after["speed_mm_s"]) == pytest.approx(100, rel=0.02)
+    assert set(after["force_n"]) == {1.5}
+    assert set(after["flags"]) == {CONTACT, CONTACT | BUTTON}
+
+
+def test_a_speed_is_taken_as_it_is(board: Board, live: Live) -> None:
+    board.send(
+        lambda n: encode(SensorLine(n, n * 2000, (-80_000,), None, contact=True, button=False))
+    )
+    with HandReader(live, settings_of(board, assumed_force_n=2.0)):
+        wait_until(lambda: live.readings_written > 20)
+        latest = live.latest()
+        assert latest is not None
+        assert latest["speed_mm_s"] == -80
+        assert latest["force_n"] == 2
+        assert latest["flags"] == CONTACT | FORCE_ASSUMED
+        assert np.isnan(latest["x_mm"])
+
+
+def test_a_force_that_is_neither_measured_nor_assumed_is_said(board: Board, live: Live) -> None:
+    board.send(lambda n: encode(SensorLine(n, n * 2000, (1,), None, contact=True, button=False)))
+    with HandReader(live, settings_of(board)) as reader:
+        faults: list[str] = []
+        wait_until(lambda: bool(faults.extend(reader.faults()) or faults))
+        assert "expected force from the device of the hand, got none" in faults[0]
+        wait_until(lambda: is_gone(live))
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 600)  # meanwhile it is opened again
+        assert reader.faults() == ()
+
+
+def test_a_force_below_the_least_is_no_contact(board: Board, live: Live) -> None:
+    board.send(lambda n: encode(SensorLine(n, n * 2000, (9,), 40, contact=True, button=False)))
+    with HandReader(live, settings_of(board)):
+        wait_until(lambda: live.readings_written > 20)
+        latest = live.latest()
+        assert latest is not None
+        assert (latest["force_n"], latest["flags"]) == (0, 0)
+
+
+def test_unplugged_it_is_gone_and_said_once(board: Board, live: Live) -> None:
+    board.send(at_constant_speed)
+    with HandReader(live, settings_of(board)) as reader:
+        wait_until(lambda: live.readings_written > 50)
+        board.unplug()
+        wait_until(lambda: is_gone(live))
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 300)  # one attempt at least
+        assert reader.faults()[-1] == f"the serial sensor at {board.path} was unplugged."
+
+
+def test_silent_it_is_gone_and_comes_back(board: Board, live: Live) -> None:
+    board.send(at_constant_speed)
+    with HandReader(live, settings_of(board)) as reader:
+        wait_until(lambda: live.readings_written > 50)
+        board.quiet()
+        wait_until(lambda: is_gone(live))
+        first = reader.pid
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 800)  # also while it is opened again
+        (fault, *_) = reader.faults()
+        assert f"expected good lines from the serial sensor at {board.path}, got none" in fault
+        board.send(at_constant_speed)
+        wait_until(lambda: not is_gone(live))
+        assert reader.pid == first
+
+
+def test_two_readers_of_one_port_are_refused(board: Board, live: Live) -> None:
+    board.send(at_constant_speed)
+    first = SerialSensor.open(settings_of(board))
+    second = HandReader(live, settings_of(board))
+    with pytest.raises(InputError, match="got one that another program reads"):
+        second.open()
+    first.close()
+    second.open()
+    second.close()
+
+
+def test_damaged_and_missing_lines_are_counted_and_survived(board: Board) -> None:
+    def damaged(number: int) -> bytes:
+        if number % 10 == 3:
+            return b""
+        line = at_constant_speed(number)
+        return line.replace(b"$", b"#") if number % 10 == 7 else line
+
+    board.send(damaged)
+    sensor = SerialSensor.open(settings_of(board))
+    with suppress(DeviceLost):
+        while sensor.counts()["lines"] < 100:
+            sensor.wait(0.1)
+            assert all(sample.force_n == 1.5 for sample in sensor.read())
+    sensor.close()
+    told = sensor.counts()
+    assert told["bad"] == pytest.approx(told["lines"] / 8, abs=3)
+    assert told["missing"] == pytest.approx(2 * told["lines"] / 8, abs=4)
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (lambda n: b"", "expected lines from the serial sensor at .* within 0.3 s, got none"),
+        (lambda n: b"hello world\r\n", "expected lines with a matching CRC from .* sends 115200"),
+        (
+            lambda n: at_constant_speed(n).replace(b",1500,", b",1501,"),
+            "expected lines with a matching CRC",
+        ),
+    ],
+)
+def test_a_board_that_sends_no_good_line_is_refused(
+    board: Board, monkeypatch: pytest.MonkeyPatch, line: Callable[[int], bytes], said: str
+) -> None:
+    monkeypatch.setattr(serial_sensor, "FIRST_LINE_S", 0.3)
+    board.send(line)
+    with pytest.raises(InputError, match=said):
+        SerialSensor.open(settings_of(board))
+
+
+def test_ports_that_cannot_be_opened_are_refused(
+    tmp_path: object, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    port = ConnectedDevice("/dev/ttyX", "a board", "serial", readable=True)
+    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: (port,))
+    with pytest.raises(InputError, match=r"got nothing there; there are /dev/ttyX \(a board\)"):
+        SerialSensor.open(HandSettings(kind="serial", device="/dev/ttyNONE"))
+    with pytest.raises(InputError, match="expected a serial port at /dev/null, got a refusal"):
+        SerialSensor.open(HandSettings(kind="serial", device="/dev/null"))
+    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: ())
+    with pytest.raises(InputError, match="expected one serial port, .* got none"):
+        SerialSensor.open(HandSettings(kind="serial"))
+
+
+@pytest.mark.parametrize(
+    ("raised", "said"),
+    [
+        (PermissionError(13, "denied"), r"run `sudo usermod -aG dialout \$USER`"),
+        (ValueError("Invalid baud rate: 1234"), "expected a baud rate that .* can do, got 115200"),
+    ],
+)
+def test_what_the_system_refuses_is_said_with_what_to_do(
+    board: Board, monkeypatch: pytest.MonkeyPatch, raised: Exception, said: str
+) -> None:
+    def refuse(*arguments: object, **options: object) -> None:
+        raise raised
+
+    monkeypatch.setattr(serial_sensor.serial, "Serial", refuse)
+    with pytest.raises(InputError, match=said):
+        SerialSensor.open(settings_of(board))
+
+
+def test_the_only_port_is_taken(board: Board, monkeypatch: pytest.MonkeyPatch, live: Live) -> None:
+    port = ConnectedDevice(board.path, "a board", "serial", readable=True)
+    monkeypatch.setattr(serial_sensor, "serial_ports", lambda: (port,))
+    board.send(at_constant_speed)
+    loop = HandLoop(live, HandSettings(kind="serial"), tell=lambda told: None)
+    assert loop.open() == f"serial sensor at {board.path}"
+    loop.close()
+    assert is_gone(live)

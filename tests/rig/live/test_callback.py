@@ -1,0 +1,136 @@
+"""The audio callback by itself, called without a card: levels, the log, hands of no number."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from modeling.rendering.compiled import filled_texture
+from modeling.rendering.limits import Limits
+from modeling.rendering.plan import plan_for
+from rig.live.memory import CONTACT, Live, Rows, compiled, now_s
+from stimuli.planted.textures import planted_texture
+
+RATE_HZ = 48000.0
+FADE = 240
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+class Callback:
+    """What the sound process prepares, with the callback called here."""
+
+    def __init__(self, live: Live, *, scale: float) -> None:
+        module = compiled()
+        self._ffi, self._lib, self.live = module.ffi, module.lib, live
+        self._kept: list[Any] = [self._ffi.new("char[]", self._lib.tq_sound_size())]
+        self._sound = self._ffi.cast("tq_sound *", self._kept[0])
+        self._lib.tq_sound_start(self._sound, live.address, FADE, 2, 0, -1, scale, 0.1, 5)
+
+    def texture(self, number: int, limits: Limits, gain: float = 1.0) -> None:
+        made = planted_texture("MDF")
+        fields = plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits).texture(made)
+        texture, arrays = filled_texture(self._ffi, fields, np.float64)
+        memory = self._ffi.new("tq_real[]", self._lib.TQ_ROWS * 64 + texture.taps + 64)
+        source = self._ffi.new("tq_surface *")
+        texture.noise_scale *= gain
+        self._kept += [texture, arrays, memory, source]
+        self._lib.tq_surface_start(source, texture, memory, 1, number)
+        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+
+    def signal(self, number: int, samples_g: Array) -> None:
+        samples = samples_g.astype(np.float32)
+        held, source = self._ffi.from_buffer("float[]", samples), self._ffi.new("tq_signal *")
+        self._kept += [samples, held, source]
+        self._lib.tq_signal_start(source, held, samples.size, number)
+        self._lib.tq_sound_want(self._sound, self._ffi.NULL, source)
+
+    def silence(self) -> None:
+        self._lib.tq_sound_want(self._sound, self._ffi.NULL, self._ffi.NULL)
+
+    def play(self, frames: int, *, speed_mm_s: float = 150.0, force_n: float = 1.5) -> Array:
+        """The next samples of the vibration, (frames,), for a hand read just before."""
+        self.live.write_reading(
+            now_s(), 0.0, y_mm=0.0, speed_mm_s=speed_mm_s, force_n=force_n, flags=CONTACT
+        )
+        out = np.full((frames, 2), np.nan, dtype=np.float32)
+        none = self._ffi.NULL
+        into = self._ffi.from_buffer("float[]", out)
+        self._lib.tq_sound_callback(none, into, frames, none, 0, self._sound)
+        return out[:, 0]
+
+    def log(self) -> Rows:
+        return self.live.blocks_since(0)[1]
+
+
+@pytest.fixture
+def live() -> Iterator[Live]:
+    with Live.create() as made:
+        yield made
+
+
+def test_a_peak_limit_at_full_scale_never_leaves_it(live: Live) -> None:
+    peaks = np.linspace(0.5, 3.0, 500)
+    scales = (1 / peaks).astype(np.float32)
+    # For some of them the product is rounded to above full scale.
+    peak, scale = next(
+        (peak, scale)
+        for peak, scale in zip(peaks, scales, strict=True)
+        if np.float32(peak) * scale > 1
+    )
+    callback = Callback(live, scale=float(scale))
+    callback.signal(1, np.array([peak, -peak] * 100))
+    played = callback.play(200)
+    assert np.abs(played).max() == 1.0
+
+
+@pytest.mark.parametrize("count", [1, 100, 256])
+def test_a_signal_that_ends_within_a_block_is_in_the_log(live: Live, count: int) -> None:
+    callback = Callback(live, scale=1.0)
+    callback.signal(7, np.full(count, 0.5))
+    played = callback.play(1024)
+    assert np.count_nonzero(played) == count
+    callback.play(1024)
+    assert callback.log()["presentation"].tolist() == [7, 0]
+
+
+@pytest.mark.parametrize("frames", [128, 300, 2048])
+def test_all_that_was_played_counts_for_its_presentation(live: Live, frames: int) -> None:
+    callback = Callback(live, scale=1.0)
+    callback.texture(3, Limits(peak=1.0))
+    played = [callback.play(frames) for _ in range(12)]
+    callback.silence()
+    played += [callback.play(frames) for _ in range(6)]
+    rows = callback.log()
+    assert not played[-1].any()
+    assert rows["presentation"][-1] == 0
+    own = rows[rows["presentation"] == 3]
+    wanted = float((np.concatenate(played).astype(np.float64) ** 2).sum())
+    assert own["square_sum_g2"].sum() == pytest.approx(wanted, rel=1e-9)
+    assert wanted > 0
+
+
+@pytest.mark.parametrize("gain", [1.0, 1e6, 1e300])
+def test_whatever_hand_and_model_the_limits_hold_and_every_sample_is_a_number(
+    live: Live, gain: float
+) -> None:
+    limits = Limits(peak=0.4, rms=0.1, rms_window_s=0.05, duration_s=0.2, pause_s=0.01)
+    draws = np.random.default_rng(4)
+    odd = [np.nan, np.inf, -np.inf, 1e308, -1e300, -3.0, 0.0, 150.0, 150.0, 150.0]
+    callback = Callback(live, scale=2.0)
+    played = []
+    for step in range(300):
+        if step % 40 == 0:
+            callback.texture(step + 1, limits, gain)
+        speed, force = draws.choice(odd, 2)
+        frames = int(draws.integers(1, 700))
+        played.append(callback.play(frames, speed_mm_s=speed, force_n=force))
+    signal = np.concatenate(played).astype(np.float64) / 2
+    assert np.isfinite(signal).all()
+    assert 0 < np.abs(signal).max() <= 0.4 * (1 + 1e-6)
+    share = -np.expm1(-1 / (0.05 * RATE_HZ))
+    mean_square = lfilter([share], [1, share - 1], signal**2)
+    assert np.sqrt(mean_square.max()) <= 0.1 * (1 + 1e-6)

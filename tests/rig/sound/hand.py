@@ -1,0 +1,13 @@
+"""A hand in a process of its own: writes readings to the memory of this PATH until it is killed."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from rig.live.memory import CONTACT, Live, now_s
+
+live = Live.attach(sys.argv[1])
+while True:
+    live.write_reading(now_s(), 0.0, y_mm=0.0, speed_mm_s=200.0, force_n=1.5, flags=CONTACT)
+    time.sleep(0.002)

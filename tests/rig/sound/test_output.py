@@ -1,0 +1,572 @@
+"""The sound process, with JACK's server that has no card: bits, swaps, failures."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from modeling import InputError, Renderer, TextureModel
+from modeling.hand import Hand
+from modeling.rendering.limits import Limits
+from rig.live.memory import BLOCK, CONTACT, GONE, STALE, Live, now_s
+from rig.sound.output import SoundLost, SoundOutput
+
+HERE = Path(__file__).parent
+RATE_HZ = 48000
+SCALE = 0.05
+LIMITS = Limits(peak=10.0, rms=5.0, duration_s=1000.0)
+FADE = 240
+Array = np.ndarray[Any, np.dtype[Any]]
+Jack = Callable[..., AbstractContextManager[Any]]
+
+
+def model(gain: float = 0.2) -> TextureModel:
+    return TextureModel(
+        texture="planted",
+        rate_hz=5000.0,
+        speeds_mm_s=[50.0, 350.0],
+        forces_n=[0.5, 3.5],
+        noise_gains=[[0.01, 0.02], [0.03, 0.05]],
+        frequencies_hz=np.array([60.0, 70.0, 300.0, 320.0]).reshape(2, 2, 1),
+        bandwidths_hz=np.full((2, 2, 1), 30.0),
+        gains=np.full((2, 2, 1), gain),
+        level_sd_db=np.zeros((2, 2, 1)),
+        estimator="planted",
+        simulated=True,
+    )
+
+
+def output(live: Live, *, block: int = 128, seed: int = 0, **more: Any) -> SoundOutput:
+    settings: dict[str, Any] = {"device": "system", "limits": LIMITS, "fullscale_per_g": SCALE}
+    return SoundOutput(live, rate_hz=RATE_HZ, block=block, seed=seed, **(settings | more))
+
+
+class Stroker:
+    """A hand that writes its readings every 2 ms: to and fro, or as told."""
+
+    def __init__(self, live: Live, hand: Callable[[float], tuple[float, float]]) -> None:
+        self._live, self.hand = live, hand
+        self.stands_still = self._ends = False
+        self.flags = CONTACT
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while not self._ends:
+            if not self.stands_still:
+                now = now_s()
+                speed, force = self.hand(now)
+                self._live.write_reading(
+                    now, 0.0, y_mm=0.0, speed_mm_s=speed, force_n=force, flags=self.flags
+                )
+            time.sleep(0.002)
+
+    def end(self) -> None:
+        self._ends = True
+        self._thread.join()
+
+
+def strokes(at_s: float) -> tuple[float, float]:
+    return 200 * float(np.sin(2 * np.pi * at_s)), 1.5
+
+
+def quick_strokes(at_s: float) -> tuple[float, float]:
+    """For a server that runs many times as fast as the clock."""
+    return strokes(30 * at_s)
+
+
+@contextmanager
+def stroking(live: Live, hand: Callable[[float], tuple[float, float]] = strokes) -> Iterator[Any]:
+    stroker = Stroker(live, hand)
+    try:
+        yield stroker
+    finally:
+        stroker.end()
+
+
+class Recorder:
+    """What the card would get, both channels: a client of the same server, in its own process."""
+
+    def __init__(self, server: Any, target: Path, *, block: int) -> None:
+        self._target = target
+        before = set(server.ports())
+        words = [sys.executable, str(HERE / "recorder.py"), str(target), str(RATE_HZ), str(block)]
+        self._process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == b"ready\n"
+        mine = sorted(port for port in set(server.ports()) - before if ":in_" in port)
+        played = sorted(port for port in server.ports() if ":out_" in port)
+        for number, (source, port) in enumerate(zip(played, mine, strict=True), start=1):
+            server.disconnect(f"system:capture_{number}", port)
+            server.connect(source, port)
+
+    def recorded(self) -> Array:
+        """(n, 2), from when it was connected on."""
+        self._process.communicate(timeout=30)
+        recorded: Array = np.load(self._target)
+        return recorded
+
+
+@pytest.fixture
+def server(jack_server: Jack) -> Iterator[Any]:
+    with jack_server(block=128) as running:
+        yield running
+
+
+def as_renderer(rows: Array, *, stream: int, made: TextureModel, seed: int = 0) -> Array:
+    """What `Renderer` gives for the hands of these blocks, scaled as for the card."""
+    frames = rows["frames"].astype(int)
+    hand = Hand(np.repeat(rows["speed_mm_s"], frames), np.repeat(rows["force_n"], frames))
+    renderer = Renderer(made, rate_hz=RATE_HZ, seed=seed, stream=stream, limits=LIMITS)
+    signal_g = renderer.render(*hand)
+    signal_g[:FADE] *= np.arange(1, FADE + 1) * (1 / FADE)
+    return signal_g.astype(np.float32) * np.float32(SCALE)
+
+
+@pytest.mark.parametrize("block", [1024, 128])
+def test_a_minute_leaves_with_the_bits_of_the_renderer(
+    jack_server: Jack, tmp_path: Path, block: int
+) -> None:
+    seconds = 60 if block == 1024 else 5
+    with (
+        jack_server(block=block) as server,
+        Live.create() as live,
+        stroking(live, quick_strokes),
+        output(live, block=block, seed=7) as sound,
+    ):
+        recorder = Recorder(server, tmp_path / "captured.npy", block=block)
+        sound.play(model())  # what is done once takes its time before the server runs free
+        sound.silence()
+        server.freewheel(True)
+        before = live.blocks_written
+        presented = sound.play(model())
+        blocks = seconds * RATE_HZ // block
+        rows = wait_for_blocks(live, before, blocks, of=presented.presentation)
+        server.freewheel(False)
+        captured = recorder.recorded()[:, 0]
+    rows = rows[rows["presentation"] == presented.presentation]
+    assert not np.any(rows["flags"] & STALE)
+    assert np.ptp(rows["speed_mm_s"]) > 300
+    assert np.all(np.diff(rows["position"].astype(int)) == block)
+    wanted = as_renderer(rows, stream=presented.presentation, made=model(), seed=7)
+    first = int(np.flatnonzero(captured == wanted[FADE])[0]) - FADE
+    together = min(wanted.size, captured.size - first)
+    assert together >= (seconds - 1) * RATE_HZ
+    np.testing.assert_array_equal(captured[first : first + together], wanted[:together])
+
+
+def wait_until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def wait_for_blocks(live: Live, before: int, count: int, *, of: int = 0) -> Array:
+    """All blocks since, once so many of a presentation (from this number on) are among them."""
+    rows = [np.zeros(0, dtype=BLOCK)]
+    end = time.monotonic() + 60
+    while sum(np.count_nonzero(some["presentation"] >= of) for some in rows) < count:
+        assert time.monotonic() < end
+        before, more = live.blocks_since(before)
+        rows.append(more)
+        time.sleep(0.005)
+    return np.concatenate(rows)
+
+
+# --- Swaps, signals, masking ----------------------------------------------------------------------
+
+
+def constant(at_s: float) -> tuple[float, float]:
+    return 200.0, 1.5
+
+
+def test_textures_are_swapped_through_silence_without_a_click(server: Any, tmp_path: Path) -> None:
+    with Live.create() as live, stroking(live, constant), output(live) as sound:
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        before = live.blocks_written
+        numbers = [sound.play(model(gain)).presentation for gain in (0.2, 0.4, 0.1)]
+        time.sleep(0.1)
+        sound.silence()
+        _, rows = live.blocks_since(before)
+        time.sleep(0.05)
+        captured = recorder.recorded()[:, 0] / SCALE
+    assert numbers == [1, 2, 3]
+    played = rows["presentation"]
+    changes = np.flatnonzero(np.diff(played, prepend=np.uint32(0)))
+    assert played[changes].tolist() == [1, 2, 3, 0]
+    sounding = np.flatnonzero(captured)
+    # Where one texture ends and the next begins, and at both ends, the level is that of a fade.
+    steepest = np.abs(np.diff(captured)).max()
+    edges = [sounding[0], sounding[-1]]
+    assert all(abs(captured[edge]) < 0.05 * steepest for edge in edges)
+    assert not captured[sounding[-1] + 1 :].any()
+
+
+def test_what_presenting_returns_is_when_the_first_sample_leaves(server: Any) -> None:
+    with Live.create() as live, stroking(live, constant), output(live) as sound:
+        before = live.blocks_written
+        asked_s = now_s()
+        presented = sound.play(model())
+        returned_s = now_s()
+        _, rows = live.blocks_since(before)
+    first = rows[rows["presentation"] == presented.presentation][0]
+    assert presented.time_s == first["dac_time_s"] >= first["time_s"]
+    assert asked_s < presented.time_s <= returned_s
+
+
+def test_a_signal_leaves_as_it_is_and_voices_wait_for_it(server: Any, tmp_path: Path) -> None:
+    tone = 2 * np.sin(2 * np.pi * 250 / RATE_HZ * np.arange(RATE_HZ // 4))
+    with Live.create() as live, stroking(live, constant), output(live) as sound:
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        sound.play(model())
+        before = live.blocks_written
+        first = sound.play_signal(tone, wait=True)
+        second = sound.play(model())
+        sound.silence()
+        _, rows = live.blocks_since(before)
+        captured = recorder.recorded()[:, 0]
+    played = rows["presentation"]
+    changes = [int(n) for n in played[np.flatnonzero(np.diff(played)) + 1]]
+    assert changes[-3:] == [0, second.presentation, 0]
+    assert first.presentation in changes
+    wanted = tone.astype(np.float32) * np.float32(SCALE)
+    # The tone begins with a zero: look for its largest sample.
+    at = int(np.flatnonzero(captured == wanted[48])[0]) - 48
+    # In real time a loaded machine loses blocks; those that come are equal to the bit.
+    assert np.mean(captured[at : at + wanted.size] == wanted) > 0.2
+
+
+def test_a_signal_that_is_stopped_fades(server: Any, tmp_path: Path) -> None:
+    with Live.create() as live, output(live) as sound:
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        sound.play_signal(np.ones(RATE_HZ))
+        time.sleep(0.05)
+        sound.silence()
+        time.sleep(0.05)
+        captured = recorder.recorded()[:, 0] / np.float32(SCALE)
+    sounding = np.flatnonzero(captured)
+    assert sounding.size < RATE_HZ // 2
+    falls = captured[sounding[-1] - FADE + 2 : sounding[-1] + 1]
+    np.testing.assert_allclose(falls, np.arange(FADE - 1, 0, -1) / FADE, atol=1e-6)
+
+
+def test_masking_noise_is_white_of_its_level_on_its_channel_alone(
+    server: Any, tmp_path: Path
+) -> None:
+    with Live.create() as live, output(live, masking_channel=1) as sound:
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        sound.masking(0.1)
+        time.sleep(1.2)
+        sound.masking(0)
+        time.sleep(0.1)
+        vibration, noise = recorder.recorded().T
+    assert not vibration.any()
+    sounding = np.flatnonzero(noise)
+    middle = noise[sounding[0] + FADE : sounding[-1] - FADE].astype(float)
+    assert middle.size > RATE_HZ // 2
+    assert middle.std() == pytest.approx(0.1, rel=0.02)
+    spectrum = np.abs(np.fft.rfft(middle)) ** 2
+    thirds = [part.mean() for part in np.array_split(spectrum[1:], 3)]
+    assert max(thirds) < 1.1 * min(thirds)
+    assert not noise[sounding[-1] + 1 :].any()
+
+
+def test_counters_of_the_limits_come_back_with_the_silence(server: Any) -> None:
+    low = Limits(peak=0.02, rms=5.0)
+    with Live.create() as live, stroking(live, constant), output(live, limits=low) as sound:
+        presented = sound.play(model())
+        time.sleep(0.2)
+        counted = sound.silence()
+        assert sound.silence() is not None
+    assert counted is not None
+    assert counted.presentation == presented.presentation
+    assert counted.counters.limited_peak > 0
+    assert counted.counters.limited_rms == 0
+
+
+def test_limits_hold_where_a_signal_and_a_texture_follow_each_other(
+    server: Any, tmp_path: Path
+) -> None:
+    limits = Limits(peak=10.0, rms=0.05, rms_window_s=0.2)
+    signal_g = np.full(RATE_HZ // 4, 0.05)
+    with (
+        Live.create() as live,
+        stroking(live, constant),
+        output(live, limits=limits) as sound,
+    ):
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        for _ in range(2):
+            sound.play_signal(signal_g, wait=True)
+            sound.play(model(4.0))
+            time.sleep(0.2)
+        counted = sound.silence()
+        captured = recorder.recorded()[:, 0].astype(float) / SCALE
+    assert counted is not None
+    assert counted.counters.limited_rms > 0
+    share = -np.expm1(-1 / (0.2 * RATE_HZ))
+    mean_square = lfilter([share], [1, share - 1], captured**2)
+    assert 0.9 < np.sqrt(mean_square.max()) / 0.05 < 1 + 1e-5
+
+
+def test_signals_one_after_the_other_are_no_longer_than_the_limit_without_a_pause(
+    server: Any,
+) -> None:
+    """By the log of what left: a recorder loses blocks on a loaded machine."""
+    limits = Limits(peak=1.0, duration_s=0.5, pause_s=0.1)
+    with (
+        Live.create() as live,
+        stroking(live, constant),
+        output(live, limits=limits) as sound,
+    ):
+        before = live.blocks_written
+        for _ in range(5):
+            sound.play_signal(np.full(RATE_HZ // 5, 0.5), wait=True)
+        sound.play(model())
+        time.sleep(0.2)
+        sound.play_signal(np.full(RATE_HZ // 5, 0.5), wait=True)
+        _, rows = live.blocks_since(before)
+    whole = rows[rows["peak_g"] >= 0.49]["square_sum_g2"].sum()
+    assert whole == pytest.approx(6 * RATE_HZ / 5 * 0.25, rel=0.05)
+    felt = rows[rows["square_sum_g2"] > 0]["position"].astype(int)
+    runs = np.split(felt, np.flatnonzero(np.diff(felt) >= 0.1 * RATE_HZ - 128) + 1)
+    assert len(runs) > 2
+    assert max(run[-1] - run[0] for run in runs) < 0.5 * RATE_HZ + 128
+
+
+# --- What goes wrong ------------------------------------------------------------------------------
+
+
+def silent_from(captured: Array) -> int:
+    """The first of the zeros at the end."""
+    sounding = np.flatnonzero(captured)
+    return int(sounding[-1]) + 1 if sounding.size else 0
+
+
+@pytest.mark.parametrize("how", ["stopped", "gone"])
+def test_a_hand_that_is_old_or_gone_fades_to_silence(server: Any, tmp_path: Path, how: str) -> None:
+    with Live.create() as live, stroking(live, constant) as stroker, output(live) as sound:
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        before = live.blocks_written
+        sound.play(model())
+        time.sleep(0.1)
+        if how == "stopped":
+            stroker.stands_still = True
+        else:
+            stroker.flags = GONE
+        time.sleep(0.4)
+        _, rows = live.blocks_since(before)
+        captured = recorder.recorded()[:, 0]
+        assert sound.faults() == ()
+    last = live_last = rows[rows["flags"] & STALE == 0][-1]
+    stale = rows[rows["flags"] & STALE > 0]
+    assert stale.size > 50
+    assert not stale["speed_mm_s"].any()
+    assert not stale["force_n"].any()
+    if how == "stopped":
+        assert stale["time_s"][0] - live_last["time_s"] < 0.2  # its age was below 0.1 s there
+    # From the last block with a hand on: one update and the 5 ms in which gains fall.
+    loud = rows[rows["square_sum_g2"] > 0][-1]
+    assert int(loud["position"]) - int(last["position"]) <= 128 + 48 + FADE + 128
+    assert silent_from(captured) < captured.size - RATE_HZ // 10
+
+
+def test_a_parent_that_holds_its_lock_delays_nothing(server: Any) -> None:
+    import ctypes
+
+    with Live.create() as live, output(live) as sound:
+        hand = subprocess.Popen([sys.executable, str(HERE / "hand.py"), str(live.path)])
+        try:
+            wait_until(lambda: live.readings_written > 0)
+            sound.play(model())
+            wait_for_blocks(live, live.blocks_written, 10)
+            before, held_s = live.blocks_written, now_s()
+            ctypes.PyDLL(None).usleep(1_000_000)  # a second with the interpreter's lock held
+            freed_s = now_s()
+            _, rows = live.blocks_since(before)
+        finally:
+            hand.kill()
+            hand.wait()
+    meanwhile = rows[(rows["time_s"] > held_s) & (rows["time_s"] < freed_s)]
+    assert freed_s - held_s >= 1
+    # Were it delayed, there would be none; a loaded machine loses some.
+    assert meanwhile.size > 0.5 * RATE_HZ / 128
+    assert np.count_nonzero(meanwhile["square_sum_g2"]) > 0.9 * meanwhile.size
+
+
+def test_a_killed_process_is_told_and_replaced(server: Any, tmp_path: Path) -> None:
+    with Live.create() as live, stroking(live, constant), output(live) as sound:
+        sound.play(model())
+        first = sound.pid
+        assert first is not None
+        os.kill(first, signal.SIGKILL)
+        time.sleep(0.1)
+        assert [fault for fault in sound.faults() if "it has ended" in fault]
+        assert sound.faults() == ()
+        assert sound.silence() is None
+        before = live.blocks_written
+        presented = sound.play(model())
+        assert sound.pid not in (first, None)
+        _, rows = live.blocks_since(before)
+    assert presented.presentation in rows["presentation"]
+
+
+def test_a_killed_process_is_noticed_by_who_presents_next(server: Any) -> None:
+    with Live.create() as live, stroking(live, constant), output(live) as sound:
+        sound.play(model())
+        assert sound.pid is not None
+        os.kill(sound.pid, signal.SIGKILL)
+        presented = sound.play(model())
+        assert presented.presentation == 2
+        assert len(sound.faults()) == 1
+
+
+def test_a_process_that_is_killed_in_a_signal_is_told_who_waits_for_its_end(server: Any) -> None:
+    with Live.create() as live, output(live) as sound:
+        assert sound.pid is not None
+        threading.Timer(0.3, os.kill, (sound.pid, signal.SIGKILL)).start()
+        with pytest.raises(SoundLost, match="expected a sound process that plays to the end"):
+            sound.play_signal(np.ones(10 * RATE_HZ), wait=True)
+        assert len(sound.faults()) == 1
+        sound.play_signal(np.ones(100), wait=True)
+
+
+def test_masking_of_a_killed_process_is_that_of_the_next(server: Any, tmp_path: Path) -> None:
+    with Live.create() as live, output(live, masking_channel=1) as sound:
+        assert sound.pid is not None
+        os.kill(sound.pid, signal.SIGKILL)
+        sound.masking(0.1)
+        assert len(sound.faults()) == 1
+        sound.play(model())
+        recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+        time.sleep(0.2)
+        noise = recorder.recorded()[:, 1]
+    # Blocks that the machine loses are silent.
+    assert noise[noise != 0].std() == pytest.approx(0.1, rel=0.1)
+
+
+def test_a_dead_server_is_told_within_a_second_and_nothing_hangs(jack_server: Jack) -> None:
+    with jack_server(block=128) as server, Live.create() as live, stroking(live, constant):
+        sound = output(live)
+        sound.open()
+        sound.play(model())
+        server.kill()
+        end = time.monotonic() + 10
+        told: tuple[str, ...] = ()
+        while not told and time.monotonic() < end:
+            told = sound.faults()
+            time.sleep(0.01)
+        assert len(told) == 1
+        with pytest.raises(SoundLost, match="expected"):
+            sound.play(model())
+        sound.close()
+        assert time.monotonic() < end + 20
+
+
+def test_a_dead_parent_leaves_silence_and_no_process(server: Any, tmp_path: Path) -> None:
+    parent = subprocess.Popen(
+        [sys.executable, str(HERE / "parent.py")], stdout=subprocess.PIPE, text=True
+    )
+    assert parent.stdout is not None
+    child = int(parent.stdout.readline())
+    recorder = Recorder(server, tmp_path / "captured.npy", block=128)
+    time.sleep(0.2)
+    parent.kill()
+    parent.wait()
+    wait_until(lambda: "PortAudio:out_0" not in server.ports())
+    captured = recorder.recorded()[:, 0]
+    assert captured.any()
+    assert silent_from(captured) < captured.size
+    falls = np.abs(captured[silent_from(captured) - FADE :][:FADE])
+    assert falls[-24:].max() < 0.2 * np.abs(captured).max()  # it faded, it was not cut
+    wait_until(lambda: has_ended(child))
+
+
+def has_ended(process: int) -> bool:
+    """Also where nobody has asked for its exit code, as of orphans."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+# --- Bad input ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"device": "another"}, "expected one sound device for output that is 'another', got none"),
+        ({"channels": 9}, "expected a sound device with 9 output channels, got 'system' with 2"),
+    ],
+)
+def test_a_device_that_is_not_there_is_refused(
+    server: Any, settings: dict[str, Any], sentence: str
+) -> None:
+    with Live.create() as live, pytest.raises(InputError, match=sentence):
+        output(live, **settings).open()
+
+
+def test_a_rate_that_the_card_does_not_do_is_refused_with_those_it_does(server: Any) -> None:
+    with Live.create() as live, pytest.raises(InputError, match=r"44100 Hz; it does 48000"):
+        SoundOutput(
+            live, device="system", rate_hz=44100, block=128, fullscale_per_g=SCALE, limits=LIMITS
+        ).open()
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"limits": Limits()}, "expected a peak limit of at most 20 g"),
+        ({"fullscale_per_g": 0.2}, "expected a peak limit of at most 5 g"),
+        ({"fullscale_per_g": 0.0}, "expected full scale per g above 0"),
+        ({"masking_channel": 0}, "expected different channels from 0 to 1"),
+        ({"vibration_channel": 2}, "expected different channels from 0 to 1"),
+        ({"block": 8}, "expected a block of 16 to 4096 samples"),
+    ],
+)
+def test_settings_are_checked_before_anything_starts(
+    settings: dict[str, Any], sentence: str
+) -> None:
+    with Live.create() as live, pytest.raises(InputError, match=sentence):
+        output(live, **settings)
+
+
+@pytest.mark.parametrize(
+    ("samples", "sentence"),
+    [
+        ([], "expected a signal as"),
+        ([[1.0]], "expected a signal as"),
+        ([np.nan], "expected a signal as"),
+        ([11.0], "expected a signal of at most 10 g"),
+        (np.full(RATE_HZ, 6.0), "expected a signal with a running RMS of at most 5 g"),
+        (np.full(3 * RATE_HZ, 1.0), "expected a signal of at most 2 s without a pause"),
+    ],
+)
+def test_signals_beyond_the_limits_are_refused(samples: Any, sentence: str) -> None:
+    limits = Limits(peak=10.0, rms=5.0, duration_s=2.0)
+    with Live.create() as live, pytest.raises(InputError, match=sentence):
+        output(live, limits=limits).play_signal(samples)
+
+
+@pytest.mark.parametrize("level", [-0.1, 0.6, np.nan])
+def test_masking_out_of_range_is_refused(level: float) -> None:
+    with Live.create() as live, pytest.raises(InputError, match="expected a masking noise of 0"):
+        output(live, masking_channel=1).masking(level)
+
+
+def test_masking_without_a_channel_is_refused() -> None:
+    with Live.create() as live, pytest.raises(InputError, match="expected a channel for"):
+        output(live).masking(0.1)

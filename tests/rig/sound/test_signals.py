@@ -1,0 +1,182 @@
+"""Prepared signals: tone bursts in closed form, files of a stimulus set by name and by hash."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from modeling import InputError
+from modeling.files.tables import read_table
+from modeling.rendering.limits import Limits
+from modeling.vibrators.compensation import compensation_for
+from rig.live.memory import Live
+from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.signals import stimulus, tone_burst
+from stimuli.planted.textures import planted_texture
+from stimuli.planted.vibrators import planted_vibrator
+from stimuli.sets.recipe import Recipe
+from stimuli.sets.writing import write_set
+
+RATE_HZ = 48000.0
+VIBRATOR = planted_vibrator()
+
+
+RECIPE = """
+version = 1
+[set]
+name = "few"
+rate_hz = [48000]
+format = "{kind}"
+duration_s = 0.5
+{vibrator}
+[level]
+{level}
+[[model]]
+path = "canvas.json"
+label = "full"
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.0
+"""
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sets of one texture: as floats, in 24 bits, and compensated for a vibrator."""
+    folder = tmp_path_factory.mktemp("sets")
+    planted_texture("canvas").save(folder / "canvas.json")
+    VIBRATOR.save(folder / "vibrator.json")
+    for name, kind, vibrator in (
+        ("float32", "float32", ""),
+        ("pcm24", "pcm24", ""),
+        ("driven", "float32", 'vibrator = "vibrator.json"'),
+    ):
+        level = "full_scale_g = 20.0" if kind == "pcm24" else ""
+        text = RECIPE.format(kind=kind, level=level, vibrator=vibrator)
+        (folder / f"{name}.toml").write_text(text)
+        write_set(folder / name, Recipe.load(folder / f"{name}.toml"))
+    return folder
+
+
+def row_of(folder: Path) -> dict[str, str]:
+    (row,) = read_table(folder / "manifest.tsv", ["file", "sha256", "peak", "rms"])
+    return row
+
+
+def test_a_burst_is_a_sinusoid_between_its_ramps() -> None:
+    made = tone_burst(250, 0.5, duration_s=0.2, rate_hz=RATE_HZ)
+    assert made.samples_g.shape == (9600,)
+    assert (made.rate_hz, made.vibrator_sha256, made.simulated) == (RATE_HZ, None, False)
+    middle = made.samples_g[960:-960]
+    n = np.arange(960, 9600 - 960)
+    np.testing.assert_allclose(middle, 0.5 * np.sin(2 * np.pi * 250 / RATE_HZ * n), atol=1e-12)
+    assert middle.std() == pytest.approx(0.5 / np.sqrt(2), rel=1e-6)
+    assert made.samples_g[0] == 0
+    assert abs(made.samples_g[-1]) < 1e-4
+    # A crest and a trough, as far before as after the middle of the ramp: 0.5 (r + (1 - r)).
+    assert made.samples_g[432] - made.samples_g[528] == pytest.approx(0.5, rel=1e-9)
+    assert made.samples_g[432] == pytest.approx(0.5 * (0.5 - 0.5 * np.cos(0.45 * np.pi)))
+
+
+def test_a_very_short_burst_is_ramps_only() -> None:
+    made = tone_burst(1000, 1.0, duration_s=0.01, rate_hz=RATE_HZ)
+    assert made.samples_g.size == 480
+    assert np.abs(made.samples_g).max() < 1
+    assert abs(made.samples_g[-1]) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("numbers", "sentence"),
+    [
+        ((0, 1, 1), "expected a frequency between 0 and half the rate"),
+        ((24000, 1, 1), "expected a frequency between 0 and half the rate"),
+        ((np.nan, 1, 1), "expected a frequency"),
+        ((250, -1, 1), "expected an amplitude of 0 g or more"),
+        ((250, np.inf, 1), "expected an amplitude"),
+        ((250, 1, 0), "expected a burst of up to 60 s"),
+        ((250, 1, 61), "expected a burst of up to 60 s"),
+    ],
+)
+def test_bursts_out_of_range_are_refused(numbers: tuple[float, ...], sentence: str) -> None:
+    frequency_hz, amplitude_g, duration_s = numbers
+    with pytest.raises(InputError, match=sentence):
+        tone_burst(frequency_hz, amplitude_g, duration_s=duration_s, rate_hz=RATE_HZ)
+
+
+def test_a_stimulus_is_found_by_name_and_by_hash(made: Path) -> None:
+    row = row_of(made / "float32")
+    by_name = stimulus(made / "float32", row["file"])
+    samples, rate_hz = soundfile.read(made / "float32" / row["file"])
+    np.testing.assert_array_equal(by_name.samples_g, samples)
+    assert by_name.rate_hz == rate_hz == RATE_HZ
+    assert by_name.simulated
+    assert by_name.vibrator_sha256 is None
+    for digits in (row["sha256"], row["sha256"][:8]):
+        found = stimulus(made / "float32", digits)
+        np.testing.assert_array_equal(found.samples_g, by_name.samples_g)
+
+
+def test_24_bits_are_read_in_g(made: Path) -> None:
+    floats = stimulus(made / "float32", row_of(made / "float32")["file"])
+    row = row_of(made / "pcm24")
+    bits = stimulus(made / "pcm24", row["file"])
+    np.testing.assert_allclose(bits.samples_g, floats.samples_g, atol=20.0 * 2**-23)
+    assert np.abs(bits.samples_g).max() == pytest.approx(float(row["peak"]), abs=1e-5)
+
+
+def test_a_drive_names_its_vibrator(made: Path) -> None:
+    found = stimulus(made / "driven", row_of(made / "driven")["file"])
+    content = (made / "vibrator.json").read_bytes()
+    assert found.vibrator_sha256 == hashlib.sha256(content).hexdigest()
+
+
+@pytest.mark.parametrize("which", ["another.wav", "0" * 64, "abc", ""])
+def test_an_unknown_stimulus_is_refused(made: Path, which: str) -> None:
+    with pytest.raises(InputError, match="expected the name or SHA-256 of one file of the set"):
+        stimulus(made / "float32", which)
+
+
+def test_a_stimulus_that_has_changed_is_refused(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made / "float32", tmp_path / "set")
+    path = tmp_path / "set" / row_of(tmp_path / "set")["file"]
+    data = bytearray(path.read_bytes())
+    data[-1] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=r"of its manifest, got [0-9a-f]{8}…; make the set anew"):
+        stimulus(tmp_path / "set", path.name)
+
+
+def test_a_stimulus_without_a_calibrated_unit_is_refused(made: Path, tmp_path: Path) -> None:
+    shutil.copytree(made / "float32", tmp_path / "set")
+    manifest = tmp_path / "set" / "manifest.tsv"
+    manifest.write_text(manifest.read_text().replace("\tg\t", "\tarbitrary\t"))
+    with pytest.raises(InputError, match="expected a stimulus in g, got"):
+        stimulus(tmp_path / "set", row_of(tmp_path / "set")["file"])
+
+
+def test_what_is_not_compensated_yet_is_compensated_before_the_limits() -> None:
+    compensation = compensation_for(VIBRATOR, rate_hz=RATE_HZ)
+    burst = tone_burst(VIBRATOR.frequency_hz, 1.0, duration_s=0.5, rate_hz=RATE_HZ)
+    drive = np.abs(compensation.apply(burst.samples_g)).max()
+    assert drive < 0.5  # at the resonance little drive is needed
+    limits = Limits(peak=0.6)
+    with Live.create() as live:
+        sound = SoundOutput(
+            live,
+            device="none of this name",
+            rate_hz=RATE_HZ,
+            block=128,
+            fullscale_per_g=0.1,
+            limits=limits,
+            compensation=compensation,
+        )
+        with pytest.raises(InputError, match="expected a signal of at most 0.6 g"):
+            sound.play_signal(burst.samples_g, compensated=True)
+        # Accepted as a signal: what is refused next is the device, which does not exist.
+        with pytest.raises(SoundLost, match="expected (a|one) sound device"):
+            sound.play_signal(burst.samples_g)
