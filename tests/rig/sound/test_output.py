@@ -25,7 +25,7 @@ from rig.sound.output import SoundLost, SoundOutput
 
 HERE = Path(__file__).parent
 RATE_HZ = 48000
-BLOCK = 128  # of the server here
+FRAMES = 128  # of a block of the server here
 SCALE = 0.05
 LIMITS = Limits(peak=10.0, rms=5.0, duration_s=1000.0)
 FADE = 240
@@ -122,7 +122,7 @@ class Recorder:
 
 @pytest.fixture
 def server(jack_server: Jack) -> Iterator[Any]:
-    with jack_server(block=BLOCK) as running:
+    with jack_server(block=FRAMES) as running:
         yield running
 
 
@@ -196,7 +196,7 @@ def constant(at_s: float) -> tuple[float, float]:
 
 def test_textures_are_swapped_through_silence_without_a_click(server: Any, tmp_path: Path) -> None:
     with Live.create() as live, stroking(live, constant), output(live) as sound:
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         before = live.blocks_written
         numbers = [sound.play(model(gain)).presentation for gain in (0.2, 0.4, 0.1)]
         time.sleep(0.1)
@@ -231,7 +231,7 @@ def test_what_presenting_returns_is_when_the_first_sample_leaves(server: Any) ->
 def test_a_signal_leaves_as_it_is_and_voices_wait_for_it(server: Any, tmp_path: Path) -> None:
     tone = 2 * np.sin(2 * np.pi * 250 / RATE_HZ * np.arange(RATE_HZ // 4))
     with Live.create() as live, stroking(live, constant), output(live) as sound:
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         sound.play(model())
         before = live.blocks_written
         first = sound.play_signal(tone, wait=True)
@@ -252,7 +252,7 @@ def test_a_signal_leaves_as_it_is_and_voices_wait_for_it(server: Any, tmp_path: 
 
 def test_a_signal_that_is_stopped_fades(server: Any, tmp_path: Path) -> None:
     with Live.create() as live, output(live) as sound:
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         sound.play_signal(np.ones(RATE_HZ))
         time.sleep(0.05)
         sound.silence()
@@ -268,7 +268,7 @@ def test_masking_noise_is_white_of_its_level_on_its_channel_alone(
     server: Any, tmp_path: Path
 ) -> None:
     with Live.create() as live, output(live, masking_channel=1) as sound:
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         sound.masking(0.1)
         time.sleep(1.2)
         sound.masking(0)
@@ -308,7 +308,7 @@ def test_limits_hold_where_a_signal_and_a_texture_follow_each_other(
         stroking(live, constant),
         output(live, limits=limits) as sound,
     ):
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         for _ in range(2):
             sound.play_signal(signal_g, wait=True)
             sound.play(model(4.0))
@@ -343,10 +343,10 @@ def test_signals_one_after_the_other_are_no_longer_than_the_limit_without_a_paus
     assert whole == pytest.approx(6 * RATE_HZ / 5 * 0.25, rel=0.05)
     felt = rows[rows["square_sum_g2"] > 0]
     # By time: in a block that was missed nothing is felt, and no sample of it is counted.
-    since_s = np.diff(felt["time_s"]) - BLOCK / RATE_HZ
+    since_s = np.diff(felt["time_s"]) - FRAMES / RATE_HZ
     runs = np.split(felt["frames"].astype(int), np.flatnonzero(since_s >= 0.1) + 1)
     assert len(runs) > 2
-    assert max(run.sum() for run in runs) <= 0.5 * RATE_HZ + BLOCK
+    assert max(run.sum() for run in runs) <= 0.5 * RATE_HZ + FRAMES
 
 
 # --- What goes wrong ------------------------------------------------------------------------------
@@ -361,7 +361,7 @@ def silent_from(captured: Array) -> int:
 @pytest.mark.parametrize("how", ["stopped", "gone"])
 def test_a_hand_that_is_old_or_gone_fades_to_silence(server: Any, tmp_path: Path, how: str) -> None:
     with Live.create() as live, stroking(live, constant) as stroker, output(live) as sound:
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         before = live.blocks_written
         sound.play(model())
         time.sleep(0.1)
@@ -453,7 +453,7 @@ def test_masking_of_a_killed_process_is_that_of_the_next(server: Any, tmp_path: 
         sound.masking(0.1)
         assert len(sound.faults()) == 1
         sound.play(model())
-        recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+        recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         time.sleep(0.2)
         noise = recorder.recorded()[:, 1]
     # Blocks that the machine loses are silent.
@@ -461,7 +461,7 @@ def test_masking_of_a_killed_process_is_that_of_the_next(server: Any, tmp_path: 
 
 
 def test_a_dead_server_is_told_within_a_second_and_nothing_hangs(jack_server: Jack) -> None:
-    with jack_server(block=BLOCK) as server, Live.create() as live, stroking(live, constant):
+    with jack_server(block=FRAMES) as server, Live.create() as live, stroking(live, constant):
         sound = output(live)
         sound.open()
         sound.play(model())
@@ -484,7 +484,7 @@ def test_a_dead_parent_leaves_silence_and_no_process(server: Any, tmp_path: Path
     )
     assert parent.stdout is not None
     child = int(parent.stdout.readline())
-    recorder = Recorder(server, tmp_path / "captured.npy", block=BLOCK)
+    recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
     time.sleep(0.2)
     parent.kill()
     parent.wait()
