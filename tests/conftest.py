@@ -21,6 +21,8 @@ from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_stood_still
+
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
 settings.register_profile("house", deadline=None)
 settings.load_profile("house")
@@ -44,6 +46,24 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     reporter = session.config.pluginmanager.get_plugin("terminalreporter")  # of the whole run
     if reporter and session.config.getoption("--no-skips") and reporter.stats.get("skipped"):
         session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+_BARE = BareProcess()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    repeat_where_the_machine_stood_still(items, _BARE)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
+    if needs_time(item):
+        _BARE.begin()
+    return (yield)
+
+
+def pytest_unconfigure() -> None:
+    _BARE.close()
 
 
 @pytest.fixture

@@ -49,6 +49,7 @@ class HandReader:
         self._closing = threading.Event()
         self._threads: list[threading.Thread] = []
         self._first: queue.Queue[dict[str, str]] = queue.Queue()
+        self._was_ready = False
         self._alive_s = float("inf")  # since when the process of now has to write readings
         self.device_name = ""
 
@@ -65,7 +66,7 @@ class HandReader:
             self.device_name = self._window.pointer.name
             return
         self._closing.clear()
-        self._first = queue.Queue()
+        self._first, self._was_ready = queue.Queue(), False
         self._threads = [
             threading.Thread(target=target, daemon=True) for target in (self._keep, self._watch)
         ]
@@ -165,10 +166,18 @@ class HandReader:
                     self._hear(json.loads(line))
             self._alive_s = float("inf")
             code = process.wait()
+            if not self._was_ready:  # `open` refuses
+                ended = (
+                    f"expected the hand's process to start, got its end {_how(code)}; try again."
+                )
+                self._first.put({"error": ended})
+                return
             if not self._closing.is_set():
                 # The process is no more and its heir not yet there: nobody else writes.
                 Follower(self._settings, rest_s=REST_S).gone(now_s()).write(self._live)
-                self._report_end(code, patient=patient)
+                self._add_fault(
+                    f"the process that reads the hand ended {_how(code)} and is started again."
+                )
                 patient = True
                 self._closing.wait(_PAUSE_S)
 
@@ -199,13 +208,8 @@ class HandReader:
                 self._counts = told["counts"]
         self._alive_s = min(self._alive_s, now_s())
         if "ready" in told or "error" in told:
+            self._was_ready = self._was_ready or "ready" in told
             self._first.put(told)
-
-    def _report_end(self, code: int, *, patient: bool) -> None:
-        how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
-        told = {"error": f"expected the hand's process to go on, got its end {how}; try again."}
-        self._first.put(told)  # only looked at where it never was ready
-        self._add_fault(f"the process that reads the hand ended {how} and is started again.")
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""
@@ -237,3 +241,8 @@ def _end(process: subprocess.Popen[str]) -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
+
+
+def _how(code: int) -> str:
+    """By which signal or with which code a process ended."""
+    return f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"

@@ -277,7 +277,7 @@ def test_masking_noise_is_white_of_its_level_on_its_channel_alone(
     assert not vibration.any()
     sounding = np.flatnonzero(noise)
     middle = noise[sounding[0] + FADE : sounding[-1] - FADE].astype(float)
-    assert middle.size > RATE_HZ // 2
+    assert middle.size > RATE_HZ // 5
     assert middle.std() == pytest.approx(0.1, rel=0.02)
     spectrum = np.abs(np.fft.rfft(middle)) ** 2
     thirds = [part.mean() for part in np.array_split(spectrum[1:], 3)]
