@@ -54,8 +54,11 @@ def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> 
     assert 0.1 < measured_s < record.end_s - record.start_s + 0.5
     for piece in pieces:
         assert record.start_s - 0.5 < piece.start_s < record.end_s
-    # A steady hand, and the power of most moments: a loaded machine loses some.
+    # A steady hand, and the power of most moments: a loaded machine loses some. While the simulated
+    # card stands still the server gives zeros, which no accelerometer with noise gives.
     samples = np.concatenate([piece.samples_g for piece in pieces])
+    samples = samples[samples != 0]
+    assert samples.size > 4800
     moments = samples[: samples.size // 2400 * 2400].reshape(-1, 2400)
     power = float(np.median((moments**2).mean(axis=1)))
     assert power == pytest.approx(record.dose_g2_s / record.played_s, rel=0.3)

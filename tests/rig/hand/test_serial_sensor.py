@@ -41,12 +41,15 @@ class Board:
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
         self.path = os.ttyname(self._slave)
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
 
     def write(self, text: bytes) -> None:
-        os.write(self._master, text)
+        """Send; as by a real one, what nobody reads in time is lost."""
+        with suppress(BlockingIOError):
+            os.write(self._master, text)
 
     def send(self, line: Callable[[int], bytes]) -> None:
         """Send line 0, 1, 2 … every 2 ms, until `quiet` or `unplug`."""
