@@ -16,6 +16,8 @@ from typing import Literal
 
 from modeling.errors import InputError
 from modeling.rendering.compiled import is_compiled
+from rig.hand.devices import connected_devices
+from rig.hand.sample import ConnectedDevice
 from rig.live.memory import compiled
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from rig.sound.devices import (
@@ -29,8 +31,7 @@ from rig.sound.devices import (
 
 State = Literal["ok", "note", "fault"]
 PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
-INPUT_FOLDER = Path("/dev/input")
-INPUT_NAMES = Path("/sys/class/input")
+GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 OLD_DAYS = 90  # a study may ask for less
 
 
@@ -78,13 +79,7 @@ def connected_sound() -> list[Finding]:
 
 def connected_input() -> list[Finding]:
     """What may measure a hand: pens, mice and the like on Linux, and serial ports."""
-    from serial.tools import list_ports
-
-    files = sorted(INPUT_FOLDER.glob("event*"), key=lambda file: int(file.name[5:] or 0))
-    found = [_input_device(file) for file in files]
-    for port in sorted(list_ports.comports()):
-        found.append(Finding(port.device, f"serial port, {port.description}"))
-    return found
+    return [_input_device(device) for device in connected_devices()]
 
 
 def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
@@ -116,8 +111,9 @@ def remedies(findings: Iterable[Finding]) -> list[str]:
     faults = " ".join(finding.told for finding in findings if finding.state == "fault")
     packages = [name for name in ("libportaudio2", "jackd2") if name in faults]
     lines = [f"sudo apt-get install {' '.join(packages)}"] if packages else []
-    if "group input" in faults:
-        lines.append('sudo usermod -aG input "$USER"   # then log in again')
+    groups = [group for group in ("input", "dialout") if f"group {group}" in faults]
+    if groups:
+        lines.append(f'sudo usermod -aG {",".join(groups)} "$USER"   # then log in again')
     return lines
 
 
@@ -132,12 +128,12 @@ def _described(device: SoundDevice) -> str:
     return f"{device.host}: {device.inputs} in, {device.outputs} out, usually {device.rate_hz:g} Hz"
 
 
-def _input_device(file: Path) -> Finding:
-    name_file = INPUT_NAMES / file.name / "device" / "name"
-    name = name_file.read_text().strip() if name_file.exists() else "input device"
-    if os.access(file, os.R_OK):
-        return Finding(str(file), name)
-    return Finding(str(file), f"{name}: not readable; it needs the group input", "note")
+def _input_device(device: ConnectedDevice) -> Finding:
+    told = f"{device.name}, {device.kind}"
+    if device.readable:
+        return Finding(device.path, told)
+    needed = GROUPS.get(device.kind, "input")
+    return Finding(device.path, f"{told}: not readable; it needs the group {needed}", "note")
 
 
 def _sound(rig: RigFile) -> Finding:
@@ -163,25 +159,27 @@ def _hand(rig: RigFile) -> Finding:
     told = f"{hand.kind}{f', {hand.device}' if hand.device else ''}"
     if hand.kind in ("scripted", "window"):
         return Finding("hand", told)
-    if hand.kind == "serial":
-        return _present("hand", Path(hand.device or ""), told)
     if hand.device is not None and hand.device.startswith("/"):
-        return _present("hand", Path(hand.device), told)
-    readable = [file for file in INPUT_FOLDER.glob("event*") if os.access(file, os.R_OK)]
-    if not readable:
-        told = (
-            f"expected a readable {hand.kind}, got none; connect it, and have the group input "
-            "(usermod -aG input)."
-        )
-        return Finding("hand", told, "fault")
+        return _present("hand", Path(hand.device), told, group=GROUPS[hand.kind])
+    wanted = [
+        device
+        for device in connected_devices()
+        if device.kind == hand.kind
+        and (hand.device in (None, device.path) or str(hand.device) in device.name)
+    ]
+    if not wanted:
+        return Finding("hand", f"expected a {told}, got none; connect it.", "fault")
+    if not any(device.readable for device in wanted):
+        unread = _input_device(wanted[0])
+        return Finding("hand", f"{unread.name} is {unread.told}.", "fault")
     return Finding("hand", told)
 
 
-def _present(what: str, file: Path, told: str) -> Finding:
+def _present(what: str, file: Path, told: str, *, group: str) -> Finding:
     if not file.exists():
         return Finding(what, f"expected {file}, got no such device; connect it.", "fault")
     if not os.access(file, os.R_OK):
-        told = f"expected to read {file}, got no permission; have the group input."
+        told = f"expected to read {file}, got no permission; have the group {group}."
         return Finding(what, told, "fault")
     return Finding(what, told)
 

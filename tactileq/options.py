@@ -45,3 +45,12 @@ SceneModels = Annotated[
 ]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 RigPath = Annotated[Path, typer.Option("--rig", help="Rig file (TOML).")]
+OptionalRigPath = Annotated[Path | None, typer.Option("--rig", help="Rig file (TOML).")]
+HandKind = Annotated[
+    str | None, typer.Option("--hand", help="Without --rig: tablet, mouse, serial or scripted.")
+]
+HandDevice = Annotated[str | None, typer.Option("--hand-device", help="Device of the hand.")]
+CountsPerMm = Annotated[float | None, typer.Option("--counts-per-mm", help="Of a mouse or tablet.")]
+AssumedForce = Annotated[
+    float | None, typer.Option("--force", help="Force of a hand that measures none, N.")
+]

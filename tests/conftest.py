@@ -296,9 +296,23 @@ def _running(server: JackServer, told: IO[bytes]) -> Iterator[JackServer]:
 @pytest.fixture(scope="session")
 def display() -> Iterator[str]:
     """A screen of 1920 x 1080 of its own, on whatever display number is free."""
+    with _x_server() as name:
+        yield name
+
+
+@pytest.fixture(scope="session")
+def x_server() -> Callable[..., AbstractContextManager[str]]:
+    """`with x_server(screens=2, size=(1280, 800)) as display:`"""
+    return _x_server
+
+
+@contextmanager
+def _x_server(*, screens: int = 1, size: tuple[int, int] = (1920, 1080)) -> Iterator[str]:
     reader, writer = os.pipe()
+    shape = "{}x{}x24".format(*size)
+    sizes = [word for number in range(screens) for word in ("-screen", str(number), shape)]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1920x1080x24", "-nolisten", "tcp"],
+        ["Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
         pass_fds=[writer],
         stderr=subprocess.DEVNULL,
     )

@@ -7,9 +7,9 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 from modeling.errors import InputError
-from rig.capture.input import AudioInput, InputSettings
+from rig.capture.input import AudioInput
 from rig.desk.lock import rig_locked
-from rig.desk.parts import hand_settings, sound_output
+from rig.desk.parts import hand_settings, input_settings, sound_output
 from rig.hand.reader import HandReader
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
@@ -49,14 +49,7 @@ def accelerometer_input(rig: RigFile) -> AudioInput:
             f"expected an [accelerometer] in {rig.path}, got none; nothing is calibrated without "
             "one, so fix one to the pen and describe it there."
         )
-    return AudioInput(
-        InputSettings(
-            g_per_fullscale=section.g_per_fullscale.value,
-            device=section.device,
-            channel=section.channel,
-            rate_hz=section.rate_hz,
-        )
-    )
+    return AudioInput(input_settings(section))
 
 
 def pressure_reader(rig: RigFile, live: Live) -> HandReader:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from modeling.vibrators.compensation import compensation_for
+from rig.capture.input import InputSettings
 from rig.hand.settings import HandSettings
 from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
+from rig.setup.sections import AccelerometerSection
 from rig.sound.output import SoundOutput
 
 
@@ -54,4 +56,14 @@ def hand_settings(rig: RigFile) -> HandSettings:
         baud=hand.baud,
         grab=hand.grab,
         script=str(rig.path.parent / script) if script.suffix else hand.script,
+    )
+
+
+def input_settings(accelerometer: AccelerometerSection) -> InputSettings:
+    """What reads the accelerometer."""
+    return InputSettings(
+        g_per_fullscale=accelerometer.g_per_fullscale.value,
+        device=accelerometer.device,
+        channel=accelerometer.channel,
+        rate_hz=accelerometer.rate_hz,
     )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from modeling import InputError
+from rig.desk.parts import input_settings
 from rig.interface import Acceleration
 from rig.live.child import Child, ChildLost
 from rig.setup.sections import AccelerometerSection
@@ -42,16 +44,9 @@ class Pen:
         InputError
             For a device, channel or rate that there is not.
         """
-        section = self._section
         with ExitStack() as stack:
             self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            wanted = {
-                "g_per_fullscale": section.g_per_fullscale.value,
-                "device": section.device,
-                "channel": section.channel,
-                "rate_hz": section.rate_hz,
-            }
-            settings = {"input": wanted, "folder": str(self._folder)}
+            settings = {"input": asdict(input_settings(self._section)), "folder": str(self._folder)}
             try:
                 self._child = Child("rig.desk.pen_process", settings)
             except ChildLost as lost:

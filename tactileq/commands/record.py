@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tactileq.options import Seed
+from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Seed
 from tactileq.telling import progress
 
 SILICO_RATE_HZ = 22704.0
@@ -27,7 +27,7 @@ def record(
     audio: Annotated[
         bool, typer.Option("--audio", help="Record an accelerometer at a sound card, by hand.")
     ] = False,
-    rig: Annotated[Path | None, typer.Option("--rig", help="Rig file (TOML).")] = None,
+    rig: OptionalRigPath = None,
     grid: Annotated[
         Path | None,
         typer.Option("--grid", help="Grid (TOML) from tactileq rig range; 7 x 7 without it."),
@@ -43,15 +43,10 @@ def record(
     simulated: Annotated[
         bool, typer.Option("--simulated", help="The input is a simulation: mark the recordings.")
     ] = False,
-    hand: Annotated[
-        str | None,
-        typer.Option("--hand", help="Without --rig: tablet, mouse, serial or scripted."),
-    ] = None,
-    hand_device: Annotated[str | None, typer.Option(help="Device of the hand.")] = None,
-    counts_per_mm: Annotated[float | None, typer.Option(help="Of a mouse or tablet.")] = None,
-    force: Annotated[
-        float | None, typer.Option("--force", help="Force of a hand that measures none, N.")
-    ] = None,
+    hand: HandKind = None,
+    hand_device: HandDevice = None,
+    counts_per_mm: CountsPerMm = None,
+    force: AssumedForce = None,
 ) -> None:
     """Record a surface by hand (--audio), or a planted texture in silico, 7 speeds x 7 forces.
 

@@ -7,13 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tactileq.options import RigPath
+
 if TYPE_CHECKING:
     from rig.setup.rig_file import RigFile
     from rig.sound.signals import PreparedSignal
 
 
 def rig_play(
-    rig: Annotated[Path, typer.Option("--rig", help="Rig file (TOML).")],
+    rig: RigPath,
     stimuli: Annotated[
         Path | None, typer.Option("--set", help="Folder of tactileq stimuli.")
     ] = None,

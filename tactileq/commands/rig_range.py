@@ -10,7 +10,7 @@ import typer
 
 from tactileq.commands.record_audio import HandOptions, hand_from, opened_hand, rig_from, since_now
 from tactileq.keeping import note_of_file, write_own_files
-from tactileq.options import Out
+from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
 from tactileq.telling import share_of
 
 if TYPE_CHECKING:
@@ -28,19 +28,14 @@ COMMAND = "rig range"
 
 def rig_range(
     out: Out = Path("grid.toml"),
-    rig: Annotated[Path | None, typer.Option("--rig", help="Rig file (TOML).")] = None,
+    rig: OptionalRigPath = None,
     seconds: Annotated[float, typer.Option(min=6, max=LONGEST_S, help="For how long.")] = 30.0,
     speeds: Annotated[int, typer.Option(min=1, max=50, help="Speeds of the grid.")] = 7,
     forces: Annotated[int, typer.Option(min=1, max=50, help="Forces of the grid.")] = 7,
-    hand: Annotated[
-        str | None,
-        typer.Option("--hand", help="Without --rig: tablet, mouse, serial or scripted."),
-    ] = None,
-    hand_device: Annotated[str | None, typer.Option(help="Device of the hand.")] = None,
-    counts_per_mm: Annotated[float | None, typer.Option(help="Of a mouse or tablet.")] = None,
-    force: Annotated[
-        float | None, typer.Option("--force", help="Force of a hand that measures none, N.")
-    ] = None,
+    hand: HandKind = None,
+    hand_device: HandDevice = None,
+    counts_per_mm: CountsPerMm = None,
+    force: AssumedForce = None,
 ) -> None:
     """Explore a surface freely; the grid to record goes up to the 95th percentile.
 

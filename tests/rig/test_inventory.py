@@ -10,7 +10,8 @@ import pytest
 
 from modeling import InputError
 from rig import inventory
-from rig.inventory import Finding, connected_sound, of_rig, remedies, versions
+from rig.hand.sample import ConnectedDevice
+from rig.inventory import Finding, connected_input, connected_sound, of_rig, remedies, versions
 from rig.sound.devices import SoundDevice
 from tests.rig.desk.rig_files import rig_file, rig_text
 
@@ -118,16 +119,45 @@ def test_no_card_at_all_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     assert finding.state == "fault"
 
 
+def connect(monkeypatch: pytest.MonkeyPatch, *devices: ConnectedDevice) -> None:
+    monkeypatch.setattr(inventory, "connected_devices", lambda: devices)
+
+
+def hand_finding(tmp_path: Path, text: str) -> Finding:
+    return found(rig_file(tmp_path, ('kind = "scripted"', f"{text}\n{FORCE}")).path)["hand"]
+
+
+@pytest.mark.parametrize(("kind", "group"), [("tablet", "input"), ("serial", "dialout")])
+@pytest.mark.parametrize("named", [True, False])
 def test_a_device_without_permission_asks_for_its_group(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, group: str, named: bool
+) -> None:
+    path = tmp_path / "event0"
+    path.touch()
+    connect(monkeypatch, ConnectedDevice(str(path), "Some Device", kind, readable=False))
+    monkeypatch.setattr(inventory.os, "access", lambda file, mode: False)
+    finding = hand_finding(tmp_path, f'kind = "{kind}"' + f'\ndevice = "{path}"' * named)
+    assert finding.state == "fault"
+    assert remedies([finding])[0].startswith(f'sudo usermod -aG {group} "$USER"')
+
+
+def test_a_hand_is_found_by_its_kind_and_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inventory, "INPUT_FOLDER", tmp_path)
-    monkeypatch.setattr(inventory.os, "access", lambda file, mode: False)
-    (tmp_path / "event0").touch()
-    change = ('kind = "scripted"', f'kind = "tablet"\ndevice = "{tmp_path}/event0"\n{FORCE}')
-    findings = found(rig_file(tmp_path, change).path)
-    assert faults(findings) == {"hand"}
-    assert remedies(findings.values())[0].startswith('sudo usermod -aG input "$USER"')
+    connect(
+        monkeypatch,
+        ConnectedDevice("/dev/input/event1", "Some Keyboard", "other", readable=True),
+        ConnectedDevice("/dev/input/event2", "Small Tablet Pen", "tablet", readable=True),
+    )
+    assert hand_finding(tmp_path, 'kind = "tablet"').state == "ok"
+    assert hand_finding(tmp_path, 'kind = "tablet"\ndevice = "Small"').state == "ok"
+    assert "got none" in hand_finding(tmp_path, 'kind = "tablet"\ndevice = "Large"').told
+    assert "got none" in hand_finding(tmp_path, 'kind = "serial"').told
+    told = [(finding.name, finding.told) for finding in connected_input()]
+    assert told == [
+        ("/dev/input/event1", "Some Keyboard, other"),
+        ("/dev/input/event2", "Small Tablet Pen, tablet"),
+    ]
 
 
 FORCE = 'assumed_force_n = { value = 1.0, unit = "N", assumed = true, source = "x" }'

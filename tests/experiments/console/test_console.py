@@ -6,8 +6,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -21,28 +21,10 @@ DRIVER = Path(__file__).with_name("console_session.py")
 
 
 @pytest.fixture(scope="module")
-def display() -> Iterator[str]:
-    """A screen of its own, on whatever display number is free."""
-    with x_server(screens=1) as name:
+def display(x_server: Callable[..., AbstractContextManager[str]]) -> Iterator[str]:
+    """A small screen, which software draws sooner."""
+    with x_server(size=(1280, 800)) as name:
         yield name
-
-
-@contextmanager
-def x_server(*, screens: int) -> Iterator[str]:
-    reader, writer = os.pipe()
-    sizes = [word for n in range(screens) for word in ("-screen", str(n), "1280x800x24")]
-    server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
-        pass_fds=[writer],
-        stderr=subprocess.DEVNULL,
-    )
-    os.close(writer)
-    try:
-        with os.fdopen(reader) as numbers:
-            yield f":{numbers.readline().strip()}"
-    finally:
-        server.terminate()
-        server.wait(timeout=10)
 
 
 class Participant:
@@ -212,8 +194,10 @@ for screen in map(int, sys.argv[1:]):
 """
 
 
-def test_a_screen_that_is_not_there_is_refused() -> None:
-    with x_server(screens=2) as name:
+def test_a_screen_that_is_not_there_is_refused(
+    x_server: Callable[..., AbstractContextManager[str]],
+) -> None:
+    with x_server(screens=2, size=(1280, 800)) as name:
         environment = {**os.environ, "DISPLAY": name, "PYTHONPATH": str(ROOT)}
         opened = subprocess.run(
             [sys.executable, "-c", OPEN, "2", "-1", "0"],
