@@ -45,7 +45,7 @@ def run(tmp_path: Path) -> Run:
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
-            timeout=250,
+            timeout=550,  # a hang, no speed
         )
 
     return call
