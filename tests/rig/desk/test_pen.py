@@ -32,7 +32,7 @@ def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> 
         height=1.001, g_per_fullscale=20.0, sensor_fullscale_g=50.0, noise_g=1e-4
     )
     model = planted_texture("PVC")
-    with jack_server(block=128), SimulatedCard(vibrator):
+    with jack_server(block=1024), SimulatedCard(vibrator):  # in time, though in Python
         changes = (
             ('"system"', f'"{DEVICE}"'),
             ("[real_surface]", ACCELEROMETER),
