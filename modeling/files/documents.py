@@ -127,6 +127,16 @@ def toml_section(values: Mapping[str, Any], name: str, known: Sequence[str]) -> 
     return dict(table)
 
 
+def check_version(values: Mapping[str, Any], version: int, *, what: str) -> None:
+    """Refuse a TOML file whose version is not the one that is read; `what` names its kind."""
+    stated = values.get("version")
+    if type(stated) is not int or stated != version:
+        raise InputError(
+            f"expected version = {version} at the top of a {what}, got {shown(stated)}; write that "
+            f"line, or update tactileq if the {what} is newer."
+        )
+
+
 def as_text(value: object, what: str) -> str:
     """A text; InputError for any other value."""
     if not isinstance(value, str):

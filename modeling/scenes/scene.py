@@ -64,7 +64,7 @@ from modeling.checks import (
     is_positive,
 )
 from modeling.errors import InputError, shown
-from modeling.files.documents import as_text, read_toml, toml_section
+from modeling.files.documents import as_text, check_version, read_toml, toml_section
 from modeling.files.hashes import sha256_of, sha256_of_values
 from modeling.perception.thresholds import Threshold
 from modeling.recordings.trajectory import Trajectory, load_trajectory
@@ -432,12 +432,7 @@ class Scene:
 
 def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
     check_keys(values, ("version", *_SECTIONS), where="a scene")
-    version = values.get("version")
-    if type(version) is not int or version != VERSION:
-        raise InputError(
-            f"expected version = {VERSION} at the top of a scene, got {shown(version)}; write that "
-            "line, or update tactileq if the scene is newer."
-        )
+    check_version(values, VERSION, what="scene")
     sections = {name: toml_section(values, name, keys) for name, keys in _SECTIONS.items()}
     settings = sections["scene"]
     if "name" not in settings:

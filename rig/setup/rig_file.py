@@ -16,8 +16,7 @@ from typing import Any
 
 from modeling import InputError
 from modeling.checks import check_keys
-from modeling.errors import shown
-from modeling.files.documents import read_toml, toml_section
+from modeling.files.documents import check_version, read_toml, toml_section
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_text
 from modeling.files.writing import write_text
@@ -186,12 +185,7 @@ def _rig_from(values: Mapping[str, Any], file: Path) -> RigFile:
 
 def _checked_rig(values: Mapping[str, Any], file: Path) -> RigFile:
     check_keys(values, ("version", *_SECTIONS), where="a rig file")
-    version = values.get("version")
-    if type(version) is not int or version != VERSION:
-        raise InputError(
-            f"expected version = {VERSION} at the top of a rig file, got {shown(version)}; write "
-            "that line, or update tactileq if the file is newer."
-        )
+    check_version(values, VERSION, what="rig file")
     sections = {name: _section(values, name, kind) for name, kind in _SECTIONS.items()}
     named = sections["vibrator"].file
     identified = None if named is None else Vibrator.load(file.parent / named)

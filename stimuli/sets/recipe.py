@@ -64,7 +64,7 @@ from modeling.checks import (
     is_whole,
 )
 from modeling.errors import shown
-from modeling.files.documents import as_text, read_toml, toml_section
+from modeling.files.documents import as_text, check_version, read_toml, toml_section
 from modeling.recordings.trajectory import LONGEST_S
 from modeling.scenes.loading import scene_name
 
@@ -344,12 +344,7 @@ class Recipe:
 
 def _recipe_from(values: Mapping[str, Any], folder: Path) -> Recipe:
     check_keys(values, ("version", *_SECTIONS), where="a recipe")
-    version = values.get("version")
-    if type(version) is not int or version != VERSION:
-        raise InputError(
-            f"expected version = {VERSION} at the top of a recipe, got {shown(version)}; write "
-            "that line, or update tactileq if the recipe is newer."
-        )
+    check_version(values, VERSION, what="recipe")
     settings = toml_section(values, "set", _SECTIONS["set"])
     level = toml_section(values, "level", _SECTIONS["level"])
     if "name" not in settings:

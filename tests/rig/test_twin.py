@@ -5,28 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer, TextureModel, regressed
+from modeling import InputError, Renderer, regressed
 from modeling.models.loading import Layered
 from rig.interface import SURFACES, RigReading, TextureRig
 from rig.twin import SimulatedRig
+from tests.rig.planted import planted_model as model
 
 STEP_S = 0.01
-
-
-def model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel:
-    return TextureModel(
-        texture="planted",
-        rate_hz=rate_hz,
-        speeds_mm_s=[50.0, 350.0],
-        forces_n=[0.5, 3.5],
-        noise_gains=[[0.01, 0.02], [0.03, 0.05]],
-        frequencies_hz=np.array([60.0, 70.0, 300.0, 320.0]).reshape(2, 2, 1),
-        bandwidths_hz=np.full((2, 2, 1), 30.0),
-        gains=np.full((2, 2, 1), gain),
-        level_sd_db=np.zeros((2, 2, 1)),
-        estimator="planted",
-        simulated=True,
-    )
 
 
 def hand(moments_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

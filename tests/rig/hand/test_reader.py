@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +21,8 @@ from rig.hand.reader import HandReader
 from rig.hand.sample import Sample
 from rig.hand.settings import HandSettings
 from rig.hand.window import Pointer
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live, now_s
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
+from tests.rig.waiting import is_gone, wait_until
 
 HOLD = HandSettings(kind="scripted", script="hold", speed_mm_s=120.0, force_n=2.0)
 
@@ -30,18 +31,6 @@ HOLD = HandSettings(kind="scripted", script="hold", speed_mm_s=120.0, force_n=2.
 def live() -> Iterator[Live]:
     with Live.create() as memory:
         yield memory
-
-
-def wait_until(holds: Callable[[], bool], *, seconds: float = 20) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "expected it to happen"
-        time.sleep(0.01)
-
-
-def is_gone(live: Live) -> bool:
-    latest = live.latest()
-    return latest is not None and bool(latest["flags"] & GONE)
 
 
 def moves(live: Live) -> bool:

@@ -22,6 +22,7 @@ from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from tests.rig.waiting import is_gone, wait_until
 
 PERIOD_US = 2000
 
@@ -93,18 +94,6 @@ def live() -> Iterator[Live]:
 
 def settings_of(board: Board, **others: float) -> HandSettings:
     return HandSettings.from_dict({"kind": "serial", "device": board.path, **others})
-
-
-def wait_until(holds: Callable[[], bool], *, seconds: float = 20) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "expected it to happen"
-        time.sleep(0.01)
-
-
-def is_gone(live: Live) -> bool:
-    latest = live.latest()
-    return latest is not None and bool(latest["flags"] & GONE)
 
 
 def test_a_clock_that_falls_behind_is_told_instead_of_a_hand_that_is_late(board: Board) -> None:

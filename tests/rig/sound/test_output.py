@@ -22,6 +22,8 @@ from modeling.hand import Hand
 from modeling.rendering.limits import Limits
 from rig.live.memory import BLOCK, CONTACT, GONE, STALE, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
+from tests.rig.planted import planted_model as model
+from tests.rig.waiting import wait_until
 
 HERE = Path(__file__).parent
 RATE_HZ = 48000
@@ -31,22 +33,6 @@ LIMITS = Limits(peak=10.0, rms=5.0, duration_s=1000.0)
 FADE = 240
 Array = np.ndarray[Any, np.dtype[Any]]
 Jack = Callable[..., AbstractContextManager[Any]]
-
-
-def model(gain: float = 0.2) -> TextureModel:
-    return TextureModel(
-        texture="planted",
-        rate_hz=5000.0,
-        speeds_mm_s=[50.0, 350.0],
-        forces_n=[0.5, 3.5],
-        noise_gains=[[0.01, 0.02], [0.03, 0.05]],
-        frequencies_hz=np.array([60.0, 70.0, 300.0, 320.0]).reshape(2, 2, 1),
-        bandwidths_hz=np.full((2, 2, 1), 30.0),
-        gains=np.full((2, 2, 1), gain),
-        level_sd_db=np.zeros((2, 2, 1)),
-        estimator="planted",
-        simulated=True,
-    )
 
 
 def output(live: Live, *, block: int = 128, seed: int = 0, **more: Any) -> SoundOutput:
@@ -166,13 +152,6 @@ def test_a_minute_leaves_with_the_bits_of_the_renderer(
     together = min(wanted.size, captured.size - first)
     assert together >= (seconds - 1) * RATE_HZ
     np.testing.assert_array_equal(captured[first : first + together], wanted[:together])
-
-
-def wait_until(holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
 
 
 def wait_for_blocks(live: Live, before: int, count: int, *, of: int = 0) -> Array:

@@ -1,0 +1,24 @@
+"""A small texture whose parameters everybody can see."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from modeling import TextureModel
+
+
+def planted_model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel:
+    """Two speeds, two forces, one layer."""
+    return TextureModel(
+        texture="planted",
+        rate_hz=rate_hz,
+        speeds_mm_s=[50.0, 350.0],
+        forces_n=[0.5, 3.5],
+        noise_gains=[[0.01, 0.02], [0.03, 0.05]],
+        frequencies_hz=np.array([60.0, 70.0, 300.0, 320.0]).reshape(2, 2, 1),
+        bandwidths_hz=np.full((2, 2, 1), 30.0),
+        gains=np.full((2, 2, 1), gain),
+        level_sd_db=np.zeros((2, 2, 1)),
+        estimator="planted",
+        simulated=True,
+    )
