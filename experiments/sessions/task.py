@@ -30,7 +30,7 @@ class Task:
     trial : type
         Of one trial; a dataclass.
     trials : callable
-        From textures and models in a balanced random order, and the occasion, to what
+        From the occasion, and textures and models in a balanced random order, to what
         distinguishes the trials: texture, model and the task's own fields.
     virtual : callable
         From the models and a trial to the virtual surfaces, one per button.
@@ -51,7 +51,7 @@ class Task:
     name: str
     description: str
     trial: type[Trial]
-    trials: Callable[[Order, Occasion], list[dict[str, Any]]]
+    trials: Callable[[Occasion, Order], list[dict[str, Any]]]
     virtual: Callable[[ModelSets, Any], Sequence[AnyModel]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]

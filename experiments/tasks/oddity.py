@@ -49,7 +49,7 @@ class OddityTrial(Trial):
 # --- The trials -----------------------------------------------------------------------------
 
 
-def _trials(order: Order, occasion: Occasion) -> list[dict[str, Any]]:
+def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     """For each texture and odd model, the odd one is behind each button equally often (± 1)."""
     if len(occasion.models) != 2:
         raise InputError(
