@@ -16,6 +16,9 @@ from experiments.sessions.state import SessionState
 
 Planned = Mapping[str, Any]
 
+# That somebody starts a session again ends no break: what the participant does there ends it.
+_ACTIVE = ("presented", "pressed", "slider", "answer")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Resumption:
@@ -70,7 +73,8 @@ def resumption(
     main = [trial for trial in manifest.trials if trial["phase"] != "training"]
     begun_main = any(trial["trial"] in answered for trial in main)
     over = begun_main or _said(state.events, "training_over")
-    again = _is_long(state.last_utc, now or now_utc(), longest_gap_min) or _broke_off(state.events)
+    gap = _is_long(_last_active(state.events), now or now_utc(), longest_gap_min)
+    again = gap or _broke_off(state.events)
     open_ = main if over or (again and answered) else manifest.trials
     next_trials = tuple(trial for trial in open_ if trial["trial"] not in answered)
     to_repeat = _owed(open_, state.rows)
@@ -105,6 +109,11 @@ def _broke_off(events: Sequence[Event]) -> bool:
         if event["event"] == "phase":
             return event.get("phase") == "training" and bool(event.get("again"))
     return False
+
+
+def _last_active(events: Sequence[Event]) -> str:
+    """When the participant last felt or did something; empty before."""
+    return next((e["utc"] for e in reversed(events) if e["event"] in _ACTIVE), "")
 
 
 def _is_long(last_utc: str, now: datetime, longest_gap_min: float) -> bool:

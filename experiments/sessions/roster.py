@@ -210,7 +210,7 @@ _LEFT = {"dropped": "dropped out", "withdrawn": "withdrew"}
 
 
 def _is_enrolment(event: Mapping[str, Any], subject: int) -> bool:
-    return event["event"] == "enrolled" and event["subject"] == subject
+    return bool(event["event"] == "enrolled" and event["subject"] == subject)
 
 
 def _entries(events: tuple[dict[str, Any], ...], path: Path) -> dict[int, dict[str, Any]]:
@@ -243,10 +243,10 @@ def _first_free(entries: Mapping[int, object]) -> int:
 
 
 def _slot(subject: int, participants: int, entries: Mapping[int, Mapping[str, Any]]) -> int:
-    held = {entry["slot"] for entry in entries.values() if not entry["left"]}
+    held: set[int] = {entry["slot"] for entry in entries.values() if not entry["left"]}
     if 1 <= subject <= participants and subject not in held:
         return subject
-    freed = {entry["slot"] for entry in entries.values() if entry["left"]} - held
+    freed: set[int] = {entry["slot"] for entry in entries.values() if entry["left"]} - held
     if fitting := [slot for slot in freed if slot <= participants]:
         return min(fitting)
     raise InputError(

@@ -219,32 +219,29 @@ class SessionStore:
         """
         overrides = overrides or Overrides()
         files = manifest.files(data_folder)
-        made: list[Path] = []
         try:
             admit(files, manifest, overrides=overrides)
             recorded = [*manifest.overrides]
             recorded += [record for record in overrides.recorded if record not in recorded]
             final = replace(manifest, overrides=recorded)
-            store = cls._begin(files, final, made=made)
+            make_folder(files.folder)
+            with locked(files.manifest):
+                refuse_begun(files)
+                try:
+                    return cls._begin(files, final)
+                except OSError:
+                    for path in files.there():  # all of them are ours, and nothing happened yet
+                        with suppress(OSError):
+                            path.unlink()
+                    raise
         except OSError as error:
-            for path in made:
-                with suppress(OSError):
-                    path.unlink()
             raise store_error(error, files.root, _NOTHING) from error
-        return store
 
     @classmethod
-    def _begin(
-        cls, files: SessionFiles, manifest: SessionManifest, *, made: list[Path]
-    ) -> SessionStore:
-        make_folder(files.folder)
-        with locked(files.manifest):
-            refuse_begun(files)
-            write_new(files.manifest, manifest.text.encode())
-            made.append(files.manifest)
-            handle = open_file(files.log, new=True)
-            made.append(files.log)
-            _claim(handle, files)
+    def _begin(cls, files: SessionFiles, manifest: SessionManifest) -> SessionStore:
+        write_new(files.manifest, manifest.text.encode())
+        handle = open_file(files.log, new=True)
+        _claim(handle, files)
         sync_folder(files.folder)
         store = cls(files, manifest, handle=handle)
         store._open({"resumed": False, "overrides": manifest.overrides})
@@ -287,8 +284,9 @@ class SessionStore:
         _check_unchanged(stored, manifest, files=files, overrides=overrides)
         try:
             # Killed between manifest and log, it has none yet.
-            handle = open_file(files.log, new=False)
-            _claim(handle, files)
+            with locked(files.manifest):
+                handle = open_file(files.log, new=False)
+                _claim(handle, files)
             store = cls(files, stored, handle=handle)
             try:
                 _check_open(store.before, stored, files=files)
@@ -307,9 +305,8 @@ class SessionStore:
         cut = {"cut": self._cut.decode("utf-8", "backslashreplace")} if self._cut else {}
         sha256 = self.manifest.sha256
         try:
-            self._writer.put_safely(
-                self._event("opened", {"manifest_sha256": sha256, **fields, **cut})
-            )
+            event = {"manifest_sha256": sha256, **fields, **cut}
+            self._writer.put_safely(self._event("opened", event))
         except StoreError:
             with suppress(StoreError):
                 self.close()
@@ -420,8 +417,8 @@ def _check_open(state: SessionState, stored: SessionManifest, *, files: SessionF
     named = state.events[0].get("manifest_sha256") if state.events else stored.sha256
     if named != stored.sha256:
         raise InputError(
-            f"expected the manifest that {files.log} names, got a changed {files.manifest}; restore "
-            "that file from a copy."
+            f"expected the manifest that {files.log} names, got a changed {files.manifest}; "
+            "restore that file from a copy."
         )
 
 
