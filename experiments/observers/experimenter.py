@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class SimulatedExperimenter:
-    """Mounts every sample and mends every rig at once; `experiments.sessions.surfaces.Experimenter`.
+    """Mounts every sample and mends every rig at once.
 
     Attributes
     ----------

@@ -16,10 +16,36 @@ from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.tasks import task_named
 from modeling.checks import check_whole
+from modeling.models.loading import AnyModel
+from rig.interface import HandRows, PresentationRecord, RigReading
 from rig.twin import SimulatedRig
 
 Row = Mapping[str, object]
 Occasion = tuple[str, int, int]  # task, subject, session
+_NO_ROWS = HandRows.joined([])
+_AT_REST = RigReading(0.0, 0.0, 0.0, False, simulated=True)
+
+
+class _UnfeltRig(SimulatedRig):
+    """A twin whose hand does not move, and which keeps no record of what it presents."""
+
+    def present_model(self, model: AnyModel) -> float:
+        return 0.0
+
+    def present_real(self, texture: str) -> float:
+        return 0.0
+
+    def silence(self) -> None:
+        pass
+
+    def read(self) -> RigReading:
+        return _AT_REST
+
+    def take_history(self) -> HandRows:
+        return _NO_ROWS
+
+    def take_presentations(self) -> tuple[PresentationRecord, ...]:
+        return ()
 
 
 def simulate_sessions(
@@ -112,7 +138,7 @@ def _rows_of(
     seed: int,
 ) -> list[list[Row]]:
     """The rows of these sessions, one after the other."""
-    rig = SimulatedRig()
+    rig = _UnfeltRig()
     answers = []
     for task, subject, session in agenda:
         kind = task_named(task)

@@ -5,17 +5,14 @@ docs/method/protocols.md#simulated-participants
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import exp, log
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from experiments.sessions.surfaces import HIGHEST_RATING
 from experiments.study.study import MOST_TEXTURES
 from modeling import InputError
-from modeling.arrays import Floats
 from modeling.checks import check_keys, check_number
 from modeling.errors import shown
 
@@ -117,8 +114,8 @@ class Psychometrics:
     planted : mapping of texture to mapping of what to points
         What another model than the reference does to the ratings of a texture on a scale
         (magnitude_similarity, frequency_similarity), or to the share of right answers in the
-        relative task (choice, percentage points), on average; instead of what percepts do. So small that nobody's ratings
-        are more than 90 apart.
+        relative task (choice, percentage points), on average; instead of what percepts do. So small
+        that nobody's ratings differ by more than 90.
 
     Raises
     ------
@@ -192,10 +189,9 @@ class Psychometrics:
         """The points planted for a texture, None where percepts decide."""
         return self.planted.get(texture, {}).get(what)
 
-    def felt_rating(self, distance_db: ArrayLike) -> Floats:
-        """Rating by distance alone: best_rating·exp(−distance/scale); same shape as the input."""
-        rating: Floats = self.best_rating * np.exp(-np.asarray(distance_db) / self.scale_db)
-        return rating
+    def felt_rating(self, distance_db: float) -> float:
+        """Rating by distance alone: best_rating·exp(−distance/scale)."""
+        return self.best_rating * exp(-distance_db / self.scale_db)
 
     def as_distance_db(self, points: float) -> float:
         """The distance from an identical surface that lowers a rating by |points|, in dB."""
@@ -207,9 +203,7 @@ class Psychometrics:
         return 1.0 + person.learning * exp(-(trial - 1) / self.learning_trials)
 
 
-def mean_ratings(
-    felt: float, *, bias: float, effect: float
-) -> tuple[float, float]:
+def mean_ratings(felt: float, *, bias: float, effect: float) -> tuple[float, float]:
     """A person's mean ratings of the reference and of the other model, `effect` points apart.
 
     Both are moved inward together where one would leave 3 … 95, so the difference is kept.
@@ -226,57 +220,64 @@ def mean_ratings(
     return reference, reference + effect
 
 
-def choice_shares(evidence: ArrayLike, lapse_rate: float, preferences: ArrayLike) -> Floats:
-    """Probability of each of n buttons, (n,): Luce's rule with preferences and lapses.
+def choice_shares(
+    evidence: Sequence[float], lapse_rate: float, preferences: Sequence[float]
+) -> list[float]:
+    """Probability of each of n buttons: Luce's rule with preferences and lapses.
 
     p_j = (1 − λ)·exp(e_j + b_j)/Σ exp(e_k + b_k) + λ·exp(b_j)/Σ exp(b_k)
 
     Parameters
     ----------
-    evidence : (n,) array_like
+    evidence : sequence of n float
         e, log odds; of the distance d to what is looked for, −d/τ.
     lapse_rate : float
         λ, 0 … 1: share of blind answers, which follow preference alone.
-    preferences : (n,) array_like
+    preferences : sequence of n float
         b, log odds.
     """
-    liked = np.asarray(preferences, dtype=np.float64)
-    shares: Floats = (1 - lapse_rate) * _softmax(np.asarray(evidence) + liked)
-    return shares + lapse_rate * _softmax(liked)
+    attentive = _softmax([e + b for e, b in zip(evidence, preferences, strict=True)])
+    blind = _softmax(preferences)
+    mixed = zip(attentive, blind, strict=True)
+    return [(1 - lapse_rate) * seen + lapse_rate * unseen for seen, unseen in mixed]
 
 
-def with_effect(shares: ArrayLike, right: int, *, effect: float) -> tuple[Floats, Floats]:
+def with_effect(
+    shares: Sequence[float], right: int, *, effect: float
+) -> tuple[list[float], list[float]]:
     """Shares of the reference and of the other model, `effect` apart at the right button.
 
-    The reference's is moved inward where the other's would leave 0 … 1, so the difference is kept;
-    the other buttons keep their proportions.
+    Those of the reference are moved inward where the other's would leave 0 … 1, so the difference
+    is kept; the other buttons keep their proportions.
 
     Parameters
     ----------
-    shares : (n,) array_like
+    shares : sequence of n float
         By percepts; the sum is 1.
     right : int
         Index of the right button.
     effect : float
         −1 … 1.
     """
-    before = np.asarray(shares, dtype=np.float64)
-    reference = min(max(before[right], -min(effect, 0.0)), 1.0 - max(effect, 0.0))
-    return _with_share(before, right, reference), _with_share(before, right, reference + effect)
+    reference = min(max(shares[right], -min(effect, 0.0)), 1.0 - max(effect, 0.0))
+    return _with_share(shares, right, reference), _with_share(shares, right, reference + effect)
 
 
-def _with_share(shares: Floats, right: int, share: float) -> Floats:
-    rest = 1.0 - shares[right]
-    wrong = shares * ((1.0 - share) / rest) if rest > 0 else np.full(
-        shares.size, (1.0 - share) / (shares.size - 1)
-    )
-    wrong[right] = share
-    return wrong
+def _with_share(shares: Sequence[float], right: int, share: float) -> list[float]:
+    rest = sum(shares) - shares[right]
+    if rest > 0:
+        changed = [(1.0 - share) * other / rest for other in shares]
+    else:
+        changed = [(1.0 - share) / (len(shares) - 1)] * len(shares)
+    changed[right] = share
+    return changed
 
 
-def _softmax(log_odds: Floats) -> Floats:
-    weights = np.exp(log_odds - log_odds.max())
-    return weights / weights.sum()
+def _softmax(log_odds: Sequence[float]) -> list[float]:
+    highest = max(log_odds)
+    weights = [exp(value - highest) for value in log_odds]
+    total = sum(weights)
+    return [weight / total for weight in weights]
 
 
 def _check_trait(name: str, trait: object, limits: tuple[float, float]) -> None:

@@ -7,7 +7,7 @@ The truth is a stipulation that lets analyses be tested, not a model of people
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import hypot, log
 
 import numpy as np
@@ -33,7 +33,6 @@ from experiments.study.questions import Question
 from experiments.study.study import TASKS
 from experiments.tasks.absolute import AbsoluteTrial
 from modeling import InputError
-from modeling.arrays import Floats
 from modeling.seeds import generator
 
 MEDIAN_TIME_S = 20.0
@@ -177,8 +176,8 @@ class SimulatedParticipant:
         surfaces.present_virtual(button)
         return Choice(button=button, response_time_s=self._response_time_s())
 
-    def shares(self, trial: ChoiceTrial) -> Floats:
-        """Probabilities of the buttons in such a trial of the relative task, (n,)."""
+    def shares(self, trial: ChoiceTrial) -> list[float]:
+        """Probabilities of the buttons in such a trial of the relative task."""
         place, number = self._perception.place, self._perception.set_number[trial.model]
         points = self._psychometrics.effect(trial.texture, "choice")
         model = number if points is None else 0
@@ -199,10 +198,10 @@ class SimulatedParticipant:
 
     def _odd_one(self, trial: ChoiceTrial) -> int:
         """The button whose percept, with noise, is farthest from those of the other two."""
-        liked = np.array(self._liked(trial))
+        liked = self._liked(trial)
         if self._rng.random() < self.person.lapse_rate:
-            return self._drawn(choice_shares(np.zeros(liked.size), 0.0, liked))
-        percepts = self._rng.standard_normal(liked.size)
+            return self._drawn(choice_shares([0.0] * len(liked), 1.0, liked))
+        percepts = self._rng.standard_normal(len(liked))
         odd = np.array([name == trial.model for name in trial.layout])
         percepts[odd] += self.odd_distance_db(trial) / self._temperature_db(trial)
         others = (percepts.sum() - percepts) / (percepts.size - 1)
@@ -231,10 +230,14 @@ class SimulatedParticipant:
     def _liked(self, trial: ChoiceTrial) -> tuple[float, ...]:
         return self.person.preferences[: len(trial.layout)]
 
-    def _drawn(self, shares: Floats) -> int:
+    def _drawn(self, shares: Sequence[float]) -> int:
         """An index drawn with these probabilities."""
-        place = int(np.searchsorted(np.cumsum(shares), self._rng.random(), side="right"))
-        return min(place, shares.size - 1)  # the sum may fall short of 1 by rounding
+        left = float(self._rng.random()) * sum(shares)
+        for index, share in enumerate(shares):
+            left -= share
+            if left < 0:
+                return index
+        return len(shares) - 1  # by rounding alone
 
     def _looks(self) -> int:
         return int(self._rng.poisson(LOOKS * self.person.care))

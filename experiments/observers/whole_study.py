@@ -1,4 +1,4 @@
-"""A whole study in silico: every simulated participant through the very same protocols and store."""
+"""A whole study in silico: simulated participants in the very same protocols and store."""
 
 from __future__ import annotations
 
