@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from modeling.face import lazily
 
 HOMES = {
-    "study.study": "Study TaskPlan",
+    "study.study": "Study",
+    "study.task_plan": "TaskPlan",
     "study.models": "ModelSets",
     "study.design": "SessionPlan fisher_yates",
     "sessions.store": "StoreError",
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from experiments.study.design import fisher_yates as fisher_yates
     from experiments.study.models import ModelSets as ModelSets
     from experiments.study.study import Study as Study
-    from experiments.study.study import TaskPlan as TaskPlan
+    from experiments.study.task_plan import TaskPlan as TaskPlan
     from experiments.tasks import plan_session as plan_session
     from experiments.tasks import task_named as task_named
     from experiments.tasks.absolute import run_absolute as run_absolute

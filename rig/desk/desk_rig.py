@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from modeling import InputError
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
-from rig.desk.checks import Requirements, check_rig
+from rig.desk.checks import Requirements, check_rig, layered
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
@@ -189,7 +189,7 @@ class DeskRig:
 
     # --- Presentations ----------------------------------------------------------------------
 
-    def present_model(self, model: Layered) -> float:
+    def present_model(self, model: AnyModel) -> float:
         """Render this model under the hand; returns when its first sample has left.
 
         Where nothing plays any more, that is a fault, and the time is now.
@@ -202,7 +202,7 @@ class DeskRig:
         self.silence()
         sound = self.parts.sound
         try:
-            presented = sound.play(model)
+            presented = sound.play(layered(model))
             self._playing, start_s = presented.presentation, presented.time_s
         except SoundLost as lost:
             self._playing, start_s = 0, now_s()

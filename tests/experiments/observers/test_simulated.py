@@ -169,7 +169,7 @@ def perception(
         name: replace(model, gains=2 * model.gains, noise_gains=2 * model.noise_gains)
         for name, model in truths.items()
     }
-    sets = ModelSets(full=louder, simplified=models.simplified)
+    sets = ModelSets(sets={"full": louder, "simplified": models.sets["simplified"]})
     return Perception(study, real=truths, models=sets, threshold=threshold)
 
 
@@ -179,7 +179,7 @@ def test_many_ratings_agree_with_the_planted_truth(
     truth = Psychometrics(scale_db=8.0, bias_sd=12.0, noise_sd=16.0)
     trials = plan_session(study, task="absolute", subject=1, session=1).trials
     trial = next(t for t in trials if (t.texture, t.model) == ("MDF", "full"))
-    surfaces = Surfaces(rig, texture="MDF", models=[models.full["MDF"]])
+    surfaces = Surfaces(rig, texture="MDF", models=[models.sets["full"]["MDF"]])
     surfaces.present_real()
     ratings = []
     for subject in range(1, 2001):
@@ -216,7 +216,7 @@ def test_a_subject_keeps_the_bias_and_not_the_noise(
     study: Study, perception: Perception, models: ModelSets, rig: Any
 ) -> None:
     trial = plan_session(study, task="absolute", subject=1, session=1).trials[0]
-    surfaces = Surfaces(rig, texture=trial.texture, models=[models.full[trial.texture]])
+    surfaces = Surfaces(rig, texture=trial.texture, models=[models.sets["full"][trial.texture]])
 
     def magnitude(noise_sd: float, **who: int) -> float:
         truth = Psychometrics(bias_sd=3.0, noise_sd=noise_sd, scale_db=30.0)
@@ -234,4 +234,6 @@ def test_a_real_surface_without_truth_is_refused(
     study: Study, models: ModelSets, threshold: Threshold
 ) -> None:
     with pytest.raises(InputError, match="got none for canvas, MDF"):
-        Perception(study, real={"PVC": models.full["PVC"]}, models=models, threshold=threshold)
+        Perception(
+            study, real={"PVC": models.sets["full"]["PVC"]}, models=models, threshold=threshold
+        )

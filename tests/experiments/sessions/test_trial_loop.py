@@ -154,7 +154,9 @@ def test_escape_on_the_last_page_is_no_abort(
 def test_a_missing_model_is_told_before_anything_is_written(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
-    few = ModelSets(full=models.full, simplified={"PVC": models.full["PVC"]})
+    few = ModelSets(
+        sets={"full": models.sets["full"], "simplified": {"PVC": models.sets["full"]["PVC"]}}
+    )
     with pytest.raises(InputError, match=r"a simplified model of each texture.*canvas, MDF"):
         session(study, tmp_path / "data", models=few, rig=rig, respondent=respondent)
     assert not (tmp_path / "data").exists()
@@ -163,7 +165,12 @@ def test_a_missing_model_is_told_before_anything_is_written(
 def test_one_identical_pair_of_models_is_a_control_and_all_are_refused(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
-    one = ModelSets(full=models.full, simplified={**models.simplified, "PVC": models.full["PVC"]})
+    one = ModelSets(
+        sets={
+            "full": models.sets["full"],
+            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
+        }
+    )
     assert "PVC" in one.identical(study.textures)
     result = session(study, tmp_path / "one", models=one, rig=rig, respondent=respondent)
     assert result.completed
@@ -173,7 +180,7 @@ def test_one_identical_pair_of_models_is_a_control_and_all_are_refused(
         assert stated["ModelsSHA256"] == one.sha256(study.textures)
         assert stated["StudySHA256"] == study.sha256
     assert len(set(sidecar["ModelsSHA256"]["PVC"].values())) == 1
-    same = ModelSets(full=models.full, simplified=models.full)
+    same = ModelSets(sets={"full": models.sets["full"], "simplified": models.sets["full"]})
     with pytest.raises(InputError, match="identical ones for all"):
         session(study, tmp_path / "all", models=same, rig=rig, respondent=respondent)
     assert not (tmp_path / "all").exists()
@@ -183,7 +190,12 @@ def test_sessions_with_other_models_need_another_data_folder(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
     session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    other = ModelSets(full=models.full, simplified={**models.simplified, "PVC": models.full["PVC"]})
+    other = ModelSets(
+        sets={
+            "full": models.sets["full"],
+            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
+        }
+    )
     with pytest.raises(InputError, match="ModelsSHA256 unchanged.*another PVC"):
         run_absolute(
             study,
@@ -198,7 +210,7 @@ def test_sessions_with_other_models_need_another_data_folder(
 
 def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets, rig: Any) -> None:
     rig.presses = 1
-    surfaces = Surfaces(rig, texture="PVC", models=[models.full["PVC"]])
+    surfaces = Surfaces(rig, texture="PVC", models=[models.sets["full"]["PVC"]])
     surfaces.present_real()
     surfaces.follow_rig_button()
     assert surfaces.shows_real
@@ -214,7 +226,7 @@ def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets,
 def test_toggling_among_several_returns_to_the_one_presented_last(
     models: ModelSets, rig: Any
 ) -> None:
-    surfaces = Surfaces(rig, texture="PVC", models=list(models.full.values()))
+    surfaces = Surfaces(rig, texture="PVC", models=list(models.sets["full"].values()))
     surfaces.present_real()
     surfaces.toggle()
     assert surfaces.shows_real
@@ -222,7 +234,7 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
     surfaces.present_virtual(2)
     surfaces.toggle()
     surfaces.toggle()
-    assert rig.notes[-1] == ("virtual", list(models.full.values())[2])
+    assert rig.notes[-1] == ("virtual", list(models.sets["full"].values())[2])
     assert (surfaces.selected, surfaces.presses, surfaces.switches) == (2, 2, 3)
     with pytest.raises(InputError, match="button from 0 to 2"):
         surfaces.present_virtual(3)
@@ -385,9 +397,12 @@ def test_who_strokes_outside_the_models_grid_is_told_after_the_trial(
 ) -> None:
     slow = {
         name: {texture: at_speeds(model, 1e-4) for texture, model in kinds.items()}
-        for name, kinds in (("full", models.full), ("simplified", models.simplified))
+        for name, kinds in (
+            ("full", models.sets["full"]),
+            ("simplified", models.sets["simplified"]),
+        )
     }
-    session(study, tmp_path, models=ModelSets(**slow), rig=Stroking(), respondent=respondent)
+    session(study, tmp_path, models=ModelSets(sets=slow), rig=Stroking(), respondent=respondent)
     assert respondent.heard.count("Your strokes") == 7
     told = [d for event, d in log_of(tmp_path, rows) if event == "hand outside the grid"]
     assert len(told) == 7
@@ -406,7 +421,7 @@ def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
     monkeypatch.setattr("experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
     rig.now_s = lambda: 7.0
     rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
-    surfaces = Surfaces(rig, texture="PVC", models=[models.full["PVC"]])
+    surfaces = Surfaces(rig, texture="PVC", models=[models.sets["full"]["PVC"]])
     assert surfaces.response_time_s == 0.0
     surfaces.present_real()
     assert surfaces.first_sample_s == 6.75

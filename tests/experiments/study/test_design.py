@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from experiments.study.design import fisher_yates, models_of_session
-from experiments.study.study import Study, TaskPlan
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from modeling import InputError
 

@@ -26,7 +26,7 @@ NOTE = CompiledFor(
 
 def test_models_of_a_scene_stand_where_simplified_ones_stand() -> None:
     least = {name: replace(regressed(model), compiled_for=NOTE) for name, model in FULL.items()}
-    sets = ModelSets(full=FULL, simplified=least)
+    sets = ModelSets(sets={"full": FULL, "simplified": least})
     sets.require(("canvas", "MDF"))
     assert sets.scene == NOTE
     assert sets.identical(("canvas", "MDF")) == ()
@@ -35,14 +35,16 @@ def test_models_of_a_scene_stand_where_simplified_ones_stand() -> None:
 
 
 def test_a_scene_without_a_texture_of_the_study_is_named() -> None:
-    sets = ModelSets(full=FULL, simplified={"MDF": replace(FULL["MDF"], compiled_for=NOTE)})
+    sets = ModelSets(
+        sets={"full": FULL, "simplified": {"MDF": replace(FULL["MDF"], compiled_for=NOTE)}}
+    )
     told = "each texture of the study in the scene light touch, got none of canvas; add what"
     with pytest.raises(InputError, match=told):
         sets.require(("canvas", "MDF"))
 
 
 def test_simplified_models_are_of_no_scene() -> None:
-    sets = ModelSets(full=FULL, simplified={"MDF": FULL["MDF"]})
+    sets = ModelSets(sets={"full": FULL, "simplified": {"MDF": FULL["MDF"]}})
     assert sets.scene is None
     assert sets.identical(["MDF"]) == ("MDF",)
     with pytest.raises(InputError, match="a simplified model of each texture of the study, got no"):
