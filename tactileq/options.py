@@ -32,6 +32,7 @@ HoldAbove = Annotated[
 StudyFile = Annotated[
     Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
 ]
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="A study file (TOML).")]
 Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")]
 Simplified = Annotated[
     Path | None, typer.Option("--simplified", help="Folder of simplified models. [simplified]")

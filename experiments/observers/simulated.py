@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,7 +24,7 @@ from modeling.errors import shown
 from modeling.models.loading import Layered
 from modeling.seeds import generator
 
-SurfaceKind = Literal["real", "full", "simplified"]
+SurfaceKind = str
 
 BAND_EDGES_HZ = (10.0, 20.0, 35.0, 60.0, 90.0, 130.0, 180.0, 250.0, 350.0, 480.0)
 STROKES = ((100.0, 1.0), (200.0, 1.5), (300.0, 2.5))  # (mm/s, N)
@@ -191,7 +191,7 @@ class Perception:
                 f"expected the truth behind each real surface, got none for {', '.join(missing)}; "
                 "give a model for each."
             )
-        kinds: tuple[tuple[SurfaceKind, Mapping[str, Layered]], ...] = (
+        kinds: tuple[tuple[SurfaceKind, Mapping[str, Any]], ...] = (
             ("real", real),
             ("full", models.sets["full"]),
             ("simplified", models.sets["simplified"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -21,6 +22,10 @@ from experiments.tasks.relative import run_relative
 from modeling import InputError
 from rig.interface import Acceleration, Fault
 from rig.twin import SimulatedRig
+
+
+def with_simplified(models: ModelSets, simplified: Mapping[str, Any]) -> ModelSets:
+    return ModelSets(sets={**models.sets, "simplified": simplified})
 
 
 def session(study: Study, folder: Path, task: str = "absolute", **parts: Any) -> Any:
@@ -154,9 +159,7 @@ def test_escape_on_the_last_page_is_no_abort(
 def test_a_missing_model_is_told_before_anything_is_written(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
-    few = ModelSets(
-        sets={"full": models.sets["full"], "simplified": {"PVC": models.sets["full"]["PVC"]}}
-    )
+    few = with_simplified(models, {"PVC": models.sets["full"]["PVC"]})
     with pytest.raises(InputError, match=r"a simplified model of each texture.*canvas, MDF"):
         session(study, tmp_path / "data", models=few, rig=rig, respondent=respondent)
     assert not (tmp_path / "data").exists()
@@ -165,12 +168,7 @@ def test_a_missing_model_is_told_before_anything_is_written(
 def test_one_identical_pair_of_models_is_a_control_and_all_are_refused(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
-    one = ModelSets(
-        sets={
-            "full": models.sets["full"],
-            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
-        }
-    )
+    one = with_simplified(models, {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]})
     assert "PVC" in one.identical(study.textures)
     result = session(study, tmp_path / "one", models=one, rig=rig, respondent=respondent)
     assert result.completed
@@ -190,11 +188,8 @@ def test_sessions_with_other_models_need_another_data_folder(
     tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
 ) -> None:
     session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    other = ModelSets(
-        sets={
-            "full": models.sets["full"],
-            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
-        }
+    other = with_simplified(
+        models, {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]}
     )
     with pytest.raises(InputError, match="ModelsSHA256 unchanged.*another PVC"):
         run_absolute(
@@ -397,10 +392,7 @@ def test_who_strokes_outside_the_models_grid_is_told_after_the_trial(
 ) -> None:
     slow = {
         name: {texture: at_speeds(model, 1e-4) for texture, model in kinds.items()}
-        for name, kinds in (
-            ("full", models.sets["full"]),
-            ("simplified", models.sets["simplified"]),
-        )
+        for name, kinds in models.sets.items()
     }
     session(study, tmp_path, models=ModelSets(sets=slow), rig=Stroking(), respondent=respondent)
     assert respondent.heard.count("Your strokes") == 7
