@@ -24,6 +24,7 @@ COMMANDS = {
     "stimuli": "stimuli",
     "vibrator": "vibrator",
     "feel": "feel",
+    "study": "study",
     "session": "session",
     "simulate": "simulate",
     "analyze": "analyze",

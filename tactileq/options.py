@@ -32,6 +32,7 @@ HoldAbove = Annotated[
 StudyFile = Annotated[
     Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
 ]
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="A study file (TOML).")]
 Models = Annotated[
     Path | None,
     typer.Option("--models", help="Instead of the study's first models: a folder of full ones."),
