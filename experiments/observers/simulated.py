@@ -184,7 +184,7 @@ class Perception:
         models: ModelSets,
         threshold: Threshold,
     ) -> None:
-        models.require(study.textures)
+        models.require(study)
         missing = [texture for texture in study.textures if texture not in real]
         if missing:
             raise InputError(
@@ -193,8 +193,8 @@ class Perception:
             )
         kinds: tuple[tuple[SurfaceKind, Mapping[str, Layered]], ...] = (
             ("real", real),
-            ("full", models.full),
-            ("simplified", models.simplified),
+            ("full", models.sets["full"]),
+            ("simplified", models.sets["simplified"]),
         )
         percepts = {
             (kind, texture): sensation_levels(source[texture], threshold)

@@ -67,7 +67,7 @@ def simulate_study(
         If the disk does not take the answers.
     """
     check_whole("seed", seed, low=0, high=2**63)
-    models = ModelSets(full=full, simplified=simplified)
+    models = ModelSets(sets={"full": full, "simplified": simplified})
     perception = Perception(study, real=real, models=models, threshold=threshold)
     agenda = _agenda(study)
     results = []
@@ -107,6 +107,6 @@ def _agenda(study: Study) -> list[tuple[str, int, int]]:
     return [
         (task, subject, session)
         for task, plan in study.tasks.items()
-        for session in range(1, plan.sessions + 1)
+        for session in range(1, study.sessions(task) + 1)
         for subject in range(1, plan.participants + 1)
     ]

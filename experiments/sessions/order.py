@@ -2,53 +2,76 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from experiments.sessions.task import Task
 from experiments.study.design import (
+    BOTH_IN_A_TRIAL,
+    Occasion,
     Phase,
     SessionPlan,
     fisher_yates,
-    models_of_session,
-    session_generator,
+    first_models,
+    with_first_models,
 )
 from experiments.study.study import Study
-from modeling.checks import check_whole
 
 
-def draw_session(study: Study, task: Task, *, subject: int, session: int) -> SessionPlan:
+def draw_session(study: Study, task: Task, *, subject: int, session: int, slot: int) -> SessionPlan:
     """The order of one session: training trials, then the main ones.
 
     docs/method/protocols.md#order
 
-    The same study, task, subject and session always give the same order.
+    The same study, task, subject, session and slot always give the same order.
 
     Parameters
     ----------
     study : Study
     task : Task
     subject : int
-        1 … participants of the task.
+        1 … 9999; the shuffles follow from it.
     session : int
-        1 … sessions of the task (2 by day, 1 interleaved).
+        1 … sessions of the task (by day one for each model, 1 interleaved).
+    slot : int
+        1 … participants of the task; what is balanced over participants follows from it.
 
     Raises
     ------
     InputError
-        If the study has no such task, subject or session.
+        If the study has no such task, subject, session or slot.
     """
-    plan = study.plan(task.name)
-    check_whole("subject", subject, low=1, high=plan.participants)
-    check_whole("session", session, low=1, high=plan.sessions)
-    rng = session_generator(study, task.name, subject, session=session)
-    models = models_of_session(study, task=task.name, subject=subject, session=session)
-    pairs = [(texture, model) for model in models for texture in study.textures]
-    pairs *= study.repeats if task.repeated else 1
-    training = task.trials(fisher_yates(pairs, rng), study, rng)[: study.training_trials]
-    drafts: list[tuple[Phase, dict[str, Any]]] = [("training", draft) for draft in training]
-    drafts += [("main", draft) for draft in task.trials(fisher_yates(pairs, rng), study, rng)]
+    occasion = Occasion.of(study, task=task.name, subject=subject, session=session, slot=slot)
+    drafts: list[tuple[Phase, dict[str, Any]]]
+    drafts = [("training", draft) for draft in _training(occasion, task)]
+    drafts += [("main", draft) for draft in task.trials(occasion, _order(occasion))]
     trials = tuple(
         task.trial(trial=number, phase=phase, tray=study.trays[draft["texture"]], **draft)
         for number, (phase, draft) in enumerate(drafts, start=1)
     )
-    return SessionPlan(study=study, task=task.name, subject=subject, session=session, trials=trials)
+    return SessionPlan(
+        study=study, task=task.name, subject=subject, session=session, slot=slot, trials=trials
+    )
+
+
+def _training(occasion: Occasion, task: Task) -> list[dict[str, Any]]:
+    """As many trials for practice as there may be, drawn as the main ones are."""
+    most = occasion.study.plan_of(task.name).most_training_trials
+    practice = replace(occasion, phase="training")
+    drafts: list[dict[str, Any]] = []
+    while len(drafts) < most:
+        drafts += task.trials(practice, _order(practice))
+    return drafts[:most]
+
+
+def _order(occasion: Occasion) -> list[tuple[str, str]]:
+    """Textures and models in random order, each model first for as many textures as planned."""
+    plan = occasion.study.plan_of(occasion.task)
+    repeats = plan.repeats
+    if occasion.task in BOTH_IN_A_TRIAL:
+        repeats //= len(plan.models)
+    pairs = [(texture, model) for model in occasion.models for texture in occasion.study.textures]
+    order = fisher_yates(pairs * repeats, occasion.rng)
+    if len(occasion.models) == 1:
+        return order
+    return with_first_models(order, first_models(occasion))

@@ -413,7 +413,7 @@ def _sidecar_text(
             "StudyName": study.name,
             "Masking": study.masking,
             "SurfaceVisible": study.surface_visible,
-            "Schedule": study.plan(plan.task).schedule,
+            "Schedule": study.plan_of(plan.task).schedule,
             **origin,
             **columns,
         }

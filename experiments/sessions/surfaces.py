@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from experiments.study.design import ModelKind, Trial
+from experiments.study.design import Trial
 from modeling import InputError
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
 from rig.interface import TextureRig
 
 HIGHEST_RATING = 100.0
@@ -57,7 +57,7 @@ class Surfaces:
     rig : TextureRig
     texture : str
         The real surface.
-    models : sequence of TextureModel or RegressedModel
+    models : sequence of models of any kind
         The virtual surfaces, one per button.
 
     Attributes
@@ -70,7 +70,7 @@ class Surfaces:
         When the first sample of the first presentation left, on the rig's clock.
     """
 
-    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[Layered]) -> None:
+    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[AnyModel]) -> None:
         self._rig = rig
         self._texture = texture
         self._models = tuple(models)
@@ -154,7 +154,7 @@ class ChoiceTrial(Protocol):
     def texture(self) -> str: ...
 
     @property
-    def model(self) -> ModelKind: ...
+    def model(self) -> str: ...
 
     @property
     def layout(self) -> tuple[str, ...]:

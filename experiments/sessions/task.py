@@ -6,14 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from experiments.sessions.surfaces import Respondent, Surfaces
-from experiments.study.design import Order, Trial
+from experiments.study.design import Occasion, Order, Trial
 from experiments.study.models import ModelSets
-from experiments.study.study import Study
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,11 +27,9 @@ class Task:
         What the participant reads: before the phases "training" and "main", and at "closing".
     trial : type
         Of one trial; a dataclass.
-    repeated : bool
-        Whether each texture and model comes as often as the study's `repeats` says, or once.
     trials : callable
-        From textures and models in random order, the study and a generator of random numbers to
-        what distinguishes the trials: texture, model and the task's own fields.
+        From an occasion and textures and models in random, balanced order to what distinguishes
+        the trials: texture, model and the task's own fields.
     virtual : callable
         From the models and a trial to the virtual surfaces, one per button.
     begin : callable
@@ -47,9 +42,8 @@ class Task:
     description: str
     texts: Mapping[str, tuple[str, str]]
     trial: type[Trial]
-    repeated: bool
-    trials: Callable[[Order, Study, np.random.Generator], list[dict[str, Any]]]
-    virtual: Callable[[ModelSets, Any], Sequence[Layered]]
+    trials: Callable[[Occasion, Order], list[dict[str, Any]]]
+    virtual: Callable[[ModelSets, Any], Sequence[AnyModel]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]
 

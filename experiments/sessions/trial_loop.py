@@ -87,8 +87,8 @@ def run_session(
     StoreError
         If the disk does not take the answers.
     """
-    models.require(study.textures)
-    plan = draw_session(study, task, subject=subject, session=session)
+    models.require(study)
+    plan = draw_session(study, task, subject=subject, session=session, slot=subject)
     rig.open()
     try:
         with SessionStore.create(

@@ -1,21 +1,26 @@
-"""The order of the trials: who does what, when (docs/method/protocols.md#order, PAPER VII)."""
+"""The order of the trials: who does what, when (docs/method/protocols.md#order, PAPER VII).
+
+What is balanced over participants follows from the *slot*, a place 1 … participants in the plan of
+a task, which the replacement of a dropout takes over; all shuffles follow from the subject.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
 from experiments.study.study import TASKS, Study
-from modeling.seeds import generator
+from modeling.checks import check_whole
+from modeling.seeds import generator, number_of
 
 Phase = Literal["training", "main"]
-ModelKind = Literal["full", "simplified"]
 Item = TypeVar("Item")
-
-MODELS: tuple[ModelKind, ...] = ("full", "simplified")
+HIGHEST_SUBJECT = 9999
+# Tasks whose trials hold all models, so that a trial is a repeat of each; its own is the odd one.
+BOTH_IN_A_TRIAL = ("oddity",)
 
 
 def fisher_yates(items: Sequence[Item], rng: np.random.Generator) -> list[Item]:
@@ -40,6 +45,20 @@ def fisher_yates(items: Sequence[Item], rng: np.random.Generator) -> list[Item]:
     return shuffled
 
 
+def dealt(items: Sequence[Item], count: int, rng: np.random.Generator) -> list[Item]:
+    """`count` items in random order, each equally often; which comes once more is random, too.
+
+    Parameters
+    ----------
+    items : sequence of length n
+    count : int
+        ≥ 0.
+    rng : numpy.random.Generator
+    """
+    order = fisher_yates(items, rng)
+    return fisher_yates([order[index % len(order)] for index in range(count)], rng)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Trial:
     """What every trial has; each task adds its own.
@@ -51,8 +70,8 @@ class Trial:
     phase : {"training", "main"}
     texture : str
         The real surface.
-    model : {"full", "simplified"}
-        Behind the virtual surfaces.
+    model : str
+        The set of models behind the virtual surfaces.
     tray : str
         Where the real sample lies.
     """
@@ -60,11 +79,138 @@ class Trial:
     trial: int
     phase: Phase
     texture: str
-    model: ModelKind
+    model: str
     tray: str
 
 
-Order = Sequence[tuple[str, ModelKind]]
+Order = Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Occasion:
+    """One session of one participant: what its trials are drawn from.
+
+    Parameters
+    ----------
+    study : Study
+    task : str
+    subject : int
+        1 … 9999; with the seed, the task and the session all shuffles follow from it.
+    slot : int
+        1 … participants; what is balanced over participants follows from it.
+    session : int
+        From 1.
+    models : tuple of str
+        Those that the session presents.
+    rng : numpy.random.Generator
+        Of the session's shuffles.
+    phase : {"training", "main"}
+        What the trials are drawn for.
+    """
+
+    study: Study
+    task: str
+    subject: int
+    slot: int
+    session: int
+    models: tuple[str, ...]
+    rng: np.random.Generator
+    phase: Phase = "main"
+
+    @staticmethod
+    def of(study: Study, *, task: str, subject: int, session: int, slot: int) -> Occasion:
+        """The occasion of one session.
+
+        Raises
+        ------
+        InputError
+            If the study has no such task, subject, session or slot.
+        """
+        check_whole("subject", subject, low=1, high=HIGHEST_SUBJECT)
+        check_whole("slot", slot, low=1, high=study.plan_of(task).participants)
+        check_whole("session", session, low=1, high=study.sessions(task))
+        return Occasion(
+            study=study,
+            task=task,
+            subject=subject,
+            slot=slot,
+            session=session,
+            models=models_of_session(study, task=task, slot=slot, session=session),
+            rng=generator(study.seed, TASKS.index(task), subject, session),
+        )
+
+    def block(self, size: int, purpose: str) -> tuple[np.random.Generator, int]:
+        """Random numbers that `size` neighbouring slots share, and this slot's place among them.
+
+        Parameters
+        ----------
+        size : int
+            Slots 1 … size are the first block, and so on.
+        purpose : str
+            What it is for; each purpose has random numbers of its own.
+
+        Returns
+        -------
+        numpy.random.Generator
+            In the same state for every slot of the block.
+        int
+            0 … size − 1, dealt by Fisher–Yates: another one for each slot of the block.
+        """
+        return block_of(self.study, self.task, slot=self.slot, size=size, purpose=purpose)
+
+
+def block_of(
+    study: Study, task: str, *, slot: int, size: int, purpose: str
+) -> tuple[np.random.Generator, int]:
+    """`Occasion.block` of a slot before there is an occasion."""
+    number, place = divmod(slot - 1, size)
+    rng = generator(study.seed, TASKS.index(task), number, 0, number_of(purpose))
+    return rng, fisher_yates(range(size), rng)[place]
+
+
+def models_of_session(study: Study, *, task: str, slot: int, session: int) -> tuple[str, ...]:
+    """The models that a session presents: all of the task when interleaved, one when by day.
+
+    By day, as many neighbouring slots as there are models do them in the rows of a cyclic Latin
+    square of a random order, dealt at random: exactly as many begin with each model, and a number
+    does not tell which.
+    """
+    models = study.models_of(task)
+    if study.plan_of(task).schedule == "interleaved":
+        return models
+    rng, row = block_of(study, task, slot=slot, size=len(models), purpose="days")
+    order = fisher_yates(models, rng)
+    return (order[(row + session - 1) % len(order)],)
+
+
+def first_models(occasion: Occasion) -> dict[str, str]:
+    """The model that comes first of each texture in an interleaved session.
+
+    Over as many neighbouring slots as there are models each comes first once, and within a session
+    each is first for equally many textures, or for one more.
+    """
+    models, textures = occasion.models, occasion.study.textures
+    rng, place = occasion.block(len(models), "first model")
+    order = fisher_yates(models, rng)
+    starts = dealt(range(len(order)), len(textures), rng)
+    return {
+        texture: order[(start + place) % len(order)]
+        for texture, start in zip(textures, starts, strict=True)
+    }
+
+
+def with_first_models(order: Order, first: Mapping[str, str]) -> list[tuple[str, str]]:
+    """The order with two models of a texture exchanged wherever another one came first.
+
+    Exchanging names of a uniformly random order leaves it uniform among those that begin so.
+    """
+    came: dict[str, str] = {}
+    for texture, model in order:
+        came.setdefault(texture, model)
+    names = {
+        texture: {model: first[texture], first[texture]: model} for texture, model in came.items()
+    }
+    return [(texture, names[texture].get(model, model)) for texture, model in order]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,30 +221,16 @@ class SessionPlan:
     task: str
     subject: int
     session: int
+    slot: int
     trials: tuple[Trial, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as plain values, for the order file."""
-        return asdict(self) | {"study": self.study.to_dict()}
-
-
-def models_of_session(
-    study: Study, *, task: str, subject: int, session: int
-) -> tuple[ModelKind, ...]:
-    """The models that a session presents: both when interleaved, one when by day.
-
-    By day, subjects 1 and 2, 3 and 4, … are pairs in which a fair coin decides who begins with
-    the full model: an exactly counterbalanced order that cannot be guessed from the number.
-    """
-    if study.plan(task).schedule == "interleaved":
-        return MODELS
-    pair = (subject + 1) // 2
-    coin = int(session_generator(study, task, pair, session=0).integers(0, 2))
-    return (MODELS[(subject + session + coin) % 2],)
-
-
-def session_generator(
-    study: Study, task: str, subject: int, *, session: int
-) -> np.random.Generator:
-    """Random numbers of one session (session 0: of one counterbalancing pair)."""
-    return generator(study.seed, TASKS.index(task), subject, session)
+        """The plan as plain values."""
+        return {
+            "study": self.study.to_dict(),
+            "task": self.task,
+            "subject": self.subject,
+            "session": self.session,
+            "slot": self.slot,
+            "trials": [asdict(trial) for trial in self.trials],
+        }

@@ -1,73 +1,136 @@
-"""The models that a study presents: a full and a simplified one of every texture."""
+"""The models that a study presents: two or more named sets, one model of every texture each."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NoReturn
 
-from experiments.study.design import MODELS, ModelKind
-from modeling import InputError, TextureModel
+from experiments.study.study import Study
+from modeling import InputError
 from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
+
+Presentable = AnyModel
+# What may go on where a reason is given: a word for what, and the sentence that refuses it.
+Allow = Callable[[str, str], None]
+
+
+def refuse(what: str, sentence: str) -> NoReturn:
+    """Go on with nothing."""
+    raise InputError(sentence)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSets:
-    """Full and simplified models by the name of their texture.
+    """Models by the name of their set and of their texture; the first set is the reference.
 
-    In the place of simplified ones may stand those of a compiled scene.
+    Parameters
+    ----------
+    sets : mapping of name to mapping of texture to model
     """
 
-    full: Mapping[str, TextureModel]
-    simplified: Mapping[str, Layered]
+    sets: Mapping[str, Mapping[str, Presentable]]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the sets, the reference first."""
+        return tuple(self.sets)
 
     @property
     def scene(self) -> CompiledFor | None:
-        """What the simplified models say of the scene that they were compiled for, if they were."""
-        notes = (model.compiled_for for model in self.simplified.values())
+        """What the models say of a scene that they were compiled for, if some were."""
+        every = (model for models in self.sets.values() for model in models.values())
+        notes = (getattr(model, "compiled_for", None) for model in every)
         return next((note for note in notes if note), None)
 
-    def of(self, texture: str, kind: ModelKind) -> Layered:
-        """The model of one texture."""
-        return (self.full if kind == "full" else self.simplified)[texture]
+    def of(self, texture: str, name: str) -> Presentable:
+        """The model of one texture in one set."""
+        return self.sets[name][texture]
 
     def sha256(self, textures: Sequence[str]) -> dict[str, dict[str, str]]:
         """SHA-256 of the models of each texture, by which a session names what it presented."""
         return {
-            texture: {kind: self.of(texture, kind).sha256 for kind in MODELS}
+            texture: {name: self.of(texture, name).sha256 for name in self.sets}
             for texture in textures
         }
 
-    def identical(self, textures: Sequence[str]) -> tuple[str, ...]:
-        """The textures whose simplified model is the full one: controls, nothing to compare."""
-        return tuple(name for name in textures if self.full[name] == self.simplified[name])
+    def identical(
+        self, textures: Sequence[str], names: Sequence[str] | None = None
+    ) -> tuple[str, ...]:
+        """The textures whose models are equal in all (or these) sets: nothing to compare."""
+        first, *others = names or self.names
+        return tuple(
+            texture
+            for texture in textures
+            if all(self.of(texture, first) == self.of(texture, name) for name in others)
+        )
 
-    def require(self, textures: Sequence[str]) -> None:
-        """Refuse a study with textures that have no model, or without two models to compare.
+    def exchanged(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        """Textures whose reference was made from the model of another set, with that set's name."""
+        reference, *others = self.names
+        return tuple(
+            (texture, name)
+            for texture in textures
+            for name in others
+            if self.of(texture, name).sha256 in made_from(self.of(texture, reference))
+        )
+
+    def require(self, study: Study, *, allow: Allow = refuse) -> None:
+        """Refuse a study with textures that have no model, or without models to compare.
+
+        Parameters
+        ----------
+        study : Study
+        allow : callable
+            Told what could go on for a reason ("exchanged models") and the sentence against it.
 
         Raises
         ------
         InputError
-            Naming the textures and the kind of model that they lack; or where the simplified model
-            of every texture is the full one.
+            Naming textures and sets: of missing models; where the models of all textures are equal;
+            where the reference was made from another set's model.
         """
-        for kind, models in (("full", self.full), ("simplified", self.simplified)):
-            missing = [texture for texture in textures if texture not in models]
-            if missing and kind == "simplified" and self.scene:
+        self._require_all(study)
+        for task in study.tasks:
+            if len(self.identical(study.textures, study.models_of(task))) == len(study.textures):
                 raise InputError(
-                    f"expected each texture of the study in the scene {self.scene.scene}, got none "
+                    f"expected a {study.models_of(task)[1]} model that differs from the "
+                    f"{study.models_of(task)[0]} one for some texture of the study, got identical "
+                    "ones for all, so that there is nothing to compare; simplify with another "
+                    "threshold or margin, or add other textures."
+                )
+        if exchanged := self.exchanged(study.textures):
+            texture, name = exchanged[0]
+            allow(
+                "exchanged models",
+                f"expected the reference set {self.names[0]} to hold the models that others were "
+                f"made from, got one of {texture} that was made from the one in {name}; exchange "
+                "the two sets.",
+            )
+
+    def _require_all(self, study: Study) -> None:
+        for name in study.models:
+            models = self.sets.get(name, {})
+            missing = [texture for texture in study.textures if texture not in models]
+            notes = [getattr(model, "compiled_for", None) for model in models.values()]
+            scene = next((note.scene for note in notes if note), None)
+            if missing and scene:
+                raise InputError(
+                    f"expected each texture of the study in the scene {scene}, got none "
                     f"of {', '.join(missing)}; add what is missing to the scene, or remove it from "
                     "the study."
                 )
             if missing:
                 raise InputError(
-                    f"expected a {kind} model of each texture of the study, got none of "
+                    f"expected a {name} model of each texture of the study, got none of "
                     f"{', '.join(missing)}; record and model what is missing, "
                     "or remove it from the study."
                 )
-        if len(self.identical(textures)) == len(textures):
-            raise InputError(
-                "expected a simplified model that differs from the full one for some texture of "
-                "the study, got identical ones for all, so that there is nothing to compare; "
-                "simplify with another threshold or margin, or add other textures."
-            )
+
+
+def made_from(model: Presentable) -> set[str]:
+    """SHA-256 of the models that a model says it was simplified or compiled from."""
+    note = getattr(model, "compiled_for", None)
+    stated = {getattr(model, "simplified_from", ""), note.full_sha256 if note else ""}
+    return stated - {""}

@@ -1,91 +1,44 @@
-"""The study file: textures, trays, participants, schedules and circumstances.
+"""The study file: textures, trays, models, participants, schedules and circumstances.
 
 docs/method/protocols.md
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from experiments.study.plan import Plan
+from experiments.study.questions import Question
+from experiments.study.tables import (
+    as_list,
+    as_table,
+    require_bool,
+    require_different,
+    require_keys,
+    require_label,
+)
+from experiments.study.task_plan import PAPER_PLANS, TaskPlan, check_plan
 from modeling import InputError
 from modeling.checks import check_keys, check_number, check_whole
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.documents import read_toml
+from modeling.files.documents import as_text, read_toml
 from modeling.files.hashes import sha256_of_values
 
-Schedule = Literal["by-day", "interleaved"]
-
-TASKS = tuple(ANSWER_TABLES)
-SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
+# Their order is part of every seed: new ones go to the end.
+TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))
+# A threshold is sought by a staircase of its own: no order of textures is planned for it.
+PLANNED = tuple(task for task in TASKS if task != "threshold")
 MOST_TEXTURES = 12
+MOST_MODELS = 6
 CALIBRATION_DAYS = 90.0
-_SINCE: dict[str, object] = {"calibration_days": CALIBRATION_DAYS, "measured_force": False}
+LONGEST_GAP_MIN = 30.0
+TWO_MODELS = {"full": "models", "simplified": "simplified"}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
-
-
-def _require_label(name: str, value: object, *, forbidden: str) -> None:
-    if (
-        not isinstance(value, str)
-        or value.strip() != value
-        or value in ("", "n/a")
-        or not value.isprintable()
-        or any(character in value for character in forbidden)
-    ):
-        listed = f" and none of {' '.join(forbidden)}" if forbidden else ""
-        raise InputError(
-            f"expected printable text for {name}, without tabs, line ends or spaces around it"
-            f"{listed}, got {shown(value)}; rename it."
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class TaskPlan:
-    """How many people do a task, and how the two models are spread over their days.
-
-    Parameters
-    ----------
-    participants : int
-        At least 1; even where the schedule is by day, so that the order of the models is
-        counterbalanced exactly.
-    schedule : {"by-day", "interleaved"}
-        Either the two models on two days (two sessions), or mixed at random in one session.
-
-    Raises
-    ------
-    InputError
-        For any other value.
-    """
-
-    participants: int
-    schedule: Schedule
-
-    def __post_init__(self) -> None:
-        check_whole("participants", self.participants, low=1, high=9999)
-        if self.schedule not in SCHEDULES:
-            raise InputError(
-                f"expected a schedule of {' or '.join(SCHEDULES)}, got {shown(self.schedule)}; "
-                "choose one of the two."
-            )
-        if self.schedule == "by-day" and self.participants % 2:
-            raise InputError(
-                "expected an even number of participants for the schedule by-day, got "
-                f"{self.participants}; add or leave out one, so that half begin with each model."
-            )
-
-    @property
-    def sessions(self) -> int:
-        """Sessions (days) per participant: 2 by day, 1 interleaved."""
-        return 2 if self.schedule == "by-day" else 1
-
-
-PAPER_PLANS = {
-    "absolute": TaskPlan(participants=20, schedule="interleaved"),
-    "relative": TaskPlan(participants=24, schedule="by-day"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,17 +49,26 @@ class Study:
     ----------
     name : str
     seed : int
-        ≥ 0; the order of every session follows from it, the task, the subject and the session.
+        ≥ 0; the order of every session follows from it, the task, the subject, the session and the
+        slot.
     textures : tuple of str
         2 … 12 different names.
     trays : dict of str
         For each texture the label of the tray that holds its sample; all different.
-    repeats : int
-        Presentations of each texture and model in the relative task, ≥ 1.
-    training_trials : int
-        Trials before the main ones in each session, from 0 to the number of textures.
     tasks : mapping of task to TaskPlan
         Those of the paper (absolute, relative) are planned as there where they are not named.
+    models : mapping of set to path
+        Two or more named sets of models, relative to the study file; the first is the reference.
+    languages : tuple of str
+        Codes such as en; the first is the default.
+    consent : str
+        Version of the page of consent; empty for none.
+    questions : tuple of Question
+        What a participant is asked once.
+    plan : Plan
+        Claims and exclusions.
+    longest_gap_min : float
+        A session that goes on after a longer gap begins with training again, minutes.
     masking : str
         How the sound of the device was masked.
     surface_visible : str
@@ -128,9 +90,13 @@ class Study:
     seed: int
     textures: tuple[str, ...]
     trays: Mapping[str, str]
-    repeats: int = 3
-    training_trials: int = 2
     tasks: Mapping[str, TaskPlan] = field(default_factory=dict)
+    models: Mapping[str, str] = field(default_factory=lambda: dict(TWO_MODELS))
+    languages: tuple[str, ...] = ("en",)
+    consent: str = ""
+    questions: tuple[Question, ...] = ()
+    plan: Plan = field(default_factory=Plan)
+    longest_gap_min: float = LONGEST_GAP_MIN
     masking: str = "not stated"
     surface_visible: str = "not stated"
     data_license: str = "not stated"
@@ -138,42 +104,32 @@ class Study:
     measured_force: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "textures", tuple(self.textures))
-        object.__setattr__(self, "trays", dict(self.trays))
-        planned = {**PAPER_PLANS, **self.tasks}
-        check_keys(planned, TASKS, where="the tasks")
-        for task, plan in planned.items():
-            if not isinstance(plan, TaskPlan):
-                raise InputError(
-                    f"expected a TaskPlan for {task}, got {shown(plan)}; give participants and "
-                    "schedule."
-                )
-        in_order = {task: planned[task] for task in TASKS if task in planned}
-        object.__setattr__(self, "tasks", in_order)
+        for name in ("textures", "languages", "questions"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        for name in ("trays", "models"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
         check_whole("seed", self.seed, low=0, high=2**63)
-        check_whole("repeats", self.repeats, low=1, high=100)
         check_number("calibration_days", self.calibration_days, low=1.0, high=3650.0)
-        object.__setattr__(self, "calibration_days", float(self.calibration_days))
-        if not isinstance(self.measured_force, bool):
-            raise InputError(
-                f"expected true or false for measured_force, got {shown(self.measured_force)}; "
-                "correct it."
-            )
+        check_number("longest_gap_min", self.longest_gap_min, high=10_080.0)
+        for name in ("calibration_days", "longest_gap_min"):
+            object.__setattr__(self, name, float(getattr(self, name)))
+        require_bool("measured_force", self.measured_force)
         self._check_texts()
         self._check_trays()
-        check_whole("training_trials", self.training_trials, low=0, high=len(self.textures))
+        self._check_models()
+        self._check_questions()
+        self._plan_tasks()
+        self.plan.check(self.tasks)
 
     def _check_texts(self) -> None:
         for name in ("name", "masking", "surface_visible", "data_license"):
-            _require_label(name, getattr(self, name), forbidden="")
+            require_label(name, getattr(self, name))
+        if self.consent:
+            require_label("the version of the consent", self.consent)
         for texture in self.textures:
-            _require_label("texture", texture, forbidden='|"\\')
+            require_label("texture", texture, forbidden='|"\\')
         check_whole("number of textures", len(self.textures), low=2, high=MOST_TEXTURES)
-        if len(set(self.textures)) != len(self.textures):
-            raise InputError(
-                f"expected different textures, got {', '.join(self.textures)}; "
-                "name each texture once."
-            )
+        require_different("textures", self.textures)
 
     def _check_trays(self) -> None:
         if set(self.trays) != set(self.textures):
@@ -182,15 +138,50 @@ class Study:
                 f"{', '.join(self.trays) or 'none'}; give each texture its tray under [trays]."
             )
         for tray in self.trays.values():
-            _require_label("tray", tray, forbidden='"\\')
-        if len(set(self.trays.values())) != len(self.trays):
-            raise InputError(
-                f"expected different trays, got {', '.join(self.trays.values())}; "
-                "put each sample into a tray of its own."
-            )
+            require_label("tray", tray, forbidden='"\\')
+        require_different("trays", tuple(self.trays.values()))
 
-    def plan(self, task: str) -> TaskPlan:
-        """Participants and schedule of one task.
+    def _check_models(self) -> None:
+        for name, path in self.models.items():
+            require_label("a set of models", name, forbidden='|"\\')
+            require_label(f"the place of the models {name}", path)
+        check_whole("number of sets of models", len(self.models), low=2, high=MOST_MODELS)
+        require_different("places of models", tuple(self.models.values()))
+
+    def _check_questions(self) -> None:
+        for language in self.languages:
+            if not (isinstance(language, str) and re.fullmatch("[a-z]{2,3}", language)):
+                raise InputError(
+                    f"expected languages such as en or ja, got {shown(language)}; correct it."
+                )
+        if not self.languages:
+            raise InputError('expected one language at least, got none; write languages = ["en"].')
+        require_different("languages", self.languages)
+        require_different("questions", [question.name for question in self.questions])
+        for question in self.questions:
+            question.require_texts(self.languages)
+
+    def _plan_tasks(self) -> None:
+        """Put the tasks in order, name the models of each, and refuse what cannot be planned."""
+        planned = {**PAPER_PLANS, **self.tasks}
+        check_keys(planned, PLANNED, where="the tasks")
+        in_order = {}
+        for task in (task for task in TASKS if task in planned):
+            plan = planned[task]
+            if not isinstance(plan, TaskPlan):
+                raise InputError(
+                    f"expected a TaskPlan for {task}, got {shown(plan)}; give participants and "
+                    "schedule."
+                )
+            named = plan.models or tuple(self.models)[:2]
+            check_keys(named, tuple(self.models), where=f"the models of [{task}]")
+            models = tuple(name for name in self.models if name in named)
+            in_order[task] = replace(plan, models=models)
+            check_plan(task, in_order[task], textures=self.textures)
+        object.__setattr__(self, "tasks", in_order)
+
+    def plan_of(self, task: str) -> TaskPlan:
+        """Participants, schedule, models and repeats of one task.
 
         Raises
         ------
@@ -199,27 +190,46 @@ class Study:
         """
         if task not in self.tasks:
             raise InputError(
-                f"expected the task {' or '.join(self.tasks)}, got {shown(task)}; choose one."
+                f"expected the task {' or '.join(self.tasks)}, got {shown(task)}; choose one, or "
+                "plan it in the study file."
             )
         return self.tasks[task]
 
-    @property
-    def absolute(self) -> TaskPlan:
-        """The plan of the absolute task."""
-        return self.tasks["absolute"]
+    def models_of(self, task: str) -> tuple[str, ...]:
+        """The sets of models that a task compares, in the study's order.
 
-    @property
-    def relative(self) -> TaskPlan:
-        """The plan of the relative task."""
-        return self.tasks["relative"]
+        Raises
+        ------
+        InputError
+            If the study has no such task.
+        """
+        return self.plan_of(task).models
+
+    def sessions(self, task: str) -> int:
+        """Sessions (days) per participant: by day one for each model, else 1.
+
+        Raises
+        ------
+        InputError
+            If the study has no such task.
+        """
+        plan = self.plan_of(task)
+        return len(plan.models) if plan.schedule == "by-day" else 1
 
     def to_dict(self) -> dict[str, Any]:
-        """The study as plain values; `Study.from_dict` makes it again."""
-        values: dict[str, Any] = {}
-        for name, value in asdict(self).items():
-            values |= value if name == "tasks" else {name: value}
-        # Studies from before there were these keep their hash.
-        return {name: value for name, value in values.items() if value != _SINCE.get(name)}
+        """The study as plain values, as in a study file; `Study.from_dict` makes it again."""
+        plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "tasks"}
+        return {
+            **plain,
+            "textures": list(self.textures),
+            "trays": dict(self.trays),
+            "models": dict(self.models),
+            "languages": list(self.languages),
+            "consent": {"version": self.consent},
+            "questions": [question.to_dict() for question in self.questions],
+            "plan": self.plan.to_dict(),
+            **{task: plan.to_dict() for task, plan in self.tasks.items()},
+        }
 
     @property
     def sha256(self) -> str:
@@ -237,18 +247,27 @@ class Study:
         """
         settings = dict(values)
         check_keys(settings, _STUDY_KEYS, where="the study")
-        _require(settings, {"name", "seed", "textures", "trays"}, "the study")
-        tasks = {name: _task_plan(name, settings.pop(name)) for name in TASKS if name in settings}
-        if not isinstance(settings.get("trays", {}), Mapping):
-            raise InputError(
-                f"expected a table [trays] of texture = tray, got {shown(settings['trays'])}; "
-                "write one line per texture under [trays]."
-            )
-        if not isinstance(settings.get("textures", []), list | tuple):
-            raise InputError(
-                f"expected a list of textures, got {shown(settings['textures'])}; "
-                'write textures = ["…", "…"].'
-            )
+        require_keys(settings, ("name", "seed", "textures", "trays"), where="the study")
+        tasks = {
+            name: TaskPlan.from_dict(name, settings.pop(name))
+            for name in PLANNED
+            if name in settings
+        }
+        for name, example in (("trays", "texture = tray"), ("models", "name = folder")):
+            if name in settings:
+                settings[name] = as_table(
+                    settings[name], where=f"[{name}] of {example}", example="one line for each"
+                )
+        for name, example in (("textures", '["…", "…"]'), ("languages", '["en"]')):
+            if name in settings:
+                settings[name] = as_list(settings[name], where=name, example=f"{name} = {example}")
+        if "questions" in settings:
+            asked = as_list(settings["questions"], where="questions", example="[[questions]]")
+            settings["questions"] = tuple(map(Question.from_dict, asked))
+        if "consent" in settings:
+            settings["consent"] = _version(settings["consent"])
+        if "plan" in settings:
+            settings["plan"] = Plan.from_dict(settings["plan"])
         return Study(**settings, tasks=tasks)
 
     @staticmethod
@@ -269,26 +288,11 @@ class Study:
 
 
 _STUDY_KEYS = tuple(
-    key for f in fields(Study) for key in (TASKS if f.name == "tasks" else (f.name,))
+    key for f in fields(Study) for key in (PLANNED if f.name == "tasks" else (f.name,))
 )
 
 
-def _task_plan(task: str, values: object) -> TaskPlan:
-    if not isinstance(values, Mapping):
-        raise InputError(
-            f"expected a table [{task}] with participants and schedule, got {shown(values)}; "
-            "write both under that heading."
-        )
-    known = tuple(f.name for f in fields(TaskPlan))
-    check_keys(values, known, where=f"[{task}]")
-    _require(values, set(known), f"[{task}]")
-    return TaskPlan(**values)
-
-
-def _require(values: Mapping[str, Any], needed: set[str], where: str) -> None:
-    missing = sorted(needed - set(values))
-    if missing:
-        raise InputError(
-            f"expected {', '.join(sorted(needed))} in {where}, got no {', '.join(missing)}; "
-            "add what is missing."
-        )
+def _version(values: object) -> str:
+    table = as_table(values, where="[consent]", example='version = "…" under [consent]')
+    check_keys(table, ("version",), where="[consent]")
+    return as_text(table.get("version", ""), "version in [consent]")

@@ -20,12 +20,24 @@ def task_named(name: str) -> Task:
     return found
 
 
-def plan_session(study: Study, *, task: str, subject: int, session: int) -> SessionPlan:
+def plan_session(
+    study: Study, *, task: str, subject: int, session: int, slot: int | None = None
+) -> SessionPlan:
     """The order of one session of a task, as `draw_session` draws it.
+
+    Parameters
+    ----------
+    study : Study
+    task : str
+    subject, session : int
+        From 1.
+    slot : int, optional
+        The place in the plan, 1 … participants; the subject's own number without it.
 
     Raises
     ------
     InputError
-        If the study has no such task, subject or session.
+        If the study has no such task, subject, session or slot.
     """
-    return draw_session(study, task_named(task), subject=subject, session=session)
+    place = subject if slot is None else slot
+    return draw_session(study, task_named(task), subject=subject, session=session, slot=place)

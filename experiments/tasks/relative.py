@@ -6,20 +6,18 @@ textures, switches freely, and says once which virtual surface is the real one.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial, update_wrapper
 from typing import Any
 
-import numpy as np
-
 from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.sessions.trial_loop import run_session
-from experiments.study.design import Order, Trial, fisher_yates
+from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -61,15 +59,39 @@ class RelativeTrial(Trial):
 # --- The trials -----------------------------------------------------------------------------
 
 
-def _trials(order: Order, study: Study, rng: np.random.Generator) -> list[dict[str, Any]]:
-    """A new layout of the buttons for each trial."""
-    return [
-        {"texture": texture, "model": model, "layout": tuple(fisher_yates(study.textures, rng))}
-        for texture, model in order
-    ]
+def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
+    """A new layout of the buttons for each trial, each button right equally often.
+
+    Whenever all textures have come with a model once, each of the buttons was right once
+    (docs/method/protocols.md#order).
+    """
+    buttons: dict[tuple[str, int], dict[str, int]] = {}
+    came: Counter[tuple[str, str]] = Counter()
+    drafts = []
+    for texture, model in order:
+        turn = (model, came[texture, model])
+        came[texture, model] += 1
+        if turn not in buttons:
+            buttons[turn] = _right_buttons(occasion)
+        layout = _layout(occasion, texture, buttons[turn][texture])
+        drafts.append({"texture": texture, "model": model, "layout": layout})
+    return drafts
 
 
-def _virtual(models: ModelSets, trial: RelativeTrial) -> list[Layered]:
+def _right_buttons(occasion: Occasion) -> dict[str, int]:
+    textures = occasion.study.textures
+    return dict(zip(textures, fisher_yates(range(len(textures)), occasion.rng), strict=True))
+
+
+def _layout(occasion: Occasion, texture: str, button: int) -> tuple[str, ...]:
+    """The texture behind its button, the others in random order behind theirs."""
+    others = [other for other in occasion.study.textures if other != texture]
+    layout = fisher_yates(others, occasion.rng)
+    layout.insert(button, texture)
+    return tuple(layout)
+
+
+def _virtual(models: ModelSets, trial: RelativeTrial) -> list[AnyModel]:
     return [models.of(texture, trial.model) for texture in trial.layout]
 
 
@@ -94,7 +116,6 @@ TASK = Task(
     description=DESCRIPTION,
     texts=TEXTS,
     trial=RelativeTrial,
-    repeated=True,
     trials=_trials,
     virtual=_virtual,
     begin=_begin,

@@ -40,10 +40,10 @@ class SavedModel(_Base):
     def to_dict(self) -> dict[str, Any]:
         """The model as plain values, those of its file; `from_dict` makes it again.
 
-        An optional field that is None is left out.
+        An optional field that is None or an empty text is left out.
         """
         values = {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
-        given = {n: v for n, v in values.items() if not (v is None and n in self.OPTIONAL)}
+        given = {n: v for n, v in values.items() if not (v in (None, "") and n in self.OPTIONAL)}
         return {"format": self.FORMAT, "version": self.VERSION, **given}
 
     @cached_property

@@ -70,6 +70,8 @@ class TextureModel(SavedModel):
         without it means linear.
     compiled_for : CompiledFor, optional
         The scene that the model was compiled for, with the bound that it keeps there.
+    simplified_from : str
+        SHA-256 of the full model, where `simplify` dropped layers of it; else empty.
 
     Raises
     ------
@@ -78,7 +80,7 @@ class TextureModel(SavedModel):
     """
 
     FORMAT = "tactileq.texture-model"
-    OPTIONAL = frozenset({"blending", "compiled_for"})
+    OPTIONAL = frozenset({"blending", "compiled_for", "simplified_from"})
 
     texture: str
     rate_hz: float
@@ -97,6 +99,7 @@ class TextureModel(SavedModel):
     interpolated: Bools = field(default_factory=_no_marks)
     blending: Blending = "linear"
     compiled_for: CompiledFor | None = None
+    simplified_from: str = ""
 
     def __post_init__(self) -> None:
         self._check_kinds()
@@ -127,12 +130,14 @@ class TextureModel(SavedModel):
     def _check_kinds(self) -> None:
         # A file may hold anything: "false" in quotes would count as true.
         check_texture_name(self.texture)
-        kinds = isinstance(self.simulated, bool) and isinstance(self.estimator, str)
+        texts = isinstance(self.estimator, str) and isinstance(self.simplified_from, str)
+        kinds = isinstance(self.simulated, bool) and texts
         if not (is_number(self.rate_hz) and kinds):
             raise InputError(
                 f"{self.texture}: expected a number for rate_hz, true or false for simulated and "
-                f"text for estimator, got {shown(self.rate_hz)}, {shown(self.simulated)} and "
-                f"{shown(self.estimator)}; fit the model again."
+                f"text for estimator and simplified_from, got {shown(self.rate_hz)}, "
+                f"{shown(self.simulated)}, {shown(self.estimator)} and "
+                f"{shown(self.simplified_from)}; fit the model again."
             )
 
     def _check_values(self) -> None:

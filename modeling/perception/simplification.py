@@ -113,6 +113,8 @@ def simplify(
     )
     keep = [layer for layer, (kept, _) in enumerate(decided) if kept]
     simplified = with_signs_chosen_again(model, keep)
+    if len(keep) < model.n_layers:
+        simplified = replace(simplified, simplified_from=model.sha256)
     return Simplification(
         simplified, verdicts, criterion, threshold, margin_db, hold_above, model.sha256
     )

@@ -54,8 +54,10 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         checked, benches = mapped(with_checks, made), Benches.begun(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
         models = ModelSets(
-            full={r.texture: r.model for r in made},
-            simplified={r.texture: r.simplification.model for r in made},
+            sets={
+                "full": {r.texture: r.model for r in made},
+                "simplified": {r.texture: r.simplification.model for r in made},
+            }
         )
         real = {r.texture: r.truth for r in made if r.truth is not None}
         run_study(

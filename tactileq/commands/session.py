@@ -53,7 +53,7 @@ def session(
 
     plan = Study.load(study)
     sets, inputs = models_to_compare(models, simplified, scene)
-    sets.require(plan.textures)
+    sets.require(plan)
     tell_controls(sets, plan.textures)
     device, rig_files, rig_settings = rig_of(plan, sets, rig=rig, override=override)
     if device.simulated:
@@ -122,7 +122,7 @@ def rig_of(
     )
     device = DeskRig(file, requirements=wanted, override=override)
     check_models(
-        file, [kind[texture] for kind in (sets.full, sets.simplified) for texture in plan.textures]
+        file, [models[texture] for models in sets.sets.values() for texture in plan.textures]
     )
     return device, [rig, *file.files], {"rig_sha256": file.sha256, "override": override}
 
@@ -141,7 +141,7 @@ def models_to_compare(
     full = load_models(models)
     if scene is None:
         fewer = simplified or Path("simplified")
-        return ModelSets(full=full, simplified=load_models(fewer)), [models, fewer]
+        return ModelSets(sets={"full": full, "simplified": load_models(fewer)}), [models, fewer]
     if simplified is not None:
         raise ValueError(
             f"expected simplified models or a scene, got both ({simplified} and {scene}); remove "
@@ -150,7 +150,7 @@ def models_to_compare(
     files = scene_files(scene)
     with share_of("Compiling the scene") as tell:
         least = scene_models(scene, full, progress=tell)
-    return ModelSets(full=full, simplified=least), [models, *files]
+    return ModelSets(sets={"full": full, "simplified": least}), [models, *files]
 
 
 def scene_settings(sets: ModelSets) -> dict[str, object]:

@@ -52,7 +52,7 @@ def simulate(
         )
     real = {name: planted_texture(name) for name in plan.textures}
     sets, inputs = models_to_compare(models, simplified, scene)
-    sets.require(plan.textures)
+    sets.require(plan)
     felt_above = Threshold.named(threshold)
     run_study(plan, real=real, models=sets, data=data, threshold=felt_above, seed=seed)
     note = data / "sourcedata" / "simulate_provenance.json"
@@ -82,13 +82,13 @@ def run_study(
     from rig.twin import SimulatedRig
 
     tell_controls(models, plan.textures)
-    sessions = sum(task.participants * task.sessions for task in plan.tasks.values())
+    sessions = sum(task.participants * plan.sessions(name) for name, task in plan.tasks.items())
     with progress("Simulated participants", sessions) as advance:
         simulate_study(
             plan,
             real=real,
-            full=models.full,
-            simplified=models.simplified,
+            full=models.sets["full"],
+            simplified=models.sets["simplified"],
             rig=SimulatedRig(real, seed=seed),
             data_folder=data,
             seed=seed,

@@ -114,11 +114,9 @@ def study() -> Study:
         seed=11,
         textures=TEXTURES,
         trays={"canvas": "C", "MDF": "A", "PVC": "B"},
-        repeats=2,
-        training_trials=1,
         tasks={
-            "absolute": TaskPlan(participants=3, schedule="interleaved"),
-            "relative": TaskPlan(participants=4, schedule="by-day"),
+            "absolute": TaskPlan(participants=3, schedule="interleaved", training_trials=1),
+            "relative": TaskPlan(participants=4, schedule="by-day", repeats=2, training_trials=1),
         },
     )
 
@@ -136,7 +134,7 @@ def truths() -> dict[str, TextureModel]:
 @pytest.fixture(scope="session")
 def models(truths: dict[str, TextureModel], threshold: Threshold) -> ModelSets:
     simplified = {name: simplify(model, threshold).model for name, model in truths.items()}
-    return ModelSets(full=truths, simplified=simplified)
+    return ModelSets(sets={"full": truths, "simplified": simplified})
 
 
 @pytest.fixture

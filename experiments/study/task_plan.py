@@ -1,0 +1,186 @@
+"""How many people do a task, how often, on which days: a table such as [absolute] of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from typing import Any, Literal
+
+from experiments.study.tables import (
+    as_list,
+    as_table,
+    require_bool,
+    require_different,
+    require_keys,
+    require_label,
+)
+from modeling import InputError
+from modeling.checks import check_keys, check_whole
+from modeling.errors import shown
+
+Schedule = Literal["by-day", "interleaved"]
+SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
+
+# The usual repeats of a task whose table does not say; 1 in any other.
+REPEATS = {"relative": 3, "oddity": 6}
+MOST_TRAINING_TRIALS = 100
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskPlan:
+    """How many people do a task, and how its trials are spread over their days.
+
+    docs/method/protocols.md#schedule
+
+    Parameters
+    ----------
+    participants : int
+        At least 1; by day a multiple of the number of models, so that their order is
+        counterbalanced exactly.
+    schedule : {"by-day", "interleaved"}
+        Either each model on a day of its own (one session per model), or all mixed in one session.
+    repeats : int
+        How often each texture comes with each model, ≥ 1. In the oddity task, whose every trial
+        holds both models: trials of each texture.
+    models : tuple of str
+        The sets of models that are compared, two at least; empty for the first two of the study.
+    training_trials, most_training_trials : int
+        Trials for practice: the fewest, and the most where strokes stay outside the grid; 0 for as
+        many as the fewest.
+    break_after : int
+        Trials between two breaks; 0 for none.
+    anchors : mapping of texture to texture
+        Real surfaces that are presented beside the virtual one of another texture, said to
+        correspond (docs/method/protocols.md#anchors); once in each session.
+    feel_all : bool
+        Whether all virtual surfaces of a trial have to be felt before an answer.
+
+    Raises
+    ------
+    InputError
+        For any other value.
+    """
+
+    participants: int
+    schedule: Schedule
+    repeats: int = 1
+    models: tuple[str, ...] = ()
+    training_trials: int = 2
+    most_training_trials: int = 0
+    break_after: int = 0
+    anchors: Mapping[str, str] = field(default_factory=dict)
+    feel_all: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "models", tuple(self.models))
+        object.__setattr__(self, "anchors", dict(self.anchors))
+        self._check_numbers()
+        if self.schedule not in SCHEDULES:
+            raise InputError(
+                f"expected a schedule of {' or '.join(SCHEDULES)}, got {shown(self.schedule)}; "
+                "choose one of the two."
+            )
+        require_bool("feel_all", self.feel_all)
+        for name in self.models:
+            require_label("a set of models", name)
+        require_different("models", self.models)
+        if len(self.models) == 1:
+            raise InputError(
+                f"expected two models or more to compare, got {self.models[0]} alone; name "
+                "another one beside it."
+            )
+
+    def _check_numbers(self) -> None:
+        check_whole("participants", self.participants, low=1, high=9999)
+        check_whole("repeats", self.repeats, low=1, high=100)
+        check_whole("break_after", self.break_after, low=0, high=10_000)
+        check_whole("training_trials", self.training_trials, low=0, high=MOST_TRAINING_TRIALS)
+        check_whole(
+            "most_training_trials", self.most_training_trials, low=0, high=MOST_TRAINING_TRIALS
+        )
+        most = self.most_training_trials or self.training_trials
+        if most < self.training_trials:
+            raise InputError(
+                f"expected most_training_trials of at least the {self.training_trials} "
+                f"training_trials, got {most}; raise it, or lower training_trials."
+            )
+        object.__setattr__(self, "most_training_trials", most)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plan as plain values, as in a study file."""
+        return {**asdict(self), "models": list(self.models)}
+
+    @staticmethod
+    def from_dict(task: str, values: object) -> TaskPlan:
+        """A plan from the table of a task in a study file.
+
+        Raises
+        ------
+        InputError
+            For unknown or missing keys, or values out of range.
+        """
+        table = as_table(values, where=f"[{task}]", example=f"[{task}] above its keys")
+        check_keys(table, tuple(f.name for f in fields(TaskPlan)), where=f"[{task}]")
+        require_keys(table, ("participants", "schedule"), where=f"[{task}]")
+        table = {"repeats": REPEATS.get(task, 1), **table}
+        example = '["full", "simplified"]'
+        table["models"] = as_list(
+            table.get("models", ()), where=f"models in [{task}]", example=f"models = {example}"
+        )
+        table["anchors"] = as_table(
+            table.get("anchors", {}),
+            where=f"anchors in [{task}]",
+            example='anchors = {canvas = "PVC"}',
+        )
+        return TaskPlan(**table)
+
+
+PAPER_PLANS = {
+    "absolute": TaskPlan(participants=20, schedule="interleaved"),
+    "relative": TaskPlan(participants=24, schedule="by-day", repeats=REPEATS["relative"]),
+}
+
+
+def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:
+    """Refuse a plan that its task or the study's textures do not allow; models are named in it."""
+    count = len(plan.models)
+    if plan.schedule == "by-day" and plan.participants % count:
+        even = "an even number" if count == 2 else f"a multiple of {count}"
+        raise InputError(
+            f"expected {even} of participants for the schedule by-day in [{task}], got "
+            f"{plan.participants}; change it, so that equally many begin with each model."
+        )
+    if task == "absolute" and plan.feel_all:
+        raise InputError(
+            "expected feel_all in a task with several virtual surfaces, got it in [absolute]; "
+            "remove it there."
+        )
+    _check_anchors(task, plan.anchors, textures)
+    if task == "oddity":
+        _check_oddity(plan)
+
+
+def _check_anchors(task: str, anchors: Mapping[str, str], textures: tuple[str, ...]) -> None:
+    if anchors and task != "absolute":
+        raise InputError(
+            f"expected anchors in [absolute] alone, got some in [{task}]; remove them there."
+        )
+    for real, virtual in anchors.items():
+        if real not in textures or virtual not in textures or real == virtual:
+            raise InputError(
+                f"expected two different textures of the study in each anchor, got {shown(real)} "
+                f"= {shown(virtual)}; name the real surface, then that of the virtual one."
+            )
+
+
+def _check_oddity(plan: TaskPlan) -> None:
+    if len(plan.models) != 2 or plan.schedule != "interleaved":
+        raise InputError(
+            "expected two models and the schedule interleaved in [oddity], each of whose trials "
+            f"holds both, got {', '.join(plan.models)} {plan.schedule}; correct it."
+        )
+    if plan.repeats % 2:
+        raise InputError(
+            "expected an even number of repeats in [oddity], so that each of the two models is "
+            f"the odd one equally often, got {plan.repeats}; 6 have it at each place once."
+        )
