@@ -1,0 +1,87 @@
+"""Whether a session may begin: not twice, not before its day, not in others' data.
+
+docs/method/protocols.md#admission
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import datetime
+
+from experiments.sessions.data_set import claim_data_set
+from experiments.sessions.files import SessionFiles
+from experiments.sessions.log import now_utc
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.overrides import Overrides
+from experiments.sessions.state import session_state
+from modeling import InputError
+
+_AGAIN = {
+    "running": "another console runs it now; wait for its end",
+    "complete": "it is complete; choose another subject or session",
+    "aborted": "it was aborted; go on with --resume",
+    "crashed": "it broke off; go on with --resume",
+}
+
+
+def admit(files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides) -> None:
+    """Refuse a session that has begun, comes too early, or does not belong into its data folder.
+
+    Parameters
+    ----------
+    files : SessionFiles
+    manifest : SessionManifest
+    overrides : Overrides
+        Takes what goes on against a rule.
+
+    Raises
+    ------
+    InputError
+    OSError
+        If the disk does not take the description of the data set.
+    """
+    refuse_begun(files)
+    if manifest.session > 1:
+        _require_day_before(files, manifest, overrides=overrides)
+    claim_data_set(files.root, manifest, overrides=overrides)
+
+
+def refuse_begun(files: SessionFiles) -> None:
+    """InputError where a session has any file."""
+    there = files.there()
+    if files.manifest in there:
+        raise InputError(
+            f"expected a session that has not been run, got {files.stem}, and "
+            f"{_AGAIN[session_state(files.log).status]}."
+        )
+    if there:
+        raise InputError(
+            f"expected a session that has not been run, got {files.stem}, which has the file "
+            f"{there[0]} but no manifest; move that file away."
+        )
+
+
+def _require_day_before(
+    files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides
+) -> None:
+    """The session before must be complete, and of a person begun on an earlier date."""
+    before = replace(files, session=manifest.session - 1)
+    state = session_state(before.log)
+    if state.status != "complete":
+        got = state.status if before.manifest.exists() else "no such session"
+        overrides.allow(
+            "day before",
+            f"expected {before.stem} complete before session {manifest.session}, got {got}; "
+            "complete that one first",
+        )
+    if state.begun_utc and not manifest.simulated_participant and _is_today(state.begun_utc):
+        overrides.allow(
+            "same date",
+            f"expected session {manifest.session} on a later date than {before.stem}, got the same "
+            "one; let the participant come on another day",
+        )
+
+
+def _is_today(utc: str) -> bool:
+    """Whether this moment, or a later one, is of the local date of now."""
+    return datetime.fromisoformat(utc).astimezone().date() >= now_utc().astimezone().date()

@@ -1,0 +1,137 @@
+"""Where the files of a session are."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from modeling.files.places import unfinished_file
+
+_MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionFiles:
+    """The files of one session, be they there or not.
+
+    Parameters
+    ----------
+    root : Path
+        Of the data set.
+    task : str
+    subject, session : int
+        From 1.
+    """
+
+    root: Path
+    task: str
+    subject: int
+    session: int
+
+    @property
+    def stem(self) -> str:
+        """Beginning of their names, as sub-01_ses-01_task-absolute."""
+        return f"sub-{self.subject:02d}_ses-{self.session:02d}_task-{self.task}"
+
+    @property
+    def folder(self) -> Path:
+        """The folder that they are in."""
+        session = Path(f"sub-{self.subject:02d}", f"ses-{self.session:02d}")
+        return self.root / "sourcedata" / session
+
+    def named(self, ending: str) -> Path:
+        """The file with this ending, such as "hand.tsv"."""
+        return self.folder / f"{self.stem}_{ending}"
+
+    @property
+    def manifest(self) -> Path:
+        """What was fixed before the first trial."""
+        return self.named("manifest.json")
+
+    @property
+    def log(self) -> Path:
+        """What happened."""
+        return self.named("log.jsonl")
+
+    def there(self) -> list[Path]:
+        """All of them that are there."""
+        return sorted(self.folder.glob(f"{self.stem}_*"))
+
+    @staticmethod
+    def of_manifest(path: Path) -> SessionFiles | None:
+        """The files of the session that has its manifest there; None for any other name."""
+        match = _MANIFEST.fullmatch(path.name)
+        if not match:
+            return None
+        subject, session, task = int(match[1]), int(match[2]), match[3]
+        files = SessionFiles(root=path.parents[3], task=task, subject=subject, session=session)
+        return files if files.manifest == path else None
+
+
+def sessions_in(data_folder: str | Path) -> tuple[SessionFiles, ...]:
+    """The sessions of a data set that have a manifest, by subject, session and task."""
+    found = Path(data_folder).glob("sourcedata/sub-*/ses-*/*_manifest.json")
+    sessions = [files for path in found if (files := SessionFiles.of_manifest(path))]
+    return tuple(sorted(sessions, key=lambda f: (f.subject, f.session, f.task)))
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those that it is in, so that a loss of power leaves them there."""
+    if folder.is_dir():
+        return
+    make_folder(folder.parent)
+    folder.mkdir(exist_ok=True)
+    sync_folder(folder.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Force the names of new files to disk (Windows does so by itself)."""
+    if os.name == "nt":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def open_file(path: Path, *, new: bool) -> int:
+    """A handle to append to a file: one that must not be there yet, or one that may."""
+    flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_BINARY", 0)
+    return os.open(path, flags | (os.O_EXCL if new else 0), 0o644)
+
+
+def write_all(handle: int, data: bytes) -> None:
+    """Write all of it, however little the system takes at a time."""
+    while data:
+        data = data[os.write(handle, data) :]
+
+
+def write_new(path: Path, data: bytes) -> None:
+    """Write a file that is not there yet, as `put_file` does.
+
+    Whoever may write the same one at the same time must hold the lock of its folder.
+
+    Raises
+    ------
+    OSError
+        FileExistsError where it is there.
+    """
+    if os.path.lexists(path):
+        raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
+    put_file(path, data)
+
+
+def put_file(path: Path, data: bytes) -> None:
+    """Write a file so that it is there whole and forced to disk, or is as it was before."""
+    with unfinished_file(path, data) as hidden:
+        handle = os.open(hidden, os.O_RDWR)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+        os.replace(hidden, path)
+    sync_folder(path.parent)

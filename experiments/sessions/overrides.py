@@ -1,0 +1,50 @@
+"""Rules that a study may break for a stated reason, which is then on record."""
+
+from __future__ import annotations
+
+from modeling import InputError
+from modeling.errors import shown
+
+
+class Overrides:
+    """What was allowed against a rule, and why.
+
+    Parameters
+    ----------
+    reason : str, optional
+        Printable text; without one nothing is allowed.
+
+    Raises
+    ------
+    InputError
+        For a reason that says nothing.
+    """
+
+    def __init__(self, reason: str | None = None) -> None:
+        if reason is not None and not (reason.strip() and reason.isprintable()):
+            raise InputError(
+                f"expected a reason in words after --override, got {shown(reason)}; say why."
+            )
+        self._reason = reason.strip() if reason else ""
+        self.recorded: list[dict[str, str]] = []
+
+    def allow(self, what: str, sentence: str) -> None:
+        """Go on against a rule, which is recorded once.
+
+        Parameters
+        ----------
+        what : str
+            Which rule, in a word or two.
+        sentence : str
+            Expected, got and what to do otherwise, as of any bad input, without its full stop.
+
+        Raises
+        ------
+        InputError
+            Without a reason: the sentence, and how to give one.
+        """
+        if not self._reason:
+            raise InputError(f"{sentence}, or go on with --override REASON, which is recorded.")
+        record = {"what": what, "reason": self._reason}
+        if record not in self.recorded:
+            self.recorded.append(record)
