@@ -29,8 +29,10 @@ DESCRIPTION = (
 # 1 dB RMS.
 FREQUENCIES_HZ = (20.0, 40.0, 80.0, 160.0, 250.0, 400.0, 630.0, 1000.0)
 DURATION_S = 0.7  # 14 periods of the lowest
-TRAINING_LEVEL_DB = -10.0  # well felt at most frequencies: for practice
-TONE = "tone"  # stands for the texture and the model, of which a trial has none
+# For practice, well felt: 16 dB and more above the shipped thresholds.
+PRACTICE_HZ = (80.0, 160.0, 250.0)
+PRACTICE_LEVEL_DB = -10.0
+NONE = "n/a"  # instead of a texture and of a model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class ThresholdTrial(Trial):
     Parameters
     ----------
     trial, phase, texture, model, tray
-        As in `Trial`; texture and model are "tone".
+        As in `Trial`; texture and model are "n/a".
     frequency_hz : float
     interval : int
         That of the tone, 1 or 2: the right answer.
@@ -56,29 +58,30 @@ class ThresholdTrial(Trial):
     @property
     def layout(self) -> tuple[str, ...]:
         """What is behind each button."""
-        return (TONE, "nothing") if self.interval == 1 else ("nothing", TONE)
+        return ("tone", "silence") if self.interval == 1 else ("silence", "tone")
 
 
 # --- The trials -----------------------------------------------------------------------------
 
 
-def _trials(order: Order, occasion: Occasion) -> list[dict[str, Any]]:
+def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     """Rounds of all frequencies, each in random order; either interval equally often (± 1)."""
+    frequencies_hz = PRACTICE_HZ if occasion.phase == "training" else FREQUENCIES_HZ
     repeats = occasion.study.plan_of("threshold").repeats
     pair = fisher_yates((1, 2), occasion.rng)
     intervals = {
         frequency_hz: fisher_yates([pair[n % 2] for n in range(repeats)], occasion.rng)
-        for frequency_hz in FREQUENCIES_HZ
+        for frequency_hz in frequencies_hz
     }
     return [
         {
-            "texture": TONE,
-            "model": TONE,
+            "texture": NONE,
+            "model": NONE,
             "frequency_hz": frequency_hz,
             "interval": intervals[frequency_hz][number],
         }
         for number in range(repeats)
-        for frequency_hz in fisher_yates(FREQUENCIES_HZ, occasion.rng)
+        for frequency_hz in fisher_yates(frequencies_hz, occasion.rng)
     ]
 
 
@@ -90,7 +93,7 @@ def _adapt(
     highest_g = min(rig.strongest_g(burst), 10 ** (float(LEVELS_DB[-1]) / 20))
     highest_db = 20 * log10(highest_g)
     if trial.phase == "training":
-        level_db = min(TRAINING_LEVEL_DB, highest_db)
+        level_db = min(PRACTICE_LEVEL_DB, highest_db)
     else:
         answers = [a for a in answers_of(rows) if a.frequency_hz == trial.frequency_hz]
         level_db = next_level_db(answers, highest_db=highest_db)
