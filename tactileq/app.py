@@ -25,6 +25,7 @@ COMMANDS = {
     "vibrator": "vibrator",
     "feel": "feel",
     "session": "session",
+    "threshold": "threshold",
     "simulate": "simulate",
     "analyze": "analyze",
     "demo": "demo",
