@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modeling.arrays import Floats
-from modeling.models.loading import Layered
+from modeling.models.ar_model import ARModel
+from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
 
 Surface = Literal["none", "real", "virtual"]
@@ -243,7 +244,7 @@ class TextureRig(Protocol):
     def health(self) -> RigHealth:
         """How the rig is now."""
 
-    def present_model(self, model: Layered) -> float:
+    def present_model(self, model: AnyModel) -> float:
         """Render this model wherever the virtual surface is touched, from now on.
 
         Returns
@@ -291,7 +292,8 @@ class TextureRig(Protocol):
         """What was measured at the pen during them; nothing without an accelerometer."""
 
 
-def grid_of(model: Layered) -> tuple[Range, Range]:
+def grid_of(model: AnyModel) -> tuple[Range, Range]:
     """Lowest and highest speed (mm/s) and force (N) of the conditions of a model's grid."""
-    speeds, forces = model.table.speeds_mm_s, model.table.forces_n
+    grid = model if isinstance(model, ARModel) else model.table
+    speeds, forces = grid.speeds_mm_s, grid.forces_n
     return (float(speeds[0]), float(speeds[-1])), (float(forces[0]), float(forces[-1]))

@@ -15,7 +15,7 @@ from modeling import InputError, Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.errors import shown
 from modeling.hand import Hand
-from modeling.models.loading import Layered
+from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
 from rig.interface import (
     SURFACES,
@@ -59,7 +59,7 @@ class SimulatedRig:
         self._real = dict(real or {})
         self._seed = seed
         self._streams = 0
-        self._presented: Layered | None = None
+        self._presented: AnyModel | None = None
         self._renderer: Renderer | None = (
             None  # made when the hand first moves on what is presented
         )
@@ -127,7 +127,7 @@ class SimulatedRig:
         """What the hand felt during the last reading's 10 ms, in g at the model's rate."""
         return self._last_vibration
 
-    def present_model(self, model: Layered) -> float:
+    def present_model(self, model: AnyModel) -> float:
         """Render this model under the hand, with fresh noise."""
         self._begin("virtual", model.texture, model)
         assert self._now is not None
@@ -184,7 +184,7 @@ class SimulatedRig:
         self._begin("real", texture, self._real.get(texture))
         return self.now_s()
 
-    def _begin(self, surface: Surface, texture: str, felt: Layered | None) -> None:
+    def _begin(self, surface: Surface, texture: str, felt: AnyModel | None) -> None:
         self.silence()
         self._presentations += 1
         self._streams += felt is not None

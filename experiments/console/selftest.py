@@ -75,7 +75,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
     return Timing(
         name="frames",
         meaning="from one frame to the next",
-        milliseconds=1e3 * np.diff(shown),
+        milliseconds=(1e3 * np.diff(shown)).tolist(),
         limit_ms=25.0,
     )
 

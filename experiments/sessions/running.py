@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -123,10 +123,87 @@ def run_session(
                 people=people,
                 store=store,
                 intake=_intake(study, root, person),
-                agenda=_agenda(task, store, study=study),
+                agenda=_agenda(task, store),
                 pilot=said.pilot,
             )
     finally:
         rig.close()
     export_session(root, store.files.manifest)
     return result, store.files.log
+
+
+def _manifest(
+    plan: SessionPlan,
+    task: Task,
+    *,
+    models: ModelSets,
+    rig: TextureRig,
+    people: People,
+    code: str,
+) -> SessionManifest:
+    """What is known before the first trial, but for the circumstances."""
+    study = plan.study
+    sha256 = models.sha256(study.textures)
+    return SessionManifest(
+        task=plan.task,
+        subject=plan.subject,
+        session=plan.session,
+        slot=plan.slot,
+        code=code,
+        language=study.languages[0],
+        pilot=False,
+        simulated_participant=people.respondent.simulated,
+        simulated_rig=rig.simulated,
+        study=study.to_dict(),
+        study_sha256=study.sha256,
+        plan_sha256=plan_sha256(study, sha256),
+        models_sha256=sha256,
+        model_sources={},
+        identical=models.identical(study.textures, study.models_of(plan.task)),
+        rig=rig.stated,
+        description=task.description,
+        trials=[asdict(trial) for trial in plan.trials],
+    )
+
+
+def _with(manifest: SessionManifest, said: Circumstances, study: Study) -> SessionManifest:
+    return replace(
+        manifest,
+        pilot=said.pilot,
+        language=said.language or study.languages[0],
+        model_sources=dict(said.sources),
+    )
+
+
+def _require_language(study: Study, language: str) -> None:
+    if language and language not in study.languages:
+        raise InputError(
+            f"expected a language of the study ({', '.join(study.languages)}), got "
+            f"{shown(language)}; choose one, or add it to the study."
+        )
+
+
+def _intake(study: Study, root: Path, person: Person) -> Intake:
+    """What to ask first; of somebody who was welcomed before only whether the code is theirs."""
+    logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
+    welcomed = any(event["event"] == "welcome" for log in logs for event in read_log(log).events)
+    return Intake(
+        consent=study.consent, code=person.code, known=welcomed, questions=study.questions
+    )
+
+
+def _agenda(task: Task, store: SessionStore) -> Agenda:
+    """What is to be done of the trials that the manifest on disk plans."""
+    trials = [_trial(task, values) for values in store.manifest.trials]
+    if not store.before.runs:
+        return Agenda.whole(trials)
+    gap_min = store.manifest.study["longest_gap_min"]
+    return Agenda.left(trials, resumption(store.manifest, store.before, longest_gap_min=gap_min))
+
+
+def _trial(task: Task, values: Mapping[str, Any]) -> Trial:
+    """A trial as it was before it was stored: what is a list in JSON was a tuple."""
+    stored: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
+    }
+    return task.trial(**stored)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from experiments.study.design import Trial
-from experiments.study.study import Question
+from experiments.study.questions import Question
 from modeling import InputError
 from modeling.models.loading import AnyModel
 from rig.interface import TextureRig

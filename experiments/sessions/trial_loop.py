@@ -190,9 +190,7 @@ class _Running:
         """Take the rig's faults, and log them."""
         faults = self._rig.take_faults()
         for fault in faults:
-            self.note(
-                "fault", told=fault.told, time_s=fault.time_s, invalidates=fault.invalidates
-            )
+            self.note("fault", told=fault.told, time_s=fault.time_s, invalidates=fault.invalidates)
         return faults
 
     def _announce(self, phase: str, *, again: bool) -> None:

@@ -16,7 +16,6 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
-from modeling import InputError
 from modeling.models.loading import AnyModel
 
 # --- Parameters -----------------------------------------------------------------------------
@@ -51,11 +50,6 @@ class OddityTrial(Trial):
 
 def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     """For each texture and odd model, the odd one is behind each button equally often (± 1)."""
-    if len(occasion.models) != 2:
-        raise InputError(
-            "expected two models to compare in the oddity task, got "
-            f"{', '.join(occasion.models)}; name two under [oddity]."
-        )
     positions: defaultdict[object, list[int]] = defaultdict(list)
     drafts = []
     for texture, odd in order:

@@ -8,7 +8,8 @@ from datetime import date
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.models.loading import Layered
+from modeling.models.ar_model import ARModel
+from modeling.models.loading import AnyModel, Layered
 from rig.setup.rig_file import RigFile
 
 HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
@@ -68,15 +69,31 @@ def check_rig(
         )
 
 
-def check_models(rig: RigFile, models: Iterable[Layered]) -> None:
-    """Refuse models that a rig cannot play at their level and rate.
+def layered(model: AnyModel) -> Layered:
+    """The model, if a desk rig can play one of its kind.
 
     Raises
     ------
     InputError
-        For one that is not in g, or of a higher rate than the card's.
+        For an AR model, which only the simulated rig renders.
     """
-    for model in models:
+    if isinstance(model, ARModel):
+        raise InputError(
+            f"expected a model of layers for a desk rig, got an AR model of {model.texture}; "
+            "compare models of layers there, or use the simulated rig."
+        )
+    return model
+
+
+def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
+    """Refuse models that a rig cannot play, or not at their level and rate.
+
+    Raises
+    ------
+    InputError
+        For an AR model, one that is not in g, or of a higher rate than the card's.
+    """
+    for model in map(layered, models):
         if model.unit != "g":
             raise InputError(
                 f"expected models in g for the rig in {rig.path}, got {model.texture} in unit "

@@ -16,10 +16,14 @@ from typing import Any
 import numpy as np
 
 from modeling import InputError
+<<<<<<< HEAD
 from modeling.arrays import Floats
 from modeling.models.loading import Layered
+=======
+from modeling.models.loading import AnyModel
+>>>>>>> main
 from modeling.rendering.plan import RenderCounters
-from rig.desk.checks import Requirements, check_rig
+from rig.desk.checks import Requirements, check_rig, layered
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
@@ -193,7 +197,7 @@ class DeskRig:
 
     # --- Presentations ----------------------------------------------------------------------
 
-    def present_model(self, model: Layered) -> float:
+    def present_model(self, model: AnyModel) -> float:
         """Render this model under the hand; returns when its first sample has left.
 
         Where nothing plays any more, that is a fault, and the time is now.
@@ -201,11 +205,20 @@ class DeskRig:
         Raises
         ------
         InputError
-            For a model of a higher rate than the card's.
+            For an AR model, or one of a higher rate than the card's.
         """
         self.silence()
         sound = self.parts.sound
+<<<<<<< HEAD
         start_s = self._started(lambda: sound.play(model))
+=======
+        try:
+            presented = sound.play(layered(model))
+            self._playing, start_s = presented.presentation, presented.time_s
+        except SoundLost as lost:
+            self._playing, start_s = 0, now_s()
+            self._fail(str(lost))
+>>>>>>> main
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",
