@@ -16,12 +16,8 @@ from typing import Any
 import numpy as np
 
 from modeling import InputError
-<<<<<<< HEAD
 from modeling.arrays import Floats
-from modeling.models.loading import Layered
-=======
 from modeling.models.loading import AnyModel
->>>>>>> main
 from modeling.rendering.plan import RenderCounters
 from rig.desk.checks import Requirements, check_rig, layered
 from rig.desk.journal import Journal
@@ -209,16 +205,7 @@ class DeskRig:
         """
         self.silence()
         sound = self.parts.sound
-<<<<<<< HEAD
-        start_s = self._started(lambda: sound.play(model))
-=======
-        try:
-            presented = sound.play(layered(model))
-            self._playing, start_s = presented.presentation, presented.time_s
-        except SoundLost as lost:
-            self._playing, start_s = 0, now_s()
-            self._fail(str(lost))
->>>>>>> main
+        start_s = self._started(lambda: sound.play(layered(model)))
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",
