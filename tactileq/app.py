@@ -26,6 +26,7 @@ COMMANDS = {
     "feel": "feel",
     "study": "study",
     "session": "session",
+    "threshold": "threshold",
     "simulate": "simulate",
     "analyze": "analyze",
     "demo": "demo",
