@@ -87,7 +87,10 @@ def test_the_validator_finds_no_error(study_on_disk, write_session, tmp_path, ki
     found = validated(tmp_path / "data")
     assert [issue for issue in found if issue["severity"] == "error"] == []
     # What it would like to know besides, and nobody here knows.
-    allowed = {"JSON_KEY_RECOMMENDED", "SIDECAR_KEY_RECOMMENDED"} | {"NO_AUTHORS", "TOO_FEW_AUTHORS"}
+    allowed = {"JSON_KEY_RECOMMENDED", "SIDECAR_KEY_RECOMMENDED"} | {
+        "NO_AUTHORS",
+        "TOO_FEW_AUTHORS",
+    }
     assert {issue["code"] for issue in found} <= allowed
 
 
