@@ -123,7 +123,7 @@ class SimulatedParticipant:
             response_time_s=self._response_time_s(),
         )
 
-    def mean_ratings(self, trial: AbsoluteTrial) -> tuple[float, float]:
+    def mean_ratings(self, trial: RatedTrial) -> tuple[float, float]:
         """The participant's mean ratings on the two scales in such a trial, without lapses."""
         biases = (self.person.magnitude_bias, self.person.frequency_bias)
         magnitude, frequency = (
@@ -131,7 +131,7 @@ class SimulatedParticipant:
         )
         return magnitude, frequency
 
-    def _mean_rating(self, trial: AbsoluteTrial, scale: int, *, bias: float) -> float:
+    def _mean_rating(self, trial: RatedTrial, scale: int, *, bias: float) -> float:
         real, virtual = (
             self._perception.place[texture] for texture in (trial.texture, trial.virtual_texture)
         )
