@@ -40,7 +40,7 @@ from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import dump_json
 from modeling.files.places import locked
-from modeling.files.writing import write_bytes, write_text
+from modeling.files.writing import write_bytes
 from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 __all__ = ["MemoryStore", "SessionStore", "Store", "StoreError"]
@@ -370,9 +370,8 @@ class SessionStore:
         self._writer.close()
 
     def _table(self, name: str, columns: Mapping[str, Mapping[str, Any]]) -> GrowingTable:
-        described = self.files.named(f"{name}.json")
-        if not described.exists():
-            write_text(described, dump_json(dict(columns)))
+        described = dump_json(dict(columns))
+        self.files.named(f"{name}.json").write_text(described, encoding="utf-8")
         table = GrowingTable(self.files.named(f"{name}.tsv"), tuple(columns))
         self._tables.append(table)
         return table
