@@ -1,9 +1,9 @@
 """Runs small sessions in processes of their own, for the tests of what survives them.
 
-    killed_session.py kill FOLDER FROM    SIGKILL before every call that changes a disk, in turn, and
-                                          in the middle of every write; from nothing, or on a copy
-                                          of the data in FROM, resumed
-    killed_session.py race FOLDER         eight consoles at once
+    killed_session.py kill FOLDER FROM   SIGKILL before every call that changes a disk, in turn, and
+                                         in the middle of every write; from nothing, or on a copy
+                                         of the data in FROM, resumed
+    killed_session.py race FOLDER        eight consoles at once
 
 What a session did is told in FOLDER/NAME.told: each answer that it was told is safe, and to which
 length each log was forced to disk.
@@ -61,8 +61,11 @@ def manifest(subject=1):
         description="Compare",
         trials=[{"trial": n, "phase": phase} for n, phase in enumerate(phases, start=1)],
         program={
-            **{"versions": {}, "platform": "", "git_revision": ""},
-            **{"git_uncommitted": None, "lock_sha256": ""},
+            "versions": {},
+            "platform": "",
+            "git_revision": "",
+            "git_uncommitted": None,
+            "lock_sha256": "",
         },
     )
 

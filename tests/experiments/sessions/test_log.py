@@ -45,14 +45,24 @@ def test_any_values_come_back_equal_from_one_line(values: dict[str, object]) -> 
 
 def test_what_json_has_no_word_for() -> None:
     values = {
-        **{"nan": float("nan"), "inf": [float("-inf"), np.float64("nan")]},
-        **{"array": np.array([1.5, np.nan]), "n": np.int64(3), "yes": np.bool_(True)},
-        **{"path": Path("data"), "pair": (1, 2), 4: "key"},
+        "nan": float("nan"),
+        "inf": [float("-inf"), np.float64("nan")],
+        "array": np.array([1.5, np.nan]),
+        "n": np.int64(3),
+        "yes": np.bool_(True),
+        "path": Path("data"),
+        "pair": (1, 2),
+        4: "key",
     }
     assert json.loads(line_of(values)) == {
-        **{"nan": None, "inf": [None, None]},
-        **{"array": [1.5, None], "n": 3, "yes": True},
-        **{"path": "data", "pair": [1, 2], "4": "key"},
+        "nan": None,
+        "inf": [None, None],
+        "array": [1.5, None],
+        "n": 3,
+        "yes": True,
+        "path": "data",
+        "pair": [1, 2],
+        "4": "key",
     }
 
 

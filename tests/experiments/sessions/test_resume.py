@@ -151,10 +151,24 @@ def test_however_often_it_breaks_off_every_trial_is_asked_once(
 ) -> None:
     """A session is run by what is left, and breaks off after any number of answers, twice."""
     manifest = SessionManifest(
-        **{"task": "absolute", "subject": 1, "session": 1, "slot": 1, "code": "", "language": "en"},
-        **{"pilot": False, "simulated_participant": True, "simulated_rig": True},
-        **{"study": {}, "study_sha256": "", "plan_sha256": "", "models_sha256": {}, "rig": {}},
-        **{"model_sources": {}, "identical": [], "description": "", "program": {}},
+        task="absolute",
+        subject=1,
+        session=1,
+        slot=1,
+        code="",
+        language="en",
+        pilot=False,
+        simulated_participant=True,
+        simulated_rig=True,
+        study={},
+        study_sha256="",
+        plan_sha256="",
+        models_sha256={},
+        rig={},
+        model_sources={},
+        identical=[],
+        description="",
+        program={},
         trials=[{"trial": n, "phase": "training" if n <= 2 else "main"} for n in NUMBERS],
     )
     told: list[Told | float] = []

@@ -200,20 +200,26 @@ def test_in_memory_rows_are_kept_and_nothing_is_written() -> None:
 # Disks
 
 
+def answer_eight(store: SessionStore, taken: list[int]) -> None:
+    for trial in range(2, 9):
+        store.log("presented", trial=trial)
+        store.answer(trial, row_of(trial))
+        taken.append(trial)
+
+
 def test_a_full_disk_loses_nothing_that_was_safe(
     tmp_path: Path, manifest: SessionManifest, file_size_limit: FileSizeLimit
 ) -> None:
     """Wherever the disk is full: within the answer, within the event before it, or before both."""
     for room in range(0, 600, 23):
         folder, taken = tmp_path / str(room), [1]
-        with pytest.raises(StoreError) as refused, SessionStore.create(folder, manifest) as store:
-            store.answer(1, row_of(1))
-            before = store.files.log.read_bytes()
-            with file_size_limit(len(before) + room):
-                for trial in range(2, 9):
-                    store.log("presented", trial=trial)
-                    store.answer(trial, row_of(trial))
-                    taken.append(trial)
+        store = SessionStore.create(folder, manifest)
+        store.answer(1, row_of(1))
+        before = store.files.log.read_bytes()
+        with file_size_limit(len(before) + room), pytest.raises(StoreError) as refused:
+            answer_eight(store, taken)
+        with pytest.raises(StoreError, match="a file that is larger than it may be"):
+            store.close()
         assert "what was answered before is safe" in str(refused.value)
         assert "\n" not in str(refused.value)
         found = store.files.log.read_bytes()
@@ -230,23 +236,24 @@ def test_a_full_disk_loses_nothing_that_was_safe(
 def test_a_failing_disk_is_told_at_the_answer_and_ever_after(
     tmp_path: Path, manifest: SessionManifest, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
-    with pytest.raises(StoreError), SessionStore.create(tmp_path, manifest) as store:
-        store.answer(1, row_of(1))
+    store = SessionStore.create(tmp_path, manifest)
+    store.answer(1, row_of(1))
 
-        def fail(*_: object) -> int:
-            raise OSError(errno.EIO, "Input/output error")
+    def fail(*_: object) -> int:
+        raise OSError(errno.EIO, "Input/output error")
 
-        with monkeypatch.context() as broken:
-            broken.setattr(os, call, fail)
-            with pytest.raises(StoreError, match="a disk that fails"):
-                store.answer(2, row_of(2))
-        for again in (
-            lambda: store.log("presented"),
-            lambda: store.answer(2, row_of(2)),
-            lambda: store.finish("crashed"),
-        ):
-            with pytest.raises(StoreError, match="a disk that fails"):
-                again()
+    with monkeypatch.context() as broken:
+        broken.setattr(os, call, fail)
+        with pytest.raises(StoreError, match="a disk that fails"):
+            store.answer(2, row_of(2))
+    for again in (
+        lambda: store.log("presented"),
+        lambda: store.answer(2, row_of(2)),
+        lambda: store.finish("crashed"),
+        lambda: store.close(),
+    ):
+        with pytest.raises(StoreError, match="a disk that fails"):
+            again()
     state = session_state(store.files.log)
     assert [row["trial"] for row in state.rows] == [1]
     assert state.status == "crashed"
@@ -258,10 +265,14 @@ def test_an_error_in_the_block_is_not_hidden_by_the_disk(
     def fail(*_: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    with pytest.raises(ZeroDivisionError), SessionStore.create(tmp_path, manifest) as store:
-        monkeypatch.setattr(os, "write", fail)
-        store.log("presented")
-        raise ZeroDivisionError
+    def failing() -> None:
+        with SessionStore.create(tmp_path, manifest) as store:
+            monkeypatch.setattr(os, "write", fail)
+            store.log("presented")
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        failing()
 
 
 @pytest.mark.parametrize("limit", [0, 100, 1500, 2100])
