@@ -110,6 +110,26 @@ class Store(Protocol):
             If it, or an earlier event, could not be written.
         """
 
+    def close(self) -> None:
+        """Take nothing more; harmless when closed already.
+
+        Raises
+        ------
+        StoreError
+            If something could not be written.
+        """
+
+    def __enter__(self) -> Self:
+        """Closed when the block ends."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close; an error of the block is never hidden by one of the disk."""
+
 
 class MemoryStore:
     """Keeps answers in memory, for studies that are only planned; nothing is written.
@@ -154,6 +174,20 @@ class MemoryStore:
         """Keep how it ended."""
         self.status = status
         self.log("ended", status=status, reason=reason, by=by)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
 
 
 class SessionStore:

@@ -26,7 +26,7 @@ from experiments.sessions.log import line_of, read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
 from experiments.sessions.state import session_state
-from experiments.sessions.store import MemoryStore, SessionStore, StoreError
+from experiments.sessions.store import MemoryStore, SessionStore, Store, StoreError
 from experiments.sessions.tables import GrowingTable, cell
 from modeling import InputError
 from rig.interface import Acceleration, HandRows, PresentationRecord
@@ -186,15 +186,17 @@ def test_the_hand_and_the_pen_stand_beside_it(
 
 
 def test_in_memory_rows_are_kept_and_nothing_is_written() -> None:
-    store = MemoryStore()
-    store.log("presented", trial=1)
-    store.answer(1, row_of(1))
-    store.trace(1, HandRows.joined([]), presentations=(), faults=())
-    store.acceleration(1, ())
-    store.finish("complete")
-    assert store.rows == [row_of(1)]
-    assert store.status == "complete"
-    assert [event["event"] for event in store.events] == ["presented", "ended"]
+    memory = MemoryStore()
+    store: Store = memory
+    with store:
+        store.log("presented", trial=1)
+        store.answer(1, row_of(1))
+        store.trace(1, HandRows.joined([]), presentations=(), faults=())
+        store.acceleration(1, ())
+        store.finish("complete")
+    assert memory.rows == [row_of(1)]
+    assert memory.status == "complete"
+    assert [event["event"] for event in memory.events] == ["presented", "ended"]
 
 
 # Disks
