@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from modeling.files.answer_tables import MODEL_LEVELS
-
-MODELS = tuple(MODEL_LEVELS)
-TASKS = {"absolute": "absolute evaluation", "relative": "forced choice"}
+# The sets of models that the statistics compare, the reference first.
+MODELS = ("full", "simplified")
+TASKS = {
+    "absolute": "absolute evaluation",
+    "relative": "forced choice",
+    "oddity": "oddity task",
+    "threshold": "detection threshold",
+}
 SCALES = {
     "magnitude_similarity": "vibration magnitude",
     "frequency_similarity": "frequency pattern",

@@ -46,7 +46,8 @@ class PairTrial(Trial):
     layout: tuple[str, ...]
 
 
-def _trials(order, study, rng):
+def _trials(occasion, order):
+    study, rng = occasion.study, occasion.rng
     drafts = []
     for texture, model in order:
         other = fisher_yates([t for t in study.textures if t != texture], rng)[0]
@@ -71,7 +72,6 @@ TASK = Task(
     description="Which of two?",
     texts={phase: (phase, "Which of two?") for phase in ("training", "main", "closing")},
     trial=PairTrial,
-    repeated=True,
     trials=_trials,
     virtual=lambda models, trial: [models.of(t, trial.model) for t in trial.layout],
     begin=lambda trial, surfaces: surfaces.present_real(),
@@ -92,7 +92,6 @@ STUDY = """
 name = "Pairs"
 seed = 3
 textures = ["canvas", "PVC"]
-training_trials = 1
 [trays]
 canvas = "A"
 PVC = "B"
@@ -105,6 +104,8 @@ schedule = "by-day"
 [pair]
 participants = 2
 schedule = "interleaved"
+repeats = 3
+training_trials = 1
 """
 MODELS = """
 from modeling import Threshold, simplify

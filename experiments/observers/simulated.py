@@ -26,12 +26,12 @@ from experiments.sessions.surfaces import (
     ChoiceTrial,
     Intake,
     Note,
+    RatedTrial,
     Rating,
     Surfaces,
 )
 from experiments.study.questions import Question
 from experiments.study.study import TASKS
-from experiments.tasks.absolute import AbsoluteTrial
 from modeling import InputError
 from modeling.seeds import generator
 
@@ -104,7 +104,7 @@ class SimulatedParticipant:
     def progress(self, done: int, of: int) -> None:
         """Simulated participants do not look at it."""
 
-    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Switch a few times, then rate by the distance to the real surface."""
         surfaces.start()
         for _ in range(1 + self._looks()):

@@ -11,8 +11,8 @@ from experiments.study.design import (
     Occasion,
     Phase,
     SessionPlan,
-    fisher_yates,
     first_models,
+    fisher_yates,
     with_first_models,
 )
 from experiments.study.study import Study

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.agenda import Agenda
-from experiments.sessions.bids import export_session
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
@@ -21,8 +20,7 @@ from experiments.sessions.task import Task
 from experiments.sessions.trial_loop import People, SessionResult, run_trials
 from experiments.study.design import SessionPlan, Trial
 from experiments.study.models import ModelSets
-from experiments.study.page import plan_sha256
-from experiments.study.study import Study
+from experiments.study.study import Study, plan_sha256
 from modeling import InputError
 from modeling.errors import shown
 from rig.interface import TextureRig
@@ -89,7 +87,7 @@ def run_session(
     SessionResult
         Not completed if somebody ended it early.
     Path
-        Its log.
+        Its manifest, beside which its log lies; `experiments.sessions.bids` makes tables of them.
 
     Raises
     ------
@@ -128,8 +126,7 @@ def run_session(
             )
     finally:
         rig.close()
-    export_session(root, store.files.manifest)
-    return result, store.files.log
+    return result, store.files.manifest
 
 
 def _manifest(

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NoReturn
 
 from experiments.study.study import Study
-from modeling import InputError
+from modeling import InputError, TextureModel
+from modeling.checks import check_keys
 from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import AnyModel
+from modeling.models.loading import AnyModel, load_any_models
+from modeling.scenes.compiled import FILE as SCENE
+from modeling.scenes.loading import scene_files, scene_models
 
 Presentable = AnyModel
+STIMULI = "manifest.tsv"  # stands in a folder of tactileq stimuli
 # What may go on where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
 
@@ -76,6 +81,16 @@ class ModelSets:
             if self.of(texture, name).sha256 in made_from(self.of(texture, reference))
         )
 
+    def of_others(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        """Textures and sets whose model says that it was made from one that no set holds."""
+        return tuple(
+            (texture, name)
+            for texture in textures
+            for name in self.names
+            if (sources := made_from(self.of(texture, name)))
+            and not sources & {self.of(texture, other).sha256 for other in self.names}
+        )
+
     def require(self, study: Study, *, allow: Allow = refuse) -> None:
         """Refuse a study with textures that have no model, or without models to compare.
 
@@ -134,3 +149,72 @@ def made_from(model: Presentable) -> set[str]:
     note = getattr(model, "compiled_for", None)
     stated = {getattr(model, "simplified_from", ""), note.full_sha256 if note else ""}
     return stated - {""}
+
+
+def load_model_sets(
+    study: Study,
+    folder: str | Path,
+    *,
+    overriding: Mapping[str, Path] | None = None,
+    progress: Callable[[float, str], None] = lambda share, texture: None,
+) -> tuple[ModelSets, list[Path]]:
+    """The sets of models of a study, and all that was read for them.
+
+    Parameters
+    ----------
+    study : Study
+    folder : path
+        What the study's paths are relative to: the folder of its file.
+    overriding : mapping of set to path, optional
+        Other places than the study's; relative to where the program runs.
+    progress : callable
+        Told the share that is done, and the texture that was done last, where a scene is compiled.
+
+    Raises
+    ------
+    InputError
+        For a set that the study does not name, for a place without models, and for what
+        `modeling.scenes.loading.scene_models` refuses.
+    """
+    given = dict(overriding or {})
+    check_keys(given, tuple(study.models), where="the sets of models of the study")
+    sets: dict[str, Mapping[str, Presentable]] = {}
+    files: list[Path] = []
+    for name, stated in study.models.items():
+        place = given.get(name, Path(folder) / stated)
+        reference = next(iter(sets.values()), None)
+        try:
+            sets[name], read = _models_at(place, reference, progress=progress)
+        except InputError as error:
+            raise InputError(f"models {name}: {error}") from None
+        files += read
+    return ModelSets(sets=sets), files
+
+
+def _models_at(
+    place: Path,
+    reference: Mapping[str, Presentable] | None,
+    *,
+    progress: Callable[[float, str], None],
+) -> tuple[Mapping[str, Presentable], list[Path]]:
+    """The models of a folder or a scene; of a scene those that belong to the reference's."""
+    if place.is_dir() and (place / STIMULI).is_file():
+        raise InputError(
+            f"expected models in {place}, got a stimulus set of tactileq stimuli, whose signals "
+            "do not follow a hand; give the models that it was rendered from."
+        )
+    if place.suffix == ".toml" or (place / SCENE).is_file():
+        full = _grids(reference)
+        return scene_models(place, full, progress=progress), [*scene_files(place)]
+    if not place.is_dir():
+        raise InputError(
+            f"expected a folder of models or a scene at {place}, got none; make it, or correct the "
+            "place under [models]."
+        )
+    return load_any_models(place), [place]
+
+
+def _grids(models: Mapping[str, Presentable] | None) -> Mapping[str, TextureModel] | None:
+    """Those that a scene can be compiled from; None where there are others among them."""
+    grids = {name: m for name, m in (models or {}).items() if isinstance(m, TextureModel)}
+    return grids if grids and len(grids) == len(models or {}) else None

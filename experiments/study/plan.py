@@ -1,4 +1,4 @@
-"""What is fixed before the first answer: the table [plan] of a study (docs/method/protocols.md#plan)."""
+"""What is fixed before the first answer: the table [plan] (docs/method/protocols.md#plan)."""
 
 from __future__ import annotations
 

@@ -296,3 +296,18 @@ def _version(values: object) -> str:
     table = as_table(values, where="[consent]", example='version = "…" under [consent]')
     check_keys(table, ("version",), where="[consent]")
     return as_text(table.get("version", ""), "version in [consent]")
+
+
+def plan_sha256(study: Study, models_sha256: Mapping[str, Mapping[str, str]]) -> str:
+    """SHA-256 of all that the page to preregister says: the study, and the models by their hashes.
+
+    docs/method/protocols.md#plan
+
+    Parameters
+    ----------
+    study : Study
+    models_sha256 : mapping of texture to mapping of set to SHA-256
+        As `ModelSets.sha256` gives them.
+    """
+    models = {texture: dict(hashes) for texture, hashes in models_sha256.items()}
+    return sha256_of_values({"study": study.to_dict(), "models_sha256": models})

@@ -26,9 +26,9 @@ class AnswerColumn:
     unit : str
     required : bool
         Whether every row has a value.
-    before : str, optional
-        What every row of a table holds that was written before there was this column; without it
-        such a table is refused.
+    right : str
+        Of a column `answer` beside one that is called `correct`: the column that holds the right
+        answer.
     """
 
     name: str
@@ -37,7 +37,7 @@ class AnswerColumn:
     limits: tuple[float, float] | None = None
     unit: str = ""
     required: bool = False
-    before: str | None = None
+    right: str = "texture"
 
     def sidecar(self) -> dict[str, Any]:
         """The column as a BIDS sidecar describes it."""
@@ -49,10 +49,12 @@ class AnswerColumn:
         return described
 
 
-MODEL_LEVELS = {"full": "all layers", "simplified": "without imperceptible layers"}
+YES_NO = {"1": "yes", "0": "no"}
 
 
-def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[AnswerColumn, ...]:
+def answer_columns(
+    *own: AnswerColumn, texture: str, model: str, of_surfaces: bool = True
+) -> tuple[AnswerColumn, ...]:
     """The columns of a task's table: those of every task, with its own among them.
 
     Parameters
@@ -61,11 +63,14 @@ def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[Answer
         What only this task has.
     texture, model : str
         What these two columns mean in it.
+    of_surfaces : bool
+        Whether every trial has a texture and a model.
     """
     return (
         AnswerColumn(
             name="trial",
-            description="Running number in the session, training included",
+            description="Number in the session: of a planned trial its own, training included; of "
+            "any other one the next that was free",
             limits=(0, inf),
             required=True,
         ),
@@ -75,29 +80,39 @@ def answer_columns(*own: AnswerColumn, texture: str, model: str) -> tuple[Answer
             levels={"training": "for practice", "main": "counts"},
             required=True,
         ),
-        AnswerColumn(name="texture", description=texture, required=True),
+        AnswerColumn(name="texture", description=texture, required=of_surfaces),
         AnswerColumn(
             name="model",
-            description=model,
-            levels=MODEL_LEVELS,
-            required=True,
+            description=f"{model}: the name of a set of models in the study",
+            required=of_surfaces,
         ),
         AnswerColumn(name="tray", description="Tray that held the sample"),
         *own,
+        AnswerColumn(
+            name="run",
+            description="In which start of the session it was answered: 1, and one more each time "
+            "that the session was resumed",
+            limits=(1, inf),
+            required=True,
+        ),
         AnswerColumn(
             name="valid",
             description="Whether the rig presented what was planned",
             levels={"1": "it did", "0": "it failed in this trial; the log says how"},
             limits=(0, 1),
             required=True,
-            before="1",
         ),
         AnswerColumn(
             name="repeats",
-            description="Of a trial that was repeated at the end of its phase, since it was not "
-            "valid: its number; n/a for planned trials",
+            description="Number of the planned trial that was presented once more, since it was "
+            "not valid, or since training began again; n/a for a planned trial itself",
             limits=(1, inf),
-            before="n/a",
+        ),
+        AnswerColumn(
+            name="pilot",
+            description="Whether the session was a pilot, whose answers are no data of the study",
+            levels={"true": "of a pilot", "false": "of the study"},
+            required=True,
         ),
         AnswerColumn(
             name="simulated",
@@ -118,9 +133,27 @@ RESPONSE_TIME = AnswerColumn(
     unit="s",
 )
 
+CORRECT = AnswerColumn(
+    name="correct",
+    description="Whether the answer is right",
+    levels=YES_NO,
+    limits=(0, 1),
+)
+PRESSES = AnswerColumn(
+    name="presses",
+    description="Presentations of a virtual surface, repeated ones included",
+    limits=(0, inf),
+)
+
 # In the order in which a study does them; that order is part of every seed.
 ANSWER_TABLES = {
     "absolute": answer_columns(
+        AnswerColumn(
+            name="virtual_texture",
+            description="Texture that the virtual surface models: the real one's, or in an anchor "
+            "another one, which was said to be the same",
+            required=True,
+        ),
         AnswerColumn(
             name="first_surface",
             description="Surface presented when the trial began",
@@ -144,7 +177,7 @@ ANSWER_TABLES = {
             limits=(0, inf),
         ),
         RESPONSE_TIME,
-        texture="Real surface, and the texture that the virtual one models",
+        texture="Real surface",
         model="Model behind the virtual surface",
     ),
     "relative": answer_columns(
@@ -153,19 +186,66 @@ ANSWER_TABLES = {
             description="Texture behind each button, from button 1, separated by |",
         ),
         AnswerColumn(name="answer", description="Texture of the chosen virtual surface"),
-        AnswerColumn(
-            name="correct",
-            description="Whether the answer is the texture of the real surface",
-            levels={"1": "right", "0": "wrong"},
-            limits=(0, 1),
-        ),
-        AnswerColumn(
-            name="presses",
-            description="Presentations of a virtual surface, repeated ones included",
-            limits=(0, inf),
-        ),
+        CORRECT,
+        PRESSES,
         RESPONSE_TIME,
         texture="Real surface, which is the right answer",
         model="Model behind all virtual surfaces of the trial",
+    ),
+    "oddity": answer_columns(
+        AnswerColumn(
+            name="layout",
+            description="Model behind each button, from button 1, separated by |",
+        ),
+        AnswerColumn(
+            name="odd_position",
+            description="Button of the odd one, from 1",
+            limits=(1, 3),
+            required=True,
+        ),
+        AnswerColumn(
+            name="answer",
+            description="Button that was chosen, from 1",
+            limits=(1, 3),
+            right="odd_position",
+        ),
+        CORRECT,
+        PRESSES,
+        RESPONSE_TIME,
+        texture="Texture that all three virtual surfaces model",
+        model="Model of the odd one",
+    ),
+    "threshold": answer_columns(
+        AnswerColumn(
+            name="frequency_hz",
+            description="Frequency of the sinusoid",
+            limits=(0, inf),
+            unit="Hz",
+            required=True,
+        ),
+        AnswerColumn(
+            name="amplitude_g",
+            description="Amplitude of the sinusoid (peak)",
+            limits=(0, inf),
+            unit="g",
+            required=True,
+        ),
+        AnswerColumn(
+            name="interval",
+            description="Interval that held the sinusoid; the other one was silent",
+            limits=(1, 2),
+            required=True,
+        ),
+        AnswerColumn(
+            name="answer",
+            description="Interval that was chosen",
+            limits=(1, 2),
+            right="interval",
+        ),
+        CORRECT,
+        RESPONSE_TIME,
+        texture="n/a: no surface is presented",
+        model="n/a: no surface is presented",
+        of_surfaces=False,
     ),
 }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TypeVar
 
 from modeling.errors import InputError, shown
 from modeling.files.documents import read_json_object
@@ -13,6 +14,7 @@ from modeling.models.texture_model import TextureModel
 
 Layered = TextureModel | RegressedModel
 AnyModel = Layered | ARModel
+Model = TypeVar("Model", bound=AnyModel)
 _KINDS: dict[str, type[AnyModel]] = {
     kind.FORMAT: kind for kind in (TextureModel, RegressedModel, ARModel)
 }
@@ -56,16 +58,31 @@ def models_in(folder: Path) -> tuple[list[Path], list[Path]]:
 
 
 def load_models(folder: Path) -> dict[str, TextureModel]:
-    """All models of a folder by the name of their texture.
+    """All models of a folder by the name of their texture; each has to be a `TextureModel`.
 
     Raises
     ------
     InputError
         For a folder without models, a file that is none, and two models of one texture.
     """
-    models: dict[str, TextureModel] = {}
+    return _by_texture(folder, TextureModel.load)
+
+
+def load_any_models(folder: Path) -> dict[str, AnyModel]:
+    """All models of a folder by the name of their texture, of any kind.
+
+    Raises
+    ------
+    InputError
+        For a folder without models, a file that is none, and two models of one texture.
+    """
+    return _by_texture(folder, load_model)
+
+
+def _by_texture(folder: Path, load: Callable[[Path], Model]) -> dict[str, Model]:
+    models: dict[str, Model] = {}
     for path in models_in(folder)[0]:
-        fitted = TextureModel.load(path)
+        fitted = load(path)
         if fitted.texture in models:
             raise InputError(
                 f"expected one model of each texture in {folder}, got two of "

@@ -87,8 +87,8 @@ def run_study(
         simulate_study(
             plan,
             real=real,
-            full=models.sets["full"],
-            simplified=models.sets["simplified"],
+            full=models.sets["full"],  # type: ignore[arg-type]
+            simplified=models.sets["simplified"],  # type: ignore[arg-type]
             rig=SimulatedRig(real, seed=seed),
             data_folder=data,
             seed=seed,

@@ -272,7 +272,7 @@ def test_a_session_presents_the_models_of_a_scene(
     perception = Perception(
         Study.load(study / "study.toml"),
         real=full,
-        models=ModelSets(full=full, simplified=least),
+        models=ModelSets(sets={"full": full, "simplified": least}),
         threshold=Threshold.shipped("codec"),
     )
     someone = SimulatedParticipant(perception, Psychometrics(), seed=1, subject=1, occasion=(1,))

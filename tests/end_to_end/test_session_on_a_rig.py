@@ -26,17 +26,18 @@ STUDY = """
 name = "Two surfaces"
 seed = 3
 textures = ["MDF", "PVC"]
-training_trials = 1
-repeats = 1
 [trays]
 MDF = "A"
 PVC = "B"
 [absolute]
 participants = 1
 schedule = "interleaved"
+training_trials = 1
 [relative]
 participants = 2
 schedule = "by-day"
+training_trials = 1
+repeats = 1
 """
 FILES = ("--subject", 1, "--study", "study.toml", "--simplified", "fewer", "--data", "data")
 WORDS = ("--task", "absolute", *FILES)

@@ -9,7 +9,8 @@ import pytest
 
 from experiments.sessions.surfaces import Choice, Rating, Surfaces
 from experiments.study.models import ModelSets
-from experiments.study.study import Study, TaskPlan
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.relative import RelativeTrial
 from modeling import TextureModel, Threshold, simplify

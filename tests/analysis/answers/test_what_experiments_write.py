@@ -11,7 +11,8 @@ from analysis.statistics.rates import rate_tests
 from experiments.observers.whole_study import simulate_study
 from experiments.sessions.surfaces import Choice, SessionAborted, Surfaces
 from experiments.study.models import ModelSets
-from experiments.study.study import Study, TaskPlan
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
 from experiments.tasks.relative import RelativeTrial, run_relative
 from modeling import Threshold, simplify
 from rig.twin import SimulatedRig
@@ -31,11 +32,11 @@ def responses(tmp_path_factory) -> Responses:
             seed=3,
             textures=TEXTURES,
             trays={"leather": "A", "MDF": "B", "PVC": "C"},
-            repeats=2,
-            training_trials=1,
             tasks={
-                "absolute": TaskPlan(participants=3, schedule="interleaved"),
-                "relative": TaskPlan(participants=4, schedule="by-day"),
+                "absolute": TaskPlan(participants=3, schedule="interleaved", training_trials=1),
+                "relative": TaskPlan(
+                    participants=4, schedule="by-day", repeats=2, training_trials=1
+                ),
             },
         ),
         real=truths,
@@ -74,7 +75,7 @@ def test_a_session_left_early_is_named(tmp_path):
         Study.load(),
         subject=1,
         session=1,
-        models=ModelSets(full=truths, simplified=fewer),
+        models=ModelSets(sets={"full": truths, "simplified": fewer}),
         rig=SimulatedRig(),
         respondent=Leaving(),
         data_folder=tmp_path,

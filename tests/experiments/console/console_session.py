@@ -63,7 +63,7 @@ with Console(
         study,
         subject=1,
         session=1,
-        models=ModelSets(full=truths, simplified=fewer),
+        models=ModelSets(sets={"full": truths, "simplified": fewer}),
         rig=TellingRig(truths),
         respondent=console,
         data_folder=folder,

@@ -20,8 +20,8 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
     return simulate_study(
         study,
         real=truths,
-        full=models.full,
-        simplified=models.simplified,
+        full=models.sets["full"],
+        simplified=models.sets["simplified"],
         rig=SimulatedRig(truths),
         data_folder=folder,
         **{"seed": 3, **more},
@@ -37,7 +37,7 @@ def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: 
         study,
         tmp_path,
         truths,
-        ModelSets(full=truths, simplified=reduced),
+        ModelSets(sets={"full": truths, "simplified": reduced}),
         threshold=threshold,
         progress=lambda done, total, name: steps.append((done, total, name)),
     )
@@ -51,7 +51,7 @@ def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: 
     absolute = [r for p in tmp_path.rglob("*_task-absolute_beh.tsv") for r in rows(p)]
     main = [row for row in absolute if row["phase"] == "main"]
     assert set(Counter((row["texture"], row["model"]) for row in main).values()) == {20}
-    assert len(absolute) - len(main) == 20 * study.training_trials
+    assert len(absolute) - len(main) == 20 * study.plan_of("absolute").training_trials
     assert all(0 <= float(row["magnitude_similarity"]) <= 100 for row in absolute)
 
     relative = [r for p in tmp_path.rglob("*_task-relative_beh.tsv") for r in rows(p)]

@@ -35,7 +35,7 @@ run_absolute(
     study,
     subject=1,
     session=1,
-    models=ModelSets(full=truths, simplified=fewer),
+    models=ModelSets(sets={"full": truths, "simplified": fewer}),
     rig=SimulatedRig(truths),
     respondent=Killed(),
     data_folder=sys.argv[1],

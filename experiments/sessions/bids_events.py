@@ -1,0 +1,157 @@
+"""What happened in a session, as a BIDS table of events: from its log and its presentations.
+
+docs/method/protocols.md#bids
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+from typing import Any
+
+from experiments.sessions.log import OWN_FIELDS, Event
+from experiments.sessions.traces import PRESENTATION_COLUMNS
+
+# Two records of one presentation: the log's when a press was seen, and the rig's (s).
+SAME_START_S = 1e-3
+
+_MEANINGS = {
+    "opened": "The session was begun or taken up again",
+    "welcome": "The participant consented, confirmed the code and answered the questions",
+    "phase": "A part of the session was announced",
+    "mount_requested": "The experimenter was asked for the sample of a tray",
+    "mount_confirmed": "The experimenter said that it is mounted",
+    "presented": "A surface was presented",
+    "slider": "A slider was let go",
+    "pressed": "A button or key was pressed",
+    "answer": "The trial was answered; the answer is in the table of answers",
+    "training_over": "Training ended",
+    "outside": "The participant was asked to stroke otherwise",
+    "break_began": "A break began",
+    "break_ended": "The participant ended the break",
+    "stop_asked": "The participant asked to stop, and was asked whether to",
+    "stop_withdrawn": "The participant goes on after all",
+    "fault": "The rig failed, or something in it did",
+    "pen": "Acceleration at the pen was stored",
+    "ended": "This start of the session ended",
+}
+_OWN: dict[str, dict[str, Any]] = {
+    "onset": {"Description": "Since the session was begun", "Units": "s"},
+    "duration": {
+        "Description": "From the first to the last sample of a presentation; n/a of what has none",
+        "Units": "s",
+    },
+    "trial_type": {"Description": "What happened"},
+    "run": {"Description": "In which start of the session, from 1"},
+    "trial": {"Description": "Number of the trial; n/a outside trials"},
+    "phase": {"Description": "Part of the session that was announced"},
+    "tray": {"Description": "Tray of the sample"},
+    "surface": {
+        "Description": "What was presented",
+        "Levels": {"real": "the mounted real surface", "virtual": "a virtual surface"},
+    },
+    "button": {"Description": "Button of the virtual surface, from 1"},
+    "scale": {"Description": "Which slider"},
+    "value": {"Description": "Where it was let go, 0 to 100", "Units": "arbitrary"},
+    "status": {
+        "Description": "How this start of the session ended",
+        "Levels": {
+            "complete": "all trials were answered",
+            "aborted": "somebody ended it",
+            "crashed": "the program failed",
+        },
+    },
+    "by": {"Description": "Who or what ended it"},
+    "told": {"Description": "What was told: a fault, a reason, an advice"},
+    "invalidates": {
+        "Description": "Whether the participant cannot have felt what was planned",
+        "Levels": {"true": "the trial is not valid", "false": "nothing follows"},
+    },
+    "start_s": {"Description": "When the first sample left, on the rig's clock", "Units": "s"},
+}
+_FROM_PRESENTATIONS = {
+    name: described
+    for name, described in PRESENTATION_COLUMNS.items()
+    if name not in ("trial", "surface", "start_s", "end_s", "faults")
+}
+COLUMNS: dict[str, dict[str, Any]] = {**_OWN, **_FROM_PRESENTATIONS}
+# Answers are in their own tables, the participants' in participants.tsv.
+_ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut")
+
+
+def event_rows(
+    events: Sequence[Event], presentations: Sequence[Mapping[str, str]]
+) -> list[dict[str, object]]:
+    """The rows of the table of events, in the order of their onsets.
+
+    Parameters
+    ----------
+    events : sequence of dict
+        Of the log.
+    presentations : sequence of mapping
+        The rows of the session's table of presentations, as text.
+    """
+    onsets = onsets_s(events)
+    shown: dict[str, list[Mapping[str, str]]] = {}
+    for row in presentations:
+        shown.setdefault(row["trial"], []).append(row)
+    rows = [
+        _row(event, onset, shown.get(str(event.get("trial")), ()))
+        for event, onset in zip(events, onsets, strict=True)
+    ]
+    return sorted(rows, key=lambda row: float(str(row["onset"])))
+
+
+def onsets_s(events: Sequence[Event]) -> list[float]:
+    """When each event happened, in seconds since the first one (its run's clock, then UTC's).
+
+    Within a run the monotonic clock counts; where a run begins is told by the date and time, but
+    is never before the end of the last one.
+    """
+    onsets: list[float] = []
+    began: dict[int, float] = {}
+    for event in events:
+        run, latest = event["run"], max(onsets, default=0.0)
+        if run not in began:
+            since = (_moment(event) - _moment(events[0])).total_seconds()
+            began[run] = max(since if onsets else 0.0, latest) - event["t_s"]
+        onsets.append(began[run] + event["t_s"])
+    return onsets
+
+
+def trial_types(rows: Sequence[Mapping[str, object]]) -> dict[str, str]:
+    """Every kind of event that there is, with its meaning."""
+    found = sorted({str(row["trial_type"]) for row in rows})
+    return {name: _MEANINGS.get(name, "As the log of the session says") for name in found}
+
+
+def _moment(event: Event) -> datetime:
+    return datetime.fromisoformat(event["utc"])
+
+
+def _row(event: Event, onset: float, of_trial: Sequence[Mapping[str, str]]) -> dict[str, object]:
+    kept = {k: v for k, v in event.items() if k not in (*_ELSEWHERE, *OWN_FIELDS)}
+    kept = {name: value for name, value in kept.items() if name in _OWN and value is not None}
+    index = event.get("index")
+    return {
+        **kept,
+        **(_presentation(event, of_trial) if event["event"] == "presented" else {}),
+        "onset": round(onset, 6),
+        "trial_type": event["event"],
+        "run": event["run"],
+        "button": index + 1 if isinstance(index, int) else None,
+        "told": event.get("told") or event.get("reason") or event.get("advice"),
+    }
+
+
+def _presentation(event: Event, of_trial: Sequence[Mapping[str, str]]) -> dict[str, object]:
+    """What the rig says of a presentation, where it was stored."""
+    start_s = event.get("start_s")
+    if not isinstance(start_s, int | float):
+        return {}
+    for row in of_trial:
+        if abs(float(row["start_s"]) - start_s) < SAME_START_S:
+            found: dict[str, object] = {name: row[name] for name in _FROM_PRESENTATIONS}
+            duration_s = float(row["end_s"]) - float(row["start_s"])
+            return {**found, "duration": round(duration_s, 6)}
+    return {}

@@ -1,0 +1,182 @@
+"""Who took part, in which sessions: the tables of a data set about people.
+
+docs/method/protocols.md#bids
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.bids_tables import json_bytes, table_bytes
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.state import SessionState
+from modeling.files.answer_tables import ANSWER_TABLES
+
+STATUS_LEVELS = {
+    "complete": "all trials were answered",
+    "aborted": "somebody ended it; it can be resumed",
+    "crashed": "the program was killed or failed; it can be resumed",
+    "running": "it was going on when this table was written",
+}
+_SESSION_COLUMNS: dict[str, dict[str, Any]] = {
+    "session_id": {"Description": "Session (day)"},
+    "day": {
+        "Description": "Whole days since the participant's first session; the dates themselves are "
+        "left out, since they may tell who it was",
+        "Units": "day",
+    },
+    **{
+        task: {"Description": f"How the session of the task {task} stands", "Levels": STATUS_LEVELS}
+        for task in ANSWER_TABLES
+    },
+}
+_FIRST = {"participant_id": {"Description": "Participant"}}
+_LAST: dict[str, dict[str, Any]] = {
+    "slot": {
+        "Description": "Place in the design: whose share of the balanced parts of the order it is"
+    },
+    "status": {
+        "Description": "Whether the participant goes on",
+        "Levels": {"enrolled": "takes part", "dropped": "will not come again"},
+    },
+    "consent_version": {"Description": "Version of the consent form that was agreed to"},
+    "language": {"Description": "Language of the texts"},
+    "pilot": {
+        "Description": "Whether the sessions were a pilot",
+        "Levels": {"true": "a pilot", "false": "data of the study"},
+    },
+    "simulated": {
+        "Description": "Whether the participant was simulated",
+        "Levels": {"true": "simulated", "false": "a person"},
+    },
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """One session that there is: its manifest, and how it stands."""
+
+    manifest: SessionManifest
+    state: SessionState
+
+    @property
+    def participant(self) -> str:
+        """As sub-01."""
+        return f"sub-{self.manifest.subject:02d}"
+
+    @property
+    def session(self) -> str:
+        """As ses-01."""
+        return f"ses-{self.manifest.session:02d}"
+
+
+def people_files(
+    root: Path, sessions: Sequence[Held], roster: Mapping[int, Mapping[str, Any]]
+) -> dict[Path, bytes]:
+    """participants.tsv and each one's sessions.tsv, with their sidecars.
+
+    Parameters
+    ----------
+    root : Path
+        Of the data set.
+    sessions : sequence of Held
+        By subject, session and task.
+    roster : mapping of subject to mapping
+        As `Roster.subjects` gives it.
+    """
+    by_person: dict[str, list[Held]] = {}
+    for held in sessions:
+        by_person.setdefault(held.participant, []).append(held)
+    questions = _questions(sessions)
+    columns = _FIRST | questions | _LAST
+    rows = [_person(name, of_one, roster) for name, of_one in sorted(by_person.items())]
+    files = {
+        root / "participants.tsv": table_bytes(columns, rows),
+        root / "participants.json": json_bytes(columns),
+    }
+    for name, of_one in by_person.items():
+        table = root / name / f"{name}_sessions.tsv"
+        files[table] = table_bytes(_SESSION_COLUMNS, _session_rows(of_one))
+        files[table.with_suffix(".json")] = json_bytes(_SESSION_COLUMNS)
+    return files
+
+
+def _questions(sessions: Iterable[Held]) -> dict[str, dict[str, Any]]:
+    """The columns of what was asked, in the order of the study."""
+    columns: dict[str, dict[str, Any]] = {}
+    for held in sessions:
+        for question in held.manifest.study.get("questions", ()):
+            name, levels = question["name"], question.get("levels", ())
+            wording = question.get("text", {})
+            described: dict[str, Any] = {"Description": wording.get("en", name.replace("_", " "))}
+            if levels:
+                described["Levels"] = {level: level for level in levels}
+            if name == "age":
+                described["Units"] = "year"
+            columns.setdefault(name, described)
+    return columns
+
+
+def _person(
+    name: str, sessions: Sequence[Held], roster: Mapping[int, Mapping[str, Any]]
+) -> dict[str, object]:
+    first = sessions[0].manifest
+    answers: dict[str, object] = {}
+    consent = ""
+    for held in sessions:
+        for event in held.state.events:
+            if event["event"] == "welcome":
+                answers |= event.get("answers") or {}
+                consent = event.get("consent") or consent
+    listed = roster.get(first.subject, {})
+    return {
+        **answers,
+        "participant_id": name,
+        "slot": first.slot,
+        "status": "dropped" if listed.get("left") == "dropped" else "enrolled",
+        "consent_version": consent,
+        "language": first.language,
+        "pilot": first.pilot,
+        "simulated": first.simulated_participant,
+    }
+
+
+def _session_rows(sessions: Sequence[Held]) -> list[dict[str, object]]:
+    days = {s.session: datetime.fromisoformat(s.state.begun_utc).date() for s in sessions}
+    first = min(days.values())
+    rows: dict[str, dict[str, object]] = {}
+    for held in sessions:
+        row = rows.setdefault(held.session, {"session_id": held.session})
+        row["day"] = (days[held.session] - first).days
+        row[held.manifest.task] = held.state.status
+    return [rows[session] for session in sorted(rows)]
+
+
+def readme(description: Mapping[str, Any]) -> bytes:
+    """What somebody reads first who is given the data set."""
+    simulated = (
+        "\nTHESE DATA ARE SIMULATED (participants, the rig, or both): dataset_description.json says "
+        "which.\n"
+        if description.get("Simulated")
+        else ""
+    )
+    return f"""{description.get("Name", "")}
+{simulated}
+Answers of a study with tactileq, as a BIDS data set.
+
+sub-XX/ses-XX/beh/*_beh.tsv      the answers, one row for each trial, in the order in which they were given
+sub-XX/ses-XX/beh/*_events.tsv   what happened: presentations with what limits did to them, mounts, breaks, faults
+sub-XX/ses-XX/beh/*_physio.tsv.gz  the hand, 250 times a second, one file for each start of the session
+sub-XX/sub-XX_sessions.tsv       the person's sessions, and how each one ended
+participants.tsv                 who took part
+sourcedata/                      what the program wrote while a session ran; all of the above is made from it
+
+Every column is described in the JSON file beside its table. n/a stands for what there is not. Text
+with quotes is written as in CSV; control characters stand as the characters that picture them.
+
+sourcedata holds pseudonyms, dates and times: leave it out of what you publish.
+""".encode()

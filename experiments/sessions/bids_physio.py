@@ -1,0 +1,146 @@
+"""The hand at a regular rate, as BIDS stores what is measured all the time.
+
+docs/method/protocols.md#bids
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from experiments.sessions.log import Event
+from modeling.arrays import Floats
+from rig.interface import SURFACES
+
+RATE_HZ = 250.0
+# Between readings further apart than this nobody knows what the hand did.
+LONGEST_GAP_S = 0.02
+
+COLUMNS: dict[str, dict[str, Any]] = {
+    "speed_mm_s": {
+        "Description": "Tangential speed, its sign the direction; linear between two readings; "
+        "n/a where nothing measured it and between trials",
+        "Units": "mm/s",
+    },
+    "force_n": {
+        "Description": "Normal force; linear between two readings; n/a where nothing measured it "
+        "and between trials",
+        "Units": "N",
+    },
+    "surface": {
+        "Description": "What was presented at the last reading",
+        "Levels": {
+            str(SURFACES.index("none")): "nothing",
+            str(SURFACES.index("real")): "the mounted real surface",
+            str(SURFACES.index("virtual")): "a virtual surface",
+        },
+    },
+    "force_assumed": {
+        "Description": "Whether the force of the last reading was not measured but assumed",
+        "Levels": {"1": "assumed", "0": "measured, or n/a"},
+    },
+    "trial": {"Description": "Number of the trial"},
+    "presentation": {
+        "Description": "Number of the presentation since the rig was opened, as in the events; 0 "
+        "where nothing was presented"
+    },
+}
+
+
+def by_run(hand: pd.DataFrame, events: Sequence[Event]) -> dict[int, pd.DataFrame]:
+    """The readings of each start of a session, whose rig has a clock of its own, by its number.
+
+    A trial's readings are stored once, right after its answer: they are of the start in which it
+    was answered.
+    """
+    run_of = {
+        event["trial"]: event["run"]
+        for kind in ("presented", "answer")
+        for event in events
+        if event["event"] == kind and "trial" in event
+    }
+    runs = hand["trial"].map(run_of)
+    return {int(run): hand[runs == run] for run in sorted(runs.dropna().unique())}
+
+
+def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:
+    """Readings of one start of a session at 250 Hz, from the first one to the last.
+
+    Parameters
+    ----------
+    hand : DataFrame
+        trial, presentation, time_s, speed_mm_s, force_n, surface (a name), force_assumed; one row
+        at least.
+
+    Returns
+    -------
+    DataFrame
+        One row every 4 ms, with `COLUMNS`; NaN between trials, and between readings that are more
+        than 20 ms apart.
+    """
+    hand = hand.sort_values("time_s", kind="stable")
+    time_s = hand["time_s"].to_numpy(float)
+    count = int(np.floor((time_s[-1] - time_s[0]) * RATE_HZ + 1e-6)) + 1
+    grid_s = time_s[0] + np.arange(count) / RATE_HZ
+    last = np.clip(np.searchsorted(time_s, grid_s + 1e-9, side="right") - 1, 0, None)
+    following = np.minimum(last + 1, time_s.size - 1)
+    between_s = time_s[following] - time_s[last]
+    share = np.divide(
+        grid_s - time_s[last], between_s, out=np.zeros(count), where=between_s > 0
+    ).clip(0.0, 1.0)
+    share[share < 1e-6] = 0.0
+    trial = hand["trial"].to_numpy()
+    known = (share == 0.0) | ((between_s <= LONGEST_GAP_S) & (trial[last] == trial[following]))
+    surface = hand["surface"].map(SURFACES.index)
+    steps = {"surface": surface, **{n: hand[n] for n in ("force_assumed", "trial", "presentation")}}
+    return pd.DataFrame(
+        {
+            **{
+                name: np.where(
+                    known, _linear(hand[name].to_numpy(float), last, following, share), np.nan
+                )
+                for name in ("speed_mm_s", "force_n")
+            },
+            **{
+                name: pd.array(np.where(known, values.to_numpy(float)[last], np.nan)).astype(
+                    "Int64"
+                )
+                for name, values in steps.items()
+            },
+        }
+    )
+
+
+def _linear(values: Floats, last: Any, following: Any, share: Floats) -> Floats:
+    # At a reading itself the next one does not count: it may be NaN.
+    return np.where(
+        share == 0.0, values[last], (1.0 - share) * values[last] + share * values[following]
+    )
+
+
+def start_onset_s(
+    hand: pd.DataFrame, events: Sequence[Event], onsets_s: Sequence[float], *, run: int
+) -> float:
+    """When the first reading of a start of the session was made, as an onset of an event.
+
+    The clocks of log and rig are matched at the first presentation that has both.
+    """
+    first_s = float(hand["time_s"].min())
+    of_run = [(e, onset) for e, onset in zip(events, onsets_s, strict=True) if e["run"] == run]
+    for event, onset in of_run:
+        if event["event"] == "presented" and isinstance(event.get("start_s"), int | float):
+            return round(onset + first_s - event["start_s"], 6)
+    return round(of_run[0][1], 6)
+
+
+def physio_bytes(regular: pd.DataFrame) -> bytes:
+    """The compressed table, without header and without the time of compression."""
+    text = io.StringIO()
+    rounded = regular.round({"speed_mm_s": 4, "force_n": 5})
+    rounded.to_csv(text, sep="\t", header=False, index=False, na_rep="n/a", lineterminator="\n")
+    return gzip.compress(text.getvalue().encode(), mtime=0)

@@ -1,0 +1,91 @@
+"""Deleting what there is of a person, and noting who will not come again.
+
+docs/method/protocols.md#withdrawing
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from experiments.sessions.bids import export_all
+from experiments.sessions.files import sessions_in
+from experiments.sessions.roster import Roster
+from experiments.sessions.state import is_running
+from modeling import InputError
+from modeling.errors import shown
+from modeling.files.places import clear_unfinished
+
+
+def withdraw(data_folder: str | Path, subject: int) -> None:
+    """Delete all files of a person; the number is never given again, the slot becomes free.
+
+    Begun again after a failure, it goes on where it stopped.
+
+    Parameters
+    ----------
+    data_folder : path
+        Root of the data set.
+    subject : int
+
+    Raises
+    ------
+    InputError
+        If nobody of that number was enrolled, a session of that person is running, or there is
+        nothing left to delete.
+    OSError
+        If files cannot be deleted.
+    """
+    root = Path(data_folder)
+    _require_still(root, subject)
+    left = [folder for folder in _folders(root, subject) if folder.exists()]
+    roster = Roster(root)
+    if not left or roster.subjects().get(subject, {}).get("left") != "withdrawn":
+        roster.withdraw(subject)
+    # What the others are made from goes first, so that nothing is made again in between.
+    for folder in left:
+        shutil.rmtree(folder)
+    clear_unfinished(root)
+    export_all(root)
+
+
+def drop_out(data_folder: str | Path, subject: int) -> None:
+    """Note that a person will not come again: the data stay, the slot becomes free.
+
+    Parameters
+    ----------
+    data_folder : path
+    subject : int
+
+    Raises
+    ------
+    InputError
+        If nobody of that number takes part, or a session of that person is running.
+    """
+    root = Path(data_folder)
+    _require_still(root, subject)
+    Roster(root).drop(subject)
+    export_all(root)
+
+
+def files_of(data_folder: str | Path, subject: int) -> tuple[Path, ...]:
+    """All files of a person."""
+    folders = _folders(Path(data_folder), subject)
+    found = (path for folder in folders for path in folder.rglob("*") if not path.is_dir())
+    return tuple(sorted(found))
+
+
+def _folders(root: Path, subject: int) -> tuple[Path, Path]:
+    name = f"sub-{subject:02d}"
+    return root / "sourcedata" / name, root / name
+
+
+def _require_still(root: Path, subject: int) -> None:
+    if not root.is_dir():
+        raise InputError(f"expected a data folder, got {shown(str(root))}; name it with --data.")
+    for files in sessions_in(root):
+        if files.subject == subject and is_running(files.log):
+            raise InputError(
+                f"expected no running session of subject {subject}, got {files.stem}, which a "
+                "console runs now; end it first."
+            )

@@ -1,0 +1,138 @@
+"""How balanced the orders of a study are over its participants (docs/method/protocols.md#order)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from experiments.study.design import Trial
+from experiments.study.study import Study
+from experiments.tasks import plan_session
+
+
+@dataclass(frozen=True, kw_only=True)
+class Balance:
+    """How often something comes, over participants or within a session.
+
+    Parameters
+    ----------
+    task : str
+    what : str
+        What is counted.
+    least, most : int
+        Of all its counts.
+    of : int
+        How often it could have come.
+    """
+
+    task: str
+    what: str
+    least: int
+    most: int
+    of: int
+
+
+def balance_of(study: Study, task: str) -> list[Balance]:
+    """What is balanced in a task when each slot is done once, by the subject of its number.
+
+    Raises
+    ------
+    InputError
+        If the study has no such task.
+    """
+    plan = study.plan_of(task)
+    sessions = [
+        [
+            [trial for trial in _trials(study, task, slot, session) if not _is_anchor(trial)]
+            for session in range(1, study.sessions(task) + 1)
+        ]
+        for slot in range(1, plan.participants + 1)
+    ]
+    models = study.models_of(task)
+    if plan.schedule == "by-day":
+        found = [_begin(sessions, models)]
+    else:
+        found = list(_first(sessions, study, models))
+    flat = [trials for days in sessions for trials in days]
+    if hasattr(flat[0][0], "first_surface"):
+        found += _surfaces(flat, study, models)
+    if hasattr(flat[0][0], "layout") and hasattr(flat[0][0], "texture"):
+        found += _buttons(flat)
+    return [
+        Balance(task=task, what=what, least=min(counts), most=max(counts), of=of)
+        for what, counts, of in found
+    ]
+
+
+Found = tuple[str, list[int], int]
+
+
+def _trials(study: Study, task: str, slot: int, session: int) -> list[Trial]:
+    order = plan_session(study, task=task, subject=slot, session=session).trials
+    return [trial for trial in order if trial.phase == "main"]
+
+
+def _is_anchor(trial: Trial) -> bool:
+    return bool(getattr(trial, "virtual_texture", trial.texture) != trial.texture)
+
+
+def _begin(sessions: Sequence[Sequence[Sequence[Trial]]], models: Sequence[str]) -> Found:
+    begun = Counter(days[0][0].model for days in sessions)
+    return "participants who begin with a model", [begun[m] for m in models], len(sessions)
+
+
+def _first(
+    sessions: Sequence[Sequence[Sequence[Trial]]], study: Study, models: Sequence[str]
+) -> Iterator[Found]:
+    """Of each texture, which model comes first."""
+    firsts = []
+    for days in sessions:
+        first: dict[str, str] = {}
+        for trial in days[0]:
+            first.setdefault(trial.texture, trial.model)
+        firsts.append(first)
+    pairs = [(texture, model) for texture in study.textures for model in models]
+    over = [sum(first[texture] == model for first in firsts) for texture, model in pairs]
+    yield "participants who get a model of a texture first", over, len(sessions)
+    within = [list(first.values()).count(model) for first in firsts for model in models]
+    yield "textures of a participant of which a model comes first", within, len(study.textures)
+
+
+def _surfaces(
+    sessions: Sequence[Sequence[Trial]], study: Study, models: Sequence[str]
+) -> Iterator[Found]:
+    """Where the real surface comes first."""
+    real: Counter[tuple[str, str]] = Counter()
+    every: Counter[tuple[str, str]] = Counter()
+    within = []
+    for trials in sessions:
+        firsts = [trial for trial in trials if getattr(trial, "first_surface", "") == "real"]
+        real.update((trial.texture, trial.model) for trial in firsts)
+        every.update((trial.texture, trial.model) for trial in trials)
+        within.append(len(firsts))
+    pairs = [(texture, model) for texture in study.textures for model in models]
+    yield (
+        "trials of a texture and model with the real surface first",
+        [real[pair] for pair in pairs],
+        max(every.values()),
+    )
+    yield "trials of a session with the real surface first", within, len(sessions[0])
+
+
+def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
+    """How often each button is right; in the oddity task, that of the odd surface."""
+    over: Counter[int] = Counter()
+    within = []
+    for trials in sessions:
+        right = Counter(map(_right, trials))
+        over.update(right)
+        within += [right[button] for button in range(len(trials[0].layout))]  # type: ignore[attr-defined]
+    yield "trials of a session in which a button is right", within, len(sessions[0])
+    trials_in_all = sum(map(len, sessions))
+    yield "trials of all in which a button is right", list(over.values()), trials_in_all
+
+
+def _right(trial: Trial) -> int:
+    layout: tuple[str, ...] = trial.layout  # type: ignore[attr-defined]
+    return layout.index(trial.texture if trial.texture in layout else trial.model)
