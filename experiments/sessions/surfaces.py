@@ -11,7 +11,7 @@ from experiments.study.design import Trial
 from experiments.study.questions import Question
 from modeling import InputError
 from modeling.models.loading import AnyModel
-from rig.interface import TextureRig
+from rig.interface import TextureRig, ToneBurst
 
 HIGHEST_RATING = 100.0
 Whose = Literal["participant", "experimenter", "signal"]
@@ -78,8 +78,8 @@ class Surfaces:
     rig : TextureRig
     texture : str
         The real surface.
-    models : sequence of TextureModel, RegressedModel or ARModel
-        The virtual surfaces, one per button.
+    models : sequence of TextureModel, RegressedModel, ARModel or ToneBurst
+        What is behind each button: a virtual surface, or a signal that is felt once in a trial.
     begin : callable
         Presents the first surface; called by `start`.
     note : callable
@@ -107,7 +107,7 @@ class Surfaces:
         rig: TextureRig,
         *,
         texture: str,
-        models: Sequence[AnyModel],
+        models: Sequence[AnyModel | ToneBurst],
         begin: Callable[[Surfaces], None],
         note: Note,
         feel_all: bool = False,
@@ -165,6 +165,8 @@ class Surfaces:
     def present_virtual(self, index: int = 0) -> None:
         """Present the virtual surface of a button (index from 0).
 
+        A signal that has been felt in this trial is only selected.
+
         Raises
         ------
         InputError
@@ -174,8 +176,14 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        left_s = self._rig.present_model(self._models[index])
+        shown = self._models[index]
         self._selected = index
+        if isinstance(shown, ToneBurst):
+            if index in self.felt:
+                return
+            left_s = self._rig.present_signal(shown)
+        else:
+            left_s = self._rig.present_model(shown)
         self.presses += 1
         self.felt.add(index)
         self._presented("virtual", left_s, index=index)
@@ -198,8 +206,9 @@ class Surfaces:
         if self.shows_real:
             self._again("real", self._rig.present_real(self._texture))
         elif self._selected is not None and self._shown is not None:
-            left_s = self._rig.present_model(self._models[self._selected])
-            self._again("virtual", left_s, index=self._selected)
+            shown = self._models[self._selected]
+            if not isinstance(shown, ToneBurst):  # which is over
+                self._again("virtual", self._rig.present_model(shown), index=self._selected)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""
