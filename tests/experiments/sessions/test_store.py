@@ -581,6 +581,18 @@ def test_days_of_other_subjects_and_tasks_do_not_count(
         SessionStore.create(tmp_path, manifest_of(session=2))
 
 
+def test_a_day_before_that_cannot_be_read_is_passed_over_for_a_stated_reason(
+    tmp_path: Path, manifest_of: ManifestOf
+) -> None:
+    files = completed(tmp_path, manifest_of())
+    files.log.write_bytes(b"spoilt\n" + files.log.read_bytes())
+    second = manifest_of(session=2)
+    with pytest.raises(InputError, match=r"line 1 of .*from a copy, or go on with --override"):
+        SessionStore.create(tmp_path, second)
+    with SessionStore.create(tmp_path, second, overrides=Overrides("disk failed")) as store:
+        assert [record["what"] for record in store.manifest.overrides] == ["unreadable log"]
+
+
 def test_simulated_participants_may_come_twice_a_day_but_in_order(
     tmp_path: Path, manifest_of: ManifestOf
 ) -> None:
