@@ -14,17 +14,22 @@ HOMES = {
     "sessions.running": "Circumstances run_session",
     "sessions.trial_loop": "People SessionResult run_trials",
     "tasks": "plan_session task_named",
-    "observers.simulated": "Psychometrics",
+    "observers.psychometrics": "Psychometrics Trait",
+    "observers.percepts": "Perception",
+    "observers.in_memory": "simulate_sessions",
     "observers.whole_study": "simulate_study",
 }
 
 if TYPE_CHECKING:
-    from experiments.observers.simulated import Psychometrics as Psychometrics
+    from experiments.observers.in_memory import simulate_sessions as simulate_sessions
+    from experiments.observers.percepts import Perception as Perception
+    from experiments.observers.psychometrics import Psychometrics as Psychometrics
+    from experiments.observers.psychometrics import Trait as Trait
     from experiments.observers.whole_study import simulate_study as simulate_study
-    from experiments.sessions.store import StoreError as StoreError
-    from experiments.sessions.task import Task as Task
     from experiments.sessions.running import Circumstances as Circumstances
     from experiments.sessions.running import run_session as run_session
+    from experiments.sessions.store import StoreError as StoreError
+    from experiments.sessions.task import Task as Task
     from experiments.sessions.trial_loop import People as People
     from experiments.sessions.trial_loop import SessionResult as SessionResult
     from experiments.sessions.trial_loop import run_trials as run_trials

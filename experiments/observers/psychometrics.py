@@ -127,13 +127,13 @@ class Psychometrics:
     sensitivity: Trait = Trait(1.0, 0.2)
     magnitude_bias: Trait = Trait(0.0, 6.0)
     frequency_bias: Trait = Trait(0.0, 6.0)
-    lapse_rate: Trait = Trait(0.03, 0.01)
+    lapse_rate: Trait = Trait(0.01, 0.003)
     learning: Trait = Trait(0.5, 0.15)
     care: Trait = Trait(1.0, 0.2)
     preference_sd: float = 0.3
     best_rating: float = 80.0
     scale_db: float = 12.0
-    noise_sd: float = 10.0
+    noise_sd: float = 8.0
     temperature_db: float = 1.0
     learning_trials: float = 8.0
     planted: Mapping[str, Mapping[str, float]] = field(default_factory=dict)

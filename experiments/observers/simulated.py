@@ -70,7 +70,8 @@ class SimulatedParticipant:
     ) -> None:
         self._perception = perception
         self._psychometrics = psychometrics
-        self.person = psychometrics.draw(generator(seed, subject))
+        self._own_rng = generator(seed, subject)
+        self.person = psychometrics.draw(self._own_rng)
         felt = perception.felt(self.person.threshold_db)
         self._from_real = (self.person.sensitivity * felt.from_real).tolist()
         self._between = (self.person.sensitivity * felt.between).tolist()
@@ -80,15 +81,15 @@ class SimulatedParticipant:
         """Simulated participants have nothing to note."""
 
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
-        """Consent, and answer each question at random."""
+        """Consent, and answer each question at random; no answer to a trial hangs on it."""
         return {question.name: self._answer(question) for question in intake.questions}
 
     def _answer(self, question: Question) -> str | int:
         if question.levels:
-            return question.levels[int(self._rng.integers(len(question.levels)))]
+            return question.levels[int(self._own_rng.integers(len(question.levels)))]
         assert question.least is not None
         assert question.most is not None
-        return int(self._rng.integers(round(question.least), round(question.most) + 1))
+        return int(self._own_rng.integers(round(question.least), round(question.most) + 1))
 
     def announce(self, page: str, **values: object) -> None:
         """Simulated participants know the task."""

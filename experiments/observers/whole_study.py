@@ -9,7 +9,8 @@ from experiments.observers.experimenter import SimulatedExperimenter
 from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import Psychometrics
 from experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
-from experiments.sessions.running import run_session
+from experiments.sessions.bids import export_all
+from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.trial_loop import People, SessionResult
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
@@ -31,6 +32,7 @@ def simulate_study(
     seed: int,
     threshold: Threshold,
     psychometrics: Psychometrics | None = None,
+    sources: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> tuple[SessionResult, ...]:
     """Run all sessions of all subjects of all tasks with simulated participants.
@@ -52,6 +54,8 @@ def simulate_study(
         Of the average participant, who feels nothing below it.
     psychometrics : Psychometrics, optional
         How percepts become answers.
+    sources : mapping of set of models to str, optional
+        Where the models came from, for the manifests.
     progress : callable, optional
         Called with sessions done, sessions in all, and the session just done.
 
@@ -65,13 +69,14 @@ def simulate_study(
     InputError
         If a model is missing or not in g, an effect cannot be planted, or a session has been run
         before.
-    StoreError
+    StoreError, OSError
         If the disk does not take the answers.
     """
     check_whole("seed", seed, low=0, high=2**63)
     perception = Perception(study, real=real, models=models, threshold=threshold)
     population = psychometrics or Psychometrics()
     require_plantable(perception, population)
+    circumstances = Circumstances(sources=sources or {})
     agenda = _agenda(study)
     results = []
     for done, (task, subject, session) in enumerate(agenda, start=1):
@@ -91,10 +96,12 @@ def simulate_study(
             rig=rig,
             people=People(respondent=participant, experimenter=SimulatedExperimenter()),
             data_folder=data_folder,
+            circumstances=circumstances,
         )
         results.append(result)
         if progress is not None:
             progress(done, len(agenda), f"{task}, subject {subject}, session {session}")
+    export_all(data_folder)
     return tuple(results)
 
 

@@ -43,7 +43,7 @@ def outside_grid(rows: HandRows, records: Sequence[PresentationRecord]) -> Outsi
     Outside or None
         None where the hand did not move on a virtual surface.
     """
-    if not len(rows):
+    if not rows.presentation.any():
         return None
     found = [_beyond(rows, record) for record in records if record.speeds_mm_s is not None]
     beyond = np.concatenate([np.zeros((0, 4)), *found])
