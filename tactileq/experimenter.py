@@ -6,14 +6,13 @@ It names trays, never a texture or a model (docs/method/protocols.md#mounting).
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from queue import Empty, SimpleQueue
 from threading import Thread
 from typing import TextIO
 
 from rich.console import Console
 
-from experiments.sessions.surfaces import SessionAborted
+from experiments.sessions.surfaces import SessionAborted, Standing
 
 STOP = "stop"
 CLOSED = "the experimenter's terminal was closed"
@@ -48,21 +47,13 @@ class Terminal:
         """Tell what failed, and ask to mend it; the trial will be repeated."""
         self._ask(f"[bold]The rig failed in this trial.[/] {told} Mend it")
 
-    def tell(
-        self,
-        *,
-        phase: str,
-        done: int,
-        of: int,
-        minutes_left: float | None = None,
-        problems: Sequence[str] = (),
-        **more: object,
-    ) -> None:
+    def tell(self, standing: Standing) -> None:
         """Show how far the session is, and how the rig is."""
-        parts = ["training" if phase == "training" else f"{done} of {of} trials done"]
-        if minutes_left is not None:
-            parts.append(f"about {max(1, round(minutes_left))} min left")
-        parts.append("rig: " + ("; ".join(problems) if problems else "ready"))
+        training = standing.phase == "training"
+        parts = ["training" if training else f"{standing.done} of {standing.of} trials done"]
+        if standing.minutes_left is not None:
+            parts.append(f"about {max(1, round(standing.minutes_left))} min left")
+        parts.append("rig: " + (" ".join(standing.problems) or "ready"))
         self._console.print("\n" + " · ".join(parts))
 
     def ready(self) -> bool:

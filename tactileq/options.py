@@ -38,7 +38,8 @@ Models = Annotated[
     typer.Option("--models", help="Instead of the study's first models: a folder of full ones."),
 ]
 Simplified = Annotated[
-    Path | None, typer.Option(
+    Path | None,
+    typer.Option(
         "--simplified", help="Instead of the study's second models: a folder of simplified ones."
     ),
 ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from experiments.sessions.surfaces import Standing
+
 
 class SimulatedExperimenter:
     """Mounts every sample and mends every rig at once.
@@ -30,5 +32,5 @@ class SimulatedExperimenter:
         """Always."""
         return True
 
-    def tell(self, **state: object) -> None:
+    def tell(self, standing: Standing) -> None:
         """Needs to be told nothing."""

@@ -26,12 +26,12 @@ from experiments.sessions.surfaces import (
     ChoiceTrial,
     Intake,
     Note,
+    RatedTrial,
     Rating,
     Surfaces,
 )
 from experiments.study.questions import Question
 from experiments.study.study import TASKS
-from experiments.tasks.absolute import AbsoluteTrial
 from modeling import InputError
 from modeling.seeds import generator
 
@@ -104,7 +104,7 @@ class SimulatedParticipant:
     def progress(self, done: int, of: int) -> None:
         """Simulated participants do not look at it."""
 
-    def rate(self, trial: AbsoluteTrial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Switch a few times, then rate by the distance to the real surface."""
         surfaces.start()
         for _ in range(1 + self._looks()):
@@ -123,7 +123,7 @@ class SimulatedParticipant:
             response_time_s=self._response_time_s(),
         )
 
-    def mean_ratings(self, trial: AbsoluteTrial) -> tuple[float, float]:
+    def mean_ratings(self, trial: RatedTrial) -> tuple[float, float]:
         """The participant's mean ratings on the two scales in such a trial, without lapses."""
         biases = (self.person.magnitude_bias, self.person.frequency_bias)
         magnitude, frequency = (
@@ -131,7 +131,7 @@ class SimulatedParticipant:
         )
         return magnitude, frequency
 
-    def _mean_rating(self, trial: AbsoluteTrial, scale: int, *, bias: float) -> float:
+    def _mean_rating(self, trial: RatedTrial, scale: int, *, bias: float) -> float:
         real, virtual = (
             self._perception.place[texture] for texture in (trial.texture, trial.virtual_texture)
         )

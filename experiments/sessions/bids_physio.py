@@ -95,19 +95,21 @@ def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:
     ).clip(0.0, 1.0)
     share[share < 1e-6] = 0.0
     trial = hand["trial"].to_numpy()
-    known = (share == 0.0) | (
-        (between_s <= LONGEST_GAP_S) & (trial[last] == trial[following])
-    )
+    known = (share == 0.0) | ((between_s <= LONGEST_GAP_S) & (trial[last] == trial[following]))
     surface = hand["surface"].map(SURFACES.index)
     steps = {"surface": surface, **{n: hand[n] for n in ("force_assumed", "trial", "presentation")}}
     return pd.DataFrame(
         {
             **{
-                name: np.where(known, _linear(hand[name].to_numpy(float), last, following, share), np.nan)
+                name: np.where(
+                    known, _linear(hand[name].to_numpy(float), last, following, share), np.nan
+                )
                 for name in ("speed_mm_s", "force_n")
             },
             **{
-                name: pd.array(np.where(known, values.to_numpy(float)[last], np.nan)).astype("Int64")
+                name: pd.array(np.where(known, values.to_numpy(float)[last], np.nan)).astype(
+                    "Int64"
+                )
                 for name, values in steps.items()
             },
         }

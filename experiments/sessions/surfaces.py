@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from experiments.study.design import Trial
 from experiments.study.questions import Question
 from modeling import InputError
 from modeling.models.loading import AnyModel
@@ -79,7 +78,7 @@ class Surfaces:
     texture : str
         The real surface.
     models : sequence of TextureModel, RegressedModel, ARModel or ToneBurst
-        What is behind each button: a virtual surface, or a signal that is felt once in a trial.
+        The virtual surfaces, one per button; a burst is presented once in a trial.
     begin : callable
         Presents the first surface; called by `start`.
     note : callable
@@ -165,8 +164,6 @@ class Surfaces:
     def present_virtual(self, index: int = 0) -> None:
         """Present the virtual surface of a button (index from 0).
 
-        A signal that has been felt in this trial is only selected.
-
         Raises
         ------
         InputError
@@ -176,8 +173,8 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        shown = self._models[index]
         self._selected = index
+        shown = self._models[index]
         if isinstance(shown, ToneBurst):
             if index in self.felt:
                 return
@@ -205,10 +202,11 @@ class Surfaces:
         """Present again what was presented before the pause."""
         if self.shows_real:
             self._again("real", self._rig.present_real(self._texture))
-        elif self._selected is not None and self._shown is not None:
+        elif self._selected is not None:
             shown = self._models[self._selected]
-            if not isinstance(shown, ToneBurst):  # which is over
-                self._again("virtual", self._rig.present_model(shown), index=self._selected)
+            if not isinstance(shown, ToneBurst):
+                left_s = self._rig.present_model(shown)
+                self._again("virtual", left_s, index=self._selected)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""
@@ -229,8 +227,29 @@ class Surfaces:
         self._again(shown, left_s, **which)
 
 
+class RatedTrial(Protocol):
+    """A trial whose answer is how alike a real and a virtual surface are."""
+
+    @property
+    def trial(self) -> int: ...
+
+    @property
+    def texture(self) -> str: ...
+
+    @property
+    def model(self) -> str: ...
+
+    @property
+    def virtual_texture(self) -> str:
+        """Whose model the virtual surface renders."""
+        ...
+
+
 class ChoiceTrial(Protocol):
     """A trial whose answer is one of several virtual surfaces."""
+
+    @property
+    def trial(self) -> int: ...
 
     @property
     def texture(self) -> str: ...
@@ -297,13 +316,35 @@ class Respondent(Protocol):
         """Show from now on how many trials are done."""
         ...
 
-    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Compare the real with the virtual surface and rate their likeness."""
         ...
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
         """Choose one of the virtual surfaces."""
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """How far a session is, as an experimenter sees it.
+
+    Parameters
+    ----------
+    phase : str
+    done, of : int
+        Main trials.
+    minutes_left : float, optional
+        An estimate from the trials so far; None before the first.
+    problems : tuple of str
+        Of the rig, one sentence each.
+    """
+
+    phase: str
+    done: int
+    of: int
+    minutes_left: float | None
+    problems: tuple[str, ...]
 
 
 class Experimenter(Protocol):
@@ -321,6 +362,6 @@ class Experimenter(Protocol):
         """Whether what was asked last has been confirmed."""
         ...
 
-    def tell(self, **state: object) -> None:
+    def tell(self, standing: Standing) -> None:
         """Show how far the session is, and how the rig is."""
         ...

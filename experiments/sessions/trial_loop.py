@@ -21,6 +21,7 @@ from experiments.sessions.surfaces import (
     Intake,
     Respondent,
     SessionAborted,
+    Standing,
     Surfaces,
 )
 from experiments.sessions.task import Task
@@ -234,6 +235,7 @@ class _Running:
             self._next_number += 1
         self._at = trial.trial
         began_s = time.monotonic()
+        self._experimenter.tell(self._standing(trial))
         if self._task.mounts:
             self._mount(trial)
         self._respondent.progress(self._mains_done, self._mains)
@@ -276,23 +278,22 @@ class _Running:
         return answer
 
     def _mount(self, trial: Trial) -> None:
-        self._experimenter.tell(
-            phase=trial.phase,
-            done=self._mains_done,
-            of=self._mains,
-            minutes_left=self._minutes_left(),
-            problems=self._rig.health().problems,
-        )
         self.note("mount_requested", tray=trial.tray)
         self._experimenter.ask_mount(trial.tray)
         self._respondent.wait(self._experimenter.ready)
         self.note("mount_confirmed", tray=trial.tray)
 
-    def _minutes_left(self) -> float | None:
-        """By the median duration of the trials so far; None before there are any."""
-        if not self._durations_s:
-            return None
-        return median(self._durations_s) * (self._mains - self._mains_done) / 60.0
+    def _standing(self, trial: Trial) -> Standing:
+        left = None
+        if self._durations_s:
+            left = median(self._durations_s) * (self._mains - self._mains_done) / 60.0
+        return Standing(
+            phase=trial.phase,
+            done=self._mains_done,
+            of=self._mains,
+            minutes_left=left,
+            problems=self._rig.health().problems,
+        )
 
     def _call(self, told: str) -> None:
         """Call the experimenter, whom the participant waits for."""

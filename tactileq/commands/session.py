@@ -69,9 +69,7 @@ def session(
     from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
-    sets, sources = models_of_study(
-        plan, study, models=models, simplified=simplified, scene=scene
-    )
+    sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
@@ -107,9 +105,7 @@ def session(
         print(f"ended early ({result.reason}), {left}; go on with --resume: {manifest.parent}")
 
 
-def rig_of(
-    plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None
-) -> TextureRig:
+def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None) -> TextureRig:
     """The rig that a session presents on.
 
     Parameters
@@ -167,9 +163,7 @@ def models_of_study(
     given = dict(zip(plan.models, (models, simplified or scene), strict=False))
     overriding = {name: place for name, place in given.items() if place is not None}
     folder = Path() if study is None else study.parent
-    places = {
-        name: overriding.get(name, folder / place) for name, place in plan.models.items()
-    }
+    places = {name: overriding.get(name, folder / place) for name, place in plan.models.items()}
     sources = {name: str(place) for name, place in places.items()}
     if not any(place.suffix == ".toml" for place in places.values()):
         return load_model_sets(plan, folder, overriding=overriding)[0], sources

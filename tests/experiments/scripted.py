@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from experiments.sessions.surfaces import Choice, Intake, Note, Rating, Surfaces
+from experiments.sessions.surfaces import Choice, Intake, Note, Rating, Standing, Surfaces
 
 
 class Scripted:
@@ -62,7 +62,7 @@ class Ready:
     def __init__(self) -> None:
         self.trays: list[str] = []
         self.called: list[str] = []
-        self.told: list[dict[str, object]] = []
+        self.told: list[Standing] = []
 
     def ask_mount(self, tray: str) -> None:
         self.trays.append(tray)
@@ -73,5 +73,5 @@ class Ready:
     def ready(self) -> bool:
         return True
 
-    def tell(self, **state: object) -> None:
-        self.told.append(state)
+    def tell(self, standing: Standing) -> None:
+        self.told.append(standing)

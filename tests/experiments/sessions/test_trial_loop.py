@@ -123,10 +123,10 @@ def test_the_experimenter_is_told_how_far_it_is_and_sees_no_condition(
 ) -> None:
     experimenter = Ready()
     run(experimenter=experimenter)
-    assert [state["done"] for state in experimenter.told] == [0, 0, 1, 2, 3, 4, 5]
-    assert {state["of"] for state in experimenter.told} == {6}
-    assert experimenter.told[0]["minutes_left"] is None
-    assert all(state["minutes_left"] >= 0 for state in experimenter.told[1:])
+    assert [state.done for state in experimenter.told] == [0, 0, 1, 2, 3, 4, 5]
+    assert {state.of for state in experimenter.told} == {6}
+    assert experimenter.told[0].minutes_left is None
+    assert all(state.minutes_left >= 0 for state in experimenter.told[1:])
     shown = repr([experimenter.told, experimenter.trays])
     assert not any(name in shown for name in (*study.textures, *study.models))
 

@@ -131,21 +131,27 @@ def test_by_day_exactly_half_begin_with_each_model() -> None:
         assert all(first != second for first, second in days)
 
 
-def test_interleaved_each_model_of_a_texture_is_first_for_exactly_half() -> None:
-    for seed in SEEDS:
-        study = shipped(seed=seed)
-        found = [firsts(main_of(study, "absolute", slot)) for slot in range(1, 21)]
-        for texture in study.textures:
+@pytest.fixture(scope="module")
+def ratings() -> list[list[list[Trial]]]:
+    """Main trials of the absolute task, by seed and slot."""
+    studies = [shipped(seed=seed) for seed in SEEDS]
+    return [[main_of(study, "absolute", slot) for slot in range(1, 21)] for study in studies]
+
+
+def test_interleaved_each_model_of_a_texture_is_first_for_exactly_half(
+    ratings: list[list[list[Trial]]],
+) -> None:
+    for sessions in ratings:
+        found = [firsts(trials) for trials in sessions]
+        for texture in found[0]:
             assert sum(first[texture] == "full" for first in found) == 10
         within = [list(first.values()).count("full") for first in found]
         assert set(within) <= {3, 4}
         assert sum(within) == 70
 
 
-def test_the_real_surface_is_first_in_exactly_half() -> None:
-    for seed in SEEDS:
-        study = shipped(seed=seed)
-        sessions = [main_of(study, "absolute", slot) for slot in range(1, 21)]
+def test_the_real_surface_is_first_in_exactly_half(ratings: list[list[list[Trial]]]) -> None:
+    for sessions in ratings:
         real = Counter(
             (trial.texture, trial.model)
             for trials in sessions
@@ -263,7 +269,8 @@ def test_a_replacement_takes_over_the_cells_of_the_slot_with_other_shuffles() ->
         ]
         for subject in (9, 40)
     ]
-    assert [[t[0].model for t in trials] for trials in days][0] == [t[0].model for t in days[1]]
+    models = [[trials[0].model for trials in each] for each in days]
+    assert models[0] == models[1]
     assert days[0][0] != days[1][0]
 
 
@@ -407,9 +414,8 @@ def test_blocks_share_their_numbers_and_deal_each_place_once() -> None:
     drawn = [int(rng.integers(2**60)) for rng, _ in found]
     assert len(set(drawn[:4])) == len(set(drawn[4:])) == 1
     assert drawn[0] != drawn[4]
-    assert (
-        sorted(place for _, place in found[:4]) == sorted(p for _, p in found[4:]) == [0, 1, 2, 3]
-    )
+    for block in (found[:4], found[4:]):
+        assert sorted(place for _, place in block) == [0, 1, 2, 3]
     occasion = Occasion.of(study, task="absolute", subject=1, session=1, slot=1)
     assert int(occasion.block(4, "other")[0].integers(2**60)) != drawn[0]
 

@@ -27,6 +27,15 @@ NOTE = CompiledFor(
     single=True,
 )
 
+SCENE = """
+version = 1
+[scene]
+name = "light touch"
+[hand]
+speed_mm_s = [100, 200]
+force_n = [1.0, 2.0]
+"""
+
 
 def study(**models: str) -> Study:
     return Study(

@@ -1,0 +1,214 @@
+"""How far a study is: who was here, what was answered, what comes next; no names of conditions.
+
+docs/method/protocols.md#status
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.files import SessionFiles, sessions_in
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.roster import Roster
+from experiments.sessions.state import SessionState, Status, session_state
+from experiments.study.study import Study
+from modeling import InputError
+from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES
+
+
+@dataclass(frozen=True, kw_only=True)
+class SessionProgress:
+    """How far one session is.
+
+    Parameters
+    ----------
+    task : str
+    session : int
+    status : {"running", "complete", "aborted", "crashed"}
+    answered, planned : int
+        Of the main trials; repeats are not counted.
+    """
+
+    task: str
+    session: int
+    status: Status
+    answered: int
+    planned: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class PersonProgress:
+    """How far one person is.
+
+    Parameters
+    ----------
+    subject, slot : int
+    code : str
+        Pseudonym; empty of somebody who withdrew.
+    left : {"", "dropped", "withdrawn"}
+    sessions : tuple of SessionProgress
+        In the order of the study's tasks.
+    due : str
+        The next session, in words; empty where none is.
+    """
+
+    subject: int
+    slot: int
+    code: str
+    left: str
+    sessions: tuple[SessionProgress, ...]
+    due: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TaskProgress:
+    """How many sessions of a task are complete, of those that are planned."""
+
+    task: str
+    complete: int
+    planned: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyProgress:
+    """How far a study is."""
+
+    people: tuple[PersonProgress, ...]
+    tasks: tuple[TaskProgress, ...]
+
+
+def study_progress(
+    data_folder: str | Path, study: Study | None = None, *, today: date | None = None
+) -> StudyProgress:
+    """How far a study is.
+
+    Parameters
+    ----------
+    data_folder : path
+        Root of the data set.
+    study : Study, optional
+        Without it that of the first session.
+    today : date, optional
+        Local; that of now without it.
+
+    Raises
+    ------
+    InputError
+        If there is no such folder, nobody was there yet and no study is given, or a manifest, a
+        log or the roster cannot be read.
+    """
+    root = Path(data_folder)
+    if not root.is_dir():
+        raise InputError(f"expected a data folder, got {shown(str(root))}; name it with --data.")
+    held = [
+        (files, SessionManifest.load(files.manifest), session_state(files.log))
+        for files in sessions_in(root)
+    ]
+    if study is None and not held:
+        raise InputError(
+            f"expected sessions below {root / 'sourcedata'}, found none; name the study's file with "
+            "--study."
+        )
+    design = study.to_dict() if study is not None else held[0][1].study
+    wanted = {
+        task: (design[task]["participants"], _sessions(design[task]))
+        for task in ANSWER_TABLES
+        if isinstance(design.get(task), Mapping)
+    }
+    people = tuple(
+        _person(entry, [h for h in held if h[0].subject == entry["subject"]], wanted, today=today)
+        for entry in Roster(root).subjects().values()
+    )
+    return StudyProgress(people=people, tasks=_tasks(people, wanted))
+
+
+Held = tuple[SessionFiles, SessionManifest, SessionState]
+
+
+def _sessions(plan: Mapping[str, Any]) -> int:
+    """Sessions of a task for one person, as `Study.sessions`."""
+    return len(plan["models"]) if plan["schedule"] == "by-day" else 1
+
+
+def _person(
+    entry: Mapping[str, Any],
+    held: Sequence[Held],
+    wanted: Mapping[str, tuple[int, int]],
+    *,
+    today: date | None,
+) -> PersonProgress:
+    order = list(ANSWER_TABLES)
+    found = sorted(held, key=lambda one: (order.index(one[0].task), one[0].session))
+    person = PersonProgress(
+        subject=entry["subject"],
+        slot=entry["slot"],
+        code=entry["code"],
+        left=entry["left"],
+        sessions=tuple(_session(*one) for one in found),
+    )
+    begun = {(one[0].task, one[0].session): one[2].begun_utc for one in found}
+    return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
+
+
+def _session(files: SessionFiles, manifest: SessionManifest, state: SessionState) -> SessionProgress:
+    main = {trial["trial"] for trial in manifest.trials if trial["phase"] == "main"}
+    answered = main & {row["trial"] for row in state.rows}
+    return SessionProgress(
+        task=files.task,
+        session=files.session,
+        status=state.status,
+        answered=len(answered),
+        planned=len(main),
+    )
+
+
+def _due(
+    person: PersonProgress,
+    begun: Mapping[tuple[str, int], str],
+    wanted: Mapping[str, tuple[int, int]],
+    *,
+    today: date | None,
+) -> str:
+    """The first session of the study that is not complete."""
+    status = {(one.task, one.session): one.status for one in person.sessions}
+    for task, (participants, sessions) in wanted.items():
+        if person.slot > participants:
+            continue
+        for session in range(1, sessions + 1):
+            name = f"{task} {session}" if sessions > 1 else task
+            stands = status.get((task, session))
+            if stands == "running":
+                return f"{name} is running"
+            if stands in ("aborted", "crashed"):
+                return f"{name}, with --resume"
+            if stands is None:
+                day_before = begun.get((task, session - 1), "")
+                return f"{name}, not before tomorrow" if _is(day_before, today) else name
+    return ""
+
+
+def _is(utc: str, today: date | None) -> bool:
+    if not utc:
+        return False
+    moment = datetime.fromisoformat(utc).astimezone()
+    return moment.date() >= (today or datetime.now().astimezone().date())
+
+
+def _tasks(
+    people: Sequence[PersonProgress], wanted: Mapping[str, tuple[int, int]]
+) -> tuple[TaskProgress, ...]:
+    """Sessions of those whose slot was given to somebody else do not count."""
+    counted = [one for person in people if not person.left for one in person.sessions]
+    return tuple(
+        TaskProgress(
+            task=task,
+            complete=sum(one.task == task and one.status == "complete" for one in counted),
+            planned=participants * sessions,
+        )
+        for task, (participants, sessions) in wanted.items()
+    )

@@ -1,0 +1,44 @@
+"""tactileq study withdraw and dropout: people who take their data back, or do not come again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactileq.options import Data
+
+Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Do not ask.")]
+
+
+def study_withdraw(subject: Subject, data: Data = Path("data"), yes: Yes = False) -> None:
+    """Delete all data of a person; the number stays taken, the slot goes to a replacement.
+
+    Example: tactileq study withdraw 7 --data data
+    """
+    from experiments.sessions.withdrawing import files_of, withdraw
+
+    there = len(files_of(data, subject))
+    _confirm(f"Delete {there} files of subject {subject} in {data}, for good?", yes=yes)
+    withdraw(data, subject)
+    print(f"withdrawn: subject {subject}; {there} files deleted, the slot is free")
+    print("Copies elsewhere, such as backups and reports, are yours to delete.")
+
+
+def study_dropout(subject: Subject, data: Data = Path("data"), yes: Yes = False) -> None:
+    """Note that a person will not come again: the data stay, the slot goes to a replacement.
+
+    Example: tactileq study dropout 7 --data data
+    """
+    from experiments.sessions.withdrawing import drop_out
+
+    _confirm(f"Give the slot of subject {subject} to somebody else?", yes=yes)
+    drop_out(data, subject)
+    print(f"dropped out: subject {subject}; the data stay, the slot is free")
+
+
+def _confirm(question: str, *, yes: bool) -> None:
+    if not (yes or typer.confirm(question)):
+        raise ValueError("expected y to go on, got no; nothing was changed.")

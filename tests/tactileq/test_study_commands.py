@@ -1,0 +1,80 @@
+"""What tactileq study status shows, and what withdraw and dropout ask."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+import typer
+from rich.console import Console
+from typer.testing import CliRunner
+
+from experiments.sessions.roster import Roster
+from experiments.sessions.status import (
+    PersonProgress,
+    SessionProgress,
+    StudyProgress,
+    TaskProgress,
+)
+from tactileq.commands.study_status import table_of
+from tactileq.commands.study_withdraw import study_dropout, study_withdraw
+
+
+def test_every_person_and_session_has_its_place():
+    session = SessionProgress(
+        task="relative", session=2, status="aborted", answered=5, planned=14
+    )
+    people = (
+        PersonProgress(subject=1, slot=1, code="TAKI-46", left="", sessions=(session,), due="x 2"),
+        PersonProgress(subject=2, slot=2, code="", left="withdrawn", sessions=()),
+    )
+    tasks = (TaskProgress(task="relative", complete=0, planned=4),)
+    screen = io.StringIO()
+    Console(file=screen, width=120).print(table_of(StudyProgress(people=people, tasks=tasks)))
+    told = [line.split() for line in screen.getvalue().splitlines()]
+    shown = [" ".join(word for word in words if word.isprintable()) for words in told]
+    (first,) = [line for line in shown if "TAKI-46" in line]
+    assert "2: aborted, 5 of 14" in first
+    assert first.strip("│ ").endswith("x 2")
+    assert any("withdrawn, data deleted" in line for line in shown)
+
+
+@pytest.fixture
+def app() -> typer.Typer:
+    app = typer.Typer()
+    app.command("withdraw")(study_withdraw)
+    app.command("dropout")(study_dropout)
+    return app
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    Roster(tmp_path).enroll(1, 2)
+    beh = tmp_path / "sub-01" / "ses-01" / "beh"
+    beh.mkdir(parents=True)
+    (beh / "answers.tsv").write_text("mine")
+    return tmp_path
+
+
+@pytest.mark.parametrize("command", ["withdraw", "dropout"])
+def test_nothing_happens_without_a_yes(app, data, command):
+    ended = CliRunner().invoke(app, [command, "1", "--data", str(data)], input="n\n")
+    assert "nothing was changed" in str(ended.exception)
+    assert Roster(data).subjects()[1]["left"] == ""
+    assert (data / "sub-01" / "ses-01" / "beh" / "answers.tsv").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("command", "left", "told"),
+    [
+        ("withdraw", "withdrawn", "1 files deleted, the slot is free"),
+        ("dropout", "dropped", "the data stay, the slot is free"),
+    ],
+)
+def test_with_a_yes_it_is_done(app, data, command, left, told):
+    ended = CliRunner().invoke(app, [command, "1", "--data", str(data), "--yes"])
+    assert ended.exit_code == 0, ended.output
+    assert told in ended.output
+    assert Roster(data).subjects()[1]["left"] == left
+    assert (data / "sub-01").exists() is (command == "dropout")
