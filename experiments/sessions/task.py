@@ -46,6 +46,8 @@ class Task:
     virtual: Callable[[ModelSets, Any], Sequence[AnyModel]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]
+    mounts: bool = True
+    feel_all: bool = False
 
     @property
     def columns(self) -> tuple[AnswerColumn, ...]:
