@@ -129,9 +129,7 @@ def _moment(event: Event) -> datetime:
     return datetime.fromisoformat(event["utc"])
 
 
-def _row(
-    event: Event, onset: float, of_trial: Sequence[Mapping[str, str]]
-) -> dict[str, object]:
+def _row(event: Event, onset: float, of_trial: Sequence[Mapping[str, str]]) -> dict[str, object]:
     kept = {k: v for k, v in event.items() if k not in (*_ELSEWHERE, *OWN_FIELDS)}
     kept = {name: value for name, value in kept.items() if name in _OWN and value is not None}
     index = event.get("index")

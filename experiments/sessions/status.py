@@ -111,8 +111,8 @@ def study_progress(
     ]
     if study is None and not held:
         raise InputError(
-            f"expected sessions below {root / 'sourcedata'}, found none; name the study's file with "
-            "--study."
+            f"expected sessions below {root / 'sourcedata'}, found none; name the study's "
+            "file with --study."
         )
     design = study.to_dict() if study is not None else held[0][1].study
     wanted = {
@@ -155,7 +155,9 @@ def _person(
     return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
 
 
-def _session(files: SessionFiles, manifest: SessionManifest, state: SessionState) -> SessionProgress:
+def _session(
+    files: SessionFiles, manifest: SessionManifest, state: SessionState
+) -> SessionProgress:
     main = {trial["trial"] for trial in manifest.trials if trial["phase"] == "main"}
     answered = main & {row["trial"] for row in state.rows}
     return SessionProgress(

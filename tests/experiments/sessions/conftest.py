@@ -172,7 +172,12 @@ def write_session(tmp_path: Path) -> WriteSession:
             subject, 2, simulated=others.get("simulated_participant", True)
         )
         manifest = a_manifest(
-            task=task, subject=subject, session=session, code=person.code, slot=person.slot, **others
+            task=task,
+            subject=subject,
+            session=session,
+            code=person.code,
+            slot=person.slot,
+            **others,
         )
         begin = SessionStore.resume if resume else SessionStore.create
         with begin(folder, manifest) as store:

@@ -35,7 +35,10 @@ def validated(folder: Path) -> list[dict[str, str]]:
     path = f"{VALIDATOR.parent}{os.pathsep}{os.environ['PATH']}"
     ended = subprocess.run(
         [str(VALIDATOR), "--format", "json", "--max-rows", "-1", str(folder)],
-        **{"capture_output": True, "text": True, "check": False, "timeout": 120},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
         env={**os.environ, "PATH": path, "DENO_NO_UPDATE_CHECK": "1"},
     )
     issues: list[dict[str, str]] = json.loads(ended.stdout)["issues"]["issues"]
@@ -87,7 +90,10 @@ def test_the_validator_finds_no_error(study_on_disk, write_session, tmp_path, ki
     found = validated(tmp_path / "data")
     assert [issue for issue in found if issue["severity"] == "error"] == []
     # What it would like to know besides, and nobody here knows.
-    allowed = {"JSON_KEY_RECOMMENDED", "SIDECAR_KEY_RECOMMENDED"} | {"NO_AUTHORS", "TOO_FEW_AUTHORS"}
+    allowed = {"JSON_KEY_RECOMMENDED", "SIDECAR_KEY_RECOMMENDED"} | {
+        "NO_AUTHORS",
+        "TOO_FEW_AUTHORS",
+    }
     assert {issue["code"] for issue in found} <= allowed
 
 
