@@ -107,7 +107,8 @@ def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:
         for name in ("surface", "force_assumed", "trial", "presentation")
     }
     # Without a decimal point, though there are gaps.
-    found = pd.DataFrame({**linear, **steps}).where(known)
+    found = pd.DataFrame({**linear, **steps})
+    found.loc[~known] = np.nan
     return found.astype(dict.fromkeys(steps, "Int64"))
 
 
