@@ -11,21 +11,28 @@ HOMES = {
     "study.design": "SessionPlan fisher_yates",
     "sessions.store": "StoreError",
     "sessions.task": "Task",
-    "sessions.trial_loop": "SessionResult run_session",
+    "sessions.running": "Circumstances run_session",
+    "sessions.trial_loop": "People SessionResult run_trials",
     "tasks": "plan_session task_named",
-    "tasks.absolute": "run_absolute",
-    "tasks.relative": "run_relative",
-    "observers.simulated": "Psychometrics",
+    "observers.psychometrics": "Psychometrics Trait",
+    "observers.percepts": "Perception",
+    "observers.in_memory": "simulate_sessions",
     "observers.whole_study": "simulate_study",
 }
 
 if TYPE_CHECKING:
-    from experiments.observers.simulated import Psychometrics as Psychometrics
+    from experiments.observers.in_memory import simulate_sessions as simulate_sessions
+    from experiments.observers.percepts import Perception as Perception
+    from experiments.observers.psychometrics import Psychometrics as Psychometrics
+    from experiments.observers.psychometrics import Trait as Trait
     from experiments.observers.whole_study import simulate_study as simulate_study
+    from experiments.sessions.running import Circumstances as Circumstances
+    from experiments.sessions.running import run_session as run_session
     from experiments.sessions.store import StoreError as StoreError
     from experiments.sessions.task import Task as Task
+    from experiments.sessions.trial_loop import People as People
     from experiments.sessions.trial_loop import SessionResult as SessionResult
-    from experiments.sessions.trial_loop import run_session as run_session
+    from experiments.sessions.trial_loop import run_trials as run_trials
     from experiments.study.design import SessionPlan as SessionPlan
     from experiments.study.design import fisher_yates as fisher_yates
     from experiments.study.models import ModelSets as ModelSets
@@ -33,7 +40,5 @@ if TYPE_CHECKING:
     from experiments.study.task_plan import TaskPlan as TaskPlan
     from experiments.tasks import plan_session as plan_session
     from experiments.tasks import task_named as task_named
-    from experiments.tasks.absolute import run_absolute as run_absolute
-    from experiments.tasks.relative import run_relative as run_relative
 else:  # a type checker that saw __getattr__ would take every name for public
     __getattr__, __dir__, __all__ = lazily(__name__, HOMES)

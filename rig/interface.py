@@ -45,6 +45,25 @@ class RigReading:
     simulated: bool
 
 
+@dataclass(frozen=True, kw_only=True)
+class ToneBurst:
+    """A sinusoid with ramps at both ends, felt by a hand at rest (docs/method/live.md#signals).
+
+    Parameters
+    ----------
+    frequency_hz : float
+        Above 0.
+    amplitude_g : float
+        Of the sinusoid, peak, ≥ 0; 0 is as long a silence.
+    duration_s : float
+        Ramps included, above 0 … 60.
+    """
+
+    frequency_hz: float
+    amplitude_g: float
+    duration_s: float
+
+
 @dataclass(frozen=True)
 class Fault:
     """Something that went wrong.
@@ -234,6 +253,23 @@ class TextureRig(Protocol):
             When the first sample left.
         """
 
+    def present_signal(self, burst: ToneBurst) -> float:
+        """Play a burst once, whatever the hand does; one that still plays ends first.
+
+        Returns
+        -------
+        float
+            When the first sample left.
+
+        Raises
+        ------
+        InputError
+            For a burst beyond the rig's limits.
+        """
+
+    def strongest_g(self, burst: ToneBurst) -> float:
+        """The highest amplitude (g) that the limits allow a burst of this frequency and length."""
+
     def present_real(self, texture: str) -> float:
         """Give way to the mounted real surface, whose texture is named; returns when."""
 
@@ -258,6 +294,6 @@ class TextureRig(Protocol):
 
 def grid_of(model: AnyModel) -> tuple[Range, Range]:
     """Lowest and highest speed (mm/s) and force (N) of the conditions of a model's grid."""
-    axes = model if isinstance(model, ARModel) else model.table
-    speeds, forces = axes.speeds_mm_s, axes.forces_n
+    grid = model if isinstance(model, ARModel) else model.table
+    speeds, forces = grid.speeds_mm_s, grid.forces_n
     return (float(speeds[0]), float(speeds[-1])), (float(forces[0]), float(forces[-1]))

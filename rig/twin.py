@@ -16,6 +16,7 @@ from modeling.arrays import Floats
 from modeling.errors import shown
 from modeling.hand import Hand
 from modeling.models.loading import AnyModel
+from modeling.rendering.plan import RenderCounters
 from rig.interface import (
     SURFACES,
     Acceleration,
@@ -25,8 +26,10 @@ from rig.interface import (
     RigHealth,
     RigReading,
     Surface,
+    ToneBurst,
     grid_of,
 )
+from rig.sound.signals import tone_burst
 
 STEP_S = 0.01
 ROW_S = 0.002  # of the history
@@ -34,6 +37,9 @@ STROKE_HZ = 1.0
 PEAK_SPEED_MM_S = 250.0
 MEAN_FORCE_N = 1.5
 FORCE_SWING_N = 0.5
+SIGNAL_RATE_HZ = 5000.0
+HIGHEST_SIGNAL_G = 5.0
+_PER_STEP = round(STEP_S * SIGNAL_RATE_HZ)
 
 
 class SimulatedRig:
@@ -131,6 +137,37 @@ class SimulatedRig:
         )
         return self.now_s()
 
+    def present_signal(self, burst: ToneBurst) -> float:
+        """Let the hand feel a burst, to its end.
+
+        Raises
+        ------
+        InputError
+            Above 5 g.
+        """
+        if burst.amplitude_g > HIGHEST_SIGNAL_G:
+            raise InputError(
+                f"expected a signal of at most {HIGHEST_SIGNAL_G:g} g, got {burst.amplitude_g:g} "
+                "g; lower it."
+            )
+        made = tone_burst(
+            burst.frequency_hz,
+            burst.amplitude_g,
+            duration_s=burst.duration_s,
+            rate_hz=SIGNAL_RATE_HZ,
+        )
+        self._begin("virtual", f"{burst.frequency_hz:g} Hz", None)
+        start_s = self.now_s()
+        for part in np.split(made.samples_g, range(_PER_STEP, made.samples_g.size, _PER_STEP)):
+            self._move_on()
+            self._last_vibration = part
+            self._log(part, SIGNAL_RATE_HZ)
+        return start_s
+
+    def strongest_g(self, burst: ToneBurst) -> float:
+        """5 g, whatever the frequency."""
+        return HIGHEST_SIGNAL_G
+
     def present_real(self, texture: str) -> float:
         """Let the hand feel the truth that stands for this texture.
 
@@ -169,14 +206,19 @@ class SimulatedRig:
 
     def read(self) -> RigReading:
         """Move the hand on by 10 ms and report where it is."""
-        self._rows.append(self._history())
-        self._steps += 1
+        self._move_on()
         time_s = self.now_s()
         speed, force = _hand(np.array([time_s]))
         self._last_vibration = self._felt(time_s)
-        self._log(self._last_vibration)
+        if self._renderer is not None:
+            self._log(self._last_vibration, self._renderer.rate_hz)
         pressed, self._button = self._button, False
         return RigReading(time_s, abs(float(speed[0])), float(force[0]), pressed, simulated=True)
+
+    def _move_on(self) -> None:
+        """Move the hand on by 10 ms."""
+        self._rows.append(self._history())
+        self._steps += 1
 
     def _history(self) -> HandRows:
         """The rows of the next 10 ms."""
@@ -203,16 +245,16 @@ class SimulatedRig:
         moments = time_s - STEP_S + np.arange(1, samples + 1) / self._renderer.rate_hz
         return self._renderer.render(*_hand(moments))
 
-    def _log(self, vibration: Floats) -> None:
+    def _log(self, vibration: Floats, rate_hz: float) -> None:
         """Add what the hand felt of a virtual surface to the record of its presentation."""
-        if self._now is None or self._renderer is None or self._now.surface != "virtual":
+        if self._now is None or self._now.surface != "virtual":
             return
-        step_s = vibration.size / self._renderer.rate_hz
+        counters = RenderCounters() if self._renderer is None else replace(self._renderer.counters)
         self._now = replace(
             self._now,
-            counters=replace(self._renderer.counters),
-            played_s=self._now.played_s + step_s,
-            dose_g2_s=self._now.dose_g2_s + float(vibration @ vibration) / self._renderer.rate_hz,
+            counters=counters,
+            played_s=self._now.played_s + vibration.size / rate_hz,
+            dose_g2_s=self._now.dose_g2_s + float(vibration @ vibration) / rate_hz,
             peak_g=max(self._now.peak_g, float(np.abs(vibration).max())),
         )
 

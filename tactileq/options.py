@@ -32,9 +32,16 @@ HoldAbove = Annotated[
 StudyFile = Annotated[
     Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
 ]
-Models = Annotated[Path, typer.Option("--models", help="Folder of full models.")]
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="A study file (TOML).")]
+Models = Annotated[
+    Path | None,
+    typer.Option("--models", help="Instead of the study's first models: a folder of full ones."),
+]
 Simplified = Annotated[
-    Path | None, typer.Option("--simplified", help="Folder of simplified models. [simplified]")
+    Path | None,
+    typer.Option(
+        "--simplified", help="Instead of the study's second models: a folder of simplified ones."
+    ),
 ]
 SceneModels = Annotated[
     Path | None,

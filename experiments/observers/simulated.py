@@ -1,216 +1,44 @@
-"""Simulated participants with a known truth: what they feel, rate and choose in closed form.
+"""Simulated participants with a known truth: what they feel, rate and choose.
 
-The truth is a stipulation that lets analyses be tested, not a model of people. Its one
-substantial property: vibration below threshold changes no percept.
+The truth is a stipulation that lets analyses be tested, not a model of people
+(docs/method/protocols.md#simulated-participants).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
+import time
+from collections.abc import Callable, Mapping, Sequence
+from math import hypot, log
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.special import softmax
 
-from experiments.sessions.surfaces import HIGHEST_RATING, Choice, ChoiceTrial, Rating, Surfaces
-from experiments.study.design import Trial
-from experiments.study.models import ModelSets
-from experiments.study.study import Study
-from modeling import InputError, TextureModel, Threshold
-from modeling.arrays import Floats
-from modeling.errors import shown
-from modeling.models.loading import Layered
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import (
+    SCALES,
+    Psychometrics,
+    choice_shares,
+    mean_ratings,
+    with_effect,
+)
+from experiments.sessions.surfaces import (
+    HIGHEST_RATING,
+    Choice,
+    ChoiceTrial,
+    Intake,
+    Note,
+    RatedTrial,
+    Rating,
+    Surfaces,
+)
+from experiments.study.questions import Question
+from experiments.study.study import TASKS
+from modeling import InputError
 from modeling.seeds import generator
 
-SurfaceKind = Literal["real", "full", "simplified"]
-
-BAND_EDGES_HZ = (10.0, 20.0, 35.0, 60.0, 90.0, 130.0, 180.0, 250.0, 350.0, 480.0)
-STROKES = ((100.0, 1.0), (200.0, 1.5), (300.0, 2.5))  # (mm/s, N)
-STEP_HZ = 1.0
-
-
-def sensation_levels(
-    model: Layered,
-    threshold: Threshold,
-    *,
-    strokes: tuple[tuple[float, float], ...] = STROKES,
-) -> Floats:
-    """How far above threshold a surface is felt, by stroke and frequency band.
-
-    The power in a band, ∫ response² · 2/rate df, is that of a sinusoid of peak amplitude √2·RMS
-    (criterion `energy`, docs/method/perception.md#criteria); each frequency counts relative to its
-    own threshold. Frequencies without a known threshold, and those beyond the model's Nyquist
-    frequency, contribute nothing.
-
-    Parameters
-    ----------
-    model : TextureModel or RegressedModel
-        In g.
-    threshold : Threshold
-    strokes : tuple of (speed in mm/s, force in N)
-
-    Returns
-    -------
-    (strokes, 9) ndarray
-        dB above threshold in the bands of `BAND_EDGES_HZ`; 0 where nothing is felt.
-
-    Raises
-    ------
-    InputError
-        If the model's unit is arbitrary: nothing can be compared with a threshold then.
-    """
-    if model.unit != "g":
-        raise InputError(
-            f"expected a model in g for a simulated participant, got one of {model.texture} in "
-            f"unit {shown(model.unit)}; record it with a calibrated sensor."
-        )
-    edges = np.array(BAND_EDGES_HZ)
-    frequency_hz = np.arange(edges[0], edges[-1], STEP_HZ) + STEP_HZ / 2
-    limit_g = threshold.at(frequency_hz)
-    known = np.isfinite(limit_g) & (frequency_hz < model.rate_hz / 2)
-    frequency_hz, limit_g = frequency_hz[known], limit_g[known]
-    band = np.searchsorted(edges, frequency_hz, side="right") - 1
-    levels = np.zeros((len(strokes), edges.size - 1))
-    for row, (speed_mm_s, force_n) in enumerate(strokes):
-        response = model.peq(speed_mm_s, force_n).response(frequency_hz)
-        power = 2 * response**2 * (2 / model.rate_hz) * STEP_HZ / limit_g**2
-        total = np.bincount(band, weights=power, minlength=edges.size - 1)
-        levels[row] = 10 * np.log10(np.maximum(total, 1.0))
-    return levels
-
-
-@dataclass(frozen=True)
-class Distance:
-    """How differently two surfaces feel, in dB: in overall level, and in shape over frequency."""
-
-    magnitude_db: float
-    frequency_db: float
-
-    @property
-    def total_db(self) -> float:
-        """Root mean square difference of the sensation levels; level and shape are orthogonal."""
-        return float(np.hypot(self.magnitude_db, self.frequency_db))
-
-
-def distance(first: Floats, second: Floats) -> Distance:
-    """Distance of two percepts, (strokes, bands) each, from `sensation_levels`."""
-    difference = first - second
-    level = difference.mean(axis=1, keepdims=True)
-    shape = difference - level
-    return Distance(float(np.sqrt((level**2).mean())), float(np.sqrt((shape**2).mean())))
-
-
-@dataclass(frozen=True, kw_only=True)
-class Psychometrics:
-    """How percepts become answers; the planted truth of a simulated study.
-
-    Parameters
-    ----------
-    scale_db : float
-        Distance at which a rating has fallen to 100/e; > 0.
-    bias_sd, noise_sd : float
-        Standard deviation over subjects, and from trial to trial, in points of the scale; ≥ 0.
-    temperature_db : float
-        τ of the choice rule: distance that makes a surface e times less likely; > 0.
-    lapse_rate : float
-        Share of choices made blindly, 0 … 1.
-
-    Raises
-    ------
-    InputError
-        For values out of range.
-    """
-
-    scale_db: float = 12.0
-    bias_sd: float = 8.0
-    noise_sd: float = 10.0
-    temperature_db: float = 1.0
-    lapse_rate: float = 0.03
-
-    def __post_init__(self) -> None:
-        limits = (
-            ("scale_db", self.scale_db > 0, "above 0"),
-            ("bias_sd", self.bias_sd >= 0, "of at least 0"),
-            ("noise_sd", self.noise_sd >= 0, "of at least 0"),
-            ("temperature_db", self.temperature_db > 0, "above 0"),
-            ("lapse_rate", 0 <= self.lapse_rate <= 1, "from 0 to 1"),
-        )
-        for name, good, wanted in limits:
-            if not (good and np.isfinite(getattr(self, name))):
-                raise InputError(
-                    f"expected a {name} {wanted}, got {getattr(self, name)}; choose another."
-                )
-
-    def true_rating(self, distance_db: ArrayLike) -> Floats:
-        """Rating without bias and noise: 100·exp(−distance/scale); same shape as the input."""
-        rating: Floats = HIGHEST_RATING * np.exp(-np.asarray(distance_db) / self.scale_db)
-        return rating
-
-    def choice_probabilities(self, distances_db: ArrayLike) -> Floats:
-        """Probability of each of n surfaces to be chosen, (n,): Luce's rule with lapses.
-
-        p_j = (1 − λ)·exp(−d_j/τ)/Σ exp(−d_k/τ) + λ/n.
-        """
-        distances = np.asarray(distances_db, dtype=np.float64)
-        attentive = softmax(-distances / self.temperature_db)
-        probabilities: Floats = (1 - self.lapse_rate) * attentive + self.lapse_rate / distances.size
-        return probabilities
-
-
-class Perception:
-    """What the surfaces of a study feel like, computed once for all simulated participants.
-
-    Parameters
-    ----------
-    study : Study
-    real : mapping of str to TextureModel
-        The truth behind each real surface.
-    models : ModelSets
-    threshold : Threshold
-
-    Raises
-    ------
-    InputError
-        If a surface has no model, or one that is not in g.
-    """
-
-    def __init__(
-        self,
-        study: Study,
-        *,
-        real: Mapping[str, TextureModel],
-        models: ModelSets,
-        threshold: Threshold,
-    ) -> None:
-        models.require(study)
-        missing = [texture for texture in study.textures if texture not in real]
-        if missing:
-            raise InputError(
-                f"expected the truth behind each real surface, got none for {', '.join(missing)}; "
-                "give a model for each."
-            )
-        kinds: tuple[tuple[SurfaceKind, Mapping[str, Layered]], ...] = (
-            ("real", real),
-            ("full", models.sets["full"]),
-            ("simplified", models.sets["simplified"]),
-        )
-        percepts = {
-            (kind, texture): sensation_levels(source[texture], threshold)
-            for kind, source in kinds
-            for texture in study.textures
-        }
-        self._distances = {
-            (texture, kind, other): distance(percepts["real", texture], percepts[kind, other])
-            for texture in study.textures
-            for kind, _ in kinds[1:]
-            for other in study.textures
-        }
-
-    def distance(self, texture: str, kind: SurfaceKind, other: str) -> Distance:
-        """Distance of the real surface `texture` to the virtual one of texture `other`."""
-        return self._distances[texture, kind, other]
+MEDIAN_TIME_S = 20.0
+TIME_SD = 0.4  # of the logarithm of response times
+LOOKS = 2.0  # comparisons beside those that every answer takes, on average
+WAITING_S = 0.01
 
 
 class SimulatedParticipant:
@@ -220,10 +48,11 @@ class SimulatedParticipant:
     ----------
     perception : Perception
     psychometrics : Psychometrics
+        The population that the participant is drawn from.
     seed : int
         Of the whole simulation.
     subject : int
-        Fixes, with the seed, the participant's bias on either scale.
+        Fixes, with the seed, the participant's traits.
     occasion : tuple of int
         Distinguishes the sessions of a participant.
     """
@@ -241,43 +70,205 @@ class SimulatedParticipant:
     ) -> None:
         self._perception = perception
         self._psychometrics = psychometrics
-        person = generator(seed, subject)
-        self._bias = person.normal(0.0, psychometrics.bias_sd, size=2)
+        self._own_rng = generator(seed, subject)
+        self.person = psychometrics.draw(self._own_rng)
+        felt = perception.felt(self.person.threshold_db)
+        self._from_real = (self.person.sensitivity * felt.from_real).tolist()
+        self._between = (self.person.sensitivity * felt.between).tolist()
         self._rng = generator(seed, subject, *occasion)
 
-    def announce(self, title: str, text: str) -> None:
+    def hear(self, note: Note) -> None:
+        """Simulated participants have nothing to note."""
+
+    def welcome(self, intake: Intake) -> Mapping[str, str | int]:
+        """Consent, and answer each question at random; no answer to a trial hangs on it."""
+        return {question.name: self._answer(question) for question in intake.questions}
+
+    def _answer(self, question: Question) -> str | int:
+        if question.levels:
+            return question.levels[int(self._own_rng.integers(len(question.levels)))]
+        assert question.least is not None
+        assert question.most is not None
+        return int(self._own_rng.integers(round(question.least), round(question.most) + 1))
+
+    def announce(self, page: str, **values: object) -> None:
         """Simulated participants know the task."""
 
-    def confirm_mount(self, tray: str) -> None:
-        """The simulated experimenter is quick and careful."""
+    def wait(self, until: Callable[[], bool]) -> None:
+        """Wait for the experimenter."""
+        while not until():
+            time.sleep(WAITING_S)
 
-    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
+    def rest(self) -> None:
+        """Simulated participants do not tire."""
+
+    def progress(self, done: int, of: int) -> None:
+        """Simulated participants do not look at it."""
+
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Switch a few times, then rate by the distance to the real surface."""
-        for _ in range(1 + int(self._rng.poisson(2.0))):
+        surfaces.start()
+        for _ in range(1 + self._looks()):
             surfaces.toggle()
-        apart = self._perception.distance(trial.texture, trial.model, trial.texture)
-        truth = self._psychometrics.true_rating([apart.magnitude_db, apart.frequency_db])
-        noise = self._rng.normal(0.0, self._psychometrics.noise_sd, size=2)
-        magnitude, frequency = np.clip(truth + self._bias + noise, 0.0, HIGHEST_RATING)
+        means = self.mean_ratings(trial)
+        if self._rng.random() < self.person.lapse_rate:
+            given = [HIGHEST_RATING * value for value in self._rng.random(len(SCALES)).tolist()]
+        else:
+            given = [self._around(mean, trial.trial) for mean in means]
+        magnitude, frequency = (round(value, 2) for value in given)
+        surfaces.note("slider", scale="magnitude", value=magnitude)
+        surfaces.note("slider", scale="frequency", value=frequency)
         return Rating(
-            magnitude_similarity=float(magnitude),
-            frequency_similarity=float(frequency),
+            magnitude_similarity=magnitude,
+            frequency_similarity=frequency,
             response_time_s=self._response_time_s(),
         )
 
+    def mean_ratings(self, trial: RatedTrial) -> tuple[float, float]:
+        """The participant's mean ratings on the two scales in such a trial, without lapses."""
+        biases = (self.person.magnitude_bias, self.person.frequency_bias)
+        magnitude, frequency = (
+            self._mean_rating(trial, scale, bias=bias) for scale, bias in enumerate(biases)
+        )
+        return magnitude, frequency
+
+    def _mean_rating(self, trial: RatedTrial, scale: int, *, bias: float) -> float:
+        real, virtual = (
+            self._perception.place[texture] for texture in (trial.texture, trial.virtual_texture)
+        )
+        model = self._perception.set_number[trial.model]
+        points = self._psychometrics.effect(trial.texture, SCALES[scale])
+        planted = points is not None and real == virtual
+        # Lapses hide some of an effect: the other trials show so much more of it.
+        effect = self._strength(points or 0.0) / (1 - self.person.lapse_rate) if planted else 0.0
+        apart = self._from_real[scale][0 if planted else model][real][virtual]
+        felt = self._psychometrics.felt_rating(apart)
+        reference, other = mean_ratings(felt, bias=bias, effect=effect)
+        return other if planted and model else reference
+
+    def _strength(self, effect: float) -> float:
+        """A planted effect as this person feels it: on average as it was planted."""
+        return effect * self.person.sensitivity / self._psychometrics.sensitivity.mean
+
+    def _around(self, mean: float, trial: int) -> float:
+        """A rating of this mean: of a beta distribution, so that none is beyond the scale."""
+        sd = self._psychometrics.noise_sd * self._unpractised(trial) / self.person.care**0.5
+        if sd == 0:
+            return mean
+        half = HIGHEST_RATING / 2
+        # The variance at the middle of the scale, half²/(1 + size), is sd².
+        size = max(half**2 / sd**2 - 1, 1.0)
+        share = mean / HIGHEST_RATING
+        return HIGHEST_RATING * float(self._rng.beta(share * size, (1 - share) * size))
+
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
-        """Feel every surface once, return to the real one, and choose by Luce's rule."""
+        """Feel every surface, then choose the one most like the real one, or the odd one out."""
+        surfaces.start()
         for button in range(surfaces.count):
             surfaces.present_virtual(button)
-        surfaces.present_real()
-        apart = [
-            self._perception.distance(trial.texture, trial.model, other).total_db
-            for other in trial.layout
-        ]
-        probabilities = self._psychometrics.choice_probabilities(apart)
-        button = int(self._rng.choice(surfaces.count, p=probabilities))
+        if trial.texture in trial.layout:
+            for _ in range(1 + self._looks()):
+                surfaces.toggle()
+            button = self._drawn(self.shares(trial))
+        else:
+            for look in range(self._looks()):
+                surfaces.present_virtual(look % surfaces.count)
+            button = self._odd_one(trial)
         surfaces.present_virtual(button)
         return Choice(button=button, response_time_s=self._response_time_s())
 
+    def shares(self, trial: ChoiceTrial) -> list[float]:
+        """Probabilities of the buttons in such a trial of the relative task."""
+        place, number = self._perception.place, self._perception.set_number[trial.model]
+        points = self._psychometrics.effect(trial.texture, "choice")
+        model = number if points is None else 0
+        magnitude, frequency = (
+            self._from_real[scale][model][place[trial.texture]] for scale in (0, 1)
+        )
+        temperature_db = self._temperature_db(trial)
+        evidence = [
+            -hypot(magnitude[place[other]], frequency[place[other]]) / temperature_db
+            for other in trial.layout
+        ]
+        shares = choice_shares(evidence, self.person.lapse_rate, self._liked(trial))
+        if points is None:
+            return shares
+        right = trial.layout.index(trial.texture)
+        reference, other = with_effect(shares, right, effect=self._strength(points) / 100)
+        return other if number else reference
+
+    def _odd_one(self, trial: ChoiceTrial) -> int:
+        """The button whose percept, with noise, is farthest from those of the other two."""
+        liked = self._liked(trial)
+        if self._rng.random() < self.person.lapse_rate:
+            return self._drawn(choice_shares([0.0] * len(liked), 1.0, liked))
+        percepts = self._rng.standard_normal(len(liked))
+        odd = np.array([name == trial.model for name in trial.layout])
+        percepts[odd] += self.odd_distance_db(trial) / self._temperature_db(trial)
+        others = (percepts.sum() - percepts) / (percepts.size - 1)
+        return int(np.argmax(np.abs(percepts - others) + liked))
+
+    def odd_distance_db(self, trial: ChoiceTrial) -> float:
+        """How far the odd model feels from the other one; planted effects count as distances."""
+        first, second = sorted({self._perception.set_number[name] for name in trial.layout})
+        place = self._perception.place[trial.texture]
+        apart = []
+        for scale, name in enumerate(SCALES):
+            points = None if first else self._psychometrics.effect(trial.texture, name)
+            if points is None:
+                apart.append(self._between[scale][first][second][place])
+            else:
+                as_db = self._psychometrics.as_distance_db(points)
+                apart.append(self.person.sensitivity * as_db)
+        return hypot(*apart)
+
+    def _temperature_db(self, trial: ChoiceTrial) -> float:
+        return self._psychometrics.temperature_db * self._unpractised(trial.trial)
+
+    def _unpractised(self, trial: int) -> float:
+        return self._psychometrics.unpractised(self.person, trial)
+
+    def _liked(self, trial: ChoiceTrial) -> tuple[float, ...]:
+        return self.person.preferences[: len(trial.layout)]
+
+    def _drawn(self, shares: Sequence[float]) -> int:
+        """An index drawn with these probabilities."""
+        left = float(self._rng.random()) * sum(shares)
+        for index, share in enumerate(shares):
+            left -= share
+            if left < 0:
+                return index
+        return len(shares) - 1  # by rounding alone
+
+    def _looks(self) -> int:
+        return int(self._rng.poisson(LOOKS * self.person.care))
+
     def _response_time_s(self) -> float:
-        return round(float(self._rng.lognormal(np.log(20.0), 0.4)), 3)
+        median_s = MEDIAN_TIME_S * self.person.care
+        return round(float(self._rng.lognormal(log(median_s), TIME_SD)), 3)
+
+
+def occasion_of(task: str, session: int) -> tuple[int, ...]:
+    """What distinguishes the sessions of a participant in the seeds of the answers."""
+    return (session, TASKS.index(task))
+
+
+def require_plantable(perception: Perception, psychometrics: Psychometrics) -> None:
+    """Refuse effects that no simulated participant could show.
+
+    Raises
+    ------
+    InputError
+        For effects on textures that are not in the study, or whose models are all equal.
+    """
+    for texture, effects in psychometrics.planted.items():
+        if texture not in perception.place:
+            raise InputError(
+                f"expected effects on {', '.join(perception.textures)}, got one on {texture}; "
+                "plant it on a texture of the study."
+            )
+        if texture in perception.identical and any(effects.values()):
+            raise InputError(
+                f"expected no effect on {texture}, whose models are equal, got one; plant it on a "
+                "texture whose models differ."
+            )

@@ -1,18 +1,22 @@
-"""A whole study in silico: every simulated subject through the very same protocols and store."""
+"""A whole study in silico: simulated participants in the very same protocols and store."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from experiments.observers.simulated import Perception, Psychometrics, SimulatedParticipant
-from experiments.sessions.trial_loop import SessionResult, run_session
+from experiments.observers.experimenter import SimulatedExperimenter
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import Psychometrics
+from experiments.observers.simulated import SimulatedParticipant, occasion_of, require_plantable
+from experiments.sessions.bids import export_all
+from experiments.sessions.running import Circumstances, run_session
+from experiments.sessions.trial_loop import People, SessionResult
 from experiments.study.models import ModelSets
-from experiments.study.study import TASKS, Study
+from experiments.study.study import Study
 from experiments.tasks import task_named
 from modeling import TextureModel, Threshold
 from modeling.checks import check_whole
-from modeling.models.loading import Layered
 from rig.interface import TextureRig
 
 Progress = Callable[[int, int, str], None]
@@ -22,13 +26,13 @@ def simulate_study(
     study: Study,
     *,
     real: Mapping[str, TextureModel],
-    full: Mapping[str, TextureModel],
-    simplified: Mapping[str, Layered],
+    models: ModelSets,
     rig: TextureRig,
     data_folder: str | Path,
     seed: int,
     threshold: Threshold,
     psychometrics: Psychometrics | None = None,
+    sources: Mapping[str, str] | None = None,
     progress: Progress | None = None,
 ) -> tuple[SessionResult, ...]:
     """Run all sessions of all subjects of all tasks with simulated participants.
@@ -39,18 +43,19 @@ def simulate_study(
         Fixes the orders, by its own seed.
     real : mapping of str to TextureModel
         The truth behind each real surface.
-    full : mapping of str to TextureModel
-    simplified : mapping of str to TextureModel or RegressedModel
+    models : ModelSets
         What the virtual surfaces present.
     rig : TextureRig
     data_folder : path
         Root of a new data set.
     seed : int
-        ≥ 0; of the participants' answers.
+        ≥ 0; of the participants and their answers.
     threshold : Threshold
-        Below it the participants feel nothing.
+        Of the average participant, who feels nothing below it.
     psychometrics : Psychometrics, optional
         How percepts become answers.
+    sources : mapping of set of models to str, optional
+        Where the models came from, for the manifests.
     progress : callable, optional
         Called with sessions done, sessions in all, and the session just done.
 
@@ -62,44 +67,42 @@ def simulate_study(
     Raises
     ------
     InputError
-        If a model is missing or not in g, or a session has been run before.
-    StoreError
+        If a model is missing or not in g, an effect cannot be planted, or a session has been run
+        before.
+    StoreError, OSError
         If the disk does not take the answers.
     """
     check_whole("seed", seed, low=0, high=2**63)
-    models = ModelSets(sets={"full": full, "simplified": simplified})
     perception = Perception(study, real=real, models=models, threshold=threshold)
+    population = psychometrics or Psychometrics()
+    require_plantable(perception, population)
+    circumstances = Circumstances(sources=sources or {})
     agenda = _agenda(study)
     results = []
     for done, (task, subject, session) in enumerate(agenda, start=1):
         participant = SimulatedParticipant(
             perception,
-            psychometrics or Psychometrics(),
+            population,
             seed=seed,
             subject=subject,
-            occasion=_occasion(task, session),
+            occasion=occasion_of(task, session),
         )
-        result = run_session(
+        result, _ = run_session(
             task_named(task),
             study,
             subject=subject,
             session=session,
             models=models,
             rig=rig,
-            respondent=participant,
+            people=People(respondent=participant, experimenter=SimulatedExperimenter()),
             data_folder=data_folder,
+            circumstances=circumstances,
         )
         results.append(result)
         if progress is not None:
-            progress(done, len(agenda), result.path.stem)
+            progress(done, len(agenda), f"{task}, subject {subject}, session {session}")
+    export_all(data_folder)
     return tuple(results)
-
-
-def _occasion(task: str, session: int) -> tuple[int, ...]:
-    """What distinguishes the sessions of a participant in the seeds of the answers."""
-    # Published answers of the paper's two tasks hang on this one number.
-    number = TASKS.index(task)
-    return (2 * session + number,) if number < 2 else (session, number)
 
 
 def _agenda(study: Study) -> list[tuple[str, int, int]]:

@@ -46,7 +46,7 @@ def draw_session(study: Study, task: Task, *, subject: int, session: int, slot: 
     drafts = [("training", draft) for draft in _training(occasion, task)]
     drafts += [("main", draft) for draft in task.trials(occasion, _order(occasion))]
     trials = tuple(
-        task.trial(trial=number, phase=phase, tray=study.trays[draft["texture"]], **draft)
+        task.trial(trial=number, phase=phase, tray=study.trays.get(draft["texture"], ""), **draft)
         for number, (phase, draft) in enumerate(drafts, start=1)
     )
     return SessionPlan(

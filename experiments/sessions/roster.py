@@ -160,6 +160,7 @@ class Roster:
         try:
             make_folder(self.path.parent)
             with locked(self.path):
+                self._cut_half_line()
                 yield self.subjects()
         except OSError as error:
             raise store_error(error, self.path, _ADVICE) from error
@@ -188,18 +189,22 @@ class Roster:
         if subject not in entries or entries[subject]["left"]:
             raise _not_there(subject, self.path)
 
+    def _cut_half_line(self) -> None:
+        """Take away what a process left that was killed before it had enrolled anybody."""
+        there = self.path.read_bytes() if self.path.exists() else b""
+        whole = there.rfind(b"\n") + 1
+        if whole < len(there):
+            os.truncate(self.path, whole)
+
     def _append(self, event: str, **fields: object) -> None:
         handle = open_file(self.path, new=False)
         try:
             size = os.fstat(handle).st_size
-            cut = len(read_lines(self.path, "the roster").cut)
-            if cut:  # by a process that was killed before it had enrolled anybody
-                os.ftruncate(handle, size - cut)
             try:
                 write_all(handle, line_of({"utc": utc_text(), "event": event, **fields}))
                 os.fsync(handle)
             except OSError:
-                os.ftruncate(handle, size - cut)
+                os.ftruncate(handle, size)
                 raise
         finally:
             os.close(handle)

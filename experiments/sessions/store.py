@@ -40,7 +40,7 @@ from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import dump_json
 from modeling.files.places import locked
-from modeling.files.writing import write_bytes, write_text
+from modeling.files.writing import write_bytes
 from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 __all__ = ["MemoryStore", "SessionStore", "Store", "StoreError"]
@@ -110,6 +110,26 @@ class Store(Protocol):
             If it, or an earlier event, could not be written.
         """
 
+    def close(self) -> None:
+        """Take nothing more; harmless when closed already.
+
+        Raises
+        ------
+        StoreError
+            If something could not be written.
+        """
+
+    def __enter__(self) -> Self:
+        """Closed when the block ends."""
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Close; an error of the block is never hidden by one of the disk."""
+
 
 class MemoryStore:
     """Keeps answers in memory, for studies that are only planned; nothing is written.
@@ -154,6 +174,20 @@ class MemoryStore:
         """Keep how it ended."""
         self.status = status
         self.log("ended", status=status, reason=reason, by=by)
+
+    def close(self) -> None:
+        """Do nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
 
 
 class SessionStore:
@@ -370,9 +404,8 @@ class SessionStore:
         self._writer.close()
 
     def _table(self, name: str, columns: Mapping[str, Mapping[str, Any]]) -> GrowingTable:
-        described = self.files.named(f"{name}.json")
-        if not described.exists():
-            write_text(described, dump_json(dict(columns)))
+        described = dump_json(dict(columns))
+        self.files.named(f"{name}.json").write_text(described, encoding="utf-8")
         table = GrowingTable(self.files.named(f"{name}.tsv"), tuple(columns))
         self._tables.append(table)
         return table

@@ -1,4 +1,4 @@
-"""Whether the hand stroked as the models were recorded, and what a participant is told if not."""
+"""Whether the hand stroked as the models were recorded, and what to tell a participant if not."""
 
 from __future__ import annotations
 
@@ -12,12 +12,7 @@ from modeling.arrays import Floats
 from rig.interface import HandRows, PresentationRecord
 
 MOSTLY = 0.5
-_ADVICE = {
-    "too_slow": ("too slowly", "more quickly"),
-    "too_fast": ("too fast", "more slowly"),
-    "too_light": ("too lightly", "more firmly"),
-    "too_hard": ("too hard", "more lightly"),
-}
+HOW = ("too_slow", "too_fast", "too_light", "too_hard")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,7 +43,7 @@ def outside_grid(rows: HandRows, records: Sequence[PresentationRecord]) -> Outsi
     Outside or None
         None where the hand did not move on a virtual surface.
     """
-    if not len(rows):
+    if not rows.presentation.any():
         return None
     found = [_beyond(rows, record) for record in records if record.speeds_mm_s is not None]
     beyond = np.concatenate([np.zeros((0, 4)), *found])
@@ -62,17 +57,19 @@ def outside_grid(rows: HandRows, records: Sequence[PresentationRecord]) -> Outsi
     return Outside(outside=outside, too_slow=slow, too_fast=fast, too_light=light, too_hard=hard)
 
 
-def told_of(outside: Outside | None) -> str | None:
-    """One sentence where the hand was outside for most of the time; None otherwise."""
+def advice_on(outside: Outside | None) -> tuple[str, int] | None:
+    """What to tell a participant whose hand was outside for most of the time; None otherwise.
+
+    Returns
+    -------
+    (str, int) or None
+        The key of a page, "strokes." and how most of it was outside (one of `HOW`), and for how
+        many per cent of the time.
+    """
     if outside is None or outside.outside <= MOSTLY:
         return None
-    shares = {name: getattr(outside, name) for name in _ADVICE}
-    worst = max(shares, key=lambda name: float(np.nan_to_num(shares[name])))
-    how, instead = _ADVICE[worst]
-    return (
-        f"For {outside.outside:.0%} of the time your hand moved outside what was recorded, mostly "
-        f"{how}; please stroke {instead} from now on."
-    )
+    worst = max(HOW, key=lambda name: float(np.nan_to_num(getattr(outside, name))))
+    return f"strokes.{worst}", round(100 * outside.outside)
 
 
 def _beyond(rows: HandRows, record: PresentationRecord) -> Floats:

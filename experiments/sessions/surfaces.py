@@ -1,22 +1,42 @@
-"""What a participant feels in a trial, who answers, and what an answer is."""
+"""What a participant feels in a trial, who answers, who mounts samples, and what an answer is."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
-from experiments.study.design import Trial
+from experiments.study.questions import Question
 from modeling import InputError
 from modeling.models.loading import AnyModel
-from rig.interface import TextureRig
+from rig.interface import TextureRig, ToneBurst
 
 HIGHEST_RATING = 100.0
+Whose = Literal["participant", "experimenter", "signal"]
+
+
+class Note(Protocol):
+    """Writes an event into the log of the session."""
+
+    def __call__(self, event: str, **fields: object) -> None: ...
 
 
 class SessionAborted(Exception):
-    """Raised by a respondent to end the session early; the answers given so far are kept."""
+    """Ends the session early; the answers given so far are kept.
+
+    Parameters
+    ----------
+    reason : str
+        As it is stored.
+    by : {"participant", "experimenter", "signal"}
+        Who ended it.
+    """
+
+    def __init__(self, reason: str = "not stated", by: Whose = "participant") -> None:
+        super().__init__(reason)
+        self.reason = reason
+        self.by = by
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,27 +77,52 @@ class Surfaces:
     rig : TextureRig
     texture : str
         The real surface.
-    models : sequence of models of any kind
-        The virtual surfaces, one per button.
+    models : sequence of TextureModel, RegressedModel, ARModel or ToneBurst
+        The virtual surfaces, one per button; a burst is presented once in a trial.
+    begin : callable
+        Presents the first surface; called by `start`.
+    note : callable
+        Writes an event into the session's log.
+    feel_all : bool
+        Whether every virtual surface must be felt before an answer.
 
     Attributes
     ----------
+    feel_all : bool
+    started : bool
+        Whether the first surface has been presented.
     switches : int
         Changes between the real and a virtual surface, the first presentation not counted.
     presses : int
         Presentations of a virtual surface, repeated ones included.
+    felt : set of int
+        Indices of the virtual surfaces that have been presented.
     first_sample_s : float or None
         When the first sample of the first presentation left, on the rig's clock.
     """
 
-    def __init__(self, rig: TextureRig, *, texture: str, models: Sequence[AnyModel]) -> None:
+    def __init__(
+        self,
+        rig: TextureRig,
+        *,
+        texture: str,
+        models: Sequence[AnyModel | ToneBurst],
+        begin: Callable[[Surfaces], None],
+        note: Note,
+        feel_all: bool = False,
+    ) -> None:
         self._rig = rig
         self._texture = texture
         self._models = tuple(models)
+        self._begin = begin
+        self._note = note
         self._shown: str | None = None
         self._selected: int | None = None
+        self.feel_all = feel_all
+        self.started = False
         self.switches = 0
         self.presses = 0
+        self.felt: set[int] = set()
         self.first_sample_s: float | None = None
         self._began_s: float | None = None
         rig.read()  # a press of the rig's button before the trial is not one in it
@@ -102,9 +147,19 @@ class Surfaces:
         """Time since the first sample of the first presentation left; 0 before."""
         return 0.0 if self._began_s is None else time.perf_counter() - self._began_s
 
+    def note(self, event: str, **fields: object) -> None:
+        """Write an event of this trial into the session's log, as the end of a slider's move."""
+        self._note(event, **fields)
+
+    def start(self) -> None:
+        """Present the first surface; a respondent calls it when it announces the trial."""
+        if not self.started:
+            self.started = True
+            self._begin(self)
+
     def present_real(self) -> None:
         """Present the real surface (the virtual one is switched off)."""
-        self._note("real", self._rig.present_real(self._texture))
+        self._presented("real", self._rig.present_real(self._texture))
 
     def present_virtual(self, index: int = 0) -> None:
         """Present the virtual surface of a button (index from 0).
@@ -118,10 +173,17 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        left_s = self._rig.present_model(self._models[index])
         self._selected = index
+        shown = self._models[index]
+        if isinstance(shown, ToneBurst):
+            if index in self.felt:
+                return
+            left_s = self._rig.present_signal(shown)
+        else:
+            left_s = self._rig.present_model(shown)
         self.presses += 1
-        self._note("virtual", left_s)
+        self.felt.add(index)
+        self._presented("virtual", left_s, index=index)
 
     def toggle(self) -> None:
         """Change between the real surface and the virtual one presented last, if any."""
@@ -132,12 +194,29 @@ class Surfaces:
         elif len(self._models) == 1:
             self.present_virtual()
 
+    def pause(self) -> None:
+        """Present nothing for a while, as long as the participant is asked something else."""
+        self._rig.silence()
+
+    def resume(self) -> None:
+        """Present again what was presented before the pause."""
+        if self.shows_real:
+            self._again("real", self._rig.present_real(self._texture))
+        elif self._selected is not None:
+            shown = self._models[self._selected]
+            if not isinstance(shown, ToneBurst):
+                left_s = self._rig.present_model(shown)
+                self._again("virtual", left_s, index=self._selected)
+
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""
         if self._rig.read().button:
             self.toggle()
 
-    def _note(self, shown: str, left_s: float) -> None:
+    def _again(self, shown: str, left_s: float, **which: int) -> None:
+        self._note("presented", surface=shown, start_s=left_s, **which)
+
+    def _presented(self, shown: str, left_s: float, **which: int) -> None:
         if self.first_sample_s is None:
             # The rig's clock may be its own, as a twin's is: only how long ago it was counts.
             self.first_sample_s = left_s
@@ -145,10 +224,32 @@ class Surfaces:
         if self._shown is not None and self._shown != shown:
             self.switches += 1
         self._shown = shown
+        self._again(shown, left_s, **which)
+
+
+class RatedTrial(Protocol):
+    """A trial whose answer is how alike a real and a virtual surface are."""
+
+    @property
+    def trial(self) -> int: ...
+
+    @property
+    def texture(self) -> str: ...
+
+    @property
+    def model(self) -> str: ...
+
+    @property
+    def virtual_texture(self) -> str:
+        """Whose model the virtual surface renders."""
+        ...
 
 
 class ChoiceTrial(Protocol):
     """A trial whose answer is one of several virtual surfaces."""
+
+    @property
+    def trial(self) -> int: ...
 
     @property
     def texture(self) -> str: ...
@@ -158,8 +259,29 @@ class ChoiceTrial(Protocol):
 
     @property
     def layout(self) -> tuple[str, ...]:
-        """Texture behind each button, from button 1 on."""
+        """What is behind each button, from button 1 on: a texture, or a model."""
         ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Intake:
+    """What a participant is asked before the first trial.
+
+    Parameters
+    ----------
+    consent : str
+        Version of the consent form; empty where none is asked for.
+    code : str
+        The participant's pseudonym.
+    known : bool
+        Whether this person was here before: then only the code is confirmed.
+    questions : tuple of Question
+    """
+
+    consent: str
+    code: str
+    known: bool
+    questions: tuple[Question, ...]
 
 
 class Respondent(Protocol):
@@ -170,18 +292,76 @@ class Respondent(Protocol):
         """True unless a person answers."""
         ...
 
-    def announce(self, title: str, text: str) -> None:
-        """Show a message until the participant goes on."""
+    def hear(self, note: Note) -> None:
+        """Be told where events outside trials go."""
         ...
 
-    def confirm_mount(self, tray: str) -> None:
-        """Return once the sample of this tray is in place."""
+    def welcome(self, intake: Intake) -> Mapping[str, str | int]:
+        """Ask for consent, the code and the study's questions; the answers by question."""
         ...
 
-    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
+    def announce(self, page: str, **values: object) -> None:
+        """Show a text, by its key, until the participant goes on."""
+        ...
+
+    def wait(self, until: Callable[[], bool]) -> None:
+        """Ask the participant to wait until the experimenter is ready."""
+        ...
+
+    def rest(self) -> None:
+        """A break, which the participant ends."""
+        ...
+
+    def progress(self, done: int, of: int) -> None:
+        """Show from now on how many trials are done."""
+        ...
+
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Compare the real with the virtual surface and rate their likeness."""
         ...
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
-        """Say which virtual surface is the real one."""
+        """Choose one of the virtual surfaces."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """How far a session is, as an experimenter sees it.
+
+    Parameters
+    ----------
+    phase : str
+    done, of : int
+        Main trials.
+    minutes_left : float, optional
+        An estimate from the trials so far; None before the first.
+    problems : tuple of str
+        Of the rig, one sentence each.
+    """
+
+    phase: str
+    done: int
+    of: int
+    minutes_left: float | None
+    problems: tuple[str, ...]
+
+
+class Experimenter(Protocol):
+    """Who mounts samples and is called when something fails; sees no names of conditions."""
+
+    def ask_mount(self, tray: str) -> None:
+        """Ask for the sample of a tray."""
+        ...
+
+    def call(self, told: str) -> None:
+        """Tell what failed, and ask to mend it."""
+        ...
+
+    def ready(self) -> bool:
+        """Whether what was asked last has been confirmed."""
+        ...
+
+    def tell(self, standing: Standing) -> None:
+        """Show how far the session is, and how the rig is."""
         ...

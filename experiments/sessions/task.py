@@ -11,11 +11,15 @@ from experiments.study.design import Occasion, Order, Trial
 from experiments.study.models import ModelSets
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
 from modeling.models.loading import AnyModel
+from rig.interface import TextureRig, ToneBurst
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
     """One task of an experiment.
+
+    What the participant reads stands under the task's name in the console's texts: before the
+    phases "training" and "main", and at "closing".
 
     Parameters
     ----------
@@ -23,29 +27,37 @@ class Task:
         One of `ANSWER_TABLES`, where the columns of its answers are declared.
     description : str
         What the participant does, for the sidecar of the answers.
-    texts : mapping of key to (title, text)
-        What the participant reads: before the phases "training" and "main", and at "closing".
     trial : type
         Of one trial; a dataclass.
     trials : callable
-        From an occasion and textures and models in random, balanced order to what distinguishes
-        the trials: texture, model and the task's own fields.
+        From the occasion, and textures and models in a balanced random order, to what
+        distinguishes the trials: texture, model and the task's own fields.
     virtual : callable
         From the models and a trial to the virtual surfaces, one per button.
     begin : callable
         Presents the first surface of a trial.
     ask : callable
         From the respondent, a trial and its surfaces to the columns that are the task's own.
+    adapt : callable, optional
+        From a planned trial, the answers so far in this session (training and those that are not
+        valid among them) and the rig to the trial as it is presented; None where everything is
+        planned.
+    mounts : bool
+        Whether a real surface is mounted for each trial.
+    feel_all : bool
+        Whether every virtual surface must be felt before an answer, whatever the study says.
     """
 
     name: str
     description: str
-    texts: Mapping[str, tuple[str, str]]
     trial: type[Trial]
     trials: Callable[[Occasion, Order], list[dict[str, Any]]]
-    virtual: Callable[[ModelSets, Any], Sequence[AnyModel]]
+    virtual: Callable[[ModelSets, Any], Sequence[AnyModel | ToneBurst]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]
+    adapt: Callable[[Any, Sequence[Mapping[str, object]], TextureRig], Any] | None = None
+    mounts: bool = True
+    feel_all: bool = False
 
     @property
     def columns(self) -> tuple[AnswerColumn, ...]:

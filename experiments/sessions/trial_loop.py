@@ -1,163 +1,131 @@
 """The one loop of all tasks: mount the sample, present, ask, fall silent, store.
 
 A trial in which the rig failed is stored, marked as not valid, and repeated once at the end of its
-phase (docs/method/protocols.md#faults).
+phase (docs/method/protocols.md#faults). Training goes on until the hand strokes as the models were
+recorded (docs/method/protocols.md#training).
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import groupby
-from pathlib import Path
+from statistics import median
 
-from experiments.sessions.order import draw_session
-from experiments.sessions.store import SessionStore
-from experiments.sessions.strokes import outside_grid, told_of
-from experiments.sessions.surfaces import Respondent, SessionAborted, Surfaces
+from experiments.sessions.agenda import Agenda
+from experiments.sessions.store import Store
+from experiments.sessions.strokes import advice_on, outside_grid
+from experiments.sessions.surfaces import (
+    Experimenter,
+    Intake,
+    Respondent,
+    SessionAborted,
+    Standing,
+    Surfaces,
+)
 from experiments.sessions.task import Task
-from experiments.study.design import Trial
+from experiments.study.design import SessionPlan, Trial
 from experiments.study.models import ModelSets
-from experiments.study.study import Study
 from rig.interface import Fault, TextureRig
-
-STROKES_TITLE = "Your strokes"
-FAULT_TITLE = "Please call the experimenter"
-FAULT_NOTE = "The rig failed in this trial."
 
 
 @dataclass(frozen=True, kw_only=True)
 class SessionResult:
-    """How a session ended: `answered` of `planned` trials are in the file at `path`.
+    """How a session ended: `answered` of `planned` trials, repeated ones counted among both.
 
-    Repeated trials count among both. `invalid` of the answers are to trials in which the rig
-    failed.
+    `invalid` of the answers are to trials in which the rig failed. Training trials that were not
+    needed are not planned.
     """
 
-    path: Path
     planned: int
     answered: int
     invalid: int = 0
-
-    @property
-    def completed(self) -> bool:
-        """Whether every planned trial was answered, and every invalid one repeated."""
-        return self.answered == self.planned
+    completed: bool = True
+    reason: str = ""
 
 
-def run_session(
-    task: Task,
-    study: Study,
-    *,
-    subject: int,
-    session: int,
-    models: ModelSets,
-    rig: TextureRig,
-    respondent: Respondent,
-    data_folder: str | Path,
-) -> SessionResult:
-    """Run one session of a task and store it.
+@dataclass(frozen=True, kw_only=True)
+class People:
+    """Who takes part beside the rig."""
 
-    Parameters
-    ----------
-    task : Task
-    study : Study
-    subject, session : int
-        From 1; with the study's seed they fix the order of the trials.
-    models : ModelSets
-        Full and simplified model of every texture of the study.
-    rig : TextureRig
-        Presents the surfaces; opened here before anything is written, silent and closed
-        afterwards, whatever happens.
-    respondent : Respondent
-        The console, or a simulated participant.
-    data_folder : path
-        Root of the data set.
-
-    Returns
-    -------
-    SessionResult
-        Not completed if the participant ended it early.
-
-    Raises
-    ------
-    InputError
-        If a model is missing, the session has been run before, or the rig cannot be opened.
-    StoreError
-        If the disk does not take the answers.
-    """
-    models.require(study)
-    plan = draw_session(study, task, subject=subject, session=session, slot=subject)
-    rig.open()
-    try:
-        with SessionStore.create(
-            data_folder,
-            plan=plan,
-            columns={column.name: column.sidecar() for column in task.columns},
-            description=task.description,
-            models=models.sha256(study.textures),
-            simulated_participant=respondent.simulated,
-            simulated_rig=rig.simulated,
-            rig=rig.stated,
-        ) as store:
-            return run_trials(
-                plan.trials, task, models=models, rig=rig, respondent=respondent, store=store
-            )
-    finally:
-        rig.close()
+    respondent: Respondent
+    experimenter: Experimenter
 
 
 def run_trials(
-    trials: Sequence[Trial],
+    plan: SessionPlan,
     task: Task,
     *,
     models: ModelSets,
     rig: TextureRig,
-    respondent: Respondent,
-    store: SessionStore,
+    people: People,
+    store: Store,
+    intake: Intake | None = None,
+    agenda: Agenda | None = None,
+    pilot: bool = False,
 ) -> SessionResult:
-    """Run all trials of a session; the rig is silent afterwards, whatever happens.
+    """Run all trials of a session that are open; the rig is silent afterwards, whatever happens.
 
     Parameters
     ----------
-    trials : sequence
-        In the order of the session's plan.
+    plan : SessionPlan
     task : Task
     models : ModelSets
-    rig, respondent, store
-        What presents, who answers, where the answers go.
+    rig : TextureRig
+        Opened already.
+    people : People
+        Who answers, and who mounts the samples.
+    store : Store
+        Where the answers go.
+    intake : Intake, optional
+        What is asked before the first trial.
+    agenda : Agenda, optional
+        What is left of a session that was begun before; all of it without.
+    pilot : bool
+        Whether the answers do not count.
 
     Returns
     -------
     SessionResult
-        Also after an abort by the respondent; any other exception is logged and passed on.
+        Also where the participant or the experimenter ended the session; any other exception is
+        logged once the rig is silent, and passed on.
     """
-    running = _Running(task, models=models, rig=rig, respondent=respondent, store=store)
+    agenda = agenda or Agenda.whole(plan.trials)
+    running = _Running(
+        plan, task, models=models, rig=rig, people=people, store=store, agenda=agenda, pilot=pilot
+    )
     try:
         rig.silence()
-        store.log("session started", f"{len(trials)} trials planned")
-        running.run(trials)
-        store.log("session ended", f"{running.answered} trials answered")
-        # Everything is answered: leaving the last page with Escape is not an abort.
+        people.respondent.hear(running.note)
+        if intake is not None:
+            answers = people.respondent.welcome(intake)
+            store.log("welcome", consent=intake.consent, answers=dict(answers))
+        running.run()
+        store.finish("complete", "all trials answered", by="program")
+        # Everything is answered: leaving the last page is not an abort.
         with suppress(SessionAborted):
-            respondent.announce(*task.texts["closing"])
-    except SessionAborted:
-        running.log_faults("when aborted")
-        store.log("session aborted", f"{running.answered} trials answered")
+            people.respondent.announce(f"{task.name}.closing")
+    except SessionAborted as aborted:
+        rig.silence()
+        running.log_faults()
+        store.finish("aborted", aborted.reason, by=aborted.by)
+        return running.result(completed=False, reason=aborted.reason)
     except BaseException as error:
-        # The log must not hide what went wrong, for instance when the disk is full.
+        # Silent first; and the log must not hide what went wrong, for instance a full disk.
+        rig.silence()
+        by_signal = isinstance(error, SystemExit | KeyboardInterrupt)
+        reason = getattr(error, "signal_name", "") or type(error).__name__
+        told = reason if by_signal else f"{reason}: {error}"
         with suppress(OSError):
-            store.log("session broken off", f"{type(error).__name__}: {error}")
+            if by_signal:
+                store.finish("aborted", told, by="signal")
+            else:
+                store.finish("crashed", told, by="program")
         raise
     finally:
         rig.silence()
-    return SessionResult(
-        path=store.path,
-        planned=len(trials) + running.to_repeat,
-        answered=running.answered,
-        invalid=running.invalid,
-    )
+    return running.result(completed=True)
 
 
 class _Running:
@@ -165,71 +133,172 @@ class _Running:
 
     def __init__(
         self,
+        plan: SessionPlan,
         task: Task,
         *,
         models: ModelSets,
         rig: TextureRig,
-        respondent: Respondent,
-        store: SessionStore,
+        people: People,
+        store: Store,
+        agenda: Agenda,
+        pilot: bool,
     ) -> None:
-        self._task, self._models, self._rig = task, models, rig
-        self._respondent, self._store = respondent, store
-        self.answered = 0
-        self.invalid = 0
-        self.to_repeat = 0
+        self._plan, self._task, self._models = plan, task, models
+        self._rig, self._store, self._agenda = rig, store, agenda
+        self._respondent, self._experimenter = people.respondent, people.experimenter
+        self._planned = plan.study.plan_of(task.name)
+        self._pilot = pilot
+        self._rows: list[Mapping[str, object]] = list(agenda.rows)
+        self._next_number = agenda.next_number
+        self._at: int | None = None  # the trial that runs now
+        self._durations_s: list[float] = []
+        self._inside = True
+        self._mains = sum(trial.phase == "main" for trial in plan.trials)
+        self._mains_done = self._mains - len(agenda.main)
+        self._owed = len(agenda.owed)
 
-    def run(self, trials: Sequence[Trial]) -> None:
-        """All phases, each announced and with its invalid trials once more at its end."""
-        number = len(trials)
-        for phase, group in groupby(trials, key=lambda trial: trial.phase):
-            self._respondent.announce(*self._task.texts[phase])
-            self._store.log("phase started", phase)
-            failed = [trial for trial in group if not self._run_trial(trial)]
-            for trial in failed:
-                number += 1
-                self._run_trial(replace(trial, trial=number), repeats=trial.trial)
+    def run(self) -> None:
+        """Training, then the main trials; each with its invalid trials once more at its end."""
+        if self._agenda.training:
+            self._announce("training", again=self._agenda.training_again)
+            self._train(self._agenda.training)
+        self._announce("main", again=self._mains_done > 0)
+        failed = [trial for trial in self._agenda.owed if trial.phase == "main"]
+        for number, trial in enumerate(self._agenda.main):
+            if number and self._planned.break_after and number % self._planned.break_after == 0:
+                self._rest()
+            if not self._run_trial(trial):
+                failed.append(trial)
+        self._repeat(failed)
 
-    def _run_trial(self, trial: Trial, *, repeats: int | None = None) -> bool:
-        """One trial from mounting to storing; whether it is valid."""
+    def result(self, *, completed: bool, reason: str = "") -> SessionResult:
+        """How it ended, or how far it came."""
+        open_trials = self._mains - self._mains_done
+        return SessionResult(
+            planned=len(self._rows) + open_trials + self._owed,
+            answered=len(self._rows),
+            invalid=sum(not row["valid"] for row in self._rows),
+            completed=completed,
+            reason=reason,
+        )
+
+    def note(self, event: str, **fields: object) -> None:
+        """Log an event with the trial in which it happened, if it did in one."""
+        where = {} if self._at is None else {"trial": self._at}
+        self._store.log(event, **where, **fields)
+
+    def log_faults(self) -> tuple[Fault, ...]:
+        """Take the rig's faults, and log them."""
+        faults = self._rig.take_faults()
+        for fault in faults:
+            self.note("fault", told=fault.told, time_s=fault.time_s, invalidates=fault.invalidates)
+        return faults
+
+    def _announce(self, phase: str, *, again: bool) -> None:
+        self._store.log("phase", phase=phase, again=again)
+        self._respondent.announce(f"{self._task.name}.{phase}")
+
+    def _train(self, trials: Sequence[Trial]) -> None:
+        """As many trials as are planned at least, and on until the strokes are as recorded."""
+        failed: list[Trial] = []
+        inside = False
+        done = self._agenda.trained
+        for trial in trials:
+            if done >= self._planned.training_trials and inside:
+                break
+            valid = self._run_trial(trial, again=self._agenda.training_again)
+            inside = self._inside
+            done += 1
+            if not valid:
+                failed.append(trial)
+        self._repeat([*(t for t in self._agenda.owed if t.phase == "training"), *failed])
+        self._store.log("training_over", inside=inside, trials=done)
+
+    def _repeat(self, failed: Sequence[Trial]) -> None:
+        for trial in failed:
+            self._run_trial(trial, again=True)
+            self._owed -= 1
+
+    def _rest(self) -> None:
+        self._store.log("break_began")
+        self._respondent.rest()
+        self._store.log("break_ended")
+
+    def _run_trial(self, trial: Trial, *, again: bool = False) -> bool:
+        """One trial from mounting to storing; whether it is valid.
+
+        `again` means that its number stands in the file already: it gets the next free one.
+        """
+        repeats = trial.trial if again else None
+        if again:
+            trial = replace(trial, trial=self._next_number)
+            self._next_number += 1
+        self._at = trial.trial
+        began_s = time.monotonic()
+        self._experimenter.tell(self._standing(trial))
+        if self._task.mounts:
+            self._mount(trial)
+        self._respondent.progress(self._mains_done, self._mains)
+        if self._task.adapt is not None:
+            trial = self._task.adapt(trial, self._rows, self._rig)
+        answer = self._ask(trial)
+        faults = self.log_faults()
+        valid = not any(fault.invalidates for fault in faults)
+        row = self._row(trial, answer, valid=valid, repeats=repeats)
+        self._store.answer(trial.trial, row)
+        self._rows.append(row)
+        self._owed += not valid and not again
+        self._mains_done += trial.phase == "main" and not again
+        self._trace(trial, faults)
+        self._durations_s.append(time.monotonic() - began_s)
+        self._at = None
+        if not valid:
+            self._call(next(fault.told for fault in faults if fault.invalidates))
+        return valid
+
+    def _ask(self, trial: Trial) -> Mapping[str, object]:
+        """Present the surfaces and get the answer; silent afterwards."""
         rig = self._rig
-        self._mount(trial)
-        self.log_faults(f"before trial {trial.trial}")
+        self.log_faults()
         rig.take_history()
         rig.take_presentations()
         rig.take_acceleration()
         surfaces = Surfaces(
-            rig, texture=trial.texture, models=self._task.virtual(self._models, trial)
+            rig,
+            texture=trial.texture,
+            models=self._task.virtual(self._models, trial),
+            begin=lambda of: self._task.begin(trial, of),
+            note=self.note,
+            feel_all=self._planned.feel_all or self._task.feel_all,
         )
-        self._task.begin(trial, surfaces)
-        if surfaces.first_sample_s is not None:
-            first = f"first sample {surfaces.first_sample_s:.4f} s after opening"
-            self._store.log("surfaces presented", f"trial {trial.trial}, {first}")
         answer = self._task.ask(self._respondent, trial, surfaces)
         rig.silence()
-        faults = self.log_faults(f"trial {trial.trial}")
-        valid = not any(fault.invalidates for fault in faults)
-        self._store.append(self._row(trial, answer, valid=valid, repeats=repeats))
-        self.answered += 1
-        self.invalid += not valid
-        self.to_repeat += not valid and repeats is None
-        self._trace(trial, faults)
-        if not valid:
-            told = next(fault.told for fault in faults if fault.invalidates)
-            self._respondent.announce(FAULT_TITLE, f"{FAULT_NOTE}\n{told}")
-        return valid
+        if not surfaces.started:
+            raise RuntimeError("the respondent answered without having started the trial")
+        return answer
 
     def _mount(self, trial: Trial) -> None:
-        label = f"trial {trial.trial}, tray {trial.tray}"
-        self._store.log("mount requested", label)
-        self._respondent.confirm_mount(trial.tray)
-        self._store.log("mount confirmed", label)
+        self.note("mount_requested", tray=trial.tray)
+        self._experimenter.ask_mount(trial.tray)
+        self._respondent.wait(self._experimenter.ready)
+        self.note("mount_confirmed", tray=trial.tray)
 
-    def log_faults(self, when: str) -> tuple[Fault, ...]:
-        """Take the rig's faults, and log them."""
-        faults = self._rig.take_faults()
-        for fault in faults:
-            self._store.log("fault", f"{when}, {fault.time_s:.4f} s after opening: {fault.told}")
-        return faults
+    def _standing(self, trial: Trial) -> Standing:
+        left = None
+        if self._durations_s:
+            left = median(self._durations_s) * (self._mains - self._mains_done) / 60.0
+        return Standing(
+            phase=trial.phase,
+            done=self._mains_done,
+            of=self._mains,
+            minutes_left=left,
+            problems=self._rig.health().problems,
+        )
+
+    def _call(self, told: str) -> None:
+        """Call the experimenter, whom the participant waits for."""
+        self._experimenter.call(told)
+        self._respondent.wait(self._experimenter.ready)
 
     def _row(
         self, trial: Trial, answer: Mapping[str, object], *, valid: bool, repeats: int | None
@@ -241,8 +310,10 @@ class _Running:
             "model": trial.model,
             "tray": trial.tray,
             **answer,
+            "run": self._agenda.run,
             "valid": int(valid),
             "repeats": repeats,
+            "pilot": self._pilot,
             "simulated": self._respondent.simulated or self._rig.simulated,
         }
 
@@ -251,7 +322,9 @@ class _Running:
         rows, shown = self._rig.take_history(), self._rig.take_presentations()
         self._store.trace(trial.trial, rows, presentations=shown, faults=faults)
         self._store.acceleration(trial.trial, self._rig.take_acceleration())
-        told = told_of(outside_grid(rows, shown))
-        if told is not None:
-            self._store.log("hand outside the grid", f"trial {trial.trial}: {told}")
-            self._respondent.announce(STROKES_TITLE, told)
+        advice = advice_on(outside_grid(rows, shown))
+        self._inside = advice is None
+        if advice is not None:
+            page, percent = advice
+            self.note("outside", advice=page, percent=percent)
+            self._respondent.announce(page, percent=percent)

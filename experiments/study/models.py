@@ -81,6 +81,16 @@ class ModelSets:
             if self.of(texture, name).sha256 in made_from(self.of(texture, reference))
         )
 
+    def of_others(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
+        """Textures and sets whose model says that it was made from one that no set holds."""
+        return tuple(
+            (texture, name)
+            for texture in textures
+            for name in self.names
+            if (sources := made_from(self.of(texture, name)))
+            and not sources & {self.of(texture, other).sha256 for other in self.names}
+        )
+
     def require(self, study: Study, *, allow: Allow = refuse) -> None:
         """Refuse a study with textures that have no model, or without models to compare.
 

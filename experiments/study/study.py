@@ -31,8 +31,6 @@ from modeling.files.hashes import sha256_of_values
 
 # Their order is part of every seed: new ones go to the end.
 TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))
-# A threshold is sought by a staircase of its own: no order of textures is planned for it.
-PLANNED = tuple(task for task in TASKS if task != "threshold")
 MOST_TEXTURES = 12
 MOST_MODELS = 6
 CALIBRATION_DAYS = 90.0
@@ -164,7 +162,7 @@ class Study:
     def _plan_tasks(self) -> None:
         """Put the tasks in order, name the models of each, and refuse what cannot be planned."""
         planned = {**PAPER_PLANS, **self.tasks}
-        check_keys(planned, PLANNED, where="the tasks")
+        check_keys(planned, TASKS, where="the tasks")
         in_order = {}
         for task in (task for task in TASKS if task in planned):
             plan = planned[task]
@@ -250,7 +248,7 @@ class Study:
         require_keys(settings, ("name", "seed", "textures", "trays"), where="the study")
         tasks = {
             name: TaskPlan.from_dict(name, settings.pop(name))
-            for name in PLANNED
+            for name in TASKS
             if name in settings
         }
         for name, example in (("trays", "texture = tray"), ("models", "name = folder")):
@@ -288,7 +286,7 @@ class Study:
 
 
 _STUDY_KEYS = tuple(
-    key for f in fields(Study) for key in (PLANNED if f.name == "tasks" else (f.name,))
+    key for f in fields(Study) for key in (TASKS if f.name == "tasks" else (f.name,))
 )
 
 
@@ -296,3 +294,18 @@ def _version(values: object) -> str:
     table = as_table(values, where="[consent]", example='version = "…" under [consent]')
     check_keys(table, ("version",), where="[consent]")
     return as_text(table.get("version", ""), "version in [consent]")
+
+
+def plan_sha256(study: Study, models_sha256: Mapping[str, Mapping[str, str]]) -> str:
+    """SHA-256 of all that the page to preregister says: the study, and the models by their hashes.
+
+    docs/method/protocols.md#plan
+
+    Parameters
+    ----------
+    study : Study
+    models_sha256 : mapping of texture to mapping of set to SHA-256
+        As `ModelSets.sha256` gives them.
+    """
+    models = {texture: dict(hashes) for texture, hashes in models_sha256.items()}
+    return sha256_of_values({"study": study.to_dict(), "models_sha256": models})

@@ -22,7 +22,7 @@ Schedule = Literal["by-day", "interleaved"]
 SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
 
 # The usual repeats of a task whose table does not say; 1 in any other.
-REPEATS = {"relative": 3, "oddity": 6}
+REPEATS = {"relative": 3, "oddity": 6, "threshold": 40}
 MOST_TRAINING_TRIALS = 100
 
 
@@ -41,7 +41,7 @@ class TaskPlan:
         Either each model on a day of its own (one session per model), or all mixed in one session.
     repeats : int
         How often each texture comes with each model, ≥ 1. In the oddity task, whose every trial
-        holds both models: trials of each texture.
+        holds both models: trials of each texture; in the threshold task: trials of each frequency.
     models : tuple of str
         The sets of models that are compared, two at least; empty for the first two of the study.
     training_trials, most_training_trials : int
@@ -158,6 +158,11 @@ def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:
     _check_anchors(task, plan.anchors, textures)
     if task == "oddity":
         _check_oddity(plan)
+    if task == "threshold" and plan.schedule != "interleaved":
+        raise InputError(
+            "expected the schedule interleaved in [threshold], where no models are compared, got "
+            f"{plan.schedule}; correct it."
+        )
 
 
 def _check_anchors(task: str, anchors: Mapping[str, str], textures: tuple[str, ...]) -> None:

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial, update_wrapper
 from typing import Any, Literal
 
 from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
-from experiments.sessions.trial_loop import run_session
 from experiments.study.design import Occasion, Order, Trial, dealt, fisher_yates
 from experiments.study.models import ModelSets
 from modeling.models.loading import AnyModel
@@ -25,20 +23,6 @@ DESCRIPTION = (
     "A real and a virtual surface, said to correspond, are compared at will and their similarity "
     "is rated on two visual analogue scales without a preset marker."
 )
-TEXTS = {
-    "training": (
-        "Training",
-        "You will compare a real surface with its virtual copy. Switch between the two as often "
-        "as you like, then rate how alike they are on both scales. "
-        "These first ratings are for practice.",
-    ),
-    "main": (
-        "The ratings begin",
-        "Switch between the real surface and its virtual copy as often as you like, "
-        "then rate how alike they are on both scales.",
-    ),
-    "closing": ("Thank you", "This part is complete."),
-}
 
 Surface = Literal["real", "virtual"]
 SURFACES: tuple[Surface, ...] = ("real", "virtual")
@@ -145,12 +129,9 @@ def _ask(respondent: Respondent, trial: AbsoluteTrial, surfaces: Surfaces) -> Ma
 TASK = Task(
     name="absolute",
     description=DESCRIPTION,
-    texts=TEXTS,
     trial=AbsoluteTrial,
     trials=_trials,
     virtual=_virtual,
     begin=_begin,
     ask=_ask,
 )
-run_absolute = partial(run_session, TASK)
-update_wrapper(run_absolute, run_session, assigned=("__doc__",), updated=())

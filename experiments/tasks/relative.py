@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial, update_wrapper
 from typing import Any
 
 from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
-from experiments.sessions.trial_loop import run_session
 from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
 from modeling.models.loading import AnyModel
@@ -25,20 +23,6 @@ DESCRIPTION = (
     "Forced choice: which of the virtual surfaces, one per button and in a new layout each time, "
     "is the real surface that can be felt beside them?"
 )
-TEXTS = {
-    "training": (
-        "Training",
-        "One real surface is in place. Each numbered button presents a virtual surface; one of "
-        "them is its copy. Switch as often as you like, then confirm the one that you think it "
-        "is. These first choices are for practice.",
-    ),
-    "main": (
-        "The choices begin",
-        "Find the virtual surface that is the copy of the real one. Switch as often as you like; "
-        "if you are not sure, take the most similar one.",
-    ),
-    "closing": ("Thank you", "This part is complete."),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,12 +98,9 @@ def _ask(respondent: Respondent, trial: RelativeTrial, surfaces: Surfaces) -> Ma
 TASK = Task(
     name="relative",
     description=DESCRIPTION,
-    texts=TEXTS,
     trial=RelativeTrial,
     trials=_trials,
     virtual=_virtual,
     begin=_begin,
     ask=_ask,
 )
-run_relative = partial(run_session, TASK)
-update_wrapper(run_relative, run_session, assigned=("__doc__",), updated=())

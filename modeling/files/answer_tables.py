@@ -231,6 +231,13 @@ ANSWER_TABLES = {
             required=True,
         ),
         AnswerColumn(
+            name="highest_g",
+            description="Highest amplitude (peak) that the rig could present",
+            limits=(0, inf),
+            unit="g",
+            required=True,
+        ),
+        AnswerColumn(
             name="interval",
             description="Interval that held the sinusoid; the other one was silent",
             limits=(1, 2),

@@ -70,28 +70,28 @@ def check_rig(
 
 
 def layered(model: AnyModel) -> Layered:
-    """The model, which the program that plays can render.
+    """The model, if a desk rig can play one of its kind.
 
     Raises
     ------
     InputError
-        For an autoregressive one, which only Python renders.
+        For an AR model, which only the simulated rig renders.
     """
     if isinstance(model, ARModel):
         raise InputError(
-            f"expected a model of layers for a real rig, got an autoregressive one of "
-            f"{model.texture}; compare it on the simulated rig, or as a stimulus set."
+            f"expected a model of layers for a desk rig, got an AR model of {model.texture}; "
+            "compare models of layers there, or use the simulated rig."
         )
     return model
 
 
 def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
-    """Refuse models that a rig cannot play at their level and rate.
+    """Refuse models that a rig cannot play, or not at their level and rate.
 
     Raises
     ------
     InputError
-        For one that is not of layers, not in g, or of a higher rate than the card's.
+        For an AR model, one that is not in g, or of a higher rate than the card's.
     """
     for model in map(layered, models):
         if model.unit != "g":

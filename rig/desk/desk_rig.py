@@ -6,7 +6,7 @@ docs/rig-file.md
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from datetime import date
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from modeling import InputError
+from modeling.arrays import Floats
 from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
 from rig.desk.checks import Requirements, check_rig, layered
@@ -32,11 +33,13 @@ from rig.interface import (
     RigHealth,
     RigReading,
     Surface,
+    ToneBurst,
     grid_of,
 )
 from rig.live.memory import GONE, Live, now_s
 from rig.setup.rig_file import RigFile
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import Presented, SoundLost, SoundOutput
+from rig.sound.signals import tone_burst
 
 OLDEST_READING_S = 0.1
 FIRST_READING_S = 5.0
@@ -91,6 +94,7 @@ class DeskRig:
         self._opened_s = 0.0
         self._presentations = 0
         self._now: PresentationRecord | None = None
+        self._signal_end_s = 0.0
         self._playing = 0  # the card's own number of what is presented now
         self._ended: list[PresentationRecord] = []
         self._faults: list[Fault] = []
@@ -197,16 +201,11 @@ class DeskRig:
         Raises
         ------
         InputError
-            For a model of a higher rate than the card's.
+            For an AR model, or one of a higher rate than the card's.
         """
         self.silence()
         sound = self.parts.sound
-        try:
-            presented = sound.play(layered(model))
-            self._playing, start_s = presented.presentation, presented.time_s
-        except SoundLost as lost:
-            self._playing, start_s = 0, now_s()
-            self._fail(str(lost))
+        start_s = self._started(lambda: sound.play(layered(model)))
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",
@@ -216,6 +215,47 @@ class DeskRig:
             speeds_mm_s=speeds,
             forces_n=forces,
         )
+
+    def present_signal(self, burst: ToneBurst) -> float:
+        """Play a burst once, compensated; returns when its first sample has left.
+
+        One that still plays ends first. Where nothing plays any more, that is a fault.
+
+        Raises
+        ------
+        InputError
+            For a burst beyond the limits.
+        """
+        time.sleep(max(0.0, self._signal_end_s - now_s()))
+        self.silence()
+        sound, samples = self.parts.sound, self._samples(burst)
+        start_s = self._started(lambda: sound.play_signal(samples))
+        self._signal_end_s = start_s + burst.duration_s
+        return self._begin("virtual", f"{burst.frequency_hz:g} Hz", start_s=start_s)
+
+    def strongest_g(self, burst: ToneBurst) -> float:
+        """The highest amplitude of such a burst within the limits, compensation included."""
+        return self.parts.sound.largest_factor(self._samples(replace(burst, amplitude_g=1.0)))
+
+    def _samples(self, burst: ToneBurst) -> Floats:
+        made = tone_burst(
+            burst.frequency_hz,
+            burst.amplitude_g,
+            duration_s=burst.duration_s,
+            rate_hz=self._file.sound.rate_hz,
+        )
+        return made.samples_g
+
+    def _started(self, play: Callable[[], Presented]) -> float:
+        """Play, and say when the first sample left; a fault where nothing plays any more."""
+        try:
+            presented = play()
+            self._playing = presented.presentation
+            return presented.time_s
+        except SoundLost as lost:
+            self._playing = 0
+            self._fail(str(lost))
+            return now_s()
 
     def present_real(self, texture: str) -> float:
         """Fall silent, so that only the real surface is felt; returns since when."""

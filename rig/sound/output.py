@@ -239,6 +239,16 @@ class SoundOutput:
         check_signal(samples, self._plan(self._rate_hz))
         return samples
 
+    def largest_factor(self, samples_g: ArrayLike) -> float:
+        """How many times a signal (n,) g can be played within the limits; needs no device.
+
+        Infinite without limits of peak and RMS, and for silence.
+        """
+        samples = np.asarray(samples_g, dtype=np.float64)
+        if self._compensation is not None:
+            samples = self._compensation.apply(samples)
+        return largest_factor(samples, self._plan(self._rate_hz))
+
     def silence(self) -> Counted | None:
         """Fade to silence; return when it has left.
 
@@ -446,8 +456,6 @@ def check_signal(samples: Floats, plan: RenderPlan) -> None:
     The running mean square is taken to be at its limit when the signal begins, whatever was felt
     before.
     """
-    from scipy.signal import lfilter
-
     if samples.ndim != 1 or not samples.size or not np.isfinite(samples).all():
         raise InputError(
             f"expected a signal as (n,) finite numbers in g, got shape {samples.shape} or values "
@@ -461,9 +469,7 @@ def check_signal(samples: Floats, plan: RenderPlan) -> None:
             "the rig's limit."
         )
     if np.isfinite(limits.rms):
-        share = plan.mean_share
-        start = [(1 - share) * limits.mean_square]
-        squares, _ = lfilter([share], [1, share - 1], samples**2, zi=start)
+        squares = _mean_squares(samples, plan) + _left_of_limit(samples.size, plan)
         if squares.max() > limits.mean_square * (1 + 1e-9):
             raise InputError(
                 f"expected a signal with a running RMS of at most {limits.rms:g} g, got "
@@ -475,6 +481,36 @@ def check_signal(samples: Floats, plan: RenderPlan) -> None:
             f"expected a signal of at most {limits.duration_s:g} s without a pause, got "
             f"{longest / plan.rate_hz:.4g} s; shorten it or raise the rig's limit."
         )
+
+
+def largest_factor(samples: Floats, plan: RenderPlan) -> float:
+    """The largest factor by which a signal (n,) may be multiplied; refused above by `check_signal`.
+
+    Limits of peak and running RMS count, not that of the duration.
+    """
+    peak = float(np.abs(samples).max(initial=0.0))
+    if not peak:
+        return float("inf")
+    factor = plan.limits.peak / peak
+    if np.isfinite(plan.limits.rms):
+        room = plan.limits.mean_square - _left_of_limit(samples.size, plan)
+        squares = _mean_squares(samples, plan)
+        felt = squares > 0
+        factor = min(factor, float(np.sqrt((room[felt] / squares[felt]).min())))
+    return float(factor)
+
+
+def _mean_squares(samples: Floats, plan: RenderPlan) -> Floats:
+    """Running mean squares (g²) of a signal after silence, (n,)."""
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter([plan.mean_share], [1, plan.mean_share - 1], samples**2))
+
+
+def _left_of_limit(count: int, plan: RenderPlan) -> Floats:
+    """What is left, sample by sample, of a running mean square that was at its limit before."""
+    left: Floats = plan.limits.mean_square * (1 - plan.mean_share) ** np.arange(1, count + 1)
+    return left
 
 
 def _longest_run(loud: np.ndarray[Any, np.dtype[np.bool_]], pause: int) -> int:

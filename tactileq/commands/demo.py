@@ -22,10 +22,13 @@ if TYPE_CHECKING:
     from analysis.report.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
+    from experiments.observers.psychometrics import Psychometrics
     from modeling import ARModel, Threshold
     from stimuli.sets.recipe import Recipe
 
 JOBS = 2
+# Points by which simulated participants rate simplified models lower; no points elsewhere.
+PLANTED_TEXTURE, PLANTED_POINTS = "MDF", -12.0
 CHART_TURNS = 5
 Result = TypeVar("Result")
 
@@ -60,6 +63,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             }
         )
         real = {r.texture: r.truth for r in made if r.truth is not None}
+        population = demo_population(plan.textures)
         run_study(
             plan,
             real=real,
@@ -67,6 +71,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             data=fresh / "data",
             threshold=threshold,
             seed=seed,
+            psychometrics=population,
         )
         with progress("Predicting conditions that were left out", len(made)) as advance:
             results, rivals = zip(*_told(checked, advance, lambda c: c[0].texture), strict=True)
@@ -79,6 +84,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             "criterion": results[0].simplification.criterion,
             "margin_db": results[0].simplification.margin_db,
             "study": plan.to_dict(),
+            "planted": population.planted,
         }
         provenance = provenance_of("demo", settings, seed=seed)
         write_demo_report(
@@ -91,6 +97,15 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
         )
         seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
+
+
+def demo_population(textures: Sequence[str]) -> Psychometrics:
+    """People to whom simplified models differ in the magnitude of one texture, and nowhere else."""
+    from experiments.observers.psychometrics import SCALES, Psychometrics
+
+    planted = {texture: dict.fromkeys(SCALES, 0.0) for texture in textures}
+    planted[PLANTED_TEXTURE]["magnitude_similarity"] = PLANTED_POINTS
+    return Psychometrics(planted=planted)
 
 
 def demo_recipe(folder: Path, *, seed: int) -> Recipe:

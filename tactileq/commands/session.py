@@ -23,8 +23,8 @@ else:
 
 def session(
     task: Annotated[TaskName, typer.Option(help="Which evaluation.")],
-    subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")],
-    models: Models = Path("models"),
+    subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")] = 1,
+    models: Models = None,
     simplified: Simplified = None,
     scene: SceneModels = None,
     data: Data = Path("data"),
@@ -33,60 +33,80 @@ def session(
     rig: Annotated[
         Path | None, typer.Option(help="Rig file (TOML); the simulated rig without it.")
     ] = None,
+    resume: Annotated[
+        bool, typer.Option(help="Go on with a session that was aborted or broke off.")
+    ] = False,
+    pilot: Annotated[bool, typer.Option(help="Mark all answers as those of a pilot.")] = False,
+    language: Annotated[
+        str, typer.Option(help="Of the participant's screen; the study's first without it.")
+    ] = "",
     override: Annotated[
         str | None,
-        typer.Option(help="Reason to use a rig of a latency above 40 ms; it is stored."),
+        typer.Option(
+            help="Reason to go on where a rule is broken, such as a rig of a latency above 40 ms "
+            "or a second day on the same date; it is stored."
+        ),
     ] = None,
+    selftest: Annotated[
+        bool, typer.Option(help="Only time screen, rig and disk against what a session needs.")
+    ] = False,
     fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
     screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
 ) -> None:
-    """Run one participant's session at the console.
+    """Run one participant's session at the console; the experimenter sits at this terminal.
 
-    A trial in which the rig fails is stored, marked and repeated once at the end of its phase.
+    The terminal asks for samples by their tray. A session that was aborted or broke off goes on
+    with --resume. A trial in which the rig fails is stored, marked and repeated once at the end of
+    its phase.
 
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
-    from experiments.sessions.trial_loop import run_session
+    from experiments.sessions.bids import export_session
+    from experiments.sessions.running import Circumstances, run_session
+    from experiments.sessions.trial_loop import People
     from experiments.study.study import Study
     from experiments.tasks import task_named
-    from modeling.files.provenance import write_provenance
+    from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
-    sets, inputs = models_to_compare(models, simplified, scene)
-    sets.require(plan)
+    sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
+    device = rig_of(plan, sets, rig=rig, override=override)
+    if selftest:
+        tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
+        return
     tell_controls(sets, plan.textures)
-    device, rig_files, rig_settings = rig_of(plan, sets, rig=rig, override=override)
+    stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
         print("note: the rig is simulated; its data are marked so.")
-    with open_console(fullscreen=fullscreen, screen=screen) as console:
-        result = run_session(
+    circumstances = Circumstances(
+        pilot=pilot, language=language, override=override, resume=resume, sources=sources
+    )
+    with open_console(
+        plan, language=language, stamp=stamp, fullscreen=fullscreen, screen=screen
+    ) as console:
+        result, manifest = run_session(
             task_named(task),
             plan,
             subject=subject,
             session=number,
             models=sets,
             rig=device,
-            respondent=console,
+            people=People(respondent=console, experimenter=Terminal()),
             data_folder=data,
+            circumstances=circumstances,
         )
-    note = data / "sourcedata" / f"{result.path.stem.removesuffix('_beh')}_provenance.json"
-    settings = {
-        "task": task,
-        "study_sha256": plan.sha256,
-        "models_sha256": sets.sha256(plan.textures),
-        **scene_settings(sets),
-        **rig_settings,
-    }
-    write_provenance(note, "session", settings, inputs=[*inputs, *rig_files])
+    export_session(data, manifest)
     if result.invalid:
         print(f"note: the rig failed in {result.invalid} trials; the log says how.")
-    print(f"{'completed' if result.completed else 'ended early'}: {result.path}")
+    if result.completed:
+        print(f"completed: {manifest.parent}")
+    else:
+        left = f"{result.answered} of {result.planned} trials answered"
+        print(f"ended early ({result.reason}), {left}; go on with --resume: {manifest.parent}")
 
 
-def rig_of(
-    plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None
-) -> tuple[TextureRig, list[Path], dict[str, object]]:
-    """The rig that a session presents on, its files, and what a provenance says of it.
+def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None) -> TextureRig:
+    """The rig that a session presents on.
 
     Parameters
     ----------
@@ -104,73 +124,106 @@ def rig_of(
     InputError
         For a rig file that is none, and for a rig that does not do for this study.
     """
-    from modeling.checks import check_name
     from rig.desk.checks import Requirements, check_models
     from rig.desk.desk_rig import DeskRig
     from rig.setup.rig_file import RigFile
     from rig.twin import SimulatedRig
 
-    if override is not None:
-        check_name("the reason of --override", override)
     if rig is None:
-        if override is not None:
-            raise ValueError("expected --rig with --override, got none; name the rig file.")
-        return SimulatedRig(), [], {}
+        return SimulatedRig()
     file = RigFile.load(rig)
     wanted = Requirements(
         calibration_days=plan.calibration_days, measured_force=plan.measured_force
     )
     device = DeskRig(file, requirements=wanted, override=override)
-    check_models(
-        file, [models[texture] for models in sets.sets.values() for texture in plan.textures]
-    )
-    return device, [rig, *file.files], {"rig_sha256": file.sha256, "override": override}
+    check_models(file, [sets.of(texture, name) for name in sets.names for texture in plan.textures])
+    return device
 
 
-def models_to_compare(
-    models: Path, simplified: Path | None, scene: Path | None
-) -> tuple[ModelSets, list[Path]]:
-    """Full models and those that a study compares them with, and all that was read for them.
+def models_of_study(
+    plan: Study,
+    study: Path | None,
+    *,
+    models: Path | None,
+    simplified: Path | None,
+    scene: Path | None,
+) -> tuple[ModelSets, dict[str, str]]:
+    """The sets of models of a study, and where each came from.
 
-    The latter are simplified ones, or those of a scene; a scene file is compiled.
+    `models` stands in the place of the study's first set, `simplified` or `scene` in that of its
+    second one.
     """
-    from experiments.study.models import ModelSets
-    from modeling.models.loading import load_models
-    from modeling.scenes.loading import scene_files, scene_models
+    from experiments.study.models import load_model_sets
 
-    full = load_models(models)
-    if scene is None:
-        fewer = simplified or Path("simplified")
-        return ModelSets(sets={"full": full, "simplified": load_models(fewer)}), [models, fewer]
-    if simplified is not None:
+    if simplified is not None and scene is not None:
         raise ValueError(
             f"expected simplified models or a scene, got both ({simplified} and {scene}); remove "
             "--simplified or --scene."
         )
-    files = scene_files(scene)
+    given = dict(zip(plan.models, (models, simplified or scene), strict=False))
+    overriding = {name: place for name, place in given.items() if place is not None}
+    folder = Path() if study is None else study.parent
+    places = {name: overriding.get(name, folder / place) for name, place in plan.models.items()}
+    sources = {name: str(place) for name, place in places.items()}
+    if not any(place.suffix == ".toml" for place in places.values()):
+        return load_model_sets(plan, folder, overriding=overriding)[0], sources
     with share_of("Compiling the scene") as tell:
-        least = scene_models(scene, full, progress=tell)
-    return ModelSets(sets={"full": full, "simplified": least}), [models, *files]
+        sets, _ = load_model_sets(plan, folder, overriding=overriding, progress=tell)
+    return sets, sources
 
 
-def scene_settings(sets: ModelSets) -> dict[str, object]:
-    """What a provenance says of the scene whose models a study presents; nothing without one."""
-    if sets.scene is None:
-        return {}
-    return {"scene": sets.scene.scene, "scene_sha256": sets.scene.scene_sha256}
-
-
-def open_console(*, fullscreen: bool, screen: int) -> Console:
-    """The console's window; where there is no screen, one sentence instead of a traceback."""
+def open_console(
+    plan: Study, *, language: str, stamp: str, fullscreen: bool, screen: int
+) -> Console:
+    """The console's window in the participant's language, which must have all texts."""
     from experiments.console.console import Console
+    from experiments.console.languages import Texts
+
+    for name in plan.languages:
+        Texts.load(name).require(plan.questions)
+    return Console(
+        language=language or plan.languages[0], stamp=stamp, fullscreen=fullscreen, screen=screen
+    )
+
+
+def tell_timings(
+    sets: ModelSets,
+    device: TextureRig,
+    *,
+    plan: Study,
+    data: Path,
+    fullscreen: bool,
+    screen: int,
+) -> None:
+    """Time screen, rig and disk, and print them beside their limits.
+
+    Raises
+    ------
+    InputError
+        Where one of them is too slow.
+    """
+    from rich.console import Console as Paper
+    from rich.table import Table
+
+    from experiments.console.selftest import time_flips, time_presentations, time_syncs
     from modeling import InputError
 
-    try:
-        return Console(fullscreen=fullscreen, screen=screen)
-    except InputError:
-        raise
-    except Exception as error:  # whatever the window system raises means the same to a user
-        raise ValueError(
-            f"expected a screen for the console, got {error or type(error).__name__}; start a "
-            "graphical session (or Xvfb) and set DISPLAY."
-        ) from error
+    models = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
+    timings = [
+        time_flips(screen=screen, fullscreen=fullscreen),
+        time_presentations(device, models),
+        time_syncs(data),
+    ]
+    table = Table("", "", "median", "99th percentile", "limit", "")
+    for timing in timings:
+        numbers = (timing.median_ms, timing.p99_ms, timing.limit_ms)
+        told = [f"{number:.1f} ms" for number in numbers]
+        table.add_row(timing.name, timing.meaning, *told, "ok" if timing.within else "too slow")
+    Paper().print(table)
+    if device.simulated:
+        print("note: the rig is simulated; its presentations say nothing of a real one.")
+    if slow := [timing.name for timing in timings if not timing.within]:
+        raise InputError(
+            f"expected {', '.join(slow)} within the limit, got longer; close other programs, or use "
+            "another screen, rig or disk."
+        )

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tactileq.commands.session import models_to_compare, scene_settings
+from tactileq.commands.session import models_of_study
 from tactileq.options import (
     Data,
     Models,
@@ -19,13 +19,14 @@ from tactileq.options import (
 from tactileq.telling import progress, tell_controls
 
 if TYPE_CHECKING:
+    from experiments.observers.psychometrics import Psychometrics
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
     from modeling import TextureModel, Threshold
 
 
 def simulate(
-    models: Models = Path("models"),
+    models: Models = None,
     simplified: Simplified = None,
     scene: SceneModels = None,
     data: Data = Path("data"),
@@ -51,10 +52,18 @@ def simulate(
             f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
         )
     real = {name: planted_texture(name) for name in plan.textures}
-    sets, inputs = models_to_compare(models, simplified, scene)
+    sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     sets.require(plan)
     felt_above = Threshold.named(threshold)
-    run_study(plan, real=real, models=sets, data=data, threshold=felt_above, seed=seed)
+    run_study(
+        plan,
+        real=real,
+        models=sets,
+        data=data,
+        threshold=felt_above,
+        seed=seed,
+        sources=sources,
+    )
     note = data / "sourcedata" / "simulate_provenance.json"
     settings = {
         "study": plan.to_dict(),
@@ -62,10 +71,25 @@ def simulate(
         "models_sha256": sets.sha256(plan.textures),
         "threshold": threshold,
         "threshold_sha256": felt_above.sha256,
-        **scene_settings(sets),
+        **_scene_settings(sets),
     }
+    inputs = [file for place in sources.values() for file in _read_for(Path(place))]
     write_provenance(note, "simulate", settings, seed=seed, inputs=inputs)
     print(f"simulated answers: {data}")
+
+
+def _scene_settings(sets: ModelSets) -> dict[str, object]:
+    """What a provenance says of the scene whose models a study presents; nothing without one."""
+    if sets.scene is None:
+        return {}
+    return {"scene": sets.scene.scene, "scene_sha256": sets.scene.scene_sha256}
+
+
+def _read_for(place: Path) -> tuple[Path, ...]:
+    """What was read for a set of models: a folder, or a scene file and all that it names."""
+    from modeling.scenes.loading import scene_files
+
+    return (place,) if place.is_dir() else scene_files(place)
 
 
 def run_study(
@@ -76,6 +100,8 @@ def run_study(
     data: Path,
     threshold: Threshold,
     seed: int,
+    psychometrics: Psychometrics | None = None,
+    sources: Mapping[str, str] | None = None,
 ) -> None:
     """Simulate all participants of a study at the simulated rig, with a progress bar."""
     from experiments.observers.whole_study import simulate_study
@@ -87,11 +113,12 @@ def run_study(
         simulate_study(
             plan,
             real=real,
-            full=models.sets["full"],
-            simplified=models.sets["simplified"],
+            models=models,
             rig=SimulatedRig(real, seed=seed),
             data_folder=data,
             seed=seed,
             threshold=threshold,
+            psychometrics=psychometrics,
+            sources=sources,
             progress=lambda done, total, name: advance(name),
         )

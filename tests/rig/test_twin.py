@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from modeling import InputError, Renderer, regressed
 from modeling.models.loading import Layered
-from rig.interface import SURFACES, RigReading, TextureRig
+from rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
+from rig.sound.signals import tone_burst
 from rig.twin import SimulatedRig
 from tests.rig.planted import planted_model as model
 
@@ -176,3 +179,37 @@ def test_a_fault_is_told_once_and_opening_forgets_what_was_before() -> None:
     assert rig.take_faults() == ()
     rig.open()
     assert (len(rig.take_history()), rig.take_presentations()) == (0, ())
+
+
+def test_a_burst_is_felt_once_to_its_end_whatever_the_hand_does() -> None:
+    rig = SimulatedRig()
+    rig.open()
+    rig.press_button()
+    burst = ToneBurst(frequency_hz=50.0, amplitude_g=0.2, duration_s=0.505)
+    assert rig.present_signal(burst) == 0.0
+    assert rig.now_s() == pytest.approx(0.51)  # ends within a step
+    assert feel(rig, 3).size == 0
+    rig.silence()
+    (record,) = rig.take_presentations()
+    assert (record.surface, record.texture, record.model_sha256) == ("virtual", "50 Hz", "")
+    assert record.speeds_mm_s is None  # no grid: nobody strokes outside of it
+    expected = tone_burst(50.0, 0.2, duration_s=0.505, rate_hz=5000.0).samples_g
+    assert record.peak_g == np.abs(expected).max() == pytest.approx(0.2)
+    assert record.played_s == pytest.approx(0.505)
+    assert record.dose_g2_s == pytest.approx(float(expected @ expected) / 5000.0)
+
+
+def test_a_press_during_a_burst_is_reported_after_it() -> None:
+    rig = SimulatedRig()
+    rig.press_button()
+    rig.present_signal(ToneBurst(frequency_hz=50.0, amplitude_g=0.0, duration_s=0.1))
+    assert [rig.read().button for _ in range(2)] == [True, False]
+
+
+def test_a_burst_beyond_its_highest_amplitude_is_refused() -> None:
+    rig = SimulatedRig()
+    burst = ToneBurst(frequency_hz=50.0, amplitude_g=1.0, duration_s=0.1)
+    highest_g = rig.strongest_g(burst)
+    rig.present_signal(replace(burst, amplitude_g=highest_g))
+    with pytest.raises(InputError, match="expected a signal of at most 5 g, got 5.01 g"):
+        rig.present_signal(replace(burst, amplitude_g=highest_g + 0.01))

@@ -2,169 +2,46 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from scipy import integrate, stats
 
-from experiments.observers.simulated import (
-    BAND_EDGES_HZ,
-    STROKES,
-    Distance,
-    Perception,
-    Psychometrics,
-    SimulatedParticipant,
-    distance,
-    sensation_levels,
-)
-from experiments.sessions.surfaces import Surfaces
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import Psychometrics, Trait, choice_shares
+from experiments.observers.simulated import SimulatedParticipant, require_plantable
+from experiments.sessions.surfaces import Intake, Surfaces
 from experiments.study.models import ModelSets
+from experiments.study.questions import Question
 from experiments.study.study import Study
-from experiments.tasks import plan_session
+from experiments.tasks.absolute import AbsoluteTrial
+from experiments.tasks.oddity import OddityTrial
+from experiments.tasks.relative import RelativeTrial
 from modeling import InputError, TextureModel, Threshold
 
-PERCEPTS = arrays(np.float64, (3, 9), elements=st.floats(0.0, 80.0))
-
-
-def flat_threshold(level_g: float, low_hz: float = 1.0, high_hz: float = 2000.0) -> Threshold:
-    return Threshold("flat", np.array([low_hz, high_hz]), np.full(2, level_g), "made up", "none")
-
-
-def texture_model(
-    noise_gain: float, layers: tuple[tuple[float, float, float], ...] = ()
-) -> TextureModel:
-    """The same noise gain and layers (f, B, G) at every condition."""
-    grid = np.array(layers).reshape(1, 1, len(layers), 3).repeat(2, 0).repeat(2, 1)
-    return TextureModel(
-        texture="made up",
-        rate_hz=5000.0,
-        speeds_mm_s=np.array([50.0, 350.0]),
-        forces_n=np.array([0.5, 3.5]),
-        noise_gains=np.full((2, 2), noise_gain),
-        frequencies_hz=grid[..., 0],
-        bandwidths_hz=grid[..., 1],
-        gains=grid[..., 2],
-        level_sd_db=np.zeros(grid.shape[:3]),
-        estimator="planted",
-    )
-
-
-def test_white_noise_is_felt_by_the_power_in_each_band() -> None:
-    gain, limit_g = 0.2, 0.01
-    levels = sensation_levels(texture_model(gain), flat_threshold(limit_g))
-    power = gain**2 * (2 / 5000.0) * np.diff(BAND_EDGES_HZ)
-    expected = 20 * np.log10(np.sqrt(2 * power) / limit_g)
-    np.testing.assert_allclose(levels, np.tile(expected, (len(STROKES), 1)), atol=1e-9)
-
-
-def test_a_narrow_layer_is_felt_as_the_sinusoid_of_equal_power() -> None:
-    """`energy` (docs/method/perception.md#criteria): √2·G·√(k/(1+k)) with k = tan(πB/rate)."""
-    gain, bandwidth_hz, limit_g = 0.5, 2.0, 0.001
-    k = np.tan(np.pi * bandwidth_hz / 5000.0)
-    amplitude_g = np.sqrt(2) * gain * np.sqrt(k / (1 + k))
-    model = texture_model(0.0, ((215.0, bandwidth_hz, gain),))
-    level = sensation_levels(model, flat_threshold(limit_g))[:, 6]  # 180 … 250 Hz
-    np.testing.assert_allclose(level, 20 * np.log10(amplitude_g / limit_g), atol=0.1)
-
-
-def test_what_is_below_threshold_changes_nothing() -> None:
-    loud = ((70.0, 10.0, 0.5),)
-    felt = sensation_levels(texture_model(1e-4, loud), flat_threshold(0.02))
-    fainter = sensation_levels(texture_model(1e-6, loud), flat_threshold(0.02))
-    faint_layer = texture_model(1e-4, (*loud, (300.0, 20.0, 0.02)))
-    with_layer = sensation_levels(faint_layer, flat_threshold(0.02))
-    assert np.count_nonzero(felt) == 3
-    np.testing.assert_allclose(fainter, felt, atol=0.01)
-    np.testing.assert_allclose(with_layer, felt, atol=0.01)
-    np.testing.assert_array_equal(with_layer == 0, felt == 0)
-
-
-def test_nothing_is_felt_where_no_threshold_is_known() -> None:
-    levels = sensation_levels(texture_model(0.5), flat_threshold(0.001, 60.0, 180.0))
-    np.testing.assert_array_equal(levels > 0, np.tile([0, 0, 0, 1, 1, 1, 0, 0, 0], (3, 1)))
-
-
-def test_models_in_arbitrary_units_are_refused() -> None:
-    model = replace(texture_model(0.5), unit="arbitrary")
-    with pytest.raises(InputError, match="expected a model in g"):
-        sensation_levels(model, flat_threshold(0.001))
-
-
-@given(PERCEPTS, PERCEPTS)
-def test_distance_is_symmetric_and_splits_as_pythagoras_says(
-    first: np.ndarray, second: np.ndarray
-) -> None:
-    there, back = distance(first, second), distance(second, first)
-    np.testing.assert_allclose(
-        [there.magnitude_db, there.frequency_db], [back.magnitude_db, back.frequency_db]
-    )
-    rms = np.sqrt(((first - second) ** 2).mean())
-    np.testing.assert_allclose(there.total_db, rms, rtol=1e-9, atol=1e-9)
-    assert distance(first, first) == Distance(0.0, 0.0)
-
-
-@given(PERCEPTS, st.floats(-20.0, 20.0))
-def test_a_change_of_level_alone_is_a_distance_in_magnitude_alone(
-    percept: np.ndarray, gain_db: float
-) -> None:
-    apart = distance(percept, percept + gain_db)
-    np.testing.assert_allclose(apart.magnitude_db, abs(gain_db), atol=1e-9)
-    np.testing.assert_allclose(apart.frequency_db, 0.0, atol=1e-9)
-
-
-def cut_off_mean(mean: float, sd: float) -> float:
-    """Mean of a normal variable cut off at 0 and 100, by quadrature."""
-    density = stats.norm(mean, sd).pdf
-    inside, _ = integrate.quad(lambda x: x * density(x), 0.0, 100.0)
-    return inside + 100.0 * float(stats.norm.sf(100.0, mean, sd))
-
-
-def test_the_true_rating_falls_by_e_with_each_scale() -> None:
-    exact = Psychometrics(bias_sd=0.0, noise_sd=0.0, scale_db=10.0)
-    np.testing.assert_allclose(exact.true_rating([0.0, 10.0]), [100.0, 100.0 / np.e])
-
-
-@given(
-    arrays(np.float64, st.integers(2, 12), elements=st.floats(0.0, 1000.0)),
-    st.floats(0.05, 50.0),
-    st.floats(0.0, 1.0),
+EXACT = Psychometrics(
+    threshold_db=Trait(0.0),
+    sensitivity=Trait(1.0),
+    magnitude_bias=Trait(0.0),
+    frequency_bias=Trait(0.0),
+    lapse_rate=Trait(0.0),
+    learning=Trait(0.0),
+    care=Trait(1.0),
+    preference_sd=0.0,
+    noise_sd=0.0,
 )
-def test_choice_probabilities_follow_luce(
-    distances: np.ndarray, temperature_db: float, lapse_rate: float
-) -> None:
-    rule = Psychometrics(temperature_db=temperature_db, lapse_rate=lapse_rate)
-    probabilities = rule.choice_probabilities(distances)
-    np.testing.assert_allclose(probabilities.sum(), 1.0)
-    assert probabilities.min() >= lapse_rate / distances.size - 1e-12
-    nearer = distances[:, None] < distances[None, :]
-    assert (probabilities[:, None] >= probabilities[None, :] - 1e-12)[nearer].all()
-
-
-def test_choice_probabilities_by_hand() -> None:
-    rule = Psychometrics(temperature_db=2.0, lapse_rate=0.1)
-    expected = 0.9 * np.array([2 / 3, 1 / 3]) + 0.05
-    np.testing.assert_allclose(rule.choice_probabilities([1.0, 1.0 + 2 * np.log(2)]), expected)
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [{"scale_db": 0.0}, {"bias_sd": -1.0}, {"temperature_db": float("nan")}, {"lapse_rate": 1.1}],
-)
-def test_impossible_psychometrics_are_refused(wrong: dict[str, float]) -> None:
-    with pytest.raises(InputError, match=f"expected a {next(iter(wrong))}"):
-        Psychometrics(**wrong)
+LAYOUT = ("PVC", "canvas", "MDF")
+MakeSurfaces = Callable[..., Surfaces]
 
 
 @pytest.fixture
 def perception(
     study: Study, truths: dict[str, TextureModel], models: ModelSets, threshold: Threshold
 ) -> Perception:
-    # A virtual surface that is 6 dB too strong, so that ratings are not all at the ceiling.
+    # A reference that is 6 dB too strong, so that it does not feel like the real surface.
     louder = {
         name: replace(model, gains=2 * model.gains, noise_gains=2 * model.noise_gains)
         for name, model in truths.items()
@@ -173,67 +50,325 @@ def perception(
     return Perception(study, real=truths, models=sets, threshold=threshold)
 
 
-def test_many_ratings_agree_with_the_planted_truth(
-    study: Study, perception: Perception, models: ModelSets, rig: Any
+@pytest.fixture
+def surfaces(models: ModelSets, rig: Any) -> MakeSurfaces:
+    def make(count: int = 1, note: Any = lambda event, **fields: None) -> Surfaces:
+        shown = [models.of("MDF", "full")] * count
+        begin = Surfaces.present_real if count != 3 else Surfaces.present_virtual
+        return Surfaces(rig, texture="MDF", models=shown, begin=begin, note=note)
+
+    return make
+
+
+def somebody(perception: Perception, population: Psychometrics, subject: int = 1, **of: Any) -> Any:
+    who = {"seed": 5, "occasion": (1,), **of}
+    return SimulatedParticipant(perception, population, subject=subject, **who)
+
+
+def absolute(model: str, texture: str = "MDF", trial: int = 1, virtual: str = "") -> AbsoluteTrial:
+    return AbsoluteTrial(
+        trial=trial,
+        phase="main",
+        texture=texture,
+        model=model,
+        tray="A",
+        virtual_texture=virtual or texture,
+        first_surface="real",
+    )
+
+
+def relative(model: str, texture: str = "MDF") -> RelativeTrial:
+    place = {"trial": 1, "phase": "main", "tray": "A"}
+    return RelativeTrial(texture=texture, model=model, layout=LAYOUT, **place)
+
+
+def oddity(odd: str = "simplified", position: int = 2, texture: str = "MDF") -> OddityTrial:
+    same = {"simplified": "full", "full": "simplified"}[odd]
+    layout = tuple(odd if button == position else same for button in (1, 2, 3))
+    place = {"trial": 1, "phase": "main", "tray": "A", "texture": texture, "model": odd}
+    return OddityTrial(layout=layout, odd_position=position, **place)
+
+
+def rated(person: Any, trial: AbsoluteTrial, surfaces: MakeSurfaces) -> tuple[float, float]:
+    rating = person.rate(trial, surfaces())
+    return rating.magnitude_similarity, rating.frequency_similarity
+
+
+# --- Ratings --------------------------------------------------------------------------------
+
+
+def test_ratings_of_the_exact_follow_distances(
+    perception: Perception, surfaces: MakeSurfaces
 ) -> None:
-    truth = Psychometrics(scale_db=8.0, bias_sd=12.0, noise_sd=16.0)
-    trials = plan_session(study, task="absolute", subject=1, session=1).trials
-    trial = next(t for t in trials if (t.texture, t.model) == ("MDF", "full"))
-    surfaces = Surfaces(rig, texture="MDF", models=[models.sets["full"]["MDF"]])
-    surfaces.present_real()
-    ratings = []
+    for model in ("full", "simplified"):
+        apart = perception.distance("MDF", model, "MDF")
+        expected = [EXACT.felt_rating(apart.magnitude_db), EXACT.felt_rating(apart.frequency_db)]
+        found = rated(somebody(perception, EXACT), absolute(model), surfaces)
+        np.testing.assert_allclose(found, expected, atol=0.005)
+    assert perception.distance("MDF", "full", "MDF").magnitude_db > 1.0
+
+
+@pytest.mark.parametrize("effect", [-12.0, 0.0, 9.0])
+def test_a_planted_effect_is_anybodys_by_their_sensitivity(
+    perception: Perception, effect: float
+) -> None:
+    population = Psychometrics(planted={"MDF": {"magnitude_similarity": effect}})
+    for subject in range(1, 101):
+        person = somebody(perception, population, subject)
+        full, simplified = (person.mean_ratings(absolute(m)) for m in ("full", "simplified"))
+        attentive = (simplified[0] - full[0]) * (1 - person.person.lapse_rate)
+        assert attentive == pytest.approx(effect * person.person.sensitivity, abs=1e-9)
+        # What is not planted follows percepts.
+        assert simplified[1] != full[1]
+
+
+@pytest.mark.parametrize("effect", [-12.0, 0.0, 9.0])
+def test_what_is_planted_in_ratings_comes_back(
+    perception: Perception, surfaces: MakeSurfaces, effect: float
+) -> None:
+    scales = ("magnitude_similarity", "frequency_similarity")
+    population = Psychometrics(
+        lapse_rate=Trait(0.1, 0.02), planted={"MDF": dict.fromkeys(scales, effect)}
+    )
+    differences = []
     for subject in range(1, 2001):
-        person = SimulatedParticipant(perception, truth, seed=5, subject=subject, occasion=(1,))
-        given_ = person.rate(trial, surfaces)
-        ratings.append((given_.magnitude_similarity, given_.frequency_similarity))
-    apart = perception.distance("MDF", "full", "MDF")
-    means = truth.true_rating([apart.magnitude_db, apart.frequency_db])
-    expected = [cut_off_mean(mean, np.hypot(12.0, 16.0)) for mean in means]
-    error = np.std(ratings, axis=0) / np.sqrt(len(ratings))
-    assert (np.abs(np.mean(ratings, axis=0) - expected) < 4 * error).all()
-    assert 1.0 < expected[0] < 90.0
-    assert np.min(ratings) >= 0.0
-    assert np.max(ratings) <= 100.0
+        person = somebody(perception, population, subject)
+        full, simplified = (rated(person, absolute(m), surfaces) for m in ("full", "simplified"))
+        differences.append(np.subtract(simplified, full))
+    error = np.std(differences, axis=0) / np.sqrt(len(differences))
+    assert (np.abs(np.mean(differences, axis=0) - effect) < 4 * error).all()
+    assert (error < 0.6).all()
 
 
-def test_many_choices_agree_with_the_planted_truth(
-    study: Study, perception: Perception, models: ModelSets, rig: Any
+def test_ratings_have_the_mean_and_noise_that_they_were_given(
+    perception: Perception, surfaces: MakeSurfaces
 ) -> None:
-    truth = Psychometrics(temperature_db=4.0, lapse_rate=0.1)
-    trial = plan_session(study, task="relative", subject=1, session=1).trials[0]
-    layout = [models.of(texture, trial.model) for texture in trial.layout]
-    person = SimulatedParticipant(perception, truth, seed=6, subject=1, occasion=(1,))
-    surfaces = Surfaces(rig, texture=trial.texture, models=layout)
-    counts = np.zeros(3)
-    for _ in range(3000):
-        counts[person.choose(trial, surfaces).button] += 1
-    apart = [perception.distance(trial.texture, trial.model, t).total_db for t in trial.layout]
-    expected = 3000 * truth.choice_probabilities(apart)
-    assert stats.chisquare(counts, expected).pvalue > 0.001
+    """At the middle of the scale: noise_sd·(1 + learning)/√care in the first trial."""
+    apart = perception.distance("MDF", "full", "MDF").magnitude_db
+    to_middle = 50.0 - EXACT.felt_rating(apart)
+    population = replace(
+        EXACT,
+        noise_sd=16.0,
+        learning=Trait(0.5),
+        care=Trait(4.0),
+        magnitude_bias=Trait(to_middle),
+    )
+    person = somebody(perception, population)
+    one = surfaces()
+    ratings = [person.rate(absolute("full"), one).magnitude_similarity for _ in range(6000)]
+    sd = 16.0 * 1.5 / 2
+    assert abs(np.mean(ratings) - 50.0) < 4 * sd / np.sqrt(6000)
+    assert np.std(ratings) == pytest.approx(sd, rel=0.04)
+    late = [person.rate(absolute("full", trial=500), one).magnitude_similarity for _ in range(6000)]
+    assert np.std(late) == pytest.approx(8.0, rel=0.04)
 
 
-def test_a_subject_keeps_the_bias_and_not_the_noise(
-    study: Study, perception: Perception, models: ModelSets, rig: Any
+def test_lapsed_ratings_are_anywhere(perception: Perception, surfaces: MakeSurfaces) -> None:
+    population = replace(EXACT, lapse_rate=Trait(0.5))
+    person, one = somebody(perception, population), surfaces()
+    attentive = EXACT.felt_rating(perception.distance("MDF", "full", "MDF").magnitude_db)
+    ratings = np.array(
+        [person.rate(absolute("full"), one).magnitude_similarity for _ in range(4000)]
+    )
+    lapsed = ratings[np.abs(ratings - attentive) > 0.01]
+    assert stats.binomtest(len(lapsed), len(ratings), 0.5).pvalue > 1e-4
+    assert stats.kstest(lapsed / 100, "uniform").pvalue > 1e-4
+
+
+def test_hardly_any_rating_is_at_100(
+    study: Study, truths: dict[str, TextureModel], models: ModelSets, surfaces: Any, threshold: Any
 ) -> None:
-    trial = plan_session(study, task="absolute", subject=1, session=1).trials[0]
-    surfaces = Surfaces(rig, texture=trial.texture, models=[models.sets["full"][trial.texture]])
+    """Even where the virtual surface is the real one, and effects are planted upwards."""
+    alike = Perception(study, real=truths, models=models, threshold=threshold)
+    population = Psychometrics(planted={"MDF": {"magnitude_similarity": 10.0}})
+    ratings = np.array(
+        [
+            rated(somebody(alike, population, n), absolute(model, trial=9), surfaces)
+            for n in range(1, 1001)
+            for model in ("full", "simplified")
+        ]
+    )
+    assert np.mean(ratings >= 99.5) < 0.05
+    assert 0.0 <= ratings.min() < ratings.max() <= 100.0
+    assert ratings.mean() > 70.0
 
-    def magnitude(noise_sd: float, **who: int) -> float:
-        truth = Psychometrics(bias_sd=3.0, noise_sd=noise_sd, scale_db=30.0)
-        person = SimulatedParticipant(perception, truth, seed=7, **who)
-        return person.rate(trial, surfaces).magnitude_similarity
+
+def test_an_anchor_is_rated_as_another_texture(
+    perception: Perception, surfaces: MakeSurfaces
+) -> None:
+    planted = replace(EXACT, planted={"MDF": {"magnitude_similarity": 0.0}})
+    found = rated(somebody(perception, planted), absolute("full", virtual="PVC"), surfaces)
+    apart = perception.distance("MDF", "full", "PVC")
+    expected = [EXACT.felt_rating(apart.magnitude_db), EXACT.felt_rating(apart.frequency_db)]
+    np.testing.assert_allclose(found, np.maximum(expected, 3.0), atol=0.005)
+
+
+def test_a_subject_keeps_traits_and_not_the_noise(
+    perception: Perception, surfaces: MakeSurfaces
+) -> None:
+    def magnitude(noise_sd: float, **who: Any) -> float:
+        population = replace(EXACT, magnitude_bias=Trait(0.0, 3.0), noise_sd=noise_sd)
+        return rated(somebody(perception, population, **who), absolute("full"), surfaces)[0]
 
     steady = magnitude(0.0, subject=1, occasion=(1,))
     assert steady == magnitude(0.0, subject=1, occasion=(2,))
     assert steady != magnitude(0.0, subject=2, occasion=(1,))
-    assert magnitude(1.0, subject=1, occasion=(1,)) == magnitude(1.0, subject=1, occasion=(1,))
-    assert magnitude(1.0, subject=1, occasion=(1,)) != magnitude(1.0, subject=1, occasion=(2,))
+    assert steady != magnitude(0.0, subject=1, seed=6)
+    assert magnitude(5.0, subject=1, occasion=(1,)) == magnitude(5.0, subject=1, occasion=(1,))
+    assert magnitude(5.0, subject=1, occasion=(1,)) != magnitude(5.0, subject=1, occasion=(2,))
 
 
-def test_a_real_surface_without_truth_is_refused(
-    study: Study, models: ModelSets, threshold: Threshold
+def test_whoever_cares_more_switches_more_and_takes_longer(
+    perception: Perception, surfaces: MakeSurfaces
 ) -> None:
-    with pytest.raises(InputError, match="got none for canvas, MDF"):
-        Perception(
-            study, real={"PVC": models.sets["full"]["PVC"]}, models=models, threshold=threshold
-        )
+    switches, times = {}, {}
+    for care in (0.5, 2.0):
+        person = somebody(perception, replace(EXACT, care=Trait(care)))
+        counts, took = [], []
+        for _ in range(1000):
+            one = surfaces()
+            took.append(person.rate(absolute("full"), one).response_time_s)
+            counts.append(one.switches)
+        switches[care], times[care] = np.mean(counts), np.median(took)
+    assert switches[0.5] == pytest.approx(1 + 2 * 0.5, abs=4 * np.sqrt(1.0 / 1000))
+    assert switches[2.0] == pytest.approx(1 + 2 * 2.0, abs=4 * np.sqrt(4.0 / 1000))
+    assert times[2.0] / times[0.5] == pytest.approx(4.0, rel=0.1)
+
+
+# --- Choices --------------------------------------------------------------------------------
+
+
+def test_many_choices_agree_with_luces_rule(perception: Perception, surfaces: MakeSurfaces) -> None:
+    population = replace(EXACT, temperature_db=4.0, lapse_rate=Trait(0.1), preference_sd=0.5)
+    person = somebody(perception, population)
+    trial, counts, one = relative("full"), np.zeros(3), surfaces(3)
+    for _ in range(3000):
+        counts[person.choose(trial, one).button] += 1
+    apart = [perception.distance("MDF", "full", other).total_db for other in LAYOUT]
+    liked = person.person.preferences[:3]
+    expected = choice_shares([-d / 4.0 for d in apart], 0.1, liked)
+    assert stats.chisquare(counts, 3000 * np.array(expected)).pvalue > 0.001
+    assert len(set(liked)) == 3
+
+
+@pytest.mark.parametrize("effect", [-12.0, 0.0])
+def test_what_is_planted_in_choices_comes_back(perception: Perception, effect: float) -> None:
+    population = Psychometrics(planted={"MDF": {"choice": effect}}, temperature_db=4.0)
+    right = LAYOUT.index("MDF")
+    differences = []
+    for subject in range(1, 2001):
+        person = somebody(perception, population, subject)
+        full, simplified = (person.shares(relative(m)) for m in ("full", "simplified"))
+        planted = effect / 100 * person.person.sensitivity
+        assert simplified[right] - full[right] == pytest.approx(planted, abs=1e-9)
+        assert min(*full, *simplified) >= -1e-12
+        differences.append(simplified[right] - full[right])
+    error = np.std(differences) / np.sqrt(len(differences))
+    assert abs(100 * np.mean(differences) - effect) <= 400 * error + 1e-9
+
+
+def test_every_surface_is_felt_before_a_choice(
+    perception: Perception, surfaces: MakeSurfaces
+) -> None:
+    for trial in (relative("full"), oddity()):
+        one = surfaces(3)
+        choice = somebody(perception, Psychometrics()).choose(trial, one)
+        assert one.felt == {0, 1, 2}
+        assert one.selected == choice.button
+
+
+def triangle(sensitivity: float) -> float:
+    """Share of right answers in a triangle test (Bradley 1963, Biometrics 19:385), by d′."""
+
+    def density(u: float) -> float:
+        shift = sensitivity * np.sqrt(2 / 3)
+        tails = stats.norm.cdf([-u * np.sqrt(3) + shift, -u * np.sqrt(3) - shift])
+        return float(2 * tails.sum() * stats.norm.pdf(u))
+
+    return integrate.quad(density, 0, np.inf)[0]
+
+
+def test_the_closed_form_of_the_triangle_test_is_the_published_one() -> None:
+    """Ennis 1993 (Journal of Sensory Studies 8:353), table of the triangular method."""
+    assert triangle(0.0) == pytest.approx(1 / 3)
+    assert triangle(1.0) == pytest.approx(0.418, abs=5e-4)
+    assert triangle(2.0) == pytest.approx(0.605, abs=5e-4)
+
+
+@pytest.mark.parametrize("odd", ["full", "simplified"])
+def test_odd_ones_are_found_as_in_a_triangle_test(
+    perception: Perception, surfaces: MakeSurfaces, odd: str
+) -> None:
+    population = replace(EXACT, temperature_db=3.0, lapse_rate=Trait(0.1))
+    person, one = somebody(perception, population), surfaces(3)
+    apart = float(np.hypot(*perception.felt().between[:, 0, 1, 1]))
+    assert person.odd_distance_db(oddity(odd)) == pytest.approx(apart)
+    found = [person.choose(oddity(odd, 1 + n % 3), one).button == n % 3 for n in range(6000)]
+    expected = 0.9 * triangle(apart / 3.0) + 0.1 / 3
+    assert 0.4 < expected < 0.95
+    assert stats.binomtest(sum(found), len(found), expected).pvalue > 1e-3
+
+
+def test_without_a_difference_the_odd_one_is_found_by_chance(
+    perception: Perception, surfaces: MakeSurfaces
+) -> None:
+    scales = ("magnitude_similarity", "frequency_similarity")
+    population = Psychometrics(planted={"MDF": dict.fromkeys(scales, 0.0)})
+    one = surfaces(3)
+    right = 0
+    for subject in range(1, 301):
+        person = somebody(perception, population, subject)
+        assert person.odd_distance_db(oddity()) == 0.0
+        right += sum(person.choose(oddity("full", p), one).button == p - 1 for p in (1, 2, 3) * 5)
+    assert stats.binomtest(right, 4500, 1 / 3).pvalue > 1e-3
+
+
+def test_what_is_planted_in_ratings_is_felt_as_a_distance_by_whoever_seeks_the_odd_one(
+    perception: Perception,
+) -> None:
+    """−12 points on both scales: each as far as what lowers the best rating, 80, to 68."""
+    scales = ("magnitude_similarity", "frequency_similarity")
+    population = replace(EXACT, planted={"MDF": dict.fromkeys(scales, -12.0)})
+    apart = somebody(perception, population).odd_distance_db(oddity())
+    assert apart == pytest.approx(np.sqrt(2) * 12.0 * np.log(80 / 68))
+
+
+# --- Beside trials --------------------------------------------------------------------------
+
+
+def test_the_first_surface_is_presented_and_the_sliders_are_noted(
+    perception: Perception, surfaces: MakeSurfaces
+) -> None:
+    notes: list[tuple[str, dict[str, object]]] = []
+    one = surfaces(1, lambda event, **fields: notes.append((event, fields)))
+    rating = somebody(perception, Psychometrics()).rate(absolute("full"), one)
+    assert one.started
+    sliders = {fields["scale"]: fields["value"] for event, fields in notes if event == "slider"}
+    assert sliders == {
+        "magnitude": rating.magnitude_similarity,
+        "frequency": rating.frequency_similarity,
+    }
+
+
+def test_questions_are_answered_and_the_experimenter_is_waited_for(perception: Perception) -> None:
+    age = Question(name="age", least=18, most=20)
+    sex = Question(name="sex", levels=("female", "male"))
+    intake = Intake(consent="1", code="SIM-001", known=False, questions=(age, sex))
+    people = [somebody(perception, Psychometrics(), n).welcome(intake) for n in range(1, 101)]
+    assert {answers["age"] for answers in people} == {18, 19, 20}
+    assert {answers["sex"] for answers in people} == {"female", "male"}
+    asked = iter([False, False, True, True])
+    somebody(perception, Psychometrics()).wait(lambda: next(asked))
+    assert list(asked) == [True]
+
+
+def test_effects_are_planted_on_textures_whose_models_differ(
+    study: Study, truths: dict[str, TextureModel], models: ModelSets, threshold: Threshold
+) -> None:
+    sets = {"full": truths, "simplified": {**models.sets["simplified"], "PVC": truths["PVC"]}}
+    perception = Perception(study, real=truths, models=ModelSets(sets=sets), threshold=threshold)
+    require_plantable(perception, Psychometrics(planted={"PVC": {"choice": 0.0}}))
+    with pytest.raises(InputError, match="expected no effect on PVC, whose models are equal"):
+        require_plantable(perception, Psychometrics(planted={"PVC": {"choice": -5.0}}))
+    with pytest.raises(InputError, match="expected effects on canvas, MDF, PVC, got one on cork"):
+        require_plantable(perception, Psychometrics(planted={"cork": {"choice": 0.0}}))

@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 
 from experiments import Study, simulate_study
+from experiments.observers.in_memory import simulate_sessions
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import Psychometrics
 from experiments.study.models import ModelSets
 from modeling import InputError, TextureModel, Threshold, simplify
 from rig.twin import SimulatedRig
@@ -20,8 +23,7 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
     return simulate_study(
         study,
         real=truths,
-        full=models.sets["full"],
-        simplified=models.sets["simplified"],
+        models=models,
         rig=SimulatedRig(truths),
         data_folder=folder,
         **{"seed": 3, **more},
@@ -86,19 +88,37 @@ def test_each_participant_meets_either_model_on_one_day(
     assert all(days[subject, 1] != days[subject, 2] for subject in (1, 2, 3, 4))
 
 
-def test_a_seed_fixes_every_answer(
+def test_a_seed_fixes_every_answer_and_memory_holds_the_same(
     tmp_path: Path,
     study: Study,
     truths: dict[str, TextureModel],
     models: ModelSets,
     threshold: Threshold,
+    rows: Any,
 ) -> None:
-    answers = []
+    stored = {}
     for name, seed in (("first", 3), ("again", 3), ("other", 4)):
-        results = simulate(study, tmp_path / name, truths, models, threshold=threshold, seed=seed)
-        answers.append([result.path.read_bytes() for result in results])
-    assert answers[0] == answers[1]
-    assert all(first != other for first, other in zip(answers[0], answers[2], strict=True))
+        simulate(study, tmp_path / name, truths, models, threshold=threshold, seed=seed)
+        stored[name] = [
+            {"participant": int(path.name[4:6]), "session": int(path.name[11:13]), **row}
+            for path in sorted((tmp_path / name).rglob("*_beh.tsv"))
+            for row in rows(path)
+        ]
+    assert stored["first"] == stored["again"]
+    assert stored["first"] != stored["other"]
+    kept = simulate_sessions(
+        study,
+        models=models,
+        perception=Perception(study, real=truths, models=models, threshold=threshold),
+        psychometrics=Psychometrics(),
+        seed=3,
+    )
+    for task, mark in (("absolute", "magnitude_similarity"), ("relative", "presses")):
+        compared = ("participant", "session", "trial", "texture", "model", mark, "response_time_s")
+        on_disk = [row for row in stored["first"] if mark in row]
+        assert len(on_disk) == len(kept[task])
+        for there, here in zip(on_disk, kept[task], strict=True):
+            assert [str(there[name]) for name in compared] == [str(here[name]) for name in compared]
 
 
 def test_a_study_is_not_simulated_twice_into_one_folder(

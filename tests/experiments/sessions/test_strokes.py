@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.sessions.strokes import Outside, outside_grid, told_of
+from experiments.sessions.strokes import HOW, Outside, advice_on, outside_grid
 from rig.interface import HandRows, PresentationRecord
 
 VIRTUAL = PresentationRecord(
@@ -56,21 +56,8 @@ def test_what_is_not_measured_or_on_another_surface_is_left_out() -> None:
     assert outside_grid(rows([300.0], [1.0]), [real]) is None
 
 
-@pytest.mark.parametrize(
-    ("which", "advice"),
-    [
-        ("too_slow", "mostly too slowly; please stroke more quickly"),
-        ("too_fast", "mostly too fast; please stroke more slowly"),
-        ("too_light", "mostly too lightly; please stroke more firmly"),
-        ("too_hard", "mostly too hard; please stroke more lightly"),
-    ],
-)
-def test_the_participant_is_told_what_was_wrong_for_most_of_the_time(
-    which: str, advice: str
-) -> None:
-    told = told_of(Outside(outside=0.75, **{which: 0.7}))
-    assert told is not None
-    assert told.startswith("For 75% of the time")
-    assert advice in told
-    assert told_of(Outside(outside=0.5, **{which: 0.5})) is None
-    assert told_of(None) is None
+@pytest.mark.parametrize("which", HOW)
+def test_the_participant_is_told_what_was_wrong_for_most_of_the_time(which: str) -> None:
+    assert advice_on(Outside(outside=0.754, **{which: 0.7})) == (f"strokes.{which}", 75)
+    assert advice_on(Outside(outside=0.5, **{which: 0.5})) is None
+    assert advice_on(None) is None

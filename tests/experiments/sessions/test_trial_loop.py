@@ -1,216 +1,237 @@
-"""The loop of both protocols: what is presented, asked, stored, and that silence follows."""
+"""The loop of all tasks: what is presented, asked, stored, and that silence follows."""
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from scipy.io import wavfile
 
-from experiments.sessions.store import SessionStore, StoreError
-from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
+from experiments.sessions.agenda import Agenda
+from experiments.sessions.store import MemoryStore, StoreError
+from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
+from experiments.sessions.trial_loop import People, SessionResult, run_trials
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
-from experiments.tasks.absolute import run_absolute
-from experiments.tasks.relative import run_relative
+from experiments.study.task_plan import TaskPlan
+from experiments.tasks import plan_session, task_named
 from modeling import InputError
 from rig.interface import Acceleration, Fault
 from rig.twin import SimulatedRig
+from tests.experiments.scripted import Ready, Scripted
 
 
-def session(study: Study, folder: Path, task: str = "absolute", **parts: Any) -> Any:
-    run = run_absolute if task == "absolute" else run_relative
-    return run(study, subject=1, session=1, data_folder=folder, **parts)
+@dataclass
+class Ran:
+    """What a session left."""
+
+    result: SessionResult
+    store: MemoryStore
+
+    def events(self, name: str) -> list[dict[str, Any]]:
+        return [event for event in self.store.events if event["event"] == name]
+
+    @property
+    def told(self) -> list[object]:
+        return [event["event"] for event in self.store.events]
 
 
-def log_of(folder: Path, rows: Any) -> list[tuple[str, str]]:
-    (path,) = folder.rglob("*_log.tsv")
-    return [(row["event"], row["detail"]) for row in rows(path)]
+@pytest.fixture
+def run(study: Study, models: ModelSets, rig: Any) -> Callable[..., Ran]:
+    """Runs a session in memory; what is not given is well behaved."""
+
+    def session(
+        respondent: Any = None, experimenter: Any = None, *, task: str = "absolute", **of: Any
+    ) -> Ran:
+        store = of.pop("store", None) or MemoryStore()
+        plan = plan_session(of.pop("study", study), task=task, subject=1, session=1)
+        people = People(respondent=respondent or Scripted(), experimenter=experimenter or Ready())
+        used = {"models": models, "rig": rig, **of}
+        result = run_trials(plan, task_named(task), people=people, store=store, **used)
+        return Ran(result, store)
+
+    return session
 
 
-@pytest.mark.parametrize("task", ["absolute", "relative"])
-def test_a_person_at_the_simulated_rig_is_stored_as_a_person(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, task: str, rows: Any
+def planned(study: Study, **changes: Any) -> Study:
+    """The study with another plan of the absolute task."""
+    plan = replace(study.plan_of("absolute"), **changes)
+    return replace(study, tasks={**study.tasks, "absolute": plan})
+
+
+# --- Order of what happens ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("task", ["absolute", "relative", "oddity"])
+def test_every_planned_trial_is_answered_in_its_order(
+    run: Callable[..., Ran], study: Study, task: str
 ) -> None:
-    respondent.simulated = False
-    result = session(study, tmp_path, task, models=models, rig=rig, respondent=respondent)
-    sidecar = json.loads(result.path.with_suffix(".json").read_text())
-    assert (sidecar["SimulatedParticipant"], sidecar["SimulatedRig"]) == (False, True)
-    assert {row["simulated"] for row in rows(result.path)} == {"true"}
-    (participant,) = rows(tmp_path / "participants.tsv")
-    assert participant["simulated"] == "false"
+    if task == "oddity":
+        plan = TaskPlan(participants=2, schedule="interleaved", repeats=6)
+        study = replace(study, tasks={**study.tasks, "oddity": plan})
+    ran = run(task=task, study=study)
+    trials = plan_session(study, task=task, subject=1, session=1).trials
+    assert ran.result.completed
+    assert (ran.result.answered, ran.result.planned) == (len(trials), len(trials))
+    for row, trial in zip(ran.store.rows, trials, strict=True):
+        shared = {"trial", "phase", "texture", "model", "tray"}
+        assert {name: row[name] for name in shared} == {n: getattr(trial, n) for n in shared}
+        assert (row["run"], row["repeats"], row["valid"]) == (1, None, 1)
+    assert ran.store.status == "complete"
 
 
-def test_order_is_on_disk_and_mounting_confirmed_before_anything_is_presented(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+def test_mounting_is_confirmed_and_the_rig_silent_before_anything_is_presented(
+    run: Callable[..., Ran], rig: Any
 ) -> None:
-    class Watchful(misbehaving):
-        def confirm_mount(self, tray: str) -> None:
-            (order,) = tmp_path.rglob("*_order.json")
-            trials = json.loads(order.read_text())["trials"]
-            assert tray == trials[len(self.trays)]["tray"]
+    class Slow(Ready):
+        def ask_mount(self, tray: str) -> None:
+            super().ask_mount(tray)
+            self.polls = 0
             assert rig.notes[-1] == ("silence", None)
-            assert log_of(tmp_path, rows)[-1][0] == "mount requested"
-            super().confirm_mount(tray)
 
-    session(study, tmp_path, models=models, rig=rig, respondent=Watchful())
-    events = [event for event, _ in log_of(tmp_path, rows)]
-    assert events[:4] == ["session started", "phase started", "mount requested", "mount confirmed"]
-    assert events[-1] == "session ended"
-    assert events.count("mount confirmed") == 7
+        def ready(self) -> bool:
+            self.polls += 1
+            return self.polls > 3
+
+    experimenter = Slow()
+    ran = run(experimenter=experimenter)
+    assert experimenter.trays == [row["tray"] for row in ran.store.rows]
+    per_trial = [e for e in ran.told if e in ("mount_requested", "mount_confirmed", "presented")]
+    assert per_trial[:3] == ["mount_requested", "mount_confirmed", "presented"]
+    assert [event["trial"] for event in ran.events("mount_confirmed")] == list(range(1, 8))
 
 
-@pytest.mark.parametrize("moment", ["confirm_mount", "rate", "announce"])
-@pytest.mark.parametrize("error", [RuntimeError("pen fell"), KeyboardInterrupt()])
-def test_silence_follows_any_exception(
-    moment: str,
-    error: BaseException,
-    *,
-    tmp_path: Path,
-    study: Study,
-    models: ModelSets,
-    rig: Any,
-    respondent: Any,
-    rows: Any,
+def test_a_task_without_a_real_surface_mounts_nothing(
+    run: Callable[..., Ran], study: Study
 ) -> None:
-    def fail(*_: object) -> None:
-        rig.notes.append(("sound", None))
-        raise error
-
-    setattr(respondent, moment, fail)
-    with pytest.raises(type(error)):
-        session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    assert rig.notes[-1] == ("silence", None)
-    assert log_of(tmp_path, rows)[-1][0] == "session broken off"
-
-
-def test_silence_follows_a_broken_rig(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
-) -> None:
-    rig.broken = True
-    with pytest.raises(RuntimeError, match="vibrator"):
-        session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    assert rig.notes[-1] == ("silence", None)
-
-
-def test_silence_follows_a_full_disk_and_the_disk_is_blamed(
-    *,
-    tmp_path: Path,
-    study: Study,
-    models: ModelSets,
-    rig: Any,
-    respondent: Any,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    def full(*_: object) -> None:
-        raise StoreError("no space")
-
-    def announce(*_: object) -> None:
-        monkeypatch.setattr(SessionStore, "append", full)
-        monkeypatch.setattr(SessionStore, "log", full)
-
-    respondent.rate = lambda trial, surfaces: Rating(
-        magnitude_similarity=1.0, frequency_similarity=1.0, response_time_s=1.0
+    plan = TaskPlan(participants=2, schedule="interleaved", repeats=2)
+    experimenter = Ready()
+    ran = run(
+        experimenter=experimenter,
+        task="oddity",
+        study=replace(study, tasks={**study.tasks, "oddity": plan}),
     )
-    respondent.announce = announce
-    with pytest.raises(StoreError, match="no space"):
-        session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    assert rig.notes[-1] == ("silence", None)
+    assert experimenter.trays == []
+    assert "mount_requested" not in ran.told
 
 
-def test_an_abort_keeps_the_answers_and_is_logged(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+def test_the_experimenter_is_told_how_far_it_is_and_sees_no_condition(
+    run: Callable[..., Ran], study: Study
 ) -> None:
-    class Tired(misbehaving):
-        def confirm_mount(self, tray: str) -> None:
-            if self.answered == 2:
-                raise SessionAborted
-
-    result = session(study, tmp_path, models=models, rig=rig, respondent=Tired())
-    assert (result.answered, result.planned, result.completed) == (2, 7, False)
-    assert len(rows(result.path)) == 2
-    assert rig.notes[-1] == ("silence", None)
-    assert log_of(tmp_path, rows)[-1] == ("session aborted", "2 trials answered")
+    experimenter = Ready()
+    run(experimenter=experimenter)
+    assert [state.done for state in experimenter.told] == [0, 0, 1, 2, 3, 4, 5]
+    assert {state.of for state in experimenter.told} == {6}
+    assert experimenter.told[0].minutes_left is None
+    assert all(state.minutes_left >= 0 for state in experimenter.told[1:])
+    shown = repr([experimenter.told, experimenter.trays])
+    assert not any(name in shown for name in (*study.textures, *study.models))
 
 
-def test_escape_on_the_last_page_is_no_abort(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+def test_the_participant_sees_progress_and_the_texts_of_each_phase(run: Callable[..., Ran]) -> None:
+    respondent = Scripted()
+    run(respondent)
+    assert respondent.heard == ["absolute.training", "absolute.main", "absolute.closing"]
+    assert respondent.done == [(0, 6), *((done, 6) for done in range(6))]
+
+
+def test_what_is_asked_first_is_logged_before_any_trial(run: Callable[..., Ran]) -> None:
+    intake = Intake(consent="2026-11", code="TAKI-46", known=False, questions=())
+    respondent = Scripted()
+    ran = run(respondent, intake=intake)
+    assert respondent.asked == [intake]
+    assert ran.store.events[0] == {"event": "welcome", "consent": "2026-11", "answers": {}}
+
+
+def test_breaks_come_after_so_many_main_trials(run: Callable[..., Ran], study: Study) -> None:
+    respondent = Scripted()
+    ran = run(respondent, study=planned(study, break_after=2))
+    assert respondent.rests == 2
+    assert (ran.told.count("break_began"), ran.told.count("break_ended")) == (2, 2)
+    begun = [
+        sum(event["event"] == "mount_confirmed" for event in ran.store.events[:place])
+        for place, event in enumerate(ran.store.events)
+        if event["event"] == "break_began"
+    ]
+    assert begun == [3, 5]  # one for training
+
+
+# --- Presenting -----------------------------------------------------------------------------
+
+
+def test_nothing_is_presented_before_the_respondent_announces_it(
+    run: Callable[..., Ran], rig: Any
 ) -> None:
-    class InAHurry(misbehaving):
-        def announce(self, title: str, text: str) -> None:
-            if title == "Thank you":
-                raise SessionAborted
+    class Late(Scripted):
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            assert rig.notes[-1] == ("silence", None)
+            assert not surfaces.started
+            surfaces.start()
+            surfaces.start()  # only once
+            assert rig.notes[-1][0] == trial.first_surface
+            assert rig.notes[-2] == ("silence", None)
+            return super().rate(trial, surfaces)
 
-    result = session(study, tmp_path, models=models, rig=rig, respondent=InAHurry())
-    assert result.completed
-    assert log_of(tmp_path, rows)[-1][0] == "session ended"
+    assert run(Late()).result.completed
 
 
-def test_a_missing_model_is_told_before_anything_is_written(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
+def test_an_answer_without_a_presentation_is_a_mistake_of_the_program(
+    run: Callable[..., Ran],
 ) -> None:
-    few = ModelSets(
-        sets={"full": models.sets["full"], "simplified": {"PVC": models.sets["full"]["PVC"]}}
-    )
-    with pytest.raises(InputError, match=r"a simplified model of each texture.*canvas, MDF"):
-        session(study, tmp_path / "data", models=few, rig=rig, respondent=respondent)
-    assert not (tmp_path / "data").exists()
+    class Hasty(Scripted):
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            return Rating(magnitude_similarity=1, frequency_similarity=1, response_time_s=0.0)
+
+    with pytest.raises(RuntimeError, match="without having started"):
+        run(Hasty())
 
 
-def test_one_identical_pair_of_models_is_a_control_and_all_are_refused(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
-) -> None:
-    one = ModelSets(
-        sets={
-            "full": models.sets["full"],
-            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
-        }
-    )
-    assert "PVC" in one.identical(study.textures)
-    result = session(study, tmp_path / "one", models=one, rig=rig, respondent=respondent)
-    assert result.completed
-    description = json.loads((tmp_path / "one/dataset_description.json").read_text())
-    sidecar = json.loads(result.path.with_suffix(".json").read_text())
-    for stated in (description, sidecar):
-        assert stated["ModelsSHA256"] == one.sha256(study.textures)
-        assert stated["StudySHA256"] == study.sha256
-    assert len(set(sidecar["ModelsSHA256"]["PVC"].values())) == 1
-    same = ModelSets(sets={"full": models.sets["full"], "simplified": models.sets["full"]})
-    with pytest.raises(InputError, match="identical ones for all"):
-        session(study, tmp_path / "all", models=same, rig=rig, respondent=respondent)
-    assert not (tmp_path / "all").exists()
+def test_every_presentation_is_logged_with_its_trial(run: Callable[..., Ran]) -> None:
+    ran = run(task="relative")
+    shown = [event for event in ran.events("presented") if event["trial"] == 1]
+    assert [(event["surface"], event.get("index")) for event in shown] == [
+        ("real", None),
+        ("virtual", 0),
+        ("virtual", 1),
+        ("virtual", 2),
+        ("virtual", 1),
+    ]
+    assert all("start_s" in event for event in shown)
 
 
-def test_sessions_with_other_models_need_another_data_folder(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
-) -> None:
-    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    other = ModelSets(
-        sets={
-            "full": models.sets["full"],
-            "simplified": {**models.sets["simplified"], "PVC": models.sets["full"]["PVC"]},
-        }
-    )
-    with pytest.raises(InputError, match="ModelsSHA256 unchanged.*another PVC"):
-        run_absolute(
-            study,
-            subject=2,
-            session=1,
-            models=other,
-            rig=rig,
-            respondent=respondent,
-            data_folder=tmp_path,
-        )
+def test_what_a_respondent_notes_carries_its_trial_or_none(run: Callable[..., Ran]) -> None:
+    class Noting(Scripted):
+        def announce(self, page: str, **values: object) -> None:
+            self.note("stop_asked")
+
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            surfaces.note("slider", scale="magnitude", value=63.2)
+            return super().rate(trial, surfaces)
+
+    ran = run(Noting())
+    assert ran.events("slider")[0] == {
+        "event": "slider",
+        "trial": 1,
+        "scale": "magnitude",
+        "value": 63.2,
+    }
+    assert ran.events("stop_asked")[0] == {"event": "stop_asked"}
+
+
+def quiet(event: str, **fields: object) -> None:
+    """Notes nothing."""
+
+
+def surfaces_of(rig: Any, models: list[Any]) -> Surfaces:
+    return Surfaces(rig, texture="PVC", models=models, begin=lambda of: None, note=quiet)
 
 
 def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets, rig: Any) -> None:
     rig.presses = 1
-    surfaces = Surfaces(rig, texture="PVC", models=[models.sets["full"]["PVC"]])
+    surfaces = surfaces_of(rig, [models.of("PVC", "full")])
     surfaces.present_real()
     surfaces.follow_rig_button()
     assert surfaces.shows_real
@@ -226,7 +247,8 @@ def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets,
 def test_toggling_among_several_returns_to_the_one_presented_last(
     models: ModelSets, rig: Any
 ) -> None:
-    surfaces = Surfaces(rig, texture="PVC", models=list(models.sets["full"].values()))
+    several = list(models.sets["full"].values())
+    surfaces = surfaces_of(rig, several)
     surfaces.present_real()
     surfaces.toggle()
     assert surfaces.shows_real
@@ -234,10 +256,46 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
     surfaces.present_virtual(2)
     surfaces.toggle()
     surfaces.toggle()
-    assert rig.notes[-1] == ("virtual", list(models.sets["full"].values())[2])
+    assert rig.notes[-1] == ("virtual", several[2])
     assert (surfaces.selected, surfaces.presses, surfaces.switches) == (2, 2, 3)
+    assert surfaces.felt == {2}
     with pytest.raises(InputError, match="button from 0 to 2"):
         surfaces.present_virtual(3)
+
+
+def test_a_pause_is_silent_and_changes_no_count(models: ModelSets, rig: Any) -> None:
+    surfaces = surfaces_of(rig, [models.of("PVC", "full")])
+    surfaces.pause()
+    surfaces.resume()
+    assert rig.notes == [("silence", None)]  # nothing was presented before
+    for present, shown in (
+        (surfaces.present_real, "real"),
+        (surfaces.present_virtual, "virtual"),
+    ):
+        present()
+        counted = (surfaces.presses, surfaces.switches)
+        surfaces.pause()
+        assert rig.notes[-1] == ("silence", None)
+        surfaces.resume()
+        assert rig.notes[-1][0] == shown
+        assert (surfaces.presses, surfaces.switches) == counted
+
+
+def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
+    models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    host = [100.0]
+    monkeypatch.setattr("experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
+    rig.now_s = lambda: 7.0
+    rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
+    surfaces = surfaces_of(rig, [models.of("PVC", "full")])
+    assert surfaces.response_time_s == 0.0
+    surfaces.present_real()
+    assert surfaces.first_sample_s == 6.75
+    host[0] += 2.0
+    assert surfaces.response_time_s == pytest.approx(2.25)
+    surfaces.present_virtual()  # a later presentation changes nothing
+    assert surfaces.response_time_s == pytest.approx(2.25)
 
 
 @pytest.mark.parametrize("value", [-0.1, 100.1, float("nan")])
@@ -246,82 +304,141 @@ def test_impossible_ratings_are_refused(value: float) -> None:
         Rating(magnitude_similarity=value, frequency_similarity=50.0, response_time_s=1.0)
 
 
-def test_the_rig_is_open_during_the_session_only_and_one_that_refuses_leaves_nothing(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any
+# --- Ends -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("moment", ["wait", "rate", "announce", "welcome"])
+@pytest.mark.parametrize("error", [RuntimeError("pen fell"), KeyboardInterrupt(), SystemExit(143)])
+def test_the_rig_is_silent_before_the_end_is_logged(
+    moment: str, error: BaseException, *, run: Callable[..., Ran], rig: Any
 ) -> None:
-    class Watchful(misbehaving):
-        def confirm_mount(self, tray: str) -> None:
-            assert rig.opened
+    def fail(*_: object) -> None:
+        rig.notes.append(("sound", None))
+        raise error
 
-    session(study, tmp_path / "data", models=models, rig=rig, respondent=Watchful())
-    assert not rig.opened
+    class Careful(MemoryStore):
+        def finish(self, status: str, reason: str = "", *, by: str = "") -> None:
+            assert rig.notes[-1] == ("silence", None)
+            super().finish(status, reason, by=by)
 
-    def refuse() -> None:
-        raise InputError("expected a card, got none; plug it in.")
-
-    rig.open = refuse
-    with pytest.raises(InputError, match="expected a card"):
-        session(study, tmp_path / "none", models=models, rig=rig, respondent=Watchful())
-    assert not (tmp_path / "none").exists()
-
-
-def failing(misbehaving: Any, rig: Any, *, at: set[int], invalidates: bool = True) -> Any:
-    """A respondent in some of whose answers (from 1) the rig fails."""
-
-    class Unlucky(misbehaving):
-        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
-            if self.answered + 1 in at:
-                told = "expected a sound process that plays, got none; it was started again."
-                rig.faults.append(Fault(1.5, told, invalidates))
-            rating: Rating = super().rate(trial, surfaces)
-            return rating
-
-    return Unlucky()
+    respondent, store = Scripted(), Careful()
+    setattr(respondent, moment, fail)
+    intake = Intake(consent="1", code="TAKI-46", known=False, questions=())
+    with pytest.raises(type(error)):
+        run(respondent, store=store, intake=intake)
+    program = isinstance(error, RuntimeError)
+    assert store.status == ("crashed" if program else "aborted")
+    assert store.events[-1]["by"] == ("program" if program else "signal")
+    assert rig.notes[-1] == ("silence", None)
 
 
-def test_trials_in_which_the_rig_failed_are_stored_and_repeated_once_at_the_end_of_their_phase(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+def test_silence_follows_a_broken_rig(run: Callable[..., Ran], rig: Any) -> None:
+    rig.broken = True
+    with pytest.raises(RuntimeError, match="vibrator"):
+        run()
+    assert rig.notes[-1] == ("silence", None)
+
+
+def test_silence_follows_a_full_disk_and_the_disk_is_blamed(
+    run: Callable[..., Ran], rig: Any
+) -> None:
+    class Full(MemoryStore):
+        def answer(self, trial: int, row: Any) -> None:
+            raise StoreError("no space")
+
+        def finish(self, status: str, reason: str = "", *, by: str = "") -> None:
+            raise StoreError("still no space")
+
+    with pytest.raises(StoreError, match="^no space"):
+        run(store=Full())
+    assert rig.notes[-1] == ("silence", None)
+
+
+def test_an_abort_keeps_the_answers_and_says_who_and_why(run: Callable[..., Ran], rig: Any) -> None:
+    class Tired(Scripted):
+        def wait(self, until: Callable[[], bool]) -> None:
+            if self.answered == 2:
+                raise SessionAborted("tired")
+
+    ran = run(Tired())
+    assert (ran.result.answered, ran.result.planned, ran.result.completed) == (2, 7, False)
+    assert len(ran.store.rows) == 2
+    assert rig.notes[-1] == ("silence", None)
+    assert ran.store.events[-1] == {
+        "event": "ended",
+        "status": "aborted",
+        "reason": "tired",
+        "by": "participant",
+    }
+
+
+def test_stopping_on_the_last_page_is_no_abort(run: Callable[..., Ran]) -> None:
+    class InAHurry(Scripted):
+        def announce(self, page: str, **values: object) -> None:
+            if page.endswith("closing"):
+                raise SessionAborted
+
+    ran = run(InAHurry())
+    assert ran.result.completed
+    assert ran.store.status == "complete"
+
+
+# --- Faults ---------------------------------------------------------------------------------
+
+
+class Unlucky(Scripted):
+    """In some of whose answers (from 1) the rig fails."""
+
+    def __init__(self, rig: Any, at: set[int], *, invalidates: bool = True) -> None:
+        super().__init__()
+        self._rig, self._at, self._invalidates = rig, at, invalidates
+
+    def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+        if self.answered + 1 in self._at:
+            told = "expected a sound process that plays, got none; it was started again."
+            self._rig.faults.append(Fault(1.5, told, self._invalidates))
+        return super().rate(trial, surfaces)
+
+
+def test_trials_in_which_the_rig_failed_are_repeated_once_at_the_end_of_their_phase(
+    run: Callable[..., Ran], rig: Any
 ) -> None:
     # The training trial, the second main trial, and the repeat of the latter.
-    unlucky = failing(misbehaving, rig, at={1, 4, 9})
-    result = session(study, tmp_path, models=models, rig=rig, respondent=unlucky)
-    assert (result.planned, result.answered, result.invalid) == (9, 9, 3)
-    assert result.completed
-    stored = rows(result.path)
-    places = [(row["trial"], row["phase"], row["valid"], row["repeats"]) for row in stored]
-    assert places == [
-        ("1", "training", "0", "n/a"),
-        ("8", "training", "1", "1"),
-        ("2", "main", "1", "n/a"),
-        ("3", "main", "0", "n/a"),
-        *((str(number), "main", "1", "n/a") for number in (4, 5, 6, 7)),
-        ("9", "main", "0", "3"),
+    experimenter = Ready()
+    ran = run(Unlucky(rig, {1, 4, 9}), experimenter)
+    assert (ran.result.planned, ran.result.answered, ran.result.invalid) == (9, 9, 3)
+    assert ran.result.completed
+    stored = ran.store.rows
+    assert [(row["trial"], row["phase"], row["valid"], row["repeats"]) for row in stored] == [
+        (1, "training", 0, None),
+        (8, "training", 1, 1),
+        (2, "main", 1, None),
+        (3, "main", 0, None),
+        *((number, "main", 1, None) for number in (4, 5, 6, 7)),
+        (9, "main", 0, 3),
     ]
     for again, before in ((stored[1], stored[0]), (stored[8], stored[3])):
         same = ("texture", "model", "tray", "first_surface")
         assert [again[name] for name in same] == [before[name] for name in same]
-    assert unlucky.heard.count("Please call the experimenter") == 3
-    told = [detail for event, detail in log_of(tmp_path, rows) if event == "fault"]
-    assert [detail.split(":")[0] for detail in told] == [
-        "trial 1, 1.5000 s after opening",
-        "trial 3, 1.5000 s after opening",
-        "trial 9, 1.5000 s after opening",
-    ]
+    assert len(experimenter.called) == 3
+    told = [(event["trial"], event["time_s"]) for event in ran.events("fault")]
+    assert told == [(1, 1.5), (3, 1.5), (9, 1.5)]
 
 
 def test_a_fault_that_changed_nothing_for_the_hand_and_one_between_trials_are_only_logged(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, misbehaving: Any, rows: Any
+    run: Callable[..., Ran], rig: Any
 ) -> None:
-    class Unlucky(misbehaving):
-        def confirm_mount(self, tray: str) -> None:
+    class Clumsy(Ready):
+        def ask_mount(self, tray: str) -> None:
             rig.faults.append(Fault(0.5, "expected a process, got none.", invalidates=True))
 
-    harmless = failing(misbehaving, rig, at={2}, invalidates=False)
-    for number, respondent in enumerate((harmless, Unlucky())):
-        folder = tmp_path / str(number)
-        result = session(study, folder, models=models, rig=rig, respondent=respondent)
-        assert {row["valid"] for row in rows(result.path)} == {"1"}
-        assert "fault" in [event for event, _ in log_of(folder, rows)]
+    for people in ((Unlucky(rig, {2}, invalidates=False), Ready()), (Scripted(), Clumsy())):
+        ran = run(*people)
+        assert {row["valid"] for row in ran.store.rows} == {1}
+        assert "fault" in ran.told
+
+
+# --- Strokes and training -------------------------------------------------------------------
 
 
 class Stroking(SimulatedRig):
@@ -339,93 +456,152 @@ class Stroking(SimulatedRig):
         return began_s
 
 
-def test_the_hands_history_and_the_presentations_of_each_trial_are_kept(
-    tmp_path: Path, study: Study, models: ModelSets, respondent: Any, rows: Any
-) -> None:
-    result = session(study, tmp_path, models=models, rig=Stroking(), respondent=respondent)
-    stem = str(result.path.name).removesuffix("_beh.tsv")
-    source = tmp_path / "sourcedata/sub-01/ses-01"
-    hand = rows(source / f"{stem}_hand.tsv")
-    shown = rows(source / f"{stem}_presentations.tsv")
-    for name, table in (("hand", hand), ("presentations", shown)):
-        described = json.loads((source / f"{stem}_{name}.json").read_text())
-        assert list(described) == list(table[0])
-        assert all(column["Description"] for column in described.values())
-    answers = rows(result.path)
-    assert [row["trial"] for row in shown] == [row["trial"] for row in answers for _ in range(3)]
-    for answer in answers:
-        trial = [row for row in hand if row["trial"] == answer["trial"]]
-        times = [float(row["time_s"]) for row in trial]
-        assert len(trial) >= 3 * 250
-        assert all(0 < b - a < 0.005 for a, b in pairwise(times))
-        assert {row["surface"] for row in trial} >= {"real", "virtual"}
-        assert {row["force_assumed"] for row in trial} == {"0"}
-    speeds = {float(row["speed_mm_s"]) for row in hand}
-    assert min(speeds) < -200
-    assert max(speeds) > 200
-    for row in shown:
-        assert float(row["end_s"]) > float(row["start_s"])
-        if row["surface"] == "virtual":
-            assert float(row["dose_g2_s"]) > 0
-            assert 0 < float(row["outside_share"]) < 0.5
-            assert len(row["model_sha256"]) == 64
-        else:
-            assert (row["dose_g2_s"], row["outside_share"]) == ("0", "n/a")
-
-
-def test_what_was_measured_at_the_pen_is_kept_in_g(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
-) -> None:
-    samples = np.linspace(-3.0, 3.0, 480)
-    pieces = [(), ()]  # before and after each trial; something was measured in the second one only
-    measured = Acceleration(start_s=12.25, rate_hz=48000.0, samples_g=samples)
-    told = iter([*pieces, (), (measured, measured)])
-    rig.take_acceleration = lambda: next(told, ())
-    session(study, tmp_path, models=models, rig=rig, respondent=respondent)
-    found = sorted(tmp_path.rglob("*.wav"))
-    stem = "sub-01_ses-01_task-absolute_trial-002_pen"
-    assert [path.name for path in found] == [f"{stem}-1.wav", f"{stem}-2.wav"]
-    rate_hz, kept = wavfile.read(found[0])
-    assert rate_hz == 48000
-    assert kept == pytest.approx(samples, abs=1e-6)
-    logged = [detail for event, detail in log_of(tmp_path, rows) if event == "pen recorded"]
-    assert logged[0] == f"{stem}-1.wav, first sample 12.250000 s after opening"
+def at_speeds(models: ModelSets, factor: float) -> ModelSets:
+    """The models as if they had been recorded at other speeds."""
+    sets = {
+        name: {t: replace(m, speeds_mm_s=m.speeds_mm_s * factor) for t, m in of.items()}
+        for name, of in models.sets.items()
+    }
+    return ModelSets(sets=sets)
 
 
 def test_who_strokes_outside_the_models_grid_is_told_after_the_trial(
-    tmp_path: Path, study: Study, models: ModelSets, respondent: Any, rows: Any
+    run: Callable[..., Ran], models: ModelSets
 ) -> None:
-    slow = {
-        name: {texture: at_speeds(model, 1e-4) for texture, model in kinds.items()}
-        for name, kinds in (
-            ("full", models.sets["full"]),
-            ("simplified", models.sets["simplified"]),
-        )
-    }
-    session(study, tmp_path, models=ModelSets(sets=slow), rig=Stroking(), respondent=respondent)
-    assert respondent.heard.count("Your strokes") == 7
-    told = [d for event, d in log_of(tmp_path, rows) if event == "hand outside the grid"]
-    assert len(told) == 7
-    assert "mostly too fast; please stroke more slowly" in told[0]
+    respondent = Scripted()
+    ran = run(respondent, models=at_speeds(models, 1e-4), rig=Stroking())
+    assert respondent.heard.count("strokes.too_fast") == 7
+    assert [event["trial"] for event in ran.events("outside")] == list(range(1, 8))
 
 
-def at_speeds(model: Any, factor: float) -> Any:
-    """The model as if it had been recorded at other speeds."""
-    return replace(model, speeds_mm_s=model.speeds_mm_s * factor)
-
-
-def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
-    models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("factor", "trained"), [(1.0, 1), (1e-4, 4)])
+def test_training_goes_on_until_the_strokes_are_as_recorded_or_the_most_are_done(
+    run: Callable[..., Ran], study: Study, models: ModelSets, factor: float, trained: int
 ) -> None:
-    host = [100.0]
-    monkeypatch.setattr("experiments.sessions.surfaces.time.perf_counter", lambda: host[0])
-    rig.now_s = lambda: 7.0
-    rig.present_real = lambda texture: 6.75  # the first sample left 0.25 s ago
-    surfaces = Surfaces(rig, texture="PVC", models=[models.sets["full"]["PVC"]])
-    assert surfaces.response_time_s == 0.0
-    surfaces.present_real()
-    assert surfaces.first_sample_s == 6.75
-    host[0] += 2.0
-    assert surfaces.response_time_s == pytest.approx(2.25)
-    surfaces.present_virtual()  # a later presentation changes nothing
-    assert surfaces.response_time_s == pytest.approx(2.25)
+    ran = run(
+        study=planned(study, training_trials=1, most_training_trials=4),
+        models=at_speeds(models, factor),
+        rig=Stroking(),
+    )
+    phases = [row["phase"] for row in ran.store.rows]
+    assert phases == ["training"] * trained + ["main"] * 6
+    (over,) = ran.events("training_over")
+    assert (over["trials"], over["inside"]) == (trained, factor == 1.0)
+    numbers = [row["trial"] for row in ran.store.rows if row["phase"] == "main"]
+    assert numbers == list(range(5, 11))  # the numbers of the plan, whatever training took
+
+
+def test_training_goes_on_until_a_trial_is_inside(
+    run: Callable[..., Ran], study: Study, models: ModelSets
+) -> None:
+    class Slowing(Stroking):
+        """Its hand is too fast for the models of the first two trials."""
+
+        trials = 0
+
+        def take_presentations(self) -> Any:
+            records = super().take_presentations()
+            if records:
+                self.trials += 1
+            if self.trials <= 2:
+                low = {"speeds_mm_s": (1e-3, 1e-2), "forces_n": (0.1, 9.0)}
+                records = tuple(replace(record, **low) for record in records)
+            return records
+
+    ran = run(
+        study=planned(study, training_trials=1, most_training_trials=6),
+        models=models,
+        rig=Slowing(),
+    )
+    assert ran.events("training_over")[0]["trials"] == 3
+
+
+# --- Going on -------------------------------------------------------------------------------
+
+
+def test_what_is_left_of_a_session_is_done_with_the_numbers_of_the_plan(
+    run: Callable[..., Ran], study: Study
+) -> None:
+    trials = plan_session(study, task="absolute", subject=1, session=1).trials
+    whole = run()
+    agenda = Agenda(
+        training=(),
+        main=trials[4:],
+        owed=(trials[2],),
+        next_number=8,
+        run=2,
+        rows=tuple({**row, "valid": int(row["trial"] != 3)} for row in whole.store.rows[:4]),
+    )
+    ran = run(agenda=agenda)
+    assert [(row["trial"], row["repeats"], row["run"]) for row in ran.store.rows] == [
+        (5, None, 2),
+        (6, None, 2),
+        (7, None, 2),
+        (8, 3, 2),
+    ]
+    assert (ran.result.answered, ran.result.planned, ran.result.invalid) == (8, 8, 1)
+    assert ran.result.completed
+
+
+def test_training_comes_again_with_numbers_of_its_own(
+    run: Callable[..., Ran], study: Study
+) -> None:
+    trials = plan_session(study, task="absolute", subject=1, session=1).trials
+    before = tuple(run().store.rows[:5])
+    agenda = Agenda(
+        training=trials[:1],
+        training_again=True,
+        main=trials[5:],
+        next_number=8,
+        run=2,
+        rows=before,
+    )
+    ran = run(agenda=agenda)
+    assert [(row["trial"], row["phase"], row["repeats"]) for row in ran.store.rows] == [
+        (8, "training", 1),
+        (6, "main", None),
+        (7, "main", None),
+    ]
+    assert [event["again"] for event in ran.events("phase")] == [True, True]
+
+
+# --- Traces ---------------------------------------------------------------------------------
+
+
+def test_the_hands_history_and_the_presentations_of_each_trial_reach_the_store(
+    run: Callable[..., Ran],
+) -> None:
+    class Keeping(MemoryStore):
+        def __init__(self) -> None:
+            super().__init__()
+            self.traces: list[Any] = []
+
+        def trace(self, trial: int, rows: Any, *, presentations: Any, faults: Any) -> None:
+            self.traces.append((trial, rows, presentations))
+
+    store = Keeping()
+    run(rig=Stroking(), store=store)
+    assert [trial for trial, _, _ in store.traces] == list(range(1, 8))
+    for _, rows, presentations in store.traces:
+        assert len(presentations) == 3
+        assert len(rows) >= 3 * 250
+        assert all(0 < b - a < 0.005 for a, b in pairwise(rows.time_s))
+        assert min(rows.speed_mm_s) < -200 < 200 < max(rows.speed_mm_s)
+
+
+def test_what_was_measured_at_the_pen_belongs_to_its_trial(
+    run: Callable[..., Ran], rig: Any
+) -> None:
+    measured = Acceleration(start_s=12.25, rate_hz=48000.0, samples_g=np.zeros(3))
+    told = iter([(), (), (measured,), (measured, measured)])  # before and after each trial
+    rig.take_acceleration = lambda: next(told, ())
+
+    class Keeping(MemoryStore):
+        kept: dict[int, int] = {}  # noqa: RUF012
+
+        def acceleration(self, trial: int, pieces: Any) -> None:
+            self.kept[trial] = len(pieces)
+
+    store = Keeping()
+    run(store=store)
+    assert store.kept == {1: 0, 2: 2, **dict.fromkeys(range(3, 8), 0)}

@@ -1,19 +1,23 @@
-"""Which models a study compares."""
+"""Which models a study compares, and where they come from."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from experiments.study.models import ModelSets
-from modeling import InputError, regressed
+from experiments.study.models import ModelSets, load_model_sets
+from experiments.study.study import Study
+from modeling import ARModel, InputError, TextureModel, Threshold, regressed, simplify
 from modeling.models.compiled_for import CompiledFor
 from stimuli.planted.textures import planted_texture
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 FULL = {name: planted_texture(name, **SMALL) for name in ("canvas", "MDF")}
+CODEC = Threshold.shipped("codec")
+LEAST = {name: simplify(model, CODEC).model for name, model in FULL.items()}
 NOTE = CompiledFor(
     scene="light touch",
     scene_sha256="a",
@@ -23,29 +27,170 @@ NOTE = CompiledFor(
     single=True,
 )
 
+SCENE = """
+version = 1
+[scene]
+name = "light touch"
+[hand]
+speed_mm_s = [100, 200]
+force_n = [1.0, 2.0]
+"""
+
+
+def study(**models: str) -> Study:
+    return Study(
+        name="two",
+        seed=1,
+        textures=("canvas", "MDF"),
+        trays={"canvas": "A", "MDF": "B"},
+        models=models or {"full": "models", "simplified": "simplified"},
+    )
+
+
+def pair(simplified: object, full: object = None) -> ModelSets:
+    return ModelSets(sets={"full": full or FULL, "simplified": simplified})
+
 
 def test_models_of_a_scene_stand_where_simplified_ones_stand() -> None:
     least = {name: replace(regressed(model), compiled_for=NOTE) for name, model in FULL.items()}
-    sets = ModelSets(sets={"full": FULL, "simplified": least})
-    sets.require(("canvas", "MDF"))
+    sets = pair(least)
+    sets.require(study())
     assert sets.scene == NOTE
+    assert sets.names == ("full", "simplified")
     assert sets.identical(("canvas", "MDF")) == ()
     assert sets.of("MDF", "simplified") == least["MDF"]
     assert sets.sha256(["MDF"])["MDF"]["simplified"] == least["MDF"].sha256
 
 
 def test_a_scene_without_a_texture_of_the_study_is_named() -> None:
-    sets = ModelSets(
-        sets={"full": FULL, "simplified": {"MDF": replace(FULL["MDF"], compiled_for=NOTE)}}
-    )
+    least = {"MDF": replace(FULL["MDF"], compiled_for=NOTE)}
     told = "each texture of the study in the scene light touch, got none of canvas; add what"
     with pytest.raises(InputError, match=told):
-        sets.require(("canvas", "MDF"))
+        pair(least).require(study())
 
 
 def test_simplified_models_are_of_no_scene() -> None:
-    sets = ModelSets(sets={"full": FULL, "simplified": {"MDF": FULL["MDF"]}})
+    sets = pair({"MDF": FULL["MDF"]})
     assert sets.scene is None
     assert sets.identical(["MDF"]) == ("MDF",)
     with pytest.raises(InputError, match="a simplified model of each texture of the study, got no"):
-        sets.require(("canvas", "MDF"))
+        sets.require(study())
+
+
+def test_equal_models_of_all_textures_are_nothing_to_compare() -> None:
+    with pytest.raises(InputError, match="identical ones for all"):
+        pair(FULL).require(study())
+    one = pair({**FULL, "canvas": LEAST["canvas"]})
+    one.require(study())
+    assert one.identical(("canvas", "MDF")) == ("MDF",)
+    three = ModelSets(sets={**one.sets, "other": LEAST})
+    assert three.identical(("canvas", "MDF")) == ()
+    assert three.identical(("canvas", "MDF"), ("simplified", "other")) == ("canvas",)
+
+
+def test_exchanged_sets_are_refused_or_go_on_for_a_reason() -> None:
+    turned = pair(FULL, full=LEAST)
+    assert turned.exchanged(("canvas", "MDF")) == (
+        ("canvas", "simplified"),
+        ("MDF", "simplified"),
+    )
+    told = "the reference set full to hold .* got one of canvas that was made from the one in simp"
+    with pytest.raises(InputError, match=told):
+        turned.require(study())
+    allowed: list[str] = []
+    turned.require(study(), allow=lambda what, sentence: allowed.append(what))
+    assert allowed == ["exchanged models"]
+    assert pair(LEAST).exchanged(("canvas", "MDF")) == ()
+
+
+def test_the_full_model_of_a_compiled_one_is_known_too() -> None:
+    note = replace(NOTE, full_sha256=FULL["MDF"].sha256)
+    least = {**FULL, "MDF": replace(FULL["MDF"], compiled_for=note)}
+    assert pair(FULL, full=least).exchanged(("canvas", "MDF")) == (("MDF", "simplified"),)
+
+
+def test_a_model_that_was_made_from_one_of_no_set_is_told() -> None:
+    other = {name: model.at_rate(8000.0) for name, model in FULL.items()}
+    assert pair(LEAST).of_others(("canvas", "MDF")) == ()
+    assert pair(LEAST, full=other).of_others(("MDF",)) == (("MDF", "simplified"),)
+
+
+# --- Loading -------------------------------------------------------------------------------------
+
+
+def saved(folder: Path, models: dict[str, object]) -> Path:
+    folder.mkdir(parents=True)
+    for number, model in enumerate(models.values()):
+        model.save(folder / f"{number}.json")
+    return folder
+
+
+def ar_of(model: TextureModel) -> ARModel:
+    shape = model.noise_gains.shape
+    return ARModel(
+        texture=model.texture,
+        rate_hz=model.rate_hz,
+        speeds_mm_s=model.speeds_mm_s,
+        forces_n=model.forces_n,
+        line_spectral_frequencies=np.broadcast_to([1.0, 2.0], (*shape, 2)),
+        gains=np.full(shape, 0.1),
+        level_sd_db=np.zeros(shape),
+    )
+
+
+def test_sets_of_every_kind_are_loaded_by_the_studys_paths(tmp_path: Path) -> None:
+    saved(tmp_path / "models", FULL)
+    kinds = {
+        "simplified": LEAST,
+        "driven": {name: regressed(model) for name, model in FULL.items()},
+        "AR": {name: ar_of(model) for name, model in FULL.items()},
+    }
+    for name, models in kinds.items():
+        saved(tmp_path / name.lower(), models)
+    plan = study(full="models", **{name: name.lower() for name in kinds})
+    sets, files = load_model_sets(plan, tmp_path)
+    assert sets.sets == {"full": FULL, **kinds}
+    assert files == [tmp_path / "models", *(tmp_path / name.lower() for name in kinds)]
+    sets.require(plan)
+
+
+def test_another_place_stands_for_the_studys(tmp_path: Path) -> None:
+    saved(tmp_path / "study" / "models", FULL)
+    elsewhere = saved(tmp_path / "elsewhere", LEAST)
+    overriding = {"simplified": elsewhere}
+    sets, files = load_model_sets(study(), tmp_path / "study", overriding=overriding)
+    assert sets.sets["simplified"] == LEAST
+    assert files[1] == elsewhere
+    with pytest.raises(InputError, match="in the sets of models of the study, got paper"):
+        load_model_sets(study(), tmp_path / "study", overriding={"paper": elsewhere})
+
+
+def test_a_scene_is_compiled_from_the_reference(tmp_path: Path) -> None:
+    saved(tmp_path / "models", FULL)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE)
+    plan = study(full="models", least="scene.toml")
+    sets, files = load_model_sets(plan, tmp_path)
+    assert {sets.of(name, "least").compiled_for.full_sha256 for name in FULL} == {
+        model.sha256 for model in FULL.values()
+    }
+    assert files[:2] == [tmp_path / "models", scene]
+    sets.require(plan)
+    turned = study(least="scene.toml", full="models")
+    with pytest.raises(InputError, match=r"models least: .*folder of full models for the scene"):
+        load_model_sets(turned, tmp_path)
+
+
+def test_places_without_models_are_refused(tmp_path: Path) -> None:
+    saved(tmp_path / "models", FULL)
+    with pytest.raises(InputError, match="models simplified: expected a folder of models or a sc"):
+        load_model_sets(study(), tmp_path)
+    (tmp_path / "simplified").mkdir()
+    with pytest.raises(InputError, match="models simplified: expected model files in"):
+        load_model_sets(study(), tmp_path)
+    (tmp_path / "simplified" / "manifest.tsv").write_text("file\n")
+    with pytest.raises(InputError, match="got a stimulus set of tactileq stimuli"):
+        load_model_sets(study(), tmp_path)
+    saved(tmp_path / "twice", {**LEAST, "again": LEAST["MDF"]})
+    with pytest.raises(InputError, match="one model of each texture in .*, got two of 'MDF'"):
+        load_model_sets(study(full="models", simplified="twice"), tmp_path)

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from experiments.study.study import SHIPPED_STUDY, Study
+from experiments.study.plan import Claim, Plan
+from experiments.study.questions import Question
+from experiments.study.study import SHIPPED_STUDY, Study, plan_sha256
+from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 
 
@@ -18,43 +22,173 @@ def edited(folder: Path, old: str, new: str) -> Path:
     return path
 
 
+def rich() -> Study:
+    """A study that uses every table."""
+    claim = Claim(
+        name="odd",
+        task="oddity",
+        measure="correct",
+        models=("full", "AR"),
+        bounds=(-0.1, 0.2),
+        test="difference",
+    )
+    mood = Question(name="mood", least=0, most=10, text={"en": "Mood?", "ja": "気分は?"})
+    return replace(
+        Study.load(),
+        models={"full": "models", "AR": "ar", "simplified": "least.toml"},
+        consent="2026-11",
+        questions=(Question(name="age", least=18, most=99), mood),
+        plan=Plan(claims=(claim,), exclusions=("None.",), highest_share_at_ends=0.3),
+        tasks={
+            "absolute": TaskPlan(
+                participants=9,
+                schedule="by-day",
+                repeats=2,
+                models=("simplified", "full", "AR"),
+                training_trials=1,
+                most_training_trials=4,
+                break_after=10,
+                anchors={"canvas": "PVC"},
+            ),
+            "oddity": TaskPlan(participants=5, schedule="interleaved", repeats=6, feel_all=True),
+        },
+    )
+
+
 def test_a_study_is_made_again_from_its_plain_values() -> None:
-    study = Study.load()
-    assert Study.from_dict(study.to_dict()) == study
+    for study in (Study.load(), rich()):
+        again = Study.from_dict(study.to_dict())
+        assert again == study
+        assert again.sha256 == study.sha256
+
+
+def test_models_of_a_task_stand_in_the_studys_order_and_are_the_first_two_by_default() -> None:
+    study = rich()
+    assert study.models_of("absolute") == ("full", "AR", "simplified")
+    assert study.models_of("oddity") == study.models_of("relative") == ("full", "AR")
+    assert [study.sessions(task) for task in study.tasks] == [3, 2, 1]
+    assert list(study.tasks) == ["absolute", "relative", "oddity"]
+    with pytest.raises(InputError, match="expected the task absolute or relative, got 'oddity'"):
+        Study.load().plan_of("oddity")
+
+
+def test_every_change_of_a_study_changes_its_hash() -> None:
+    study = rich()
+    changes = (
+        {"seed": 2},
+        {"languages": ("en",)},
+        {"longest_gap_min": 31},
+        {"consent": "2026-12"},
+        {"questions": ()},
+        {"plan": Plan()},
+        {"calibration_days": 30},
+        {"measured_force": True},
+        {"models": {**study.models, "AR": "elsewhere"}},
+        {"tasks": {**study.tasks, "oddity": replace(study.plan_of("oddity"), repeats=8)}},
+    )
+    hashes = {study.sha256, *(replace(study, **change).sha256 for change in changes)}
+    assert len(hashes) == 1 + len(changes)
+
+
+def test_the_hash_of_the_plan_is_of_the_study_and_of_the_models() -> None:
+    study, models = rich(), {"canvas": {"full": "0a", "AR": "1b"}}
+    found = plan_sha256(study, models)
+    assert found == plan_sha256(Study.from_dict(study.to_dict()), models)
+    assert found != plan_sha256(replace(study, seed=2), models)
+    assert found != plan_sha256(study, {"canvas": {"full": "0a", "AR": "1c"}})
 
 
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
-    study = Study.load(edited(tmp_path, "participants = 24", "participants = 6"))
-    assert study.plan("relative").participants == 6
+    study = Study.load(
+        edited(tmp_path, "participants = 24\nschedule", "participants = 6\nschedule")
+    )
+    assert study.plan_of("relative").participants == 6
 
 
-def test_what_a_study_wants_of_a_rig_changes_its_hash_only_where_it_is_stated(
-    tmp_path: Path,
-) -> None:
-    shipped = Study.load()
-    assert not {"calibration_days", "measured_force"} & set(shipped.to_dict())
-    wanted = "seed = 1\ncalibration_days = 30\nmeasured_force = true"
-    strict = Study.load(edited(tmp_path, "seed = 1", wanted))
-    assert (strict.calibration_days, strict.measured_force) == (30.0, True)
-    assert strict.sha256 != shipped.sha256
-    assert Study.from_dict(strict.to_dict()) == strict
-    usual = "seed = 1\ncalibration_days = 90\nmeasured_force = false"
-    assert Study.load(edited(tmp_path, "seed = 1", usual)).sha256 == shipped.sha256
+def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
+    text = SHIPPED_STUDY.read_text(encoding="utf-8")
+    asked = "# [oddity]                # three", "[oddity] # three"
+    text = text.replace("repeats = 3\n", "").replace(*asked)
+    text = text.replace(
+        '# participants = 24\n# schedule = "inter', 'participants = 24\nschedule = "inter'
+    )
+    (tmp_path / "study.toml").write_text(text)
+    study = Study.load(tmp_path / "study.toml")
+    assert [study.plan_of(task).repeats for task in study.tasks] == [1, 3, 6]
+    assert {plan.most_training_trials for plan in study.tasks.values()} == {2}
+
+
+ABSOLUTE = 'participants = 20\nschedule = "interleaved"'
+RELATIVE = 'participants = 24\nschedule = "by-day"'
+CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
 
 
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("seed = 1", "sede = 1", "got sede"),
-        ("seed = 1", "", "got no seed"),
-        ("seed = 1", "seed = -1", "for seed, got -1"),
-        ("seed = 1", "seed = 1.5", "for seed, got 1.5"),
-        ("repeats = 3", "repeats = true", "for repeats, got True"),
-        ("repeats = 3", "repeats = 0", "for repeats, got 0"),
-        ("training_trials = 2", "training_trials = 8", "from 0 to 7 for training_trials"),
-        ("participants = 24", "participants = 23", "even number of participants"),
-        ("participants = 24", "subjects = 24", "got subjects"),
-        ('schedule = "by-day"', 'schedule = "daily"', "got 'daily'"),
+        ("seed = 1 ", "sede = 1 ", "got sede"),
+        ("seed = 1 ", "", "got no seed"),
+        ("seed = 1 ", "seed = -1 ", "for seed, got -1"),
+        ("seed = 1 ", "seed = 1.5 ", "for seed, got 1.5"),
+        ("seed = 1 ", "repeats = 3 # ", "got repeats"),
+        ("repeats = 3\n", "repeats = true\n", "for repeats, got True"),
+        ("repeats = 3\n", "repeats = 0\n", "for repeats, got 0"),
+        ("repeats = 3\n", "repeats = 3\ntraining_trials = 2", "expected TOML"),
+        ("repeats = 3\n", "repeats = 3\nmost_training_trials = 1\n", "at least the 2 training"),
+        ("repeats = 3\n", "repeats = 3\nbreak_after = -1\n", "for break_after, got -1"),
+        ("repeats = 3\n", 'repeats = 3\nfeel_all = "yes"\n', "for feel_all, got 'yes'"),
+        ("repeats = 3\n", 'repeats = 3\nanchors = {canvas = "PVC"}\n', r"got some in \[relative"),
+        ("repeats = 3\n", 'repeats = 3\nmodels = ["full"]\n', "two models or more"),
+        ("repeats = 3\n", 'repeats = 3\nmodels = "full"\n', "a list of models in"),
+        ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "full"]\n', "different models"),
+        ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "AR"]\n', r"\[relative\], got AR"),
+        (ABSOLUTE, f"{ABSOLUTE}\nfeel_all = true", r"got it in \[absolute\]"),
+        (ABSOLUTE, f'{ABSOLUTE}\nanchors = {{canvas = "canvas"}}', "two different textures"),
+        (ABSOLUTE, f'{ABSOLUTE}\nanchors = {{canvas = "silk"}}', "got 'canvas' = 'silk'"),
+        (ABSOLUTE, f'{ABSOLUTE}\nanchors = ["canvas"]', "expected a table anchors"),
+        (RELATIVE, RELATIVE.replace("24", "23"), "even number of participants"),
+        (RELATIVE, RELATIVE.replace("participants", "subjects"), "got subjects"),
+        (RELATIVE, 'schedule = "by-day"', "got no participants"),
+        ('schedule = "by-day"\n', 'schedule = "daily"\n', "got 'daily'"),
+        ("[plan]\n", '[oddity]\nparticipants = 2\nschedule = "by-day"\n[plan]\n', "interleaved in"),
+        (
+            "[plan]\n",
+            '[oddity]\nparticipants = 2\nschedule = "interleaved"\nrepeats = 3\n[plan]\n',
+            "an even number of repeats",
+        ),
+        ("[plan]\n", "[threshold]\nparticipants = 2\n[plan]\n", "got threshold"),
+        ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
+        ('simplified = "simplified"\n', 'simplified = "models"\n', "different places of models"),
+        ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
+        ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
+        ('["en", "ja"]', "[]", "one language at least"),
+        ('["en", "ja"]', '["English"]', "such as en or ja, got 'English'"),
+        ('["en", "ja"]', '["en", "en"]', "different languages"),
+        ("longest_gap_min = 30 ", "longest_gap_min = -1 ", "for longest_gap_min, got -1"),
+        ("# [consent]\n# version", "[consent]\nwording", "got wording"),
+        ("# [consent]\n# version = ", "[consent]\nversion = 3 #", "text for version in"),
+        ('name = "sex"', 'name = "Sex"', "a name of small letters"),
+        ('name = "sex"', 'name = "code"', "another name than"),
+        ('name = "sex"', 'name = "age"', "different questions"),
+        ('name = "sex"', 'name = "mood"', "expected the question mood in en, ja"),
+        ('name = "sex"', 'name = "mood"\ntext.en = "Mood?"', "got none in ja"),
+        ('name = "sex"', 'name = "sex"\nleast = 3', "least and most, or two levels"),
+        ("least = 18\n", "", "least and most, or two levels"),
+        ("least = 18\n", "least = 99\n", "least and most, or two levels"),
+        ("least = 18\n", "least = 18\nlevels = 3\n", "a list of levels of 'age'"),
+        ('"right", "left", "both"', '"right", "right"', "different levels"),
+        ("highest_share_at_ends = 0.2 ", "highest_share_at_ends = 2 ", "ends, got 2"),
+        ("exclusions = [", "exclusion = [", "got exclusion"),
+        ('measure = "correct"', 'measure = "accuracy"', "got 'accuracy'"),
+        ('measure = "correct"', 'measure = "magnitude_similarity"', 'to be "correct"'),
+        ('task = "relative"', 'task = "oddity"', "expected a planned task"),
+        (CLAIM, CLAIM.replace("-0.1", "0"), "bounds below and above 0 within -1 and 1"),
+        (CLAIM, CLAIM.replace("0.1]", "1.1]"), "bounds below and above 0 within -1 and 1"),
+        (CLAIM, CLAIM.replace("0.1]", "nan]"), "bounds below and above 0 within -1 and 1"),
+        (CLAIM, CLAIM.replace('"simplified"', '"AR"'), "got 'AR'"),
+        (CLAIM, CLAIM.replace('"simplified"', '"full"'), "two different models"),
+        (CLAIM, CLAIM.replace('"full", "simplified"', '"full"'), "two different models"),
+        ('name = "frequency feels the same"', 'name = "magnitude feels the same"', "names of cl"),
         ('"PVC", ', "", "got trays for"),
         ('"PVC", ', '"PVC", "PVC", ', "different textures"),
         ('PVC = "F"', 'PVC = "E"', "different trays"),
@@ -63,9 +197,9 @@ def test_what_a_study_wants_of_a_rig_changes_its_hash_only_where_it_is_stated(
         ('"canvas", ', '"can\\nvas", ', "printable text for texture"),
         ("textures = [", 'textures = "PVC" #', "a list of textures"),
         ("[relative]", "[[relative]]", r"expected a table \[relative\]"),
-        ("seed = 1", "seed = ", "expected TOML"),
-        ("seed = 1", "seed = 1\ncalibration_days = 0", "for calibration_days, got 0"),
-        ("seed = 1", "seed = 1\nmeasured_force = 1", "true or false for measured_force, got 1"),
+        ("seed = 1 ", "seed = ", "expected TOML"),
+        ("seed = 1 ", "seed = 1\ncalibration_days = 0 ", "for calibration_days, got 0"),
+        ("seed = 1 ", "seed = 1\nmeasured_force = 1 ", "true or false for measured_force, got 1"),
     ],
 )
 def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -74,6 +208,16 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told
         Study.load(path)
     assert str(path) in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
+    three = {"full": "a", "paper": "b", "simplified": "c"}
+    plan = TaskPlan(participants=20, schedule="by-day", models=tuple(three))
+    shipped = replace(Study.load(), plan=Plan())
+    with pytest.raises(InputError, match="a multiple of 3 of participants"):
+        replace(shipped, models=three, tasks={"absolute": plan})
+    study = replace(shipped, models=three, tasks={"absolute": replace(plan, participants=21)})
+    assert study.sessions("absolute") == 3
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

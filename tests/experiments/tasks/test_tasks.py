@@ -126,5 +126,5 @@ def test_every_declared_table_has_its_task_and_another_name_is_refused() -> None
     for name in ANSWER_TABLES:
         assert task_named(name).name == name
         assert {"training", "main", "closing"} <= set(task_named(name).texts)
-    with pytest.raises(InputError, match="expected the task absolute or relative, got 'os'"):
+    with pytest.raises(InputError, match="expected the task absolute or .*, got 'os'"):
         task_named("os")

@@ -7,6 +7,8 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,7 @@ import pytest
 from modeling import InputError, TextureModel
 from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
-from rig.interface import SURFACES, TextureRig
+from rig.interface import SURFACES, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import failures, rig_file
 
@@ -80,6 +82,39 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
     assert np.isfinite(rows.force_n[of["virtual"]]).mean() > 0.5
     assert np.isnan(rows.speed_mm_s[of["real"]]).all()  # nothing measures the hand there
     assert np.isnan(rows.force_n[of["real"]]).all()
+
+
+def test_bursts_play_one_after_the_other_whatever_the_hand_does(
+    server: Any, tmp_path: Path
+) -> None:
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.5, duration_s=0.3)
+    with DeskRig(rig_file(tmp_path)) as rig:
+        first_s = rig.present_signal(burst)
+        second_s = rig.present_signal(replace(burst, amplitude_g=0.0))  # waits for the first one
+        third_s = rig.present_signal(replace(burst, frequency_hz=200.0))
+        wait(rig, 0.4)
+        rig.silence()
+        records = rig.take_presentations()
+        assert failures(rig.take_faults()) == []
+    assert [record.texture for record in records] == ["100 Hz", "100 Hz", "200 Hz"]
+    assert [record.start_s for record in records] == [first_s, second_s, third_s]
+    assert all(later - earlier >= 0.3 for earlier, later in pairwise((first_s, second_s, third_s)))
+    assert [record.peak_g for record in records] == pytest.approx([0.5, 0.0, 0.5], rel=1e-3)
+    # Half the square of the amplitude; of each ramp of 20 ms 3/8 of what it would be without.
+    dose_g2_s = 0.5 * 0.5**2 * (0.3 - 0.04 + 2 * 0.02 * 3 / 8)
+    assert records[0].dose_g2_s == pytest.approx(dose_g2_s, rel=0.02)
+    assert records[0].speeds_mm_s is None
+
+
+def test_no_burst_is_stronger_than_the_limits_allow(server: Any, tmp_path: Path) -> None:
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=1.0, duration_s=0.3)
+    with DeskRig(rig_file(tmp_path)) as rig:
+        highest_g = rig.strongest_g(burst)
+        # The running RMS (limit 2 g, window 1 s) may have been at its limit before.
+        assert 2.0 * np.sqrt(2) == pytest.approx(highest_g, rel=0.1)
+        rig.present_signal(replace(burst, amplitude_g=highest_g * (1 - 1e-6)))
+        with pytest.raises(InputError, match="running RMS of at most 2 g"):
+            rig.present_signal(replace(burst, amplitude_g=highest_g * 1.01))
 
 
 def test_a_killed_sound_process_is_a_fault_and_the_next_presentation_plays(

@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
+from hypothesis import given
+from hypothesis import strategies as st
 
 from modeling import InputError
 from modeling.files.tables import read_table
 from modeling.rendering.limits import Limits
+from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.vibrators.compensation import compensation_for
 from rig.live.memory import Live
-from rig.sound.output import SoundLost, SoundOutput
+from rig.sound.output import SoundLost, SoundOutput, check_signal, largest_factor
 from rig.sound.signals import stimulus, tone_burst
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
@@ -180,3 +183,35 @@ def test_what_is_not_compensated_yet_is_compensated_before_the_limits() -> None:
         # Accepted as a signal: what is refused next is the device, which does not exist.
         with pytest.raises(SoundLost, match="expected (a|one) sound device"):
             sound.play_signal(burst.samples_g)
+
+
+def plan_of(limits: Limits) -> RenderPlan:
+    return plan_for(RATE_HZ, rate_hz=RATE_HZ, update_s=1e-3, limits=limits, compensation=None)
+
+
+def test_the_largest_factor_in_closed_form() -> None:
+    burst = tone_burst(100, 0.5, duration_s=0.5, rate_hz=RATE_HZ).samples_g
+    assert largest_factor(burst, plan_of(Limits(peak=2.0))) == pytest.approx(4.0)
+    assert largest_factor(burst, plan_of(Limits())) == np.inf
+    assert largest_factor(np.zeros(10), plan_of(Limits(peak=2.0, rms=0.1))) == np.inf
+    # After an RMS at its limit a constant signal may be as strong as the limit, no stronger.
+    constant = np.full(1000, 0.25)
+    assert largest_factor(constant, plan_of(Limits(peak=2.0, rms=1.0))) == pytest.approx(4.0)
+
+
+@given(
+    frequency_hz=st.floats(20.0, 1000.0),
+    duration_s=st.floats(0.05, 1.0),
+    peak=st.floats(0.1, 10.0),
+    rms=st.floats(0.05, 10.0),
+    window_s=st.floats(0.05, 2.0),
+)
+def test_a_signal_is_accepted_up_to_the_largest_factor_and_no_further(
+    frequency_hz: float, duration_s: float, peak: float, rms: float, window_s: float
+) -> None:
+    plan = plan_of(Limits(peak=peak, rms=rms, rms_window_s=window_s))
+    burst = tone_burst(frequency_hz, 1.0, duration_s=duration_s, rate_hz=RATE_HZ).samples_g
+    factor = largest_factor(burst, plan)
+    check_signal(burst * factor * (1 - 1e-9), plan)
+    with pytest.raises(InputError, match=r"expected a signal (of at most|with a running RMS)"):
+        check_signal(burst * factor * 1.001, plan)

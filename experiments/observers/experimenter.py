@@ -1,0 +1,36 @@
+"""The simulated experimenter, who is quick and careful."""
+
+from __future__ import annotations
+
+from experiments.sessions.surfaces import Standing
+
+
+class SimulatedExperimenter:
+    """Mounts every sample and mends every rig at once.
+
+    Attributes
+    ----------
+    asked : list of str
+        The trays that were asked for, in order.
+    calls : list of str
+        What was told to have failed.
+    """
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.calls: list[str] = []
+
+    def ask_mount(self, tray: str) -> None:
+        """The sample is mounted at once."""
+        self.asked.append(tray)
+
+    def call(self, told: str) -> None:
+        """What failed is mended at once."""
+        self.calls.append(told)
+
+    def ready(self) -> bool:
+        """Always."""
+        return True
+
+    def tell(self, standing: Standing) -> None:
+        """Needs to be told nothing."""

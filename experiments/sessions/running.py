@@ -1,0 +1,206 @@
+"""One session with everything that belongs to it: enrolment, order, rig, store, data set."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.agenda import Agenda
+from experiments.sessions.log import read_log
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.order import draw_session
+from experiments.sessions.overrides import Overrides
+from experiments.sessions.resume import resumption
+from experiments.sessions.roster import Person, Roster
+from experiments.sessions.store import SessionStore
+from experiments.sessions.surfaces import Intake
+from experiments.sessions.task import Task
+from experiments.sessions.trial_loop import People, SessionResult, run_trials
+from experiments.study.design import SessionPlan, Trial
+from experiments.study.models import ModelSets
+from experiments.study.study import Study, plan_sha256
+from modeling import InputError
+from modeling.errors import shown
+from rig.interface import TextureRig
+
+
+@dataclass(frozen=True, kw_only=True)
+class Circumstances:
+    """What is said of a session beside its study, task and numbers.
+
+    Parameters
+    ----------
+    pilot : bool
+        Whether its answers do not count.
+    language : str
+        One of the study's; empty for its first.
+    override : str, optional
+        Reason to go on where a rule is broken; stored.
+    resume : bool
+        Whether to go on with a session that was aborted or broke off.
+    sources : mapping of set of models to path
+        Where the models came from.
+    """
+
+    pilot: bool = False
+    language: str = ""
+    override: str | None = None
+    resume: bool = False
+    sources: Mapping[str, str] = field(default_factory=dict)
+
+
+def run_session(
+    task: Task,
+    study: Study,
+    *,
+    subject: int,
+    session: int,
+    models: ModelSets,
+    rig: TextureRig,
+    people: People,
+    data_folder: str | Path,
+    circumstances: Circumstances | None = None,
+) -> tuple[SessionResult, Path]:
+    """Run one session of a task and store it.
+
+    Parameters
+    ----------
+    task : Task
+    study : Study
+    subject, session : int
+        From 1; with the study's seed they fix the order of the trials.
+    models : ModelSets
+        Every model of every texture of the study.
+    rig : TextureRig
+        Presents the surfaces; opened here before anything is written, silent and closed
+        afterwards, whatever happens.
+    people : People
+        Who answers, and who mounts the samples.
+    data_folder : path
+        Root of the data set.
+    circumstances : Circumstances, optional
+
+    Returns
+    -------
+    SessionResult
+        Not completed if somebody ended it early.
+    Path
+        Its manifest, beside which its log lies; `experiments.sessions.bids` makes tables of them.
+
+    Raises
+    ------
+    InputError
+        If a model is missing, the session cannot begin or be resumed, or the rig cannot be opened.
+    StoreError
+        If the disk does not take the answers.
+    """
+    said = circumstances or Circumstances()
+    overrides = Overrides(said.override)
+    models.require(study, allow=overrides.allow)
+    _require_language(study, said.language)
+    root = Path(data_folder)
+    rig.open()
+    try:
+        person = Roster(root).enroll(
+            subject,
+            study.plan_of(task.name).participants,
+            simulated=people.respondent.simulated,
+            pilot=said.pilot,
+        )
+        plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
+        manifest = _manifest(plan, task, models=models, rig=rig, people=people, code=person.code)
+        opened = SessionStore.resume if said.resume else SessionStore.create
+        with opened(root, _with(manifest, said, study), overrides=overrides) as store:
+            result = run_trials(
+                plan,
+                task,
+                models=models,
+                rig=rig,
+                people=people,
+                store=store,
+                intake=_intake(study, root, person),
+                agenda=_agenda(task, store),
+                pilot=said.pilot,
+            )
+    finally:
+        rig.close()
+    return result, store.files.manifest
+
+
+def _manifest(
+    plan: SessionPlan,
+    task: Task,
+    *,
+    models: ModelSets,
+    rig: TextureRig,
+    people: People,
+    code: str,
+) -> SessionManifest:
+    """What is known before the first trial, but for the circumstances."""
+    study = plan.study
+    sha256 = models.sha256(study.textures)
+    return SessionManifest(
+        task=plan.task,
+        subject=plan.subject,
+        session=plan.session,
+        slot=plan.slot,
+        code=code,
+        language=study.languages[0],
+        pilot=False,
+        simulated_participant=people.respondent.simulated,
+        simulated_rig=rig.simulated,
+        study=study.to_dict(),
+        study_sha256=study.sha256,
+        plan_sha256=plan_sha256(study, sha256),
+        models_sha256=sha256,
+        model_sources={},
+        identical=models.identical(study.textures, study.models_of(plan.task)),
+        rig=rig.stated,
+        description=task.description,
+        trials=[asdict(trial) for trial in plan.trials],
+    )
+
+
+def _with(manifest: SessionManifest, said: Circumstances, study: Study) -> SessionManifest:
+    return replace(
+        manifest,
+        pilot=said.pilot,
+        language=said.language or study.languages[0],
+        model_sources=dict(said.sources),
+    )
+
+
+def _require_language(study: Study, language: str) -> None:
+    if language and language not in study.languages:
+        raise InputError(
+            f"expected a language of the study ({', '.join(study.languages)}), got "
+            f"{shown(language)}; choose one, or add it to the study."
+        )
+
+
+def _intake(study: Study, root: Path, person: Person) -> Intake:
+    """What to ask first; of somebody who was welcomed before only whether the code is theirs."""
+    logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
+    welcomed = any(event["event"] == "welcome" for log in logs for event in read_log(log).events)
+    return Intake(
+        consent=study.consent, code=person.code, known=welcomed, questions=study.questions
+    )
+
+
+def _agenda(task: Task, store: SessionStore) -> Agenda:
+    """What is to be done of the trials that the manifest on disk plans."""
+    trials = [_trial(task, values) for values in store.manifest.trials]
+    if not store.before.runs:
+        return Agenda.whole(trials)
+    gap_min = store.manifest.study["longest_gap_min"]
+    return Agenda.left(trials, resumption(store.manifest, store.before, longest_gap_min=gap_min))
+
+
+def _trial(task: Task, values: Mapping[str, Any]) -> Trial:
+    """A trial as it was before it was stored: what is a list in JSON was a tuple."""
+    stored: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
+    }
+    return task.trial(**stored)

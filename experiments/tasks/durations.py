@@ -1,0 +1,41 @@
+"""How long a session may take: a rough estimate, to plan appointments by."""
+
+from __future__ import annotations
+
+from experiments.study.study import Study
+
+# Seconds of one trial with the mounting of its sample: assumed, not measured.
+TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0}
+OTHER_TRIAL_S = 60.0
+WELCOME_S = 300.0  # consent, questions, explanation
+BREAK_S = 120.0
+
+
+def trials_of_session(study: Study, task: str) -> tuple[int, int]:
+    """Training (the fewest) and main trials of one session of a task.
+
+    Raises
+    ------
+    InputError
+        If the study has no such task.
+    """
+    plan = study.plan_of(task)
+    times = plan.repeats * len(study.textures)
+    if task != "oddity" and plan.schedule == "interleaved":
+        times *= len(plan.models)
+    return plan.training_trials, times + len(plan.anchors)
+
+
+def minutes_of_session(study: Study, task: str) -> int:
+    """About how long a session of a task takes.
+
+    Raises
+    ------
+    InputError
+        If the study has no such task.
+    """
+    training, main = trials_of_session(study, task)
+    every = study.plan_of(task).break_after
+    breaks = (main - 1) // every if every else 0
+    seconds = (training + main) * TRIAL_S.get(task, OTHER_TRIAL_S) + breaks * BREAK_S + WELCOME_S
+    return round(seconds / 60)

@@ -1,0 +1,177 @@
+"""The page to preregister: what is fixed beforehand (docs/method/protocols.md#plan)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from experiments.study.models import ModelSets
+from experiments.study.plan import RATINGS, Claim
+from experiments.study.study import Study, plan_sha256
+from experiments.study.task_plan import TaskPlan
+from experiments.tasks import task_named
+from experiments.tasks.durations import minutes_of_session, trials_of_session
+
+TESTED = {
+    "equivalence": "two one-sided t-tests of the differences within persons (TOST)",
+    "difference": "paired t-test of the differences within persons",
+}
+
+
+def plan_page(study: Study, models: ModelSets) -> str:
+    """The page as Markdown; the same study and models always give the same page.
+
+    Parameters
+    ----------
+    study : Study
+    models : ModelSets
+        With a model of each texture in each set.
+
+    Raises
+    ------
+    InputError
+        For a planned task that is none.
+    """
+    hashes = models.sha256(study.textures)
+    sections = (
+        ("", [f"SHA-256 of this plan: `{plan_sha256(study, hashes)}`. Every session names it."]),
+        ("Question", list(_question(study))),
+        ("Design", [line for task in study.tasks for line in _design(study, task)][:-1]),
+        ("Models", list(_models(study, models))),
+        ("Claims", list(_claims(study))),
+        ("Exclusions", list(_exclusions(study))),
+        ("Participants and stopping", list(_participants(study))),
+        ("Randomisation", list(_randomisation(study))),
+        ("Circumstances", list(_circumstances(study))),
+    )
+    lines = [f"# {study.name}: plan before the first answer", ""]
+    for title, body in sections:
+        lines += [f"## {title}", ""] if title else []
+        lines += [*body, ""]
+    return "\n".join(lines)
+
+
+def _question(study: Study) -> Iterator[str]:
+    reference, *others = study.models
+    yield (
+        f"Can anybody feel the difference between virtual surfaces of the {_listed(others)} "
+        f"models and those of the {reference} models, of {len(study.textures)} textures "
+        f"({', '.join(study.textures)})?"
+    )
+
+
+def _design(study: Study, task: str) -> Iterator[str]:
+    plan = study.plan_of(task)
+    training, main = trials_of_session(study, task)
+    yield f"**{task.capitalize()} task.** {task_named(task).description}"
+    yield ""
+    yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
+    times = "comes" if task == "oddity" else "comes with each model"
+    yield f"- Each texture {times} {_times(plan.repeats)}."
+    yield (
+        f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
+        f"about {minutes_of_session(study, task)} minutes (an estimate)."
+    )
+    for real, virtual in plan.anchors.items():
+        yield (
+            f"- Anchor: real {real} beside the {plan.models[0]} model of {virtual}, said to "
+            "correspond, once in each session; no part of the comparison of models."
+        )
+    if plan.break_after:
+        yield f"- A break after every {plan.break_after} trials."
+    if plan.feel_all:
+        yield "- No answer is taken before all virtual surfaces of the trial were felt."
+    yield ""
+
+
+def _schedule(study: Study, task: str) -> str:
+    if study.plan_of(task).schedule == "interleaved":
+        return "mixed in one session"
+    return f"each on a day of its own ({study.sessions(task)} sessions), counterbalanced exactly"
+
+
+def _training(fewest: int, plan: TaskPlan) -> str:
+    if plan.most_training_trials == fewest:
+        return str(fewest)
+    return f"{fewest} to {plan.most_training_trials} (until strokes stay inside the grid)"
+
+
+def _models(study: Study, models: ModelSets) -> Iterator[str]:
+    yield f"| texture | {' | '.join(f'{name} (SHA-256)' for name in models.names)} |"
+    yield "|---|" + "---|" * len(models.names)
+    for texture, hashes in models.sha256(study.textures).items():
+        yield f"| {texture} | {' | '.join(f'`{hashes[name]}`' for name in models.names)} |"
+    if identical := models.identical(study.textures):
+        yield ""
+        yield (
+            f"All models are equal for {', '.join(identical)}: presented as a control, left out "
+            "of the comparison."
+        )
+
+
+def _claims(study: Study) -> Iterator[str]:
+    if not study.plan.claims:
+        yield "None: whatever is found is exploratory."
+    for number, claim in enumerate(study.plan.claims, start=1):
+        yield f"{number}. **{claim.name}.** {_claimed(claim)}"
+
+
+def _claimed(claim: Claim) -> str:
+    first, second = claim.models
+    measure = claim.measure.replace("_", " ")
+    unit = "points of the scale" if claim.measure in RATINGS else "(shares of right answers)"
+    what = f"share of right answers in the {claim.task} task"
+    if claim.measure in RATINGS:
+        what = f"{measure} in the {claim.task} task"
+    against = f"{second} minus {first}"
+    if claim.task == "oddity":
+        against = f"{second} against {first}, minus chance (1/3)"
+    low, high = claim.bounds
+    return (
+        f"Measure: {what}, {against}. Smallest differences that matter: {low:g} and {high:g} "
+        f"{unit}. Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the "
+        "textures."
+    )
+
+
+def _exclusions(study: Study) -> Iterator[str]:
+    for sentence in study.plan.exclusions or ("None.",):
+        yield f"- {sentence}"
+    share = study.plan.highest_share_at_ends
+    yield (
+        f"- Nobody is left out for it, but a scale counts as exhausted where more than "
+        f"{share:.0%} of its ratings are 0 or 100."
+    )
+
+
+def _participants(study: Study) -> Iterator[str]:
+    for task, plan in study.tasks.items():
+        yield f"- {task}: {plan.participants} participants."
+    yield "- Whoever drops out is replaced by somebody who takes over the same place in the design."
+    yield "- Data are collected until these numbers have completed their sessions, then no more."
+    yield "- Nothing is tested before."
+
+
+def _randomisation(study: Study) -> Iterator[str]:
+    yield (
+        "Orders are Fisher–Yates shuffles within the balanced design, from the seed in the study "
+        f"file (SHA-256 of the study: `{study.sha256}`), and are stored before the first trial of "
+        "each session. The seed is not told here, since orders could be foretold from it."
+    )
+
+
+def _circumstances(study: Study) -> Iterator[str]:
+    yield f"- Masking of sound: {study.masking}."
+    yield f"- What is seen of the surface: {study.surface_visible}."
+    yield f"- Languages: {', '.join(study.languages)}."
+    if study.questions:
+        yield f"- Asked of each participant: {', '.join(q.name for q in study.questions)}."
+    yield f"- Consent: {f'page of version {study.consent}' if study.consent else 'no page'}."
+
+
+def _listed(names: Sequence[str]) -> str:
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
+def _times(count: int) -> str:
+    return {1: "once", 2: "twice"}.get(count, f"{count} times")

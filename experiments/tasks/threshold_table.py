@@ -1,0 +1,219 @@
+"""From answers to a table of thresholds that `tactileq simplify --threshold` reads.
+
+docs/method/protocols.md#detection-threshold
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+from experiments.tasks.threshold import DURATION_S
+from experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
+from modeling import InputError
+from modeling.files.tables import read_table, table_text
+
+READ = ("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid")
+TOLD = ("pilot", "simulated")
+COLUMNS = (
+    *("frequency_hz", "acceleration_g", "low_g", "high_g", "level_db", "sd_db"),
+    *("slope", "lapse_rate", "trials", "people", "note"),
+)
+BEYOND = {
+    "above": "above the highest amplitude: a lower bound",
+    "below": "below the lowest amplitude: an upper bound",
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answered:
+    """What some people answered.
+
+    Parameters
+    ----------
+    files : tuple of Path
+        Where it was read.
+    estimates : mapping of participant to their thresholds
+        Of each frequency with an answer.
+    simulated : bool
+    """
+
+    files: tuple[Path, ...]
+    estimates: Mapping[str, Mapping[float, Estimate]]
+    simulated: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeanThreshold:
+    """The threshold at one frequency over people.
+
+    Parameters
+    ----------
+    frequency_hz, level_db : float
+        The mean of the people's levels (dB re 1 g, peak).
+    sd_db : float
+        Of one person the posterior standard deviation, else that between people.
+    interval_db : (float, float) or None
+        95 %: of one person mean ± 1.96 SD, else Student's; None where a threshold is only a bound.
+    slope, lapse_rate : float
+        Means.
+    trials, people : int
+    note : str
+        Where somebody's threshold lay beyond what was presented.
+    """
+
+    frequency_hz: float
+    level_db: float
+    sd_db: float
+    interval_db: tuple[float, float] | None
+    slope: float
+    lapse_rate: float
+    trials: int
+    people: int
+    note: str
+
+
+# --- Read -----------------------------------------------------------------------------------
+
+
+def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answered:
+    """The answers of one participant, or of all, with the thresholds that follow from them.
+
+    Parameters
+    ----------
+    data_folder : path
+    subject : int, optional
+        Everybody without it. Pilots are left out.
+
+    Raises
+    ------
+    InputError
+        Where nobody has answered, a table is damaged, or simulated and real people are mixed.
+    """
+    folder = Path(data_folder)
+    who = "*" if subject is None else f"{subject:02d}"
+    files = sorted(folder.glob(f"sub-{who}/ses-*/beh/sub-*_task-threshold_beh.tsv"))
+    rows: dict[str, list[dict[str, str]]] = {}
+    simulated = set()
+    for file in files:
+        for row in read_table(file, (*READ, *TOLD)):
+            if row["pilot"] != "true":
+                rows.setdefault(file.parts[-4], []).append(row)
+                simulated.add(row["simulated"])
+    if len(simulated) > 1:
+        raise InputError(
+            f"expected answers of people or of simulated ones in {folder}, got both; keep them in "
+            "different folders, or name one with --subject."
+        )
+    estimates = {person: _estimates(own) for person, own in rows.items()}
+    estimates = {person: own for person, own in estimates.items() if own}
+    if not estimates:
+        whose = "" if subject is None else f" of participant {subject}"
+        raise InputError(
+            f"expected answers{whose} to main trials of the threshold task in {folder}, got none; "
+            "run tactileq session --task threshold first (pilots do not count)."
+        )
+    return Answered(files=tuple(files), estimates=estimates, simulated=simulated == {"true"})
+
+
+def _estimates(rows: Sequence[Mapping[str, object]]) -> dict[float, Estimate]:
+    answers = answers_of(rows)
+    return {
+        frequency_hz: estimate([a for a in answers if a.frequency_hz == frequency_hz])
+        for frequency_hz in sorted({a.frequency_hz for a in answers})
+    }
+
+
+# --- Over people ----------------------------------------------------------------------------
+
+
+def mean_thresholds(estimates: Mapping[str, Mapping[float, Estimate]]) -> list[MeanThreshold]:
+    """The mean level (dB) over people at each frequency, rising, with its 95 % interval.
+
+    Raises
+    ------
+    InputError
+        For fewer than two frequencies, which make no table.
+    """
+    frequencies_hz = sorted({frequency for own in estimates.values() for frequency in own})
+    if len(frequencies_hz) < 2:
+        raise InputError(
+            "expected answers at two frequencies or more for a table of thresholds, got "
+            f"{len(frequencies_hz)}; finish the session."
+        )
+    return [
+        _mean([own[frequency] for own in estimates.values() if frequency in own])
+        for frequency in frequencies_hz
+    ]
+
+
+def _mean(of: Sequence[Estimate]) -> MeanThreshold:
+    levels_db = np.array([one.level_db for one in of])
+    count = len(of)
+    sd_db = of[0].sd_db if count == 1 else float(levels_db.std(ddof=1))
+    beyond = [BEYOND[one.beyond] for one in of if one.beyond]
+    notes = [f"{beyond.count(told)} of {count} {told}" for told in dict.fromkeys(beyond)]
+    half_db = _factor(count) * sd_db
+    mean_db = float(levels_db.mean())
+    return MeanThreshold(
+        frequency_hz=of[0].frequency_hz,
+        level_db=mean_db,
+        sd_db=sd_db,
+        interval_db=None if beyond else (mean_db - half_db, mean_db + half_db),
+        slope=float(np.mean([one.slope for one in of])),
+        lapse_rate=float(np.mean([one.lapse_rate for one in of])),
+        trials=sum(one.trials for one in of),
+        people=count,
+        note="; ".join(notes) if count > 1 else "".join(beyond),
+    )
+
+
+def _factor(count: int) -> float:
+    """Half the 95 % interval of a mean over so many people, in standard deviations."""
+    from scipy.stats import norm, t  # late: takes longer to load than all of modeling
+
+    if count == 1:
+        return float(norm.ppf(0.975))
+    return float(t.ppf(0.975, count - 1)) / sqrt(count)
+
+
+# --- Write ----------------------------------------------------------------------------------
+
+
+def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bool) -> str:
+    """The table as a TSV with its source and caveat; `Threshold.load` reads it."""
+    who = f"{people} {'person' if people == 1 else 'people'}{' (simulated)' if simulated else ''}"
+    bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.note]
+    caveat = "felt with a pen held still; a hand that strokes feels less"
+    if bounds:
+        caveat += f"; at {', '.join(bounds)} only a bound (see note)"
+    notes = (
+        f"# source: tactileq threshold, {who}: two-interval forced choice (QUEST+) of bursts of "
+        f"{DURATION_S:g} s, 75 % right with lapses left out\n# caveat: {caveat}\n"
+    )
+    return notes + table_text(COLUMNS, [_cells(one) for one in means])
+
+
+def _cells(one: MeanThreshold) -> list[str]:
+    low_g, high_g = ("n/a", "n/a") if one.interval_db is None else map(_g, one.interval_db)
+    return [
+        f"{one.frequency_hz:g}",
+        _g(one.level_db),
+        low_g,
+        high_g,
+        f"{one.level_db:.2f}",
+        f"{one.sd_db:.2f}",
+        f"{one.slope:.2f}",
+        f"{one.lapse_rate:.3f}",
+        str(one.trials),
+        str(one.people),
+        one.note or "n/a",
+    ]
+
+
+def _g(level_db: float) -> str:
+    return f"{10 ** (level_db / 20):.6g}"

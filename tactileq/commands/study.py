@@ -1,0 +1,18 @@
+"""tactileq study: the study file, from its first line to the page to preregister."""
+
+from __future__ import annotations
+
+import typer
+
+from tactileq.commands.study_check import study_check
+from tactileq.commands.study_init import study_init
+from tactileq.commands.study_plan import study_plan
+
+study = typer.Typer(
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="A study with people: its file, its design, the page to preregister.",
+)
+study.command("init")(study_init)
+study.command("check")(study_check)
+study.command("plan")(study_plan)

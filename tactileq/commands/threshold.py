@@ -1,0 +1,52 @@
+"""tactileq threshold: from answers to a table of detection thresholds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tactileq.keeping import note_of_file, write_own_files
+from tactileq.options import Data
+
+
+def threshold(
+    data: Data,
+    out: Annotated[Path, typer.Option("--out", help="The table (TSV).")] = Path("threshold.tsv"),
+    subject: Annotated[
+        int | None, typer.Option(min=1, help="One participant; the mean of all without it.")
+    ] = None,
+) -> None:
+    """Find detection thresholds in the answers to tactileq session --task threshold.
+
+    The table has the amplitude (peak, g) at which 75 % of the answers are right, lapses left out,
+    with a 95 % interval: of one participant, or of the mean (in dB) over all. Where a threshold
+    lies above the highest amplitude that the rig may present, it says so, and that amplitude
+    stands there.
+
+    Example: tactileq threshold --data data --subject 1 --out mine.tsv, then tactileq simplify
+    models/canvas.json --threshold mine.tsv
+    """
+    from experiments.tasks.threshold_table import mean_thresholds, read_answers, threshold_text
+    from modeling.files.provenance import provenance_of
+
+    if out.suffix != ".tsv":
+        raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")
+    note = note_of_file(out, "threshold")
+    answered = read_answers(data, subject=subject)
+    means = mean_thresholds(answered.estimates)
+    people = len(answered.estimates)
+    text = threshold_text(means, people=people, simulated=answered.simulated)
+    settings: dict[str, object] = {"subject": subject, "people": sorted(answered.estimates)}
+    provenance = provenance_of("threshold", settings, inputs=answered.files)
+    write_own_files({out: text.encode()}, note, provenance)
+    for one in means:
+        within = "" if one.interval_db is None else "{:+.1f} to {:+.1f}, ".format(*one.interval_db)
+        told = f" ({one.note})" if one.note else ""
+        print(
+            f"{one.frequency_hz:g} Hz: {one.level_db:+.1f} dB re 1 g ({within}{one.trials} "
+            f"trials){told}"
+        )
+    simulated = " (simulated)" if answered.simulated else ""
+    print(f"threshold of {people} {'person' if people == 1 else 'people'}{simulated}: {out}")

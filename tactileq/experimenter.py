@@ -1,0 +1,99 @@
+"""The experimenter's terminal: which sample to mount, how far the session is, how the rig is.
+
+It names trays, never a texture or a model (docs/method/protocols.md#mounting).
+"""
+
+from __future__ import annotations
+
+import sys
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import TextIO
+
+from rich.console import Console
+
+from experiments.sessions.surfaces import SessionAborted, Standing
+
+STOP = "stop"
+CLOSED = "the experimenter's terminal was closed"
+
+
+class Terminal:
+    """An experimenter at a terminal; implements `experiments.sessions.surfaces.Experimenter`.
+
+    Enter confirms what was asked last. A line "stop" ends the session at the next sample, or at
+    once where one is asked for, and asks for the reason.
+
+    Parameters
+    ----------
+    lines : text stream
+        What the experimenter types.
+    console : rich.console.Console, optional
+        Where to write; the standard output without it.
+    """
+
+    def __init__(self, lines: TextIO = sys.stdin, *, console: Console | None = None) -> None:
+        self._console = console or Console(highlight=False)
+        self._typed: SimpleQueue[str | None] = SimpleQueue()
+        self._stopping = False
+        # A daemon, since nothing can end a wait for a line.
+        Thread(target=self._listen, args=(lines,), daemon=True).start()
+
+    def ask_mount(self, tray: str) -> None:
+        """Ask for the sample of a tray."""
+        self._ask(f"[bold]Tray {tray}[/]: put its sample in place")
+
+    def call(self, told: str) -> None:
+        """Tell what failed, and ask to mend it; the trial will be repeated."""
+        self._ask(f"[bold]The rig failed in this trial.[/] {told} Mend it")
+
+    def tell(self, standing: Standing) -> None:
+        """Show how far the session is, and how the rig is."""
+        training = standing.phase == "training"
+        parts = ["training" if training else f"{standing.done} of {standing.of} trials done"]
+        if standing.minutes_left is not None:
+            parts.append(f"about {max(1, round(standing.minutes_left))} min left")
+        parts.append("rig: " + (" ".join(standing.problems) or "ready"))
+        self._console.print("\n" + " · ".join(parts))
+
+    def ready(self) -> bool:
+        """Whether what was asked last has been confirmed.
+
+        Raises
+        ------
+        SessionAborted
+            Where the experimenter stops the session, or the terminal is closed.
+        """
+        line = self._next()
+        if self._stopping:
+            if line is None:
+                return False
+            raise SessionAborted(line or "not stated", by="experimenter")
+        if line is not None and line.lower() == STOP:
+            self._stopping = True
+            self._console.print("Why? (one line, then Enter)")
+            return False
+        return line is not None
+
+    def _ask(self, what: str) -> None:
+        # An Enter from before must not confirm what is asked only now; a stop counts.
+        while (line := self._next()) is not None:
+            self._stopping |= line.lower() == STOP
+        if self._stopping:
+            self._console.print("Stopping. Why? (one line, then Enter)")
+        else:
+            self._console.print(f"{what}, then press Enter (or type {STOP}).")
+
+    def _next(self) -> str | None:
+        try:
+            line = self._typed.get_nowait()
+        except Empty:
+            return None
+        if line is None:
+            raise SessionAborted(CLOSED, by="experimenter")
+        return line.strip()
+
+    def _listen(self, lines: TextIO) -> None:
+        for line in lines:
+            self._typed.put(line)
+        self._typed.put(None)

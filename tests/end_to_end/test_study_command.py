@@ -1,0 +1,109 @@
+"""tactileq study, from an empty folder to the page to preregister."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.study.study import SHIPPED_STUDY, Study
+from modeling import Threshold, simplify
+from stimuli.planted.textures import planted_texture
+
+SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
+
+
+def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tactileq", "study", *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    """The shipped study of small planted models, of which MDF's two are equal."""
+    for folder in ("models", "simplified"):
+        (tmp_path / folder).mkdir()
+    for number, name in enumerate(Study.load().textures):
+        full = planted_texture(name, **SMALL)
+        fewer = simplify(full, Threshold.shipped("codec")).model
+        full.save(tmp_path / f"models/{number}.json")
+        (full if name == "MDF" else fewer).save(tmp_path / f"simplified/{number}.json")
+    assert study(tmp_path, "init", "study.toml").returncode == 0
+    return tmp_path
+
+
+def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(tmp_path: Path) -> None:
+    for name in ("a.toml", "b.toml"):
+        assert study(tmp_path, "init", name).returncode == 0
+    first, second = Study.load(tmp_path / "a.toml"), Study.load(tmp_path / "b.toml")
+    assert first.seed != second.seed
+    lines = SHIPPED_STUDY.read_text(encoding="utf-8").splitlines()
+    made = (tmp_path / "a.toml").read_text(encoding="utf-8").splitlines()
+    assert [line for line in made if line not in lines] == [made[2]]
+    refused = study(tmp_path, "init", "a.toml")
+    assert refused.returncode == 1
+    assert refused.stderr == (
+        "error: expected a new file at a.toml, got one that is there already; choose another "
+        "name.\n"
+    )
+    assert Study.load(tmp_path / "a.toml") == first
+
+
+def test_a_study_is_checked_with_its_models_design_and_balance(place: Path) -> None:
+    done = study(place, "check", "study.toml")
+    assert done.returncode == 0, done.stderr
+    for told in (
+        "full and simplified are identical for MDF",
+        "absolute: 20 participants, 1 session each, 2 + 14 trials in a session; about 18 min",
+        "relative: 24 participants, 2 sessions each, 2 + 21 trials",
+        "(an estimate)",
+        "10 to 10 of 20",
+        "12 to 12 of 24",
+        "claims: 3",
+    ):
+        assert told in done.stdout
+    assert "warning" not in done.stdout
+
+
+def test_models_made_from_others_are_warned_of(place: Path) -> None:
+    planted_texture("canvas", **SMALL).at_rate(8000.0).save(place / "models/1.json")
+    done = study(place, "check", "study.toml")
+    assert done.returncode == 0, done.stderr
+    assert "warning: the simplified model of canvas was made from a model that is in none" in (
+        done.stdout
+    )
+
+
+def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -> None:
+    (place / "models").rename(place / "other")
+    (place / "simplified").rename(place / "models")
+    (place / "other").rename(place / "simplified")
+    for words in (("check",), ("plan", "--out", "plan.md")):
+        refused = study(place, words[0], "study.toml", *words[1:])
+        assert refused.returncode == 1
+        assert refused.stderr.startswith("error: expected the reference set full to hold the mod")
+        assert refused.stderr.count("\n") == 1
+    assert not (place / "plan.md").exists()
+    (place / "models/1.json").unlink()
+    refused = study(place, "check", "study.toml")
+    assert "expected a full model of each texture of the study, got none of canvas" in (
+        refused.stderr
+    )
+
+
+def test_the_page_is_written_again_but_nothing_else_is_replaced(place: Path) -> None:
+    done = study(place, "plan", "study.toml")
+    assert done.returncode == 0, done.stderr
+    page = (place / "plan.md").read_text(encoding="utf-8")
+    assert page.startswith("# Simplified texture models: plan before the first answer\n")
+    assert study(place, "plan", "study.toml").returncode == 0
+    assert (place / "plan.md").read_text(encoding="utf-8") == page
+    (place / "mine.md").write_text("mine")
+    refused = study(place, "plan", "study.toml", "--out", "mine.md")
+    assert refused.returncode == 1
+    assert (place / "mine.md").read_text() == "mine"
+    refused = study(place, "plan", "study.toml", "--out", "plan.txt")
+    assert refused.stderr == "error: expected a name that ends in .md, got plan.txt; rename it.\n"

@@ -1,0 +1,349 @@
+"""Whole sessions on disk: begun, broken off, killed, gone on with, refused."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.sessions.bids import export_all, export_session
+from experiments.sessions.log import read_log
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.roster import Roster
+from experiments.sessions.running import Circumstances, run_session
+from experiments.sessions.state import session_state
+from experiments.sessions.store import SessionStore
+from experiments.sessions.surfaces import SessionAborted
+from experiments.sessions.trial_loop import People, SessionResult
+from experiments.study.models import ModelSets
+from experiments.study.questions import Question
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
+from experiments.tasks import plan_session, task_named
+from modeling import InputError
+from tests.experiments.scripted import Ready, Scripted
+
+TRIALS = 5  # one for training, two textures with two models
+
+
+@pytest.fixture
+def small(study: Study) -> Study:
+    """The smallest study: two textures."""
+    absolute = TaskPlan(participants=2, schedule="interleaved", training_trials=1)
+    relative = TaskPlan(participants=2, schedule="by-day", training_trials=1)
+    return replace(
+        study,
+        textures=("canvas", "PVC"),
+        trays={"canvas": "C", "PVC": "B"},
+        tasks={"absolute": absolute, "relative": relative},
+    )
+
+
+@pytest.fixture
+def run(
+    small: Study, models: ModelSets, rig: Any, tmp_path: Path
+) -> Callable[..., tuple[SessionResult, Path]]:
+    """Runs a session into the test's folder; what is not given is well behaved."""
+
+    def session(
+        respondent: Any = None, *, task: str = "absolute", subject: int = 1, **of: Any
+    ) -> tuple[SessionResult, Path]:
+        used: dict[str, Any] = {"models": models, "rig": rig, "session": 1}
+        used |= {name: of.pop(name) for name in list(of) if name in (*used, "circumstances")}
+        study = of.pop("study", small)
+        folder = of.pop("folder", tmp_path)
+        circumstances = Circumstances(**of) if of else None
+        return run_session(
+            task_named(task),
+            study,
+            subject=subject,
+            people=People(respondent=respondent or Scripted(), experimenter=Ready()),
+            data_folder=folder,
+            circumstances=circumstances,
+            **used,
+        )
+
+    return session
+
+
+class Tired(Scripted):
+    """Stops after so many answers."""
+
+    def __init__(self, after: int) -> None:
+        super().__init__()
+        self._after = after
+
+    def wait(self, until: Callable[[], bool]) -> None:
+        if self.answered == self._after:
+            raise SessionAborted("tired")
+
+
+def log_beside(manifest: Path) -> Path:
+    return manifest.with_name(manifest.name.replace("manifest.json", "log.jsonl"))
+
+
+def rows_of(manifest: Path) -> list[dict[str, Any]]:
+    return [dict(row) for row in session_state(log_beside(manifest)).rows]
+
+
+def test_the_manifest_is_complete_before_the_first_trial(
+    run: Callable[..., Any], small: Study, models: ModelSets, tmp_path: Path
+) -> None:
+    class Watchful(Scripted):
+        def rate(self, trial: Any, surfaces: Any) -> Any:
+            (path,) = tmp_path.rglob("*_manifest.json")
+            self.manifest = SessionManifest.load(path)
+            return super().rate(trial, surfaces)
+
+    respondent = Watchful()
+    run(respondent, sources={"full": "models", "simplified": "fewer"})
+    manifest = respondent.manifest
+    plan = plan_session(small, task="absolute", subject=1, session=1)
+    assert [trial["texture"] for trial in manifest.trials] == [t.texture for t in plan.trials]
+    assert manifest.models_sha256 == models.sha256(small.textures)
+    assert manifest.study_sha256 == small.sha256
+    assert manifest.study["seed"] == small.seed
+    assert manifest.model_sources == {"full": "models", "simplified": "fewer"}
+    assert manifest.program["versions"]["numpy"]
+    assert len(manifest.plan_sha256) == 64
+
+
+def test_textures_whose_models_are_equal_are_marked(
+    run: Callable[..., Any], models: ModelSets, tmp_path: Path
+) -> None:
+    full = models.sets["full"]
+    one = ModelSets(
+        sets={"full": full, "simplified": {**models.sets["simplified"], "PVC": full["PVC"]}}
+    )
+    _, manifest = run(models=one)
+    assert "PVC" in SessionManifest.load(manifest).identical
+    same = ModelSets(sets={"full": full, "simplified": full})
+    with pytest.raises(InputError, match="identical ones for all"):
+        run(models=same, folder=tmp_path / "all")
+    assert not (tmp_path / "all").exists()
+
+
+def test_full_and_simplified_exchanged_are_refused_or_recorded(
+    run: Callable[..., Any], models: ModelSets
+) -> None:
+    swapped = ModelSets(sets={"full": models.sets["simplified"], "simplified": models.sets["full"]})
+    with pytest.raises(InputError, match="exchange the two sets"):
+        run(models=swapped)
+    _, manifest = run(models=swapped, override="the names are meant so")
+    (record,) = SessionManifest.load(manifest).overrides
+    assert record == {"what": "exchanged models", "reason": "the names are meant so"}
+
+
+def test_a_rig_that_refuses_leaves_nothing(
+    run: Callable[..., Any], rig: Any, tmp_path: Path
+) -> None:
+    def refuse() -> None:
+        raise InputError("expected a card, got none; plug it in.")
+
+    rig.open = refuse
+    with pytest.raises(InputError, match="expected a card"):
+        run(folder=tmp_path / "none")
+    assert not (tmp_path / "none").exists()
+
+
+def test_consent_and_questions_come_first_and_once(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    asking = replace(
+        small,
+        consent="2026-11",
+        questions=(Question(name="handedness", levels=("left", "right", "not said")),),
+    )
+    first, again = Scripted(), Scripted()
+    _, manifest = run(first, study=asking)
+    run(again, task="relative", study=asking)
+    (asked,), (known,) = first.asked, again.asked
+    assert (asked.known, known.known) == (False, True)
+    assert asked.code == known.code == Roster(tmp_path).subjects()[1]["code"]
+    welcome = [e for e in read_log(log_beside(manifest)).events if e["event"] == "welcome"]
+    assert welcome[0]["consent"] == "2026-11"
+    assert welcome[0]["answers"] == {"handedness": "not said"}
+
+
+def test_an_aborted_session_goes_on_at_the_next_open_trial(run: Callable[..., Any]) -> None:
+    result, manifest = run(Tired(3))
+    assert (result.completed, result.reason) == (False, "tired")
+    with pytest.raises(InputError, match="--resume"):
+        run()
+    result, _ = run(resume=True)
+    assert result.completed
+    rows = rows_of(manifest)
+    assert [row["trial"] for row in rows] == [1, 2, 3, 4, 5]
+    assert [row["run"] for row in rows] == [1, 1, 1, 2, 2]
+    with pytest.raises(InputError, match="complete"):
+        run(resume=True)
+
+
+def test_after_a_long_gap_training_comes_again(
+    run: Callable[..., Any],
+) -> None:
+    _, manifest = run(Tired(3))
+    log = log_beside(manifest)
+    year = read_log(log).events[0]["utc"][:5]
+    log.write_text(log.read_text().replace(f'"{year}', f'"{int(year[:4]) - 1}-'))
+    run(resume=True)
+    rows = rows_of(manifest)
+    assert [(row["trial"], row["phase"], row["repeats"]) for row in rows] == [
+        (1, "training", None),
+        (2, "main", None),
+        (3, "main", None),
+        (6, "training", 1),
+        (4, "main", None),
+        (5, "main", None),
+    ]
+
+
+def test_a_changed_study_is_refused_on_resuming_or_recorded_and_the_stored_order_stays(
+    run: Callable[..., Any], small: Study
+) -> None:
+    _, manifest = run(Tired(2))
+    before = SessionManifest.load(manifest).trials
+    other = replace(small, seed=small.seed + 1)
+    with pytest.raises(InputError, match="study"):
+        run(study=other, resume=True)
+    result, _ = run(study=other, resume=True, override="the seed was corrected")
+    assert result.completed
+    assert SessionManifest.load(manifest).trials == before
+    by_number = {trial["trial"]: trial for trial in before}
+    for row in rows_of(manifest):
+        assert row["texture"] == by_number[row["trial"]]["texture"]
+
+
+def test_the_second_day_comes_after_the_first_and_on_another_date(run: Callable[..., Any]) -> None:
+    with pytest.raises(InputError, match="complete before session 2"):
+        run(task="relative", session=2)
+    run(task="relative")
+    person = Scripted()
+    person.simulated = False
+    result, manifest = run(task="relative", session=2)  # nobody has to wait who is simulated
+    assert result.completed
+    assert SessionManifest.load(manifest).overrides == []
+
+
+def test_people_and_simulations_never_share_a_folder(run: Callable[..., Any]) -> None:
+    run()
+    person = Scripted()
+    person.simulated = False
+    with pytest.raises(InputError, match="simulat"):
+        run(person, subject=2)
+
+
+def test_a_language_that_the_study_lacks_is_refused(run: Callable[..., Any]) -> None:
+    with pytest.raises(InputError, match=r"a language of the study \(en\), got 'ja'"):
+        run(language="ja")
+
+
+def test_a_replacement_gets_the_slot_of_a_dropout(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    run(subject=1)
+    run(subject=2)
+    with pytest.raises(InputError, match="from 1 to 2"):
+        run(subject=3)
+    Roster(tmp_path).drop(1)
+    _, manifest = run(subject=3)
+    stored = SessionManifest.load(manifest)
+    assert (stored.subject, stored.slot) == (3, 1)
+    plan = plan_session(small, task="absolute", subject=3, session=1, slot=1)
+    assert [trial["texture"] for trial in stored.trials] == [t.texture for t in plan.trials]
+
+
+# --- Killed between every two events --------------------------------------------------------
+
+
+def killed_at(event: int, session: Callable[[], object]) -> bool:
+    """Run a session in a process that kills itself before this event; whether it was killed."""
+    child = os.fork()
+    if child == 0:
+        counted = Counter[str]()
+        log, answer = SessionStore.log, SessionStore.answer
+
+        def count() -> None:
+            counted["events"] += 1
+            if counted["events"] == event:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        def counting_log(self: SessionStore, name: str, **fields: object) -> None:
+            count()
+            log(self, name, **fields)
+
+        def counting_answer(self: SessionStore, trial: int, row: Any) -> None:
+            count()
+            answer(self, trial, row)
+            count()  # after it was acknowledged, too
+
+        SessionStore.log, SessionStore.answer = counting_log, counting_answer  # type: ignore[method-assign]
+        try:
+            session()
+        finally:
+            os._exit(0)
+    _, status = os.waitpid(child, 0)
+    return os.WIFSIGNALED(status)
+
+
+def test_killed_between_every_two_events_no_answer_is_lost_or_doubled(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    order = [
+        trial.trial for trial in plan_session(small, task="absolute", subject=1, session=1).trials
+    ]
+    event = killed = 0
+    while True:
+        event += 1
+        folder = tmp_path / str(event)
+        acknowledged = tmp_path / f"{event}.txt"
+
+        class Telling(Scripted):
+            """Notes, outside the session, every trial that it is asked after."""
+
+            def rate(self, trial: Any, surfaces: Any, *, told: Path = acknowledged) -> Any:
+                with told.open("a") as file:
+                    file.write(f"{trial.trial}\n")
+                return super().rate(trial, surfaces)
+
+        if not killed_at(event, lambda f=folder: run(Telling(), folder=f)):
+            break
+        killed += 1
+        begun = (
+            [int(line) for line in acknowledged.read_text().split()]
+            if (acknowledged.exists())
+            else []
+        )
+        (manifest,) = folder.rglob("*_manifest.json")
+        state = session_state(log_beside(manifest))
+        assert state.status == "crashed"
+        kept = [row["trial"] for row in state.rows]
+        assert kept == order[: len(kept)]
+        assert len(kept) >= len(begun) - 1  # all but the trial that was being answered
+        if event % 3:  # gone on with at once, or exported first
+            export_all(folder)
+        result, _ = run(folder=folder, resume=True)
+        assert result.completed
+        assert [row["trial"] for row in rows_of(manifest)] == order
+    assert killed > 6 * TRIALS
+    assert session_state(log_beside(manifest)).status == "complete"
+
+
+def test_what_a_killed_session_left_can_be_analyzed(
+    run: Callable[..., Any], tmp_path: Path
+) -> None:
+    assert killed_at(20, lambda: run())
+    (name,) = export_all(tmp_path)
+    assert name == "sub-01_ses-01_task-absolute"
+    (table,) = tmp_path.glob("sub-01/ses-01/beh/*_beh.tsv")
+    (manifest,) = tmp_path.rglob("*_manifest.json")
+    assert len(table.read_text().splitlines()) - 1 == len(rows_of(manifest))
+    run(resume=True)
+    export_session(tmp_path, manifest)
+    assert len(table.read_text().splitlines()) - 1 == TRIALS

@@ -1,0 +1,110 @@
+"""The balance of a study's orders, counted, and the page to preregister."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from experiments.study.models import ModelSets
+from experiments.study.plan import Claim, Plan
+from experiments.study.study import Study, plan_sha256
+from experiments.study.task_plan import TaskPlan
+from experiments.tasks import plan_session
+from experiments.tasks.balance import balance_of
+from experiments.tasks.durations import minutes_of_session, trials_of_session
+from experiments.tasks.page import plan_page
+from modeling import InputError
+
+
+def test_the_papers_study_is_balanced() -> None:
+    study = Study.load()
+    found = [(row.least, row.most, row.of) for row in balance_of(study, "absolute")]
+    assert found == [(10, 10, 20), (3, 4, 7), (10, 10, 20), (7, 7, 14)]
+    found = [(row.least, row.most, row.of) for row in balance_of(study, "relative")]
+    assert found == [(12, 12, 24), (3, 3, 21), (144, 144, 1008)]
+
+
+def test_imbalance_is_counted(study: Study) -> None:
+    """Three participants, three textures: nobody can get half."""
+    rows = balance_of(study, "absolute")
+    assert [(row.least, row.most, row.of) for row in rows[:2]] == [(1, 2, 3), (1, 2, 3)]
+    assert all(row.most - row.least <= 1 for row in rows)
+
+
+def test_anchors_count_for_nothing(study: Study) -> None:
+    plan = replace(study.plan_of("absolute"), anchors={"canvas": "PVC"})
+    with_anchor = replace(study, tasks={**study.tasks, "absolute": plan})
+    assert trials_of_session(with_anchor, "absolute") == (1, 7)
+    for row in balance_of(with_anchor, "absolute"):
+        assert row.most - row.least <= 1
+
+
+def test_trials_and_minutes_are_those_of_the_plan(study: Study) -> None:
+    for task in study.tasks:
+        training, main = trials_of_session(study, task)
+        trials = plan_session(study, task=task, subject=1, session=1).trials
+        assert len(trials) == training + main
+    # 2 + 14 trials of 50 s and 5 min, and a break of 2 min after 5 and after 10 of 14 trials.
+    paper = Study.load()
+    assert minutes_of_session(paper, "absolute") == round((16 * 50 + 300) / 60)
+    breaks = replace(paper.plan_of("absolute"), break_after=5)
+    slower = replace(paper, tasks={"absolute": breaks})
+    assert minutes_of_session(slower, "absolute") == round((16 * 50 + 300 + 240) / 60)
+
+
+@pytest.fixture
+def planned(study: Study) -> Study:
+    claim = Claim(
+        name="as alike",
+        task="absolute",
+        measure="magnitude_similarity",
+        models=("full", "simplified"),
+        bounds=(-7.5, 8),
+        test="equivalence",
+    )
+    anchored = TaskPlan(
+        participants=4,
+        schedule="interleaved",
+        training_trials=1,
+        most_training_trials=5,
+        break_after=4,
+        anchors={"canvas": "PVC"},
+    )
+    plan = Plan(claims=(claim,), exclusions=("Whoever takes it off.",), highest_share_at_ends=0.3)
+    return replace(study, plan=plan, tasks={**study.tasks, "absolute": anchored})
+
+
+def test_the_page_says_all_that_is_fixed(planned: Study, models: ModelSets) -> None:
+    page = plan_page(planned, models)
+    hashes = models.sha256(planned.textures)
+    assert plan_sha256(planned, hashes) in page
+    assert all(sha256 in page for named in hashes.values() for sha256 in named.values())
+    for told in (
+        "simplified minus full. Smallest differences that matter: -7.5 and 8 points",
+        "Test of equivalence",
+        "Whoever takes it off.",
+        "more than 30%",
+        "absolute: 4 participants",
+        "relative: 4 participants",
+        "1 to 5 (until strokes stay inside the grid) for practice",
+        "real canvas beside the full model of PVC",
+        "A break after every 4 trials",
+        "each on a day of its own (2 sessions)",
+    ):
+        assert told in page
+    assert plan_page(Study.from_dict(planned.to_dict()), models) == page
+
+
+def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:
+    secret = replace(planned, seed=7_422_788_540_163_745, plan=Plan())
+    same = {**models.sets["simplified"], "MDF": models.sets["full"]["MDF"]}
+    page = plan_page(secret, ModelSets(sets={**models.sets, "simplified": same}))
+    assert "7422788540163745" not in page
+    assert "All models are equal for MDF" in page
+    assert "None: whatever is found is exploratory." in page
+
+
+def test_what_is_not_planned_has_no_balance(study: Study) -> None:
+    with pytest.raises(InputError, match="expected the task absolute or relative, got 'oddity'"):
+        balance_of(study, "oddity")
