@@ -11,23 +11,27 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.order import (
+    Planned,
+    check_manifest,
     check_order,
-    check_stored,
     planned_trials,
+    told_of_open,
     told_of_unordered,
-    with_repeats,
 )
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_values
-from modeling.files.reading import read_bytes
-from modeling.files.tables import check_named_once
+from modeling.files.reading import read_text
+from modeling.files.tables import check_named_once, csv_cells
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
+# What a session may differ in where its manifest records why, and under which word.
+_MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+_DERIVE = "delete it, and tactileq study status makes it again from the session's log"
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,9 @@ class Responses:
         True where no real rig was used, so that nobody felt a real surface.
     training : mapping of task to DataFrame
         The training trials, same columns; no statistic uses them.
+    anchors : mapping of task to DataFrame
+        Of tasks that have them the main trials whose virtual surface modelled another texture than
+        the real one's, same columns; no statistic of the models uses them.
     name : str
         The study's name.
     models : mapping of texture to mapping of kind to SHA-256
@@ -69,6 +76,7 @@ class Responses:
     simulated_participants: bool
     simulated_rig: bool
     training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     study_sha256: str = ""
@@ -95,7 +103,7 @@ class Responses:
     @property
     def textures(self) -> tuple[str, ...]:
         """Textures that were asked about, in the order of the answers."""
-        asked = (texture for table in self.answers.values() for texture in table["texture"])
+        asked = (t for table in self.answers.values() for t in table["texture"].dropna())
         return tuple(dict.fromkeys(asked))
 
     def done(self, task: str) -> PlannedTask:
@@ -129,31 +137,32 @@ def load_responses(data_folder: str | Path) -> Responses:
     data_folder : str or Path
         Folder holding dataset_description.json, participants.tsv and
         sub-*/ses-*/beh/sub-*_ses-*_task-TASK_beh.tsv; beside each its sidecar, and
-        below sourcedata/ the order of its trials, where they are there. Answers must follow that
-        order, trial by trial.
+        below sourcedata/ the session's manifest, where they are there. Answers must follow the
+        order of its trials.
 
     Returns
     -------
     Responses
-        A last line cut short by a killed process is dropped and named in `warnings`; so is a
-        session with fewer answers than planned trials, one without a stored order, and how many
-        answers to invalid trials were left out.
+        Its `warnings` name sessions with fewer answers than planned trials, those without a
+        manifest, rules that were overridden, pilots, and how many answers to invalid trials were
+        left out.
 
     Raises
     ------
     InputError
         Where the folder is none, a file is malformed, a value is out of range, answers are not
-        those to the trials that were planned, or answers are mixed that differ in whether
-        participants or rig were simulated, in their study or in their models.
+        those to the trials that were planned, models are others than full and simplified ones, or
+        answers are mixed that differ in whether participants or rig were simulated; or in their
+        study, their models or whether they are a pilot, and no session says why.
     """
     folder = Path(data_folder)
     description = _description(folder)
     models = _models(description, folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
-    origin = {**simulated, **{key: description[key] for key in _RESTS_ON if key in description}}
+    origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
     warnings: list[str] = []
     participants = simulated["SimulatedParticipant"]
-    _check_participants(folder / "participants.tsv", participants, warnings=warnings)
+    _check_participants(folder / "participants.tsv", participants)
     tables = {
         task: _load_task(folder, task, origin=origin, warnings=warnings) for task in ANSWER_TABLES
     }
@@ -164,10 +173,11 @@ def load_responses(data_folder: str | Path) -> Responses:
         )
     parts = {task: _split(table, task) for task, table in tables.items()}
     return Responses(
-        answers={task: main for task, (main, _) in parts.items()},
+        answers={task: main for task, (main, *_) in parts.items()},
         simulated_participants=participants,
         simulated_rig=simulated["SimulatedRig"],
-        training={task: training for task, (_, training) in parts.items()},
+        training={task: training for task, (_, training, _) in parts.items()},
+        anchors={task: anchors for task, (*_, anchors) in parts.items() if anchors is not None},
         name=str(description.get("Name", "")),
         models=models,
         study_sha256=str(description.get("StudySHA256", "")),
@@ -222,8 +232,9 @@ def _planned(description: Mapping[str, object], path: Path) -> dict[str, Planned
                 f"expected a whole number of at least 1 for the participants of {task} under "
                 f"StudyDesign in {path}, got {participants!r}; restore the file."
             )
-        a_day_for_each_model = plan.get("schedule") == "by-day"
-        planned[task] = PlannedTask(participants, participants * (1 + a_day_for_each_model))
+        models = plan.get("models", MODELS)
+        days = len(models) if plan.get("schedule") == "by-day" else 1
+        planned[task] = PlannedTask(participants, participants * days)
     return planned
 
 
@@ -231,10 +242,10 @@ def _json_object(path: Path) -> Mapping[str, object]:
     return read_json_object(path, advice="restore the file")
 
 
-def _check_participants(path: Path, simulated: bool, *, warnings: list[str]) -> None:
+def _check_participants(path: Path, simulated: bool) -> None:
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
-    table = _read_lines(path, warnings)
+    table = _read_lines(path)
     _require_columns(table, ("participant_id", "simulated"), path=path)
     _check_simulated(table, simulated, path=path)
 
@@ -243,10 +254,20 @@ def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[s
     """SHA-256 of the models that were presented, by texture and kind; empty where not stated."""
     stated = description.get("ModelsSHA256", {})
     textures = stated.values() if isinstance(stated, Mapping) else [None]
-    if not all(isinstance(kinds, Mapping) and set(kinds) == set(MODELS) for kinds in textures):
+    place = folder / "dataset_description.json"
+    if not all(isinstance(kinds, Mapping) for kinds in textures):
         raise InputError(
-            'expected "ModelsSHA256" with a full and a simplified model of each texture in '
-            f"{folder / 'dataset_description.json'}, got something else; restore the file."
+            f'expected "ModelsSHA256" with the models of each texture in {place}, got something '
+            "else; restore the file."
+        )
+    others = [
+        kinds for kinds in textures if isinstance(kinds, Mapping) and set(kinds) != set(MODELS)
+    ]
+    if others:
+        raise InputError(
+            f"expected answers about models called full and simplified in {place}, since only "
+            f"these are compared yet, got {shown(', '.join(others[0]))}; name the study's two sets "
+            "of models so."
         )
     assert isinstance(stated, Mapping)
     return {str(t): {str(k): str(v) for k, v in kinds.items()} for t, kinds in stated.items()}
@@ -264,33 +285,38 @@ def _load_task(
                 f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
                 f"move the file back to its own participant's folder."
             )
-        sidecar = _checked_sidecar(path.with_suffix(".json"), origin)
-        table = _read_lines(path, warnings)
-        order = folder / "sourcedata" / participant / session
-        order /= path.name.removesuffix("beh.tsv") + "order.json"
         what = f"{participant} {task} {session}"
-        planned = None
-        if order.is_file():
-            stored = _json_object(order)
-            check_stored(stored, order, sidecar=sidecar, study=origin.get("StudySHA256"))
-            planned = planned_trials(stored, (participant, session, task), path=order)
-        else:
+        sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
+        table = _read_lines(path)
+        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+        planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
+        if planned is None:
             unordered.append(what)
-        if not table.columns.empty:
-            _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
-            planned = None if planned is None else with_repeats(table, planned)
-        if planned is not None and len(table) < len(planned):
-            ended = f"answered {len(table)} of {len(planned)} trials (ended early)."
-            warnings.append(f"{what} {ended}")
-        if table.columns.empty:
-            continue
+        elif told := told_of_open(table, planned):
+            warnings.append(f"{what} {told}")
         check_order(table, planned, path=path)
         table = _valid(table, what, warnings=warnings)
+        if (table["pilot"] == "true").any():
+            warnings.append(f"{what} was a pilot; its answers are no data of the study.")
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)
     warnings += [*told_of_unordered(unordered), *_unanswered(folder, task)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
+
+
+def _planned_of(
+    path: Path, session: tuple[str, str, str], *, sidecar: Mapping[str, object]
+) -> list[Planned] | None:
+    """The trials of a session's manifest, None where there is none."""
+    participant, number, _ = session
+    manifest = path.parents[3] / "sourcedata" / participant / number
+    manifest /= path.name.removesuffix("beh.tsv") + "manifest.json"
+    if not manifest.is_file():
+        return None
+    stored = _json_object(manifest)
+    check_manifest(stored, manifest, sidecar=sidecar)
+    return planned_trials(stored, session, path=manifest)
 
 
 def _valid(table: pd.DataFrame, what: str, *, warnings: list[str]) -> pd.DataFrame:
@@ -305,7 +331,9 @@ def _valid(table: pd.DataFrame, what: str, *, warnings: list[str]) -> pd.DataFra
     return table[~failed].reset_index(drop=True)
 
 
-def _checked_sidecar(path: Path, origin: Mapping[str, object]) -> Mapping[str, object]:
+def _checked_sidecar(
+    path: Path, origin: Mapping[str, object], what: str, *, warnings: list[str]
+) -> Mapping[str, object]:
     """The sidecar of a session, refused where it says otherwise than the data set what it is of."""
     if not path.is_file() and any(key in origin for key in _RESTS_ON):
         raise InputError(
@@ -313,35 +341,48 @@ def _checked_sidecar(path: Path, origin: Mapping[str, object]) -> Mapping[str, o
             "found none; restore the file."
         )
     sidecar = _json_object(path) if path.is_file() else {}
+    allowed = _overridden(sidecar, what, warnings=warnings)
     for key, value in origin.items():
-        if sidecar.get(key, value) != value:
-            found = json.dumps(sidecar[key]) if key in _SIMULATED else "another"
-            wanted = f"{key} {json.dumps(value)}" if key in _SIMULATED else f"one {key}"
-            raise InputError(
-                f"expected {wanted} in {path}, as dataset_description.json says, "
-                f"never a mixture, but found {found}; correct the file or leave "
-                "its session out."
-            )
+        if sidecar.get(key, value) == value or _MAY_DIFFER.get(key) in allowed:
+            continue
+        found = "another" if key in _RESTS_ON else json.dumps(sidecar[key])
+        wanted = f"one {key}" if key in _RESTS_ON else f"{key} {json.dumps(value)}"
+        raise InputError(
+            f"expected {wanted} in {path}, as dataset_description.json says, "
+            f"never a mixture, but found {found}; correct the file or leave "
+            "its session out."
+        )
     return sidecar
 
 
+def _overridden(sidecar: Mapping[str, object], what: str, *, warnings: list[str]) -> frozenset[str]:
+    """The rules that a session went on against, each told with its reason."""
+    stated = sidecar.get("Overrides", [])
+    records = [r for r in stated if isinstance(r, Mapping)] if isinstance(stated, list) else []
+    for record in records:
+        warnings.append(
+            f"{what} went on against a rule ({record.get('what')}): {record.get('reason')}."
+        )
+    return frozenset(str(record.get("what")) for record in records)
+
+
 def _unanswered(folder: Path, task: str) -> list[str]:
-    """A sentence for each session whose order is stored but whose answers are not there."""
+    """A sentence for each session that was begun but whose answers are not there."""
     told = []
-    for order in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_order.json")):
-        stem = order.name.removesuffix("order.json")
-        participant, session = order.parts[-3:-1]
+    for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):
+        stem = manifest.name.removesuffix("manifest.json")
+        participant, session = manifest.parts[-3:-1]
         if not (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():
-            told.append(f"{participant} {task} {session} has a stored order, but no answers.")
+            told.append(
+                f"{participant} {task} {session} was begun, but has no table of answers; it is "
+                "running, or tactileq study status makes one."
+            )
     return told
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
     columns = ANSWER_TABLES[task]
-    for column in columns:
-        if column.before is not None and column.name not in table:
-            table[column.name] = np.nan if column.before == "n/a" else column.before
     _require_columns(table, tuple(column.name for column in columns), path=path)
     for column in columns:
         found = table[column.name]
@@ -357,10 +398,12 @@ def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: boo
     _check_simulated(table, simulated, path=path)
     neither = ~table["valid"].isin([0.0, 1.0])
     _refuse(neither, table["valid"], expected="1 or 0 in column valid", path=path)
-    twice = table.duplicated(["phase", "trial"])
+    other = ~table["model"].isin(MODELS) & table["model"].notna()
+    expected = f"{' or '.join(MODELS)}, which alone are compared yet, in column model"
+    _refuse(other, table["model"], expected=expected, path=path)
+    twice = table.duplicated("trial")
     _refuse(twice, table["trial"], expected="every trial once", path=path)
-    if {"layout", "answer", "correct"} <= set(table):
-        _check_choices(table, path)
+    _check_choices(table, {column.name: column for column in columns}, path=path)
 
 
 def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:
@@ -372,23 +415,27 @@ def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path
     return values
 
 
-def _check_choices(table: pd.DataFrame, path: Path) -> None:
+def _check_choices(table: pd.DataFrame, columns: Mapping[str, AnswerColumn], *, path: Path) -> None:
+    """Where there is a right answer: whether it is told rightly, and was among the buttons."""
+    if not {"answer", "correct"} <= columns.keys():
+        return
     answered = table[table["answer"].notna()]
-    layouts = [str(layout).split("|") for layout in answered["layout"]]
-    absent = [
-        answer not in layout for answer, layout in zip(answered["answer"], layouts, strict=True)
-    ]
+    if "layout" in columns and columns["answer"].limits is None:
+        layouts = [str(layout).split("|") for layout in answered["layout"]]
+        absent = [
+            answer not in layout for answer, layout in zip(answered["answer"], layouts, strict=True)
+        ]
+        _refuse(
+            pd.Series(absent, index=answered.index, dtype=bool),
+            answered["answer"],
+            expected="an answer that stands in its trial's layout",
+            path=path,
+        )
+    right = columns["answer"].right
     _refuse(
-        pd.Series(absent, index=answered.index, dtype=bool),
-        answered["answer"],
-        expected="an answer that stands in its trial's layout",
-        path=path,
-    )
-    right = (answered["answer"] == answered["texture"]).astype(float)
-    _refuse(
-        right != answered["correct"],
+        (answered["answer"] == answered[right]).astype(float) != answered["correct"],
         answered["correct"],
-        expected="correct = 1 exactly where answer and texture agree",
+        expected=f"correct = 1 exactly where answer and {right} agree",
         path=path,
     )
 
@@ -424,51 +471,36 @@ def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], *, path: Pat
         )
 
 
-def _read_lines(path: Path, warnings: list[str]) -> pd.DataFrame:
-    """All complete lines as text; n/a becomes missing. No columns where even the first is cut."""
-    complete, _, rest = read_bytes(path, "a table").rpartition(b"\n")
-    try:
-        lines = [line.rstrip("\r") for line in complete.decode("utf-8-sig").split("\n")]
-    except UnicodeDecodeError:
-        raise InputError(
-            f"expected UTF-8 text in {path}, got other bytes; restore the file."
-        ) from None
-    if not complete:
-        warnings.append(
-            f"{path.name}: the first line was cut short (a killed session?); no answers."
-        )
-        return pd.DataFrame()
-    header = lines[0].split("\t")
-    check_named_once(header, path)
-    rows = [line.split("\t") for line in lines[1:]]
-    if rest:
-        tail = rest.decode("utf-8", errors="replace")
-        if _is_whole(tail, header):
-            rows.append(tail.split("\t"))
-        else:
-            warnings.append(
-                f"{path.name}: the last line was cut short (a killed session?) and is left out."
-            )
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(header):
+def _read_lines(path: Path) -> pd.DataFrame:
+    """All lines as text; n/a becomes missing."""
+    # Not splitlines(): that would also break cells at characters that may stand in them.
+    header, *lines = read_text(path, "a table").removesuffix("\n").split("\n")
+    names = csv_cells(header, f"line 1 of {path}", delimiter="\t")
+    check_named_once(names, path)
+    rows = []
+    for number, line in enumerate(lines, start=2):
+        cells = csv_cells(line, f"line {number} of {path}", delimiter="\t")
+        if len(cells) != len(names):
             raise InputError(
-                f"expected {len(header)} values in line {number} of {path}, but found {len(row)}; "
-                f"correct the line."
+                f"expected {len(names)} values in line {number} of {path}, but found {len(cells)}; "
+                f"{_DERIVE}."
             )
-    return pd.DataFrame(rows, columns=header, dtype=object).replace("n/a", np.nan)
+        rows.append(cells)
+    return pd.DataFrame(rows, columns=names, dtype=object).replace("n/a", np.nan)
 
 
-def _is_whole(tail: str, header: list[str]) -> bool:
-    """Only a last value known in full (true or false) proves that nothing is missing."""
-    values = tail.split("\t")
-    return len(values) == len(header) and values[-1] in ("true", "false")
-
-
-def _split(table: pd.DataFrame | None, task: str) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """Main and training trials; without answers, tables without rows."""
+def _split(
+    table: pd.DataFrame | None, task: str
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame | None]:
+    """Main trials, training and anchors (None of a task without); or tables without rows."""
     if table is None:
         kinds = {c.name: object if c.limits is None else float for c in ANSWER_TABLES[task]}
         kinds = {"participant_id": object, "session": object} | kinds
         table = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
     main = table["phase"] == "main"
-    return table[main].reset_index(drop=True), table[~main].reset_index(drop=True)
+    training = table[~main].reset_index(drop=True)
+    if "virtual_texture" not in table:
+        return table[main].reset_index(drop=True), training, None
+    anchor = main & (table["virtual_texture"] != table["texture"])
+    own, other = (table[rows].reset_index(drop=True) for rows in (main & ~anchor, anchor))
+    return own, training, other

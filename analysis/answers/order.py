@@ -1,9 +1,8 @@
-"""Whether answers are those to the trials that were planned."""
+"""Whether answers are those to the trials that were planned (docs/method/protocols.md#order)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +12,18 @@ from modeling import InputError
 from modeling.files.hashes import sha256_of
 from modeling.files.reading import read_text
 
+Planned = Mapping[str, Any]
+
 
 def planned_trials(
-    stored: Mapping[str, object], session: tuple[str, str, str], *, path: Path
-) -> list[Mapping[str, object]]:
-    """The trials of a stored order, which must be that of its own session.
+    manifest: Mapping[str, object], session: tuple[str, str, str], *, path: Path
+) -> list[Planned]:
+    """The trials of a session's manifest, which must be that of its own session.
 
     Parameters
     ----------
-    stored : mapping
-        What the file of the order holds.
+    manifest : mapping
+        What the file holds.
     session : (str, str, str)
         Participant, session and task, as its folders and its name say.
     path : Path
@@ -31,50 +32,57 @@ def planned_trials(
     Raises
     ------
     InputError
-        Where it holds no trials, or is the order of another session.
+        Where it holds no trials, or is the manifest of another session.
     """
-    trials = stored.get("trials")
-    if not isinstance(trials, list) or not all(isinstance(trial, Mapping) for trial in trials):
+    trials = manifest.get("trials")
+    if not isinstance(trials, list) or not all(_is_numbered(trial) for trial in trials):
         raise InputError(f"expected a list of trials in {path}, found none; restore the file.")
-    numbers = {"sub": stored.get("subject"), "ses": stored.get("session")}
-    found = (*(_numbered(key, number) for key, number in numbers.items()), str(stored.get("task")))
+    numbers = {"sub": manifest.get("subject"), "ses": manifest.get("session")}
+    found = (
+        *(_numbered(key, number) for key, number in numbers.items()),
+        str(manifest.get("task")),
+    )
     if found != session:
         raise InputError(
-            f"expected the order of {' '.join(session)} in {path}, found that of "
+            f"expected the manifest of {' '.join(session)} in {path}, found that of "
             f"{' '.join(found)}; move the session's files back to their own participant's folder."
         )
     return trials
 
 
-def check_stored(
-    stored: Mapping[str, object], path: Path, *, sidecar: Mapping[str, object], study: object
+def _is_numbered(trial: object) -> bool:
+    return isinstance(trial, Mapping) and isinstance(trial.get("trial"), int) and "phase" in trial
+
+
+def check_manifest(
+    manifest: Mapping[str, object], path: Path, *, sidecar: Mapping[str, Any]
 ) -> None:
-    """Refuse an order that was changed since, or that is of another study than the data set.
+    """Refuse a manifest that was changed since, or that is of another study than its answers.
 
     Parameters
     ----------
-    stored : mapping
-        What the file of the order holds.
+    manifest : mapping
+        What the file holds.
     path : Path
         The file.
     sidecar : mapping
-        Of the session's answers; it names the order by its SHA-256.
-    study : object
-        SHA-256 of the data set's study, None where it is not stated.
+        Of the session's answers; it names study and manifest by SHA-256.
 
     Raises
     ------
     InputError
     """
-    if study is not None and stored.get("study_sha256", study) != study:
+    study = sidecar.get("StudySHA256")
+    if study is not None and manifest.get("study_sha256", study) != study:
         raise InputError(
-            f"expected an order of the data set's study in {path}, found that of another; restore "
-            "the file."
+            f"expected the study of the session's answers in {path}, found another; restore the "
+            "file."
         )
-    named = sidecar.get("OrderSHA256")
-    if named is not None and named != sha256_of(read_text(path, "the order of a session")):
+    sources = sidecar.get("DerivedFrom")
+    named = sources.get("manifest") if isinstance(sources, Mapping) else None
+    if named is not None and named != sha256_of(read_text(path, "the manifest of a session")):
         raise InputError(
-            f"expected the order in {path} as it was stored before the session, found a changed "
+            f"expected the manifest in {path} as it was stored before the session, found a changed "
             "one; restore the file."
         )
 
@@ -84,88 +92,133 @@ def _numbered(key: str, number: object) -> str:
 
 
 def told_of_unordered(sessions: Sequence[str]) -> list[str]:
-    """One sentence on sessions without a stored order; none where there are none."""
+    """One sentence on sessions without a manifest; none where there are none."""
     if not sessions:
         return []
     if len(sessions) == 1:
-        who = f"{sessions[0]} has no stored order with which its"
+        who = f"{sessions[0]} has no manifest with whose order its"
     else:
         several = f"{len(sessions)} sessions ({sessions[0]} and others)"
-        who = f"{several} have no stored order with which their"
+        who = f"{several} have no manifest with whose order their"
     return [f"{who} answers could be compared."]
 
 
-def with_repeats(
-    table: pd.DataFrame, planned: Sequence[Mapping[str, object]]
-) -> list[Mapping[str, object]]:
-    """The trials that a session had to have, given which of its answers are not valid.
-
-    Each invalid trial is repeated once, with the next free number, at the end of its phase.
+def told_of_open(table: pd.DataFrame, planned: Sequence[Planned]) -> str | None:
+    """How many main trials were answered, where some were not; a failed one is owed once more.
 
     Parameters
     ----------
     table : DataFrame
-        The answers of one session, checked, in the order of the file.
+        The answers of one session, checked, perhaps without rows and columns.
     planned : sequence of mapping
-        The trials of the stored order.
+        The trials of the manifest.
     """
-    valid = table["valid"].tolist()
-    expected: list[Mapping[str, object]] = []
-    number = len(planned)
-    for _, phase in groupby(planned, key=lambda trial: trial.get("phase")):
-        failed = []
-        for trial in phase:
-            if len(expected) < len(valid) and valid[len(expected)] == 0:
-                failed.append(trial)
-            expected.append({**trial, "repeats": None})
-        for trial in failed:
-            number += 1
-            expected.append({**trial, "trial": number, "repeats": trial.get("trial")})
-    return expected
+    main = [trial["trial"] for trial in planned if trial["phase"] == "main"]
+    if table.columns.empty:
+        return f"answered 0 of {len(main)} main trials (ended early)."
+    rows = table[table["phase"] == "main"]
+    first = rows["repeats"].isna()
+    owed = len(main) + int((rows["valid"][first] == 0).sum())
+    return (
+        None if len(rows) == owed else f"answered {len(rows)} of {owed} main trials (ended early)."
+    )
 
 
-def check_order(
-    table: pd.DataFrame, planned: Sequence[Mapping[str, object]] | None, *, path: Path
-) -> None:
+def check_order(table: pd.DataFrame, planned: Sequence[Planned] | None, *, path: Path) -> None:
     """Refuse answers that do not follow the order that was stored before the first trial.
+
+    Planned trials are answered in their order; of the training ones the first few suffice. A main
+    trial that was not valid is answered once more after all others. Training may begin again. What
+    is answered again has the next free number, and names its trial under `repeats`.
 
     Parameters
     ----------
     table : DataFrame
         The answers of one session, checked, a row per trial in the order of the file.
     planned : sequence of mapping, optional
-        The trials of the stored order with those that were to be repeated (`with_repeats`): every
-        column that a trial and its answer share. Nothing is compared without it.
+        The trials of the manifest: every column that a trial and its answer share. Nothing is
+        compared without it.
     path : Path
         The file of the answers, for what is said of them.
 
     Raises
     ------
     InputError
-        For more answers than trials, and for the first row that is not the answer to the trial
-        in its place: another number, phase, texture, model, tray, first surface or layout, or
-        another trial that it repeats.
+        For the first row that is not the answer to a trial that could come in its place: another
+        number, phase, texture, model, tray, first surface or layout.
     """
     if planned is None:
         return
-    if len(table) > len(planned):
-        raise InputError(
-            f"expected at most {len(planned)} answers in {path}, as the session's stored order "
-            f"has trials, repeated ones included, but found {len(table)}; restore the file."
-        )
-    rows = table.to_dict("records")
-    for number, (row, trial) in enumerate(zip(rows, planned, strict=False), start=1):
+    follow = _Following(planned)
+    for place, row in enumerate(table.to_dict("records"), start=1):
+        wrong = follow.wrong_in({str(name): value for name, value in row.items()})
+        if wrong is not None:
+            column, expected = wrong
+            raise InputError(
+                f"expected {column} {_shown(expected)} in answer {place} of {path}, as the "
+                f"session's manifest says, but found {_shown(row[column])}; restore the file, "
+                "or leave its session out."
+            )
+
+
+class _Following:
+    """Follows the answers of a session, row by row."""
+
+    def __init__(self, planned: Sequence[Planned]) -> None:
+        self._planned = {trial["trial"]: trial for trial in planned}
+        self._training = [trial["trial"] for trial in planned if trial["phase"] != "main"]
+        self._main = [trial["trial"] for trial in planned if trial["phase"] == "main"]
+        self._free = max(self._planned, default=0) + 1
+        self._failed: list[int] = []
+        self._run = 1.0
+
+    def wrong_in(self, row: Mapping[str, Any]) -> tuple[str, object] | None:
+        """The first column with another value than it had to have, and that value."""
+        if row["run"] < self._run:
+            return "run", self._run
+        self._run = row["run"]
+        wrong = self._wrong_first(row) if pd.isna(row["repeats"]) else self._wrong_again(row)
+        if wrong is not None:
+            return wrong
+        number = row["trial"] if pd.isna(row["repeats"]) else row["repeats"]
+        trial = {**self._planned[number], "trial": row["trial"]}
         for column, value in trial.items():
             if column in row and not _same(row[column], value):
-                raise InputError(
-                    f"expected {column} {_shown(value)} in answer {number} of {path}, as the "
-                    f"session's stored order says, but found {_shown(row[column])}; restore the "
-                    "file, or leave its session out."
-                )
+                return column, value
+        return None
+
+    def _wrong_first(self, row: Mapping[str, Any]) -> tuple[str, object] | None:
+        """Of an answer to a planned trial."""
+        open_ = self._training if row["trial"] in self._training else self._main
+        if not open_:  # all were answered
+            return "repeats", self._failed[0] if self._failed else "the number of a planned trial"
+        if row["trial"] != open_[0]:
+            return "trial", open_[0]
+        open_.pop(0)
+        if open_ is self._main:
+            self._training.clear()
+            if row["valid"] == 0:
+                self._failed.append(row["trial"])
+        return None
+
+    def _wrong_again(self, row: Mapping[str, Any]) -> tuple[str, object] | None:
+        """Of an answer to a trial that was presented once more."""
+        if row["trial"] != self._free:
+            return "trial", self._free
+        self._free += 1
+        trial = self._planned.get(row["repeats"])
+        if trial is None:
+            return "repeats", None
+        if trial["phase"] != "main":
+            return None
+        if self._main or row["repeats"] not in self._failed:
+            return "repeats", self._failed[0] if self._failed and not self._main else None
+        self._failed.remove(row["repeats"])
+        return None
 
 
 def _same(answered: Any, planned: object) -> bool:
-    if planned is None:
+    if planned is None or planned == "":
         return bool(pd.isna(answered))
     if isinstance(planned, list):  # a layout
         planned = "|".join(map(str, planned))
@@ -175,6 +228,6 @@ def _same(answered: Any, planned: object) -> bool:
 def _shown(value: Any) -> str:
     if isinstance(value, list):
         return "|".join(map(str, value))
-    if value is None or pd.isna(value):
+    if value is None or value == "" or pd.isna(value):
         return "n/a"
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -88,11 +87,6 @@ def export_all(data_folder: str | Path) -> tuple[str, ...]:
     if sessions_in(root) or (root / "participants.tsv").exists():
         _export_people(root)
     return tuple(written)
-
-
-def shown_files(files: SessionFiles) -> list[Path]:
-    """What BIDS shows of a session, as far as it is there."""
-    return sorted(_beh(files).glob(f"{files.stem}_*"))
 
 
 def _held(files: SessionFiles) -> Held:
@@ -271,12 +265,18 @@ def _is_exported(files: SessionFiles) -> bool:
 
 
 def _export_people(root: Path) -> None:
-    """The tables about people, and what stands beside them, of all sessions that are shown."""
+    """The tables about people, and what stands beside them, of all sessions that are shown.
+
+    Nothing of a data set that also holds people without source data, as one that was published.
+    """
     sessions = [
         held
         for files in sessions_in(root)
         if (_beh(files) / f"{files.stem}_beh.tsv").is_file() and (held := _held(files)).state.events
     ]
+    known = {held.participant for held in sessions}
+    if any(path.is_dir() and path.name not in known for path in root.glob("sub-*")):
+        return
     made = people_files(root, sessions, Roster(root).subjects())
     description = root / DESCRIPTION_NAME
     if sessions and not description.is_file():

@@ -159,8 +159,7 @@ def _session_rows(sessions: Sequence[Held]) -> list[dict[str, object]]:
 def readme(description: Mapping[str, Any]) -> bytes:
     """What somebody reads first who is given the data set."""
     simulated = (
-        "\nTHESE DATA ARE SIMULATED (participants, the rig, or both): dataset_description.json says "
-        "which.\n"
+        "\nTHESE DATA ARE SIMULATED: dataset_description.json says what of them.\n"
         if description.get("Simulated")
         else ""
     )
@@ -168,12 +167,13 @@ def readme(description: Mapping[str, Any]) -> bytes:
 {simulated}
 Answers of a study with tactileq, as a BIDS data set.
 
-sub-XX/ses-XX/beh/*_beh.tsv      the answers, one row for each trial, in the order in which they were given
-sub-XX/ses-XX/beh/*_events.tsv   what happened: presentations with what limits did to them, mounts, breaks, faults
-sub-XX/ses-XX/beh/*_physio.tsv.gz  the hand, 250 times a second, one file for each start of the session
-sub-XX/sub-XX_sessions.tsv       the person's sessions, and how each one ended
-participants.tsv                 who took part
-sourcedata/                      what the program wrote while a session ran; all of the above is made from it
+participants.tsv           who took part
+sub-XX/sub-XX_sessions.tsv the person's sessions, and how each one ended
+sub-XX/ses-XX/beh/         of each session
+  *_beh.tsv                the answers, one row for each trial, in the order in which they came
+  *_events.tsv             what happened: presentations and what limits did to them, breaks, faults
+  *_physio.tsv.gz          the hand, 250 times a second; a file for each start of the session
+sourcedata/                what the program wrote meanwhile; all of the above is made from it
 
 Every column is described in the JSON file beside its table. n/a stands for what there is not. Text
 with quotes is written as in CSV; control characters stand as the characters that picture them.

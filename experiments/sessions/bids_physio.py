@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from experiments.sessions.log import Event
 from modeling.arrays import Floats
@@ -96,31 +97,29 @@ def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:
     share[share < 1e-6] = 0.0
     trial = hand["trial"].to_numpy()
     known = (share == 0.0) | ((between_s <= LONGEST_GAP_S) & (trial[last] == trial[following]))
-    surface = hand["surface"].map(SURFACES.index)
-    steps = {"surface": surface, **{n: hand[n] for n in ("force_assumed", "trial", "presentation")}}
-    return pd.DataFrame(
-        {
-            **{
-                name: np.where(
-                    known, _linear(hand[name].to_numpy(float), last, following, share), np.nan
-                )
-                for name in ("speed_mm_s", "force_n")
-            },
-            **{
-                name: pd.array(np.where(known, values.to_numpy(float)[last], np.nan)).astype(
-                    "Int64"
-                )
-                for name, values in steps.items()
-            },
-        }
-    )
+    linear = {
+        name: _linear(hand[name].to_numpy(float), last, following, share)
+        for name in ("speed_mm_s", "force_n")
+    }
+    codes = hand.assign(surface=hand["surface"].map(SURFACES.index))
+    steps = {
+        name: codes[name].to_numpy(float)[last]
+        for name in ("surface", "force_assumed", "trial", "presentation")
+    }
+    # Without a decimal point, though there are gaps.
+    found = pd.DataFrame({**linear, **steps})
+    found.loc[~known] = np.nan
+    return found.astype(dict.fromkeys(steps, "Int64"))
 
 
-def _linear(values: Floats, last: Any, following: Any, share: Floats) -> Floats:
+def _linear(
+    values: Floats, last: NDArray[np.intp], following: NDArray[np.intp], share: Floats
+) -> Floats:
+    between = (1.0 - share) * values[last] + share * values[following]
     # At a reading itself the next one does not count: it may be NaN.
-    return np.where(
-        share == 0.0, values[last], (1.0 - share) * values[last] + share * values[following]
-    )
+    at_reading = share == 0.0
+    between[at_reading] = values[last[at_reading]]
+    return between
 
 
 def start_onset_s(
@@ -134,7 +133,7 @@ def start_onset_s(
     of_run = [(e, onset) for e, onset in zip(events, onsets_s, strict=True) if e["run"] == run]
     for event, onset in of_run:
         if event["event"] == "presented" and isinstance(event.get("start_s"), int | float):
-            return round(onset + first_s - event["start_s"], 6)
+            return round(onset + first_s - float(event["start_s"]), 6)
     return round(of_run[0][1], 6)
 
 

@@ -111,8 +111,8 @@ def study_progress(
     ]
     if study is None and not held:
         raise InputError(
-            f"expected sessions below {root / 'sourcedata'}, found none; name the study's file with "
-            "--study."
+            f"expected sessions below {root / 'sourcedata'}, found none; name the study's "
+            "file with --study."
         )
     design = study.to_dict() if study is not None else held[0][1].study
     wanted = {

@@ -38,12 +38,14 @@ def analyze(
     """
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
+    from experiments.sessions.bids import export_all
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
     check_own_results(out, "analyze")
+    export_all(data)  # of sessions that were killed
     responses = load_responses(data)
     folders = (recordings, models, simplified)
     results = []

@@ -7,6 +7,8 @@ import typer
 from tactileq.commands.study_check import study_check
 from tactileq.commands.study_init import study_init
 from tactileq.commands.study_plan import study_plan
+from tactileq.commands.study_status import study_status
+from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 
 study = typer.Typer(
     no_args_is_help=True,
@@ -16,3 +18,6 @@ study = typer.Typer(
 study.command("init")(study_init)
 study.command("check")(study_check)
 study.command("plan")(study_plan)
+study.command("status")(study_status)
+study.command("dropout")(study_dropout)
+study.command("withdraw")(study_withdraw)

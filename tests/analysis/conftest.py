@@ -24,6 +24,8 @@ RELATIVE = (
     *("trial", "phase", "texture", "model", "tray", "layout", "answer", "correct", "presses"),
     *("response_time_s", "simulated"),
 )
+# What a table has besides, the same in all rows but the texture of the virtual surface.
+USUAL = {"run": "1", "valid": "1", "repeats": "n/a", "pilot": "false"}
 Rows = list[list[str]]
 WriteTask = Callable[..., Path]
 
@@ -44,9 +46,9 @@ def absolute_rows() -> Rows:
     """One training trial and the fourteen main ones."""
     rows = [["1", "training", "canvas", "full", "B", "real", "40", "60", "2", "9.5", "false"]]
     for number, (texture, model) in enumerate(
-        [(texture, model) for texture in TEXTURES for model in ("full", "simplified")], start=1
+        [(texture, model) for texture in TEXTURES for model in ("full", "simplified")], start=2
     ):
-        ratings = [str(50 + number), str(100 - number)]
+        ratings = [str(49 + number), str(101 - number)]
         rows.append(
             [str(number), "main", texture, model, "A", "virtual", *ratings, "4", "12.25", "false"]
         )
@@ -66,7 +68,7 @@ def relative_rows() -> Rows:
 
 @pytest.fixture
 def write_order(study_folder: Path) -> WriteTask:
-    """Store the order of a session in which these rows are the answers to all trials."""
+    """Store the manifest of a session in which these rows are the answers to all trials."""
 
     def write(task: str, rows: Rows, *, participant: str = "sub-01") -> Path:
         trials = []
@@ -76,10 +78,12 @@ def write_order(study_folder: Path) -> WriteTask:
             trial: dict[str, object] = {name: cells[name] for name in shared if name in cells}
             if "layout" in cells:
                 trial["layout"] = cells["layout"].split("|")
+            else:
+                trial["virtual_texture"] = cells["texture"]
             trials.append({"trial": int(cells["trial"]), **trial})
         path = study_folder / "sourcedata" / participant / "ses-01"
         path.mkdir(parents=True, exist_ok=True)
-        path /= f"{participant}_ses-01_task-{task}_order.json"
+        path /= f"{participant}_ses-01_task-{task}_manifest.json"
         number = int(participant.removeprefix("sub-"))
         order = {"task": task, "subject": number, "session": 1, "trials": trials}
         path.write_text(json.dumps(order))
@@ -90,7 +94,10 @@ def write_order(study_folder: Path) -> WriteTask:
 
 @pytest.fixture
 def write_task(study_folder: Path, write_order: WriteTask) -> WriteTask:
-    """Write one session's file and its order; `tail` stands after its last whole line."""
+    """Write one session's file and its manifest; `tail` stands after its last whole line.
+
+    Columns that every table has, and that are not given, are added at the end.
+    """
 
     def write(
         task: str,
@@ -104,7 +111,12 @@ def write_task(study_folder: Path, write_order: WriteTask) -> WriteTask:
         path = study_folder / participant / "ses-01" / "beh"
         path.mkdir(parents=True, exist_ok=True)
         path /= f"{participant}_ses-01_task-{task}_beh.tsv"
-        lines = ["\t".join(header), *("\t".join(row) for row in rows)]
+        added = {name: value for name, value in USUAL.items() if name not in header}
+        if task == "absolute" and "virtual_texture" not in header:
+            added["virtual_texture"] = ""
+        texture = header.index("texture")
+        lines = ["\t".join([*header, *added])]
+        lines += ["\t".join([*row, *(v or row[texture] for v in added.values())]) for row in rows]
         path.write_bytes(("\n".join(lines) + "\n" + tail).encode())
         write_order(task, rows, participant=participant)
         return path

@@ -394,6 +394,7 @@ def answer_rows() -> str:
         given = {"trial": str(trial), "phase": "main" if trial > 1 else "training"}
         given |= {"texture": texture, "model": "full", "tray": "A", "first_surface": "real"}
         given |= {"magnitude_similarity": "50", "frequency_similarity": "70", "toggles": "3"}
+        given |= {"virtual_texture": texture, "run": "1", "pilot": "false"}
         given |= {"response_time_s": "12.5", "valid": "1", "repeats": "n/a", "simulated": "false"}
         rows.append("\t".join((cells | given).values()))
     return "\n".join([*rows, ""])
@@ -405,13 +406,13 @@ DATA = {
     "data/participants.tsv": "participant_id\tsimulated\nsub-01\tfalse\n",
     f"{ANSWERS}.tsv": answer_rows(),
     f"{ANSWERS}.json": json.dumps({"Simulated": False, "trial": {"Description": "Number"}}),
-    "data/sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute_order.json": json.dumps(
+    "data/sourcedata/sub-01/ses-01/sub-01_ses-01_task-absolute_manifest.json": json.dumps(
         {
             "task": "absolute",
             "subject": 1,
             "session": 1,
             "trials": [
-                {"trial": trial, "texture": texture, "model": "full", "first_surface": "real"}
+                {"trial": trial, "phase": "main" if trial > 1 else "training", "texture": texture}
                 for trial, texture in enumerate(TEXTURES, start=1)
             ],
         }

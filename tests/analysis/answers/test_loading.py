@@ -48,37 +48,47 @@ def test_missing_values_become_nan(study_folder, write_task, absolute_rows):
     assert ratings.notna().sum() == 13
 
 
-@pytest.mark.parametrize(
-    "tail",
-    ["15\tmain\tPVC", "15\tmain\tPVC\tfull\tA\treal\t50\t50\t1\t12.2\ttr", "\xe9", "15\tmain\t\t"],
-)
-def test_a_line_cut_short_is_dropped_with_a_warning(study_folder, write_task, absolute_rows, tail):
-    path = write_task("absolute", absolute_rows, tail=tail)
-    path.write_bytes(path.read_bytes()[: -1 if tail == "\xe9" else None])  # within a character
-    responses = load_responses(study_folder)
-    assert len(responses.absolute) == 14
-    assert len(responses.warnings) == 1
-    assert path.name in responses.warnings[0]
-    assert "cut short" in responses.warnings[0]
-
-
-def test_a_whole_last_line_without_its_end_is_kept(study_folder, write_task, absolute_rows):
+@pytest.mark.parametrize("kept", range(1, 60, 7))
+def test_a_file_that_was_cut_is_refused(study_folder, write_task, absolute_rows, kept):
     path = write_task("absolute", absolute_rows)
-    path.write_bytes(path.read_bytes().removesuffix(b"\n"))
-    responses = load_responses(study_folder)
-    assert len(responses.absolute) == 14
-    assert responses.warnings == ()
+    path.write_bytes(path.read_bytes()[:-kept])
+    if kept == 1:  # only the last line end is missing
+        assert len(load_responses(study_folder).absolute) == 14
+        return
+    with pytest.raises(InputError) as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
 
 
-def test_a_session_killed_within_its_first_line_has_no_answers(
-    study_folder, write_task, absolute_rows
-):
+def test_an_empty_file_is_refused(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    path.write_text("")
+    with pytest.raises(InputError, match="expected the columns trial, phase"):
+        load_responses(study_folder)
+
+
+def test_a_session_without_an_answer_has_none(study_folder, write_task, absolute_rows):
     write_task("absolute", absolute_rows)
-    path = write_task("absolute", [], participant="sub-02")
-    path.write_text("trial\tpha")
+    write_task("absolute", [], participant="sub-02")
     responses = load_responses(study_folder)
     assert responses.absolute["participant_id"].unique().tolist() == ["sub-01"]
-    assert "no answers" in responses.warnings[0]
+
+
+def test_quoted_text_is_read_as_it_was(study_folder, write_task, absolute_rows):
+    """As a table of BIDS holds it: in quotes, each quote doubled."""
+    for row in absolute_rows:
+        row[2] = {"canvas": '"say ""linen"""'}.get(row[2], row[2])
+    path = write_task("absolute", absolute_rows)
+    (manifest,) = study_folder.rglob("*_manifest.json")
+    stored = json.loads(manifest.read_text())
+    for trial in stored["trials"]:
+        for name in ("texture", "virtual_texture"):
+            trial[name] = {'"say ""linen"""': 'say "linen"'}.get(trial[name], trial[name])
+    manifest.write_text(json.dumps(stored))
+    assert 'say "linen"' in set(load_responses(study_folder).absolute["texture"])
+    path.write_text(path.read_text().replace('"say ""linen"""', '"say "linen""'))
+    with pytest.raises(InputError, match="quotes only around whole cells"):
+        load_responses(study_folder)
 
 
 def test_windows_line_ends_and_byte_order_mark_are_read(study_folder, write_task, absolute_rows):
@@ -145,7 +155,7 @@ def test_a_missing_column_is_named(study_folder, write_task, relative_rows):
 def test_a_line_with_too_many_values_is_refused(study_folder, write_task, absolute_rows):
     absolute_rows[4].append("surplus")
     path = write_task("absolute", absolute_rows)
-    with pytest.raises(InputError, match="11 values in line 6") as caught:
+    with pytest.raises(InputError, match="16 values in line 6") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)
 
@@ -216,21 +226,21 @@ def test_a_session_that_ended_early_is_named(study_folder, write_task, write_ord
     write_order("relative", relative_rows, participant="sub-03")
     responses = load_responses(study_folder)
     assert responses.warnings == (
-        "sub-02 relative ses-01 answered 4 of 7 trials (ended early).",
-        "sub-03 relative ses-01 answered 0 of 7 trials (ended early).",
+        "sub-02 relative ses-01 answered 4 of 7 main trials (ended early).",
+        "sub-03 relative ses-01 answered 0 of 7 main trials (ended early).",
     )
     assert len(responses.relative) == 11
 
 
-def test_answers_without_a_stored_order_are_told(study_folder, write_task, absolute_rows):
+def test_answers_without_a_manifest_are_told(study_folder, write_task, absolute_rows):
     for participant in ("sub-01", "sub-02", "sub-03"):
         write_task("absolute", absolute_rows, participant=participant)
     for participant in ("sub-01", "sub-03"):
         order = study_folder / "sourcedata" / participant / "ses-01"
-        (order / f"{participant}_ses-01_task-absolute_order.json").unlink()
+        (order / f"{participant}_ses-01_task-absolute_manifest.json").unlink()
     (told,) = load_responses(study_folder).warnings
     assert told == (
-        "2 sessions (sub-01 absolute ses-01 and others) have no stored order with which their "
+        "2 sessions (sub-01 absolute ses-01 and others) have no manifest with whose order their "
         "answers could be compared."
     )
 
@@ -266,9 +276,9 @@ def _one_more(rows):
         (_swap_models, "expected model full in answer 1"),
         (_all_full, "expected model simplified in answer 3"),
         (_renamed, "expected texture canvas in answer 1"),
-        (_without_a_middle_row, "expected trial 4 in answer 5"),
+        (_without_a_middle_row, "expected trial 5 in answer 5"),
         (_other_first_surface, "expected first_surface virtual in answer 2"),
-        (_one_more, "at most 15 answers"),
+        (_one_more, "expected repeats the number of a planned trial in answer 16"),
     ],
 )
 def test_answers_that_do_not_follow_the_stored_order_are_refused(
@@ -305,9 +315,9 @@ def test_one_subjects_session_under_anothers_name_is_refused(
     )
     source = study_folder / "sourcedata"
     (source / "sub-02" / "ses-01").mkdir(parents=True)
-    moved = source / "sub-02" / "ses-01" / "sub-02_ses-01_task-absolute_order.json"
-    (source / "sub-01" / "ses-01" / f"{old}_order.json").rename(moved)
-    with pytest.raises(InputError, match="the order of sub-02 ses-01 absolute") as caught:
+    moved = source / "sub-02" / "ses-01" / "sub-02_ses-01_task-absolute_manifest.json"
+    (source / "sub-01" / "ses-01" / f"{old}_manifest.json").rename(moved)
+    with pytest.raises(InputError, match="the manifest of sub-02 ses-01 absolute") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, moved)
 
@@ -335,40 +345,49 @@ def test_sessions_without_sidecar_or_answers_are_noticed(
     path = write_task("absolute", absolute_rows)
     write_order("absolute", absolute_rows, participant="sub-02")
     (told,) = load_responses(study_folder).warnings
-    assert told == "sub-02 absolute ses-01 has a stored order, but no answers."
+    assert told.startswith("sub-02 absolute ses-01 was begun, but has no table of answers")
     _describe(study_folder, StudySHA256="00")
     with pytest.raises(InputError, match="expected the sidecar") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path.with_suffix(".json"))
 
 
-def test_a_changed_order_or_design_is_refused(study_folder, write_task, write_order, absolute_rows):
+def test_a_changed_manifest_or_design_is_refused(
+    study_folder, write_task, write_order, absolute_rows
+):
     path = write_task("absolute", absolute_rows)
-    order = write_order("absolute", absolute_rows)
+    manifest = write_order("absolute", absolute_rows)
     sidecar = path.with_suffix(".json")
-    digest = hashlib.sha256(order.read_bytes()).hexdigest()
-    sidecar.write_text(json.dumps({"OrderSHA256": digest}))
+    digest = hashlib.sha256(manifest.read_bytes()).hexdigest()
+    sidecar.write_text(json.dumps({"DerivedFrom": {"manifest": digest}}))
     assert load_responses(study_folder).warnings == ()
     write_task("absolute", absolute_rows[:-2])
     with pytest.raises(InputError, match="as it was stored before the session") as caught:
         load_responses(study_folder)
-    _one_sentence(caught.value, order)
-    order.write_text(json.dumps(json.loads(order.read_text()) | {"study_sha256": "ff"}))
+    _one_sentence(caught.value, manifest)
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"study_sha256": "ff"}))
+    sidecar.write_text(json.dumps({"StudySHA256": "00"}))
     _describe(study_folder, StudySHA256="00")
-    with pytest.raises(InputError, match="of the data set's study") as caught:
+    with pytest.raises(InputError, match="the study of the session's answers") as caught:
         load_responses(study_folder)
-    _one_sentence(caught.value, order)
+    _one_sentence(caught.value, manifest)
     described = _describe(study_folder, StudyDesign={"repeats": 3})
     with pytest.raises(InputError, match="to have the StudySHA256") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, described)
 
 
-@pytest.mark.parametrize("models", [7, {"canvas": "0a"}, {"canvas": {"full": "0a"}}])
+@pytest.mark.parametrize(
+    "models",
+    [
+        *(7, {"canvas": "0a"}, {"canvas": {"full": "0a"}}),
+        {"canvas": {"full": "0a", "simplified": "1", "paper": "2"}},
+    ],
+)
 def test_a_damaged_list_of_models_is_refused(study_folder, write_task, absolute_rows, models):
     write_task("absolute", absolute_rows)
     path = _describe(study_folder, ModelsSHA256=models)
-    with pytest.raises(InputError, match="a full and a simplified model") as caught:
+    with pytest.raises(InputError, match="models of each texture|full and simplified") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)
 
@@ -387,6 +406,96 @@ def test_sessions_with_other_models_or_another_study_are_refused(
     with pytest.raises(InputError, match=f"one {key}") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, sidecar)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "what"),
+    [
+        ("ModelsSHA256", {"canvas": {"full": "0a", "simplified": "2c"}}, "models"),
+        ("StudySHA256", "ff", "study"),
+        ("Pilot", True, "pilot"),
+    ],
+)
+def test_a_session_that_went_on_against_a_rule_is_told(
+    study_folder, write_task, absolute_rows, key, value, what
+):
+    path = write_task("absolute", absolute_rows)
+    models = {"canvas": {"full": "0a", "simplified": "1b"}}
+    _describe(study_folder, ModelsSHA256=models, StudySHA256="00", Pilot=False)
+    sidecar = path.with_suffix(".json")
+    record = {"what": what, "reason": "the disk was lost"}
+    sidecar.write_text(json.dumps({key: value, "Overrides": [record]}))
+    (told,) = load_responses(study_folder).warnings
+    assert told == (f"sub-01 absolute ses-01 went on against a rule ({what}): the disk was lost.")
+    sidecar.write_text(json.dumps({key: value, "Overrides": [{**record, "what": "same date"}]}))
+    with pytest.raises(InputError, match="never a mixture"):
+        load_responses(study_folder)
+
+
+def test_pilots_are_told(study_folder, write_task, absolute_rows):
+    columns = [*_absolute_columns(), "pilot"]
+    write_task("absolute", [[*row, "true"] for row in absolute_rows], columns=columns)
+    (told,) = load_responses(study_folder).warnings
+    assert told == "sub-01 absolute ses-01 was a pilot; its answers are no data of the study."
+
+
+def test_anchors_stand_apart(study_folder, write_task, absolute_rows):
+    columns = [*_absolute_columns(), "virtual_texture"]
+    rows = [[*row, "PVC" if row[0] in "57" else row[2]] for row in absolute_rows]
+    write_task("absolute", rows, columns=columns)
+    (manifest,) = study_folder.rglob("*_manifest.json")
+    stored = json.loads(manifest.read_text())
+    with pytest.raises(InputError, match="expected virtual_texture"):
+        load_responses(study_folder)
+    for trial, row in zip(stored["trials"], rows, strict=True):
+        trial["virtual_texture"] = row[-1]
+    manifest.write_text(json.dumps(stored))
+    responses = load_responses(study_folder)
+    assert responses.anchors["absolute"]["trial"].tolist() == [5, 7]
+    assert len(responses.absolute) == 12
+    assert not {5, 7} & set(responses.absolute["trial"])
+    assert set(responses.anchors) == {"absolute"}
+
+
+ODDITY = "trial phase texture model layout odd_position answer correct presses response_time_s"
+THRESHOLD = "trial phase frequency_hz amplitude_g interval answer correct response_time_s"
+
+
+def _others(task):
+    """Columns and three right answers of the tasks that present no real surface."""
+    if task == "oddity":
+        middle = [["canvas", "full", "full|simplified|simplified", "1", "1", "1", "6", "9.5"]] * 3
+        columns = ODDITY.split()
+    else:
+        middle = [[hertz, "0.01", "2", "2", "1", "3.5"] for hertz in ("30", "100", "300")]
+        columns = THRESHOLD.split()
+    rows = [[str(n), "main", *cells, "n/a", "false"] for n, cells in enumerate(middle, start=1)]
+    if task == "threshold":
+        columns += ["texture", "model"]
+        rows = [[*row[:-2], "n/a", "n/a", *row[-2:]] for row in rows]
+    return [*columns, "tray", "simulated"], rows
+
+
+@pytest.mark.parametrize("task", ["oddity", "threshold"])
+def test_tasks_without_a_real_surface_are_read(study_folder, write_task, task):
+    columns, rows = _others(task)
+    write_task(task, rows, columns=columns)
+    (manifest,) = study_folder.rglob("*_manifest.json")
+    trials = [
+        {"trial": n, "phase": "main", "texture": "" if task == "threshold" else "canvas"}
+        for n in (1, 2, 3)
+    ]
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "trials": trials}))
+    responses = load_responses(study_folder)
+    assert responses.answers[task]["answer"].tolist() == [[1.0] * 3, [2.0] * 3][task == "threshold"]
+    assert responses.textures == (() if task == "threshold" else ("canvas",))
+    assert responses.absolute.empty
+    rows[1][columns.index("correct")] = "0"
+    path = write_task(task, rows, columns=columns)
+    right = "interval" if task == "threshold" else "odd_position"
+    with pytest.raises(InputError, match=f"exactly where answer and {right} agree") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
 
 
 def test_an_order_without_trials_is_refused(study_folder, write_task, write_order, relative_rows):
@@ -454,6 +563,11 @@ def _one_sentence(error: InputError, path: Path) -> None:
     assert ". " not in text
 
 
+def _absolute_columns() -> list[str]:
+    names = "trial phase texture model tray first_surface magnitude_similarity"
+    return [*names.split(), "frequency_similarity", "toggles", "response_time_s", "simulated"]
+
+
 def _relative_columns() -> tuple[str, ...]:
     names = "trial phase texture model tray layout answer correct presses response_time_s simulated"
     return tuple(names.split())
@@ -464,6 +578,10 @@ def _relative_columns() -> tuple[str, ...]:
     [
         ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48)),
         ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20)),
+        (
+            {"participants": 3, "schedule": "by-day", "models": ["full", "paper", "AR"]},
+            PlannedTask(3, 9),
+        ),
     ],
 )
 def test_what_was_planned_is_read_from_the_design(

@@ -63,27 +63,33 @@ def test_repeats_replace_what_failed_and_what_failed_is_counted(study_folder, wr
     main = responses.absolute
     assert len(main) == 13
     assert 17 in main["trial"].tolist()
-    assert not {3, 7, 18} & set(main["trial"])
+    assert not {4, 8, 18} & set(main["trial"])
     assert responses.training["absolute"]["trial"].tolist() == [16]
 
 
 def test_a_session_that_ended_before_its_repeats_is_noticed(study_folder, write, failed):
     write(failed[:-1])
     told = load_responses(study_folder).warnings
-    assert "sub-01 absolute ses-01 answered 17 of 18 trials (ended early)." in told
+    assert "sub-01 absolute ses-01 answered 15 of 16 main trials (ended early)." in told
 
 
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (lambda rows: [*rows, repeat(rows[3], number=19)], "at most 18 answers"),
-        (lambda rows: rows[:1] + rows[2:], "expected trial 16 in answer 2"),
+        (lambda rows: [*rows, repeat(rows[5], number=19)], "expected repeats n/a in answer 19"),
+        (lambda rows: rows[:1] + rows[2:], "expected trial 16 in answer 16"),
         (lambda rows: [*rows[:-2], rows[-1], rows[-2]], "expected trial 17 in answer 17"),
-        (lambda rows: [*rows[:-2], repeat(rows[5], number=17)], "in answer 17"),
-        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "n/a", "false"]], "expected repeats 7"),
-        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "6", "false"]], "expected repeats 7"),
+        (lambda rows: [*rows[:-2], repeat(rows[5], number=17)], "expected repeats 4 in answer 17"),
+        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "n/a", "false"]], "expected repeats 8"),
+        (lambda rows: [*rows[:-1], [*rows[-1][:REPEATS], "6", "false"]], "expected repeats 8"),
+        (lambda rows: [*rows[:5], repeat(rows[4], number=17)], "expected repeats n/a in answer 6"),
+        (lambda rows: [*rows, repeat(rows[5], number=20)], "expected trial 19 in answer 19"),
+        (lambda rows: [*rows, repeat(rows[-1], number=19)], "expected repeats n/a in answer 19"),
     ],
-    ids=["again", "left out", "swapped", "of a valid trial", "unnamed", "of another"],
+    ids=[
+        *("again", "left out", "swapped", "of a valid trial", "unnamed", "of another"),
+        *("before the others", "a gap", "of a repeat"),
+    ],
 )
 def test_any_other_order_of_repeats_is_refused(study_folder, write, failed, change, told):
     write(change(failed))
@@ -95,18 +101,58 @@ def test_a_planned_trial_that_is_called_a_repeat_is_refused(study_folder, write,
     rows = answers(absolute_rows)
     rows[4][REPEATS] = "2"
     write(rows)
-    with pytest.raises(InputError, match="expected repeats n/a in answer 5"):
+    with pytest.raises(InputError, match="expected trial 16 in answer 5"):
         load_responses(study_folder)
 
 
-def test_a_table_from_before_there_were_repeats_has_valid_answers_only(
-    study_folder, write_task, absolute_rows
-):
-    write_task("absolute", absolute_rows)
+RESUMED = (*COLUMNS, "run")
+
+
+@pytest.fixture
+def resumed(write_task, write_order, absolute_rows):
+    """Writes a session that was resumed after a long break, with training once more.
+
+    Six trials are planned, two of them for training; `change` spoils the rows.
+    """
+
+    def written(change=lambda rows: rows):
+        planned = [absolute_rows[0], [*absolute_rows[1]], *absolute_rows[2:6]]
+        planned[1][1] = "training"
+        rows = [[*row, "1"] for row in answers(planned)]
+        later = [[*row, "2"] for row in answers(planned)]
+        again = [[*repeat(row[:-1], number=number), "2"] for number, row in enumerate(later[:2], 7)]
+        path = write_task(
+            "absolute", change([*rows[:1], *rows[2:4], *again, *later[4:]]), columns=RESUMED
+        )
+        write_order("absolute", planned)
+        return path
+
+    return written
+
+
+def test_training_may_end_early_and_begin_again(study_folder, resumed):
+    resumed()
     responses = load_responses(study_folder)
     assert responses.warnings == ()
-    assert set(responses.absolute["valid"]) == {1.0}
-    assert responses.absolute["repeats"].isna().all()
+    assert responses.training["absolute"]["trial"].tolist() == [1, 7, 8]
+    assert responses.absolute["trial"].tolist() == [3, 4, 5, 6]
+    assert responses.absolute["run"].tolist() == [1, 1, 2, 2]
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (lambda rows: [[*rows[0][:-1], "3"], *rows[1:]], "expected run 3 in answer 2"),
+        (lambda rows: [["2", *rows[0][1:]], *rows[1:]], "expected trial 1 in answer 1"),
+        (lambda rows: [*rows, ["2", *rows[0][1:-1], "2"]], "expected repeats the number"),
+        (lambda rows: [*rows[:3], ["9", *rows[3][1:]], *rows[4:]], "expected trial 7 in answer 4"),
+    ],
+    ids=["earlier run", "second first", "training at the end", "not the next free"],
+)
+def test_other_orders_of_a_resumed_session_are_refused(study_folder, resumed, change, told):
+    resumed(change)
+    with pytest.raises(InputError, match=told):
+        load_responses(study_folder)
 
 
 @pytest.mark.parametrize(

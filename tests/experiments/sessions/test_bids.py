@@ -6,6 +6,7 @@ import gzip
 import io
 import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -330,6 +331,13 @@ def test_people_and_their_sessions_are_listed(study_on_disk):
     assert sessions["threshold"].tolist()[0] == "crashed"
     other = table(study_on_disk / "sub-02" / "sub-02_sessions.tsv")
     assert other["absolute"].tolist() == ["complete"]
+
+
+def test_a_data_set_without_source_data_is_left_alone(study_on_disk):
+    shutil.rmtree(study_on_disk / "sourcedata")
+    before = contents(study_on_disk)
+    assert export_all(study_on_disk) == ()
+    assert contents(study_on_disk) == before
 
 
 def test_what_is_no_manifest_is_refused(tmp_path, write_session):
