@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from experiments.observers.experimenter import SimulatedExperimenter
@@ -20,7 +20,7 @@ from modeling.models.loading import AnyModel
 from rig.interface import HandRows, PresentationRecord, RigReading
 from rig.twin import SimulatedRig
 
-Row = Mapping[str, object]
+Row = dict[str, object]
 Occasion = tuple[str, int, int]  # task, subject, session
 _NO_ROWS = HandRows.joined([])
 _AT_REST = RigReading(0.0, 0.0, 0.0, False, simulated=True)

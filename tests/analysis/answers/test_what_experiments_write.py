@@ -40,8 +40,14 @@ def responses(tmp_path_factory) -> Responses:
             },
         ),
         real=truths,
-        full=truths,
-        simplified={name: simplify(truth, threshold).model for name, truth in truths.items()},
+        models=ModelSets(
+            sets={
+                "full": truths,
+                "simplified": {
+                    name: simplify(truth, threshold).model for name, truth in truths.items()
+                },
+            }
+        ),
         rig=SimulatedRig(seed=1),
         data_folder=folder,
         seed=7,
