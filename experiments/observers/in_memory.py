@@ -48,6 +48,13 @@ class _UnfeltRig(SimulatedRig):
         return ()
 
 
+class _Answers(MemoryStore):
+    """Keeps answers alone."""
+
+    def log(self, event: str, **fields: object) -> None:
+        pass
+
+
 def simulate_sessions(
     study: Study,
     *,
@@ -150,7 +157,7 @@ def _rows_of(
             subject=subject,
             occasion=occasion_of(task, session),
         )
-        store = MemoryStore()
+        store = _Answers()
         run_trials(
             draw_session(study, kind, subject=subject, session=session, slot=slot),
             kind,
