@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from experiments.console.widgets import PAPER
+from experiments.console.drawing import PAPER
 from modeling import InputError
 
 

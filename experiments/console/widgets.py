@@ -1,74 +1,48 @@
-"""Buttons, rating scales and pages on a PsychoPy window, operated by mouse events.
+"""Buttons and rating scales on a PsychoPy window, operated by events of the mouse and of keys.
 
 PsychoPy's own widgets ask once per frame where the mouse is: a click within a frame is lost to
 them, and a press elsewhere that is dragged in counts. Here each press and release arrives as an
 event, and a widget reacts only to a press that began on it.
-
-Positions and sizes are in PsychoPy's unit `height`: (0, 0) is the middle of the window, 1 its
-height. Everything fits a window of at least 4:3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from typing import Any, Literal, Protocol
+from collections.abc import Callable
+from typing import Any, Protocol
 
-Point = tuple[float, float]
-EventKind = Literal["press", "drag", "release"]
+from experiments.console.drawing import (
+    BLUE,
+    CARD,
+    GREY,
+    INK,
+    PALE,
+    SMALL_HEIGHT,
+    TEXT_HEIGHT,
+    Box,
+    Point,
+    fitted,
+    rounded,
+    text,
+)
+from experiments.console.events import Key
 
-# Okabe and Ito's colours, told apart by colour-blind people too.
-BLUE = "#0072B2"
-ORANGE = "#D55E00"
-INK = "#1F2328"
-GREY = "#5B6470"
-PALE = "#C9CFD6"
-CARD = "#FFFFFF"
-PAPER = "#F4F5F7"
-
-TITLE_HEIGHT = 0.046
-TEXT_HEIGHT = 0.029
-SMALL_HEIGHT = 0.024
-LEFT_BUTTON = 1
-
-
-def text(
-    window: Any,
-    content: str,
-    *,
-    at: Point,
-    height: float = TEXT_HEIGHT,
-    color: str = INK,
-    bold: bool = False,
-    wrap: float = 1.15,
-    anchor: str = "center",
-) -> Any:
-    """A PsychoPy text in the type that comes with PsychoPy, the same on every machine."""
-    import psychopy
-    from psychopy import visual
-
-    fonts = Path(psychopy.__file__).parent / "assets" / "fonts"
-    return visual.TextStim(
-        window,
-        text=content,
-        pos=at,
-        height=height,
-        color=color,
-        bold=bold,
-        wrapWidth=wrap,
-        anchorHoriz=anchor,
-        alignText=anchor,
-        font="Noto Sans",
-        fontFiles=[str(fonts / f"NotoSans-{weight}.ttf") for weight in ("Regular", "Bold")],
-        units="height",
-        autoLog=False,
-    )
+PRESSING = ("enter", "space")
+# How far a key moves a marker, in points; with shift, ten times as far.
+MOVES = {"left": -1, "down": -1, "right": 1, "up": 1, "pagedown": -10, "pageup": 10}
+FARTHER = 10
+RING_GAP = 0.008
 
 
 class Widget(Protocol):
     """What a page needs of the things on it."""
 
     name: str
+    enabled: bool
+
+    @property
+    def box(self) -> Box:
+        """Where it is."""
+        ...
 
     def contains(self, point: Point) -> bool:
         """Whether the widget reacts to a press at this point."""
@@ -84,6 +58,14 @@ class Widget(Protocol):
 
     def release(self, point: Point) -> None:
         """The mouse was let go, wherever, after a press on the widget."""
+        ...
+
+    def cancel(self) -> None:
+        """Forget a press whose end will not be told."""
+        ...
+
+    def key(self, key: Key) -> None:
+        """A key was pressed while the widget had the focus."""
         ...
 
     def draw(self) -> None:
@@ -137,7 +119,14 @@ class Button:
         self._shape = visual.ShapeStim(
             window, vertices=rounded(size, 0.014), pos=at, units="height", autoLog=False
         )
-        self._label = text(window, label, at=at, height=height, bold=True, wrap=size[0])
+        self._label = fitted(
+            window, label, box=(size[0] - 0.012, size[1]), height=height, at=at, bold=True
+        )
+
+    @property
+    def box(self) -> Box:
+        """Where it is."""
+        return (*self._at, *self._size)
 
     def contains(self, point: Point) -> bool:
         """Whether the point lies on the enabled button."""
@@ -157,6 +146,15 @@ class Button:
         """Act if the mouse is still on the button."""
         self._held = False
         if self.contains(point):
+            self._action()
+
+    def cancel(self) -> None:
+        """Forget that the button is held."""
+        self._held = False
+
+    def key(self, key: Key) -> None:
+        """Act at Enter or Space, while enabled."""
+        if self.enabled and key.name in PRESSING:
             self._action()
 
     def draw(self) -> None:
@@ -191,7 +189,11 @@ class RatingScale:
         Middle of the line.
     width : float
         Length of the line.
+    told : callable
+        Told of each rating, 0 … 100.
     """
+
+    enabled = True
 
     def __init__(
         self,
@@ -202,11 +204,13 @@ class RatingScale:
         ends: tuple[str, str],
         at: Point,
         width: float,
+        told: Callable[[float], None],
     ) -> None:
         from psychopy import visual
 
         self.name = name
         self._at, self._width = at, width
+        self._told = told
         # Read-only: PsychoPy draws it and keeps the rating, this class minds the mouse.
         self._slider = visual.Slider(
             window,
@@ -240,6 +244,11 @@ class RatingScale:
         """0 … 100; NaN before the first rating."""
         return float(self._slider.getRating()) if self.rated else float("nan")
 
+    @property
+    def box(self) -> Box:
+        """Where the line is."""
+        return (*self._at, self._width + 0.06, 0.05)
+
     def contains(self, point: Point) -> bool:
         """Whether the point lies on the line or near it."""
         across = abs(point[0] - self._at[0]) <= self._width / 2 + 0.02
@@ -255,7 +264,30 @@ class RatingScale:
 
     def release(self, point: Point) -> None:
         """Rate where the marker was let go."""
-        self._slider.recordRating(self._value(point))
+        self._rate(self._value(point))
+
+    def cancel(self) -> None:
+        """Put the marker back to the rating, if there is one."""
+        self._slider.markerPos = self._slider.getRating()
+
+    def key(self, key: Key) -> None:
+        """Move the marker by a point, or by ten.
+
+        The first key puts it to the end from which it would come: to the right, to 0; to the
+        left, to 100. A marker that appeared in the middle would suggest an answer.
+        """
+        step = MOVES.get(key.name)
+        if step is None:
+            return
+        if not self.rated:
+            self._rate(0.0 if step > 0 else 100.0)
+            return
+        far = step * FARTHER if key.shift and abs(step) == 1 else step
+        self._rate(min(max(self.rating + far, 0.0), 100.0))
+
+    def _rate(self, value: float) -> None:
+        self._slider.recordRating(value)
+        self._told(value)
 
     def _value(self, point: Point) -> float:
         share = (point[0] - self._at[0]) / self._width + 0.5
@@ -278,79 +310,25 @@ class RatingScale:
         }
 
 
-class Page:
-    """What is on the screen at one time.
-
-    Parameters
-    ----------
-    name : str
-        By which tests know it.
-    widgets : sequence of Widget
-    decoration : sequence
-        PsychoPy stimuli that only need drawing.
-    """
-
-    def __init__(self, name: str, *, widgets: Sequence[Widget], decoration: Sequence[Any]) -> None:
-        self.name = name
-        self._widgets = tuple(widgets)
-        self._decoration = tuple(decoration)
-        self._held: Widget | None = None
-
-    def handle(self, kind: EventKind, point: Point) -> None:
-        """Pass a mouse event to the widget on which the press began."""
-        if kind == "press":
-            self._held = next((w for w in self._widgets if w.contains(point)), None)
-            if self._held is not None:
-                self._held.press(point)
-        elif self._held is not None and kind == "drag":
-            self._held.drag(point)
-        elif self._held is not None:
-            widget, self._held = self._held, None
-            widget.release(point)
-
-    def draw(self) -> None:
-        """Draw everything on the page."""
-        for part in (*self._decoration, *self._widgets):
-            part.draw()
-
-    def handles(self) -> dict[str, Point]:
-        """Named points of all widgets."""
-        return {name: at for widget in self._widgets for name, at in widget.handles().items()}
-
-
-class Mouse:
-    """The left mouse button's presses, drags and releases, none lost between frames."""
+class FocusRing:
+    """Shows which widget the keys go to, from the first Tab until the mouse is pressed."""
 
     def __init__(self, window: Any) -> None:
-        self._handle = window.winHandle
-        self._events: list[tuple[EventKind, Point]] = []
-        self._handle.push_handlers(
-            on_mouse_press=lambda x, y, button, _keys: self._note("press", x, y, button),
-            on_mouse_drag=lambda x, y, _dx, _dy, held, _keys: self._note("drag", x, y, held & 1),
-            on_mouse_release=lambda x, y, button, _keys: self._note("release", x, y, button),
+        from psychopy import visual
+
+        self.visible = False
+        self._shape = visual.Rect(
+            window,
+            units="height",
+            fillColor=None,
+            lineColor=INK,
+            lineWidth=3,
+            autoLog=False,
         )
 
-    def take(self) -> list[tuple[EventKind, Point]]:
-        """The events since the last call, in order."""
-        events, self._events = self._events, []
-        return events
-
-    def _note(self, kind: EventKind, x: float, y: float, button: int) -> None:
-        if button == LEFT_BUTTON:
-            width, height = self._handle.get_size()
-            self._events.append((kind, ((x - width / 2) / height, (y - height / 2) / height)))
-
-
-def rounded(size: Point, radius: float) -> list[Point]:
-    """Vertices of a rectangle of this width and height with round corners, about (0, 0)."""
-    import numpy as np
-
-    corners = ((1, 1, 0), (-1, 1, 90), (-1, -1, 180), (1, -1, 270))
-    return [
-        (
-            sx * (size[0] / 2 - radius) + radius * float(np.cos(np.radians(start + turn))),
-            sy * (size[1] / 2 - radius) + radius * float(np.sin(np.radians(start + turn))),
-        )
-        for sx, sy, start in corners
-        for turn in range(0, 91, 10)
-    ]
+    def draw(self, box: Box) -> None:
+        """Draw it around a box, if it is visible."""
+        if self.visible:
+            self._shape.pos = box[:2]
+            self._shape.size = (box[2] + 2 * RING_GAP, box[3] + 2 * RING_GAP)
+            self._shape.draw()

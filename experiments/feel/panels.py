@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from experiments.console.widgets import BLUE, GREY, INK, ORANGE, text
+from experiments.console.drawing import BLUE, GREY, INK, ORANGE, text
 from experiments.feel.plots import (
     PIXELS,
     TICK_HEIGHT,

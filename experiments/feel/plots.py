@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from experiments.console.widgets import CARD, GREY, INK, PALE, Point, rounded, text
+from experiments.console.drawing import CARD, GREY, INK, PALE, Point, rounded, text
 from modeling.arrays import Floats
 
 TICK_HEIGHT = 0.019

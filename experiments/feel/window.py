@@ -10,16 +10,11 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from experiments.console.drawing import BLUE, GREY, ORANGE, text
+from experiments.console.events import Mouse
+from experiments.console.page import Page
 from experiments.console.screens import open_window
-from experiments.console.widgets import (
-    BLUE,
-    GREY,
-    ORANGE,
-    Button,
-    Mouse,
-    Page,
-    text,
-)
+from experiments.console.widgets import Button
 from experiments.feel.panels import HandPanel, LayerPanel, Layout, SpectrumPanel, layout_for
 from experiments.feel.plots import TICK_HEIGHT, LiveText, Picture, card
 from experiments.feel.view import (

@@ -42,6 +42,11 @@ class Circumstances:
         Whether to go on with a session that was aborted or broke off.
     sources : mapping of set of models to path
         Where the models came from.
+
+    Raises
+    ------
+    InputError
+        For a reason that says nothing.
     """
 
     pilot: bool = False
@@ -49,6 +54,9 @@ class Circumstances:
     override: str | None = None
     resume: bool = False
     sources: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        Overrides(self.override)  # refuses a reason that says nothing before anything is opened
 
 
 def run_session(

@@ -155,7 +155,9 @@ def _person(
     return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
 
 
-def _session(files: SessionFiles, manifest: SessionManifest, state: SessionState) -> SessionProgress:
+def _session(
+    files: SessionFiles, manifest: SessionManifest, state: SessionState
+) -> SessionProgress:
     main = {trial["trial"] for trial in manifest.trials if trial["phase"] == "main"}
     answered = main & {row["trial"] for row in state.rows}
     return SessionProgress(

@@ -247,9 +247,7 @@ class Study:
         check_keys(settings, _STUDY_KEYS, where="the study")
         require_keys(settings, ("name", "seed", "textures", "trays"), where="the study")
         tasks = {
-            name: TaskPlan.from_dict(name, settings.pop(name))
-            for name in TASKS
-            if name in settings
+            name: TaskPlan.from_dict(name, settings.pop(name)) for name in TASKS if name in settings
         }
         for name, example in (("trays", "texture = tray"), ("models", "name = folder")):
             if name in settings:

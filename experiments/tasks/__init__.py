@@ -7,15 +7,18 @@ from importlib import import_module
 from experiments.sessions.order import draw_session
 from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan
-from experiments.study.study import TASKS, Study
+from experiments.study.study import Study
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES
 
 
 def task_named(name: str) -> Task:
     """The task that `ANSWER_TABLES` declares under this name; InputError for another name."""
-    if name not in TASKS:
-        raise InputError(f"expected the task {' or '.join(TASKS)}, got {shown(name)}; choose one.")
+    if name not in ANSWER_TABLES:
+        raise InputError(
+            f"expected the task {' or '.join(ANSWER_TABLES)}, got {shown(name)}; choose one."
+        )
     found: Task = import_module(f"experiments.tasks.{name}").TASK
     return found
 

@@ -118,6 +118,7 @@ def _begin(trial: AbsoluteTrial, surfaces: Surfaces) -> None:
 def _ask(respondent: Respondent, trial: AbsoluteTrial, surfaces: Surfaces) -> Mapping[str, object]:
     rating = respondent.rate(trial, surfaces)
     return {
+        "virtual_texture": trial.virtual_texture,
         "first_surface": trial.first_surface,
         "magnitude_similarity": rating.magnitude_similarity,
         "frequency_similarity": rating.frequency_similarity,

@@ -7,14 +7,14 @@ most sharply tells whether anybody feels the difference.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
-from experiments.study.design import Occasion, Order, Trial, fisher_yates
+from experiments.study.design import Occasion, Order, Trial, dealt
 from experiments.study.models import ModelSets
 from modeling.models.loading import AnyModel
 
@@ -50,12 +50,13 @@ class OddityTrial(Trial):
 
 def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     """For each texture and odd model, the odd one is behind each button equally often (± 1)."""
-    positions: defaultdict[object, list[int]] = defaultdict(list)
+    positions = {
+        pair: dealt(range(1, BUTTONS + 1), count, occasion.rng)
+        for pair, count in Counter(order).items()
+    }
     drafts = []
     for texture, odd in order:
-        left = positions[texture, odd]
-        left[:] = left or fisher_yates(range(1, BUTTONS + 1), occasion.rng)
-        position = left.pop()
+        position = positions[texture, odd].pop()
         (same,) = set(occasion.models) - {odd}
         layout = [same] * BUTTONS
         layout[position - 1] = odd

@@ -70,6 +70,9 @@ def session(
 
     plan = Study.load(study)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
+    circumstances = Circumstances(
+        pilot=pilot, language=language, override=override, resume=resume, sources=sources
+    )
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
@@ -78,9 +81,6 @@ def session(
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
         print("note: the rig is simulated; its data are marked so.")
-    circumstances = Circumstances(
-        pilot=pilot, language=language, override=override, resume=resume, sources=sources
-    )
     with open_console(
         plan, language=language, stamp=stamp, fullscreen=fullscreen, screen=screen
     ) as console:
@@ -224,6 +224,6 @@ def tell_timings(
         print("note: the rig is simulated; its presentations say nothing of a real one.")
     if slow := [timing.name for timing in timings if not timing.within]:
         raise InputError(
-            f"expected {', '.join(slow)} within the limit, got longer; close other programs, or use "
-            "another screen, rig or disk."
+            f"expected {', '.join(slow)} within the limit, got longer; close other programs, "
+            "or use another screen, rig or disk."
         )

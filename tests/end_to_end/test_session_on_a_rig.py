@@ -16,16 +16,22 @@ import pandas as pd
 import pytest
 
 from analysis.answers.loading import load_responses
+from experiments.sessions.log import read_log
+from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.surfaces import Choice, Rating, Surfaces
 from rig.desk.lock import rig_locked
 from rig.setup.rig_file import RigFile
 from stimuli.planted.textures import planted_texture
+from tests.experiments.scripted import Ready, Scripted
 from tests.rig.desk.rig_files import rig_text
 
 STUDY = """
 name = "Two surfaces"
 seed = 3
 textures = ["MDF", "PVC"]
+[models]
+full = "models"
+simplified = "fewer"
 [trays]
 MDF = "A"
 PVC = "B"
@@ -39,7 +45,7 @@ schedule = "by-day"
 training_trials = 1
 repeats = 1
 """
-FILES = ("--subject", 1, "--study", "study.toml", "--simplified", "fewer", "--data", "data")
+FILES = ("--subject", 1, "--study", "study.toml", "--data", "data")
 WORDS = ("--task", "absolute", *FILES)
 
 
@@ -55,21 +61,17 @@ def study(tmp_path: Path) -> Path:
     return tmp_path
 
 
-class Unlucky:
+class Unlucky(Scripted):
     """A person at whose rig something happens in each trial."""
 
     simulated = False
 
     def __init__(self, happens: dict[int, Any]) -> None:
+        super().__init__()
         self._happens = happens
-        self.heard: list[str] = []
-
-    def announce(self, title: str, text: str) -> None:
-        self.heard.append(title)
-
-    def confirm_mount(self, tray: str) -> None: ...
 
     def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+        surfaces.start()
         self._feel(surfaces, 0.15)
         surfaces.present_virtual()
         self._feel(surfaces, 0.15)
@@ -83,6 +85,7 @@ class Unlucky:
         )
 
     def choose(self, trial: Any, surfaces: Surfaces) -> Choice:
+        surfaces.start()
         for button in range(surfaces.count):
             surfaces.present_virtual(button)
             self._feel(surfaces, 0.15)
@@ -129,6 +132,16 @@ def wait_for_hand(parts: Any) -> None:
         time.sleep(0.02)
 
 
+def sit_down(monkeypatch: pytest.MonkeyPatch, someone: Scripted) -> Ready:
+    """Somebody sits at the screen, and at the terminal an experimenter who is always ready."""
+    experimenter = Ready()
+    monkeypatch.setattr(
+        "tactileq.commands.session.open_console", lambda *_, **of: nullcontext(someone)
+    )
+    monkeypatch.setattr("tactileq.experimenter.Terminal", lambda: experimenter)
+    return experimenter
+
+
 @pytest.fixture
 def answered(
     main: Any, study: Path, jack_server: Any, monkeypatch: pytest.MonkeyPatch
@@ -137,13 +150,11 @@ def answered(
     someone = Unlucky(
         {1: hold_the_interpreter, 2: kill_the_sound, 3: pull_the_plug, 4: kill_the_reader}
     )
-    monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda **screen: nullcontext(someone)
-    )
+    experimenter = sit_down(monkeypatch, someone)
     with jack_server(block=128):
         done = main("session", *WORDS, "--rig", "rig.toml")
     assert done.returncode == 0, done.stderr
-    assert someone.heard.count("Please call the experimenter") >= 3
+    assert len(experimenter.called) >= 3
     return study, done.stdout
 
 
@@ -157,14 +168,14 @@ def test_what_fails_in_a_session_is_in_its_data_and_repeated(answered: tuple[Pat
     failed = set(answers.loc[answers["valid"] == 0, "trial"])
     assert failed >= {2, 3, 4}
     assert f"the rig failed in {len(failed)} trials" in said
-    assert "completed: data/sub-01" in said
+    assert "completed: data/sourcedata/sub-01" in said
     repeated = [int(number) for number in answers["repeats"].dropna()]
     assert repeated == sorted(number for number in failed if number <= 5)
     assert set(answers["simulated"].astype(str)) == {"True"}  # the hand is scripted
     responses = load_responses(study / "data")  # refuses any other order of repeats
     assert f"{len(failed)} of {len(answers)} answers left out" in responses.warnings[0]
     assert not set(responses.absolute["trial"]) & failed
-    check_log(pd.read_csv(f"{stem}_log.tsv", sep="\t"), failed)
+    check_log(read_log(Path(f"{stem}_log.jsonl")).events, failed)
     check_traces(
         pd.read_csv(f"{stem}_hand.tsv", sep="\t"),
         pd.read_csv(f"{stem}_presentations.tsv", sep="\t"),
@@ -173,12 +184,11 @@ def test_what_fails_in_a_session_is_in_its_data_and_repeated(answered: tuple[Pat
     check_what_is_said_of_the_rig(study)
 
 
-def check_log(log: pd.DataFrame, failed: set[int]) -> None:
-    faults = log.loc[log["event"] == "fault", "detail"].tolist()
+def check_log(events: Any, failed: set[int]) -> None:
     of: dict[int, str] = {}
-    for told in faults:
-        number = int(told.split(",")[0].removeprefix("trial "))
-        of[number] = of.get(number, "") + told
+    for event in events:
+        if event["event"] == "fault":
+            of[event["trial"]] = of.get(event["trial"], "") + event["told"]
     assert set(of) == failed
     assert "sound process" in of[2]
     assert "unplugged" in of[3]
@@ -219,10 +229,8 @@ def check_what_is_said_of_the_rig(study: Path) -> None:
     assert sidecar["Rig"]["SHA256"] == file.sha256
     assert set(sidecar["Rig"]["Assumed"]) == set(dict(file.assumed()))
     assert sidecar["Rig"]["Override"] == "n/a"
-    (path,) = (study / "data/sourcedata").glob("*_provenance.json")
-    note = json.loads(path.read_text())
-    assert note["settings"]["rig_sha256"] == file.sha256
-    assert "rig.toml" in note["inputs_sha256"]
+    (manifest,) = (study / "data/sourcedata").rglob("*_manifest.json")
+    assert SessionManifest.load(manifest).rig["SHA256"] == file.sha256
 
 
 def test_a_rig_that_does_not_do_is_refused_before_anything_is_written(
@@ -239,8 +247,7 @@ def test_a_rig_that_does_not_do_is_refused_before_anything_is_written(
         (("--rig", "slow.toml"), "got latency.p95_ms of 50 ms"),
         (("--rig", "old.toml"), "calibration of the last 90 days"),
         (("--rig", "rate.toml"), "at most sound.rate_hz, 2000 Hz"),
-        (("--override", "a pilot"), "expected --rig with --override"),
-        (("--rig", "slow.toml", "--override", " "), "reason of --override"),
+        (("--rig", "slow.toml", "--override", " "), "a reason in words after --override"),
     ):
         done = main("session", *WORDS, *words)
         assert done.returncode == 1, done.stdout
@@ -254,9 +261,7 @@ def test_a_forced_choice_on_a_rig_that_is_slow_for_a_reason(
 ) -> None:
     text = (study / "rig.toml").read_text()
     (study / "slow.toml").write_text(text.replace("value = 18.0", "value = 50.0"))
-    monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda **screen: nullcontext(Unlucky({}))
-    )
+    sit_down(monkeypatch, Unlucky({}))
     words = ("--task", "relative", *FILES, "--rig", "slow.toml")
     with jack_server(block=128):
         done = main("session", *words, "--override", "only a pilot")
@@ -280,9 +285,7 @@ def test_a_forced_choice_on_a_rig_that_is_slow_for_a_reason(
 def test_a_rig_in_use_is_refused_and_nothing_is_written(
     main: Any, study: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda **screen: nullcontext(Unlucky({}))
-    )
+    sit_down(monkeypatch, Unlucky({}))
     before = sorted(study.rglob("*"))
     with rig_locked(RigFile.load(study / "rig.toml").rig.name):
         done = main("session", *WORDS, "--rig", "rig.toml")

@@ -22,9 +22,7 @@ from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 
 
 def test_every_person_and_session_has_its_place():
-    session = SessionProgress(
-        task="relative", session=2, status="aborted", answered=5, planned=14
-    )
+    session = SessionProgress(task="relative", session=2, status="aborted", answered=5, planned=14)
     people = (
         PersonProgress(subject=1, slot=1, code="TAKI-46", left="", sessions=(session,), due="x 2"),
         PersonProgress(subject=2, slot=2, code="", left="withdrawn", sessions=()),

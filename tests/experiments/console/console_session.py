@@ -1,71 +1,139 @@
-"""Runs one session at the console on a simulated rig, and tells the test what happens.
+"""Shows a short session at the console on a simulated rig, and tells the test what happens.
 
-Standard output: one JSON object per line, {"page": …, "handles": …}, {"presented": …} or
-{"result": …}, with every text drawn so far. Standard input: a line presses the rig's button.
+    python console_session.py LANGUAGE PART ...
+
+Parts: "known" and "new" (welcome), "wait", "absolute", "relative", "oddity", "rest", "closing".
+Standard output: one JSON object per line, {"page": …, "handles": …}, {"presented": …, "after_ms":
+since the frame that was shown last, "shown": the words in it}, {"silent": …}, {"noted": …}, or
+{"result": …}. Standard input: a line presses the rig's button; while the participant waits, it ends
+the wait, and "stop" ends it as an experimenter does.
 """
 
 import json
 import select
 import sys
+import time
 
 from psychopy import visual
 
-from experiments import ModelSets, Study, run_absolute, run_relative
 from experiments.console.console import Console
+from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
+from experiments.study.questions import Question
+from experiments.tasks.absolute import AbsoluteTrial
+from experiments.tasks.oddity import OddityTrial
+from experiments.tasks.relative import RelativeTrial
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 
-task, folder = sys.argv[1:]
-texts = []
+QUESTIONS = (
+    Question(name="age", least=18, most=99),
+    Question(name="handedness", levels=("right", "left", "both")),
+)
+TRIAL = {"trial": 1, "phase": "main", "texture": "canvas", "model": "full", "tray": "A"}
+ABSOLUTE = AbsoluteTrial(**TRIAL, virtual_texture="canvas", first_surface="virtual")
+RELATIVE = RelativeTrial(**TRIAL, layout=("canvas", "MDF", "PVC"))
+ODDITY = OddityTrial(**TRIAL, layout=("full", "simplified", "full"), odd_position=2)
 
 
 def tell(**what):
     print(json.dumps(what), flush=True)
 
 
-class NotedText(visual.TextStim):
-    def __init__(self, window, **options):
-        texts.append(options["text"])
-        super().__init__(window, **options)
+def line():
+    return sys.stdin.readline().strip() if select.select([sys.stdin], [], [], 0)[0] else ""
+
+
+class Frames:
+    """When the last frame was shown, and which words it held."""
+
+    def __init__(self, window):
+        self.words, self.shown, self.at_s = [], [], 0.0
+        self._swap, window.backend.swapBuffers = window.backend.swapBuffers, self.swap
+        draw = visual.TextStim.draw
+
+        def noted(stimulus, *given, **options):
+            self.words.append(stimulus.text)
+            return draw(stimulus, *given, **options)
+
+        visual.TextStim.draw = noted
+
+    def swap(self, *given, **options):
+        self._swap(*given, **options)
+        self.at_s, self.shown, self.words = time.perf_counter(), self.words, []
 
 
 class TellingRig(SimulatedRig):
     def present_model(self, model):
-        left_s = super().present_model(model)
-        tell(presented=["virtual", model.texture])
-        return left_s
+        self.tell("virtual")
+        return super().present_model(model)
 
     def present_real(self, texture):
-        self.silence()
-        tell(presented=["real", texture])
-        return self.now_s()
+        self.tell("real")
+        return super().present_real(texture)
+
+    def tell(self, surface):
+        after_ms = round(1e3 * (time.perf_counter() - frames.at_s), 2)
+        tell(presented=surface, after_ms=after_ms, shown=frames.shown)
+
+    def silence(self):
+        tell(silent=True)
+        super().silence()
 
     def read(self):
-        if select.select([sys.stdin], [], [], 0)[0] and sys.stdin.readline():
+        if line():
             self.press_button()
-        reading = super().read()
-        if self.last_vibration.any():
-            vibrated.append(True)
-        return reading
+        return super().read()
 
 
-visual.TextStim = NotedText
-vibrated = []
-study = Study.load()
-truths = {texture: planted_texture(texture) for texture in study.textures}
-fewer = {texture: truth.with_layers([0]) for texture, truth in truths.items()}
-run = {"absolute": run_absolute, "relative": run_relative}[task]
-with Console(
-    size=(1280, 800),
-    on_page=lambda page, handles: tell(page=page, handles=handles, texts=texts),
-) as console:
-    result = run(
-        study,
-        subject=1,
-        session=1,
-        models=ModelSets(sets={"full": truths, "simplified": fewer}),
-        rig=TellingRig(truths),
-        respondent=console,
-        data_folder=folder,
+def ready():
+    said = line()
+    if said == "stop":
+        raise SessionAborted("the rig is broken", by="experimenter")
+    return bool(said)
+
+
+def surfaces_of(count, begin, *, feel_all=False):
+    rig = TellingRig()
+    rig.open()
+    return Surfaces(
+        rig,
+        texture="canvas",
+        models=[planted_texture("canvas")] * count,
+        begin=begin,
+        note=lambda event, **fields: tell(noted=event, **fields),
+        feel_all=feel_all,
     )
-tell(result=[str(result.path), result.answered], vibrated=bool(vibrated))
+
+
+def run(part):
+    if part in ("known", "new"):
+        known = part == "known"
+        return console.welcome(
+            Intake(consent="2026-11", code="TAKI-46", known=known, questions=QUESTIONS)
+        )
+    if part == "absolute":
+        rating = console.rate(ABSOLUTE, surfaces_of(1, Surfaces.present_virtual))
+        return [rating.magnitude_similarity, rating.frequency_similarity, rating.response_time_s]
+    if part == "relative":
+        return console.choose(RELATIVE, surfaces_of(3, Surfaces.present_real)).button
+    if part == "oddity":
+        surfaces = surfaces_of(3, Surfaces.present_virtual, feel_all=True)
+        return console.choose(ODDITY, surfaces).button
+    if part == "wait":
+        return console.wait(ready)
+    return console.rest() if part == "rest" else console.announce(f"absolute.{part}")
+
+
+language, *parts = sys.argv[1:]
+with Console(
+    language=language,
+    stamp="pilot",
+    on_page=lambda page, handles: tell(page=page, handles=handles, shown=frames.shown),
+) as console:
+    frames = Frames(console._window)
+    console.hear(lambda event, **fields: tell(noted=event, **fields))
+    console.progress(12, 28)
+    try:
+        tell(result=[run(part) for part in parts])
+    except SessionAborted as aborted:
+        tell(result=[aborted.reason, aborted.by])

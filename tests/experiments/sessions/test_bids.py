@@ -35,7 +35,10 @@ def validated(folder: Path) -> list[dict[str, str]]:
     path = f"{VALIDATOR.parent}{os.pathsep}{os.environ['PATH']}"
     ended = subprocess.run(
         [str(VALIDATOR), "--format", "json", "--max-rows", "-1", str(folder)],
-        capture_output=True, text=True, check=False, timeout=120,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
         env={**os.environ, "PATH": path, "DENO_NO_UPDATE_CHECK": "1"},
     )
     issues: list[dict[str, str]] = json.loads(ended.stdout)["issues"]["issues"]

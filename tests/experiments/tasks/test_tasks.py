@@ -1,130 +1,125 @@
-"""Both tasks of the paper: what each presents, asks and stores."""
+"""The tasks: what each presents, asks and stores."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from experiments.sessions.store import MemoryStore
+from experiments.sessions.trial_loop import People, run_trials
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
-from experiments.tasks.absolute import run_absolute
-from experiments.tasks.relative import run_relative
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
+from tests.experiments.scripted import Ready, Scripted
 
 
-def test_an_absolute_session_is_stored_as_it_went(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
+def run(task: str, study: Study, models: ModelSets, rig: Any) -> MemoryStore:
+    """One session of a task, answered by rote."""
+    store = MemoryStore()
+    plan = plan_session(study, task=task, subject=1, session=1)
+    people = People(respondent=Scripted(), experimenter=Ready())
+    run_trials(plan, task_named(task), models=models, rig=rig, people=people, store=store)
+    return store
+
+
+@pytest.mark.parametrize("task", ["absolute", "relative", "oddity"])
+def test_every_answer_has_the_columns_of_its_table(
+    task: str, study: Study, models: ModelSets, rig: Any
 ) -> None:
-    result = run_absolute(
-        study,
-        subject=1,
-        session=1,
-        data_folder=tmp_path,
-        models=models,
-        rig=rig,
-        respondent=respondent,
-    )
+    for row in run(task, with_oddity(study), models, rig).rows:
+        assert list(row) == [column.name for column in ANSWER_TABLES[task]]
+
+
+def with_oddity(study: Study) -> Study:
+    plan = TaskPlan(participants=2, schedule="interleaved", repeats=6)
+    return replace(study, tasks={**study.tasks, "oddity": plan})
+
+
+def test_an_absolute_answer_is_the_rating_of_its_trial(
+    study: Study, models: ModelSets, rig: Any
+) -> None:
     trials = plan_session(study, task="absolute", subject=1, session=1).trials
-    stored = rows(result.path)
-    assert result.completed
-    assert len(stored) == len(trials) == 7
-    assert list(stored[0]) == [
-        "trial",
-        "phase",
-        "texture",
-        "model",
-        "tray",
-        "first_surface",
-        "magnitude_similarity",
-        "frequency_similarity",
-        "toggles",
-        "response_time_s",
-        "valid",
-        "repeats",
-        "simulated",
-    ]
-    for row, trial in zip(stored, trials, strict=True):
-        assert (row["texture"], row["model"]) == (trial.texture, trial.model)
-        assert (row["tray"], row["first_surface"]) == (trial.tray, trial.first_surface)
-        assert (row["magnitude_similarity"], row["frequency_similarity"]) == ("70", "30.5")
-        assert (row["toggles"], row["simulated"]) == ("2", "true")
-    assert respondent.trays == [trial.tray for trial in trials]
-    assert respondent.heard == ["Training", "The ratings begin", "Thank you"]
+    for row, trial in zip(run("absolute", study, models, rig).rows, trials, strict=True):
+        assert row["first_surface"] == trial.first_surface
+        assert row["virtual_texture"] == trial.virtual_texture
+        assert (row["magnitude_similarity"], row["frequency_similarity"]) == (70.0, 30.5)
+        assert row["toggles"] == 2
 
 
 def test_each_absolute_trial_presents_its_own_surfaces_in_its_own_order(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any
+    study: Study, models: ModelSets, rig: Any
 ) -> None:
-    run_absolute(
-        study,
-        subject=1,
-        session=1,
-        data_folder=tmp_path,
-        models=models,
-        rig=rig,
-        respondent=respondent,
-    )
+    run("absolute", study, models, rig)
     wanted: list[tuple[str, object]] = [("silence", None)]
     for trial in plan_session(study, task="absolute", subject=1, session=1).trials:
         real = ("real", trial.texture)
-        virtual = ("virtual", models.of(trial.texture, trial.model))
+        virtual = ("virtual", models.of(trial.virtual_texture, trial.model))
         first, second = (real, virtual) if trial.first_surface == "real" else (virtual, real)
         wanted += [first, second, first, ("silence", None)]
     assert rig.notes == [*wanted, ("silence", None)]
 
 
-def test_a_relative_session_is_stored_as_it_went(
-    tmp_path: Path, study: Study, models: ModelSets, rig: Any, respondent: Any, rows: Any
+def test_an_anchor_presents_another_textures_reference_model(
+    study: Study, models: ModelSets, rig: Any
 ) -> None:
-    result = run_relative(
-        study,
-        subject=1,
-        session=1,
-        data_folder=tmp_path,
-        models=models,
-        rig=rig,
-        respondent=respondent,
+    plan = replace(study.plan_of("absolute"), anchors={"canvas": "PVC"})
+    study = replace(study, tasks={**study.tasks, "absolute": plan})
+    store = run("absolute", study, models, rig)
+    (anchor,) = [row for row in store.rows if row["virtual_texture"] != row["texture"]]
+    assert (anchor["texture"], anchor["virtual_texture"], anchor["model"]) == (
+        "canvas",
+        "PVC",
+        "full",
     )
+    shown = [event for event in store.events if event["event"] == "presented"]
+    assert len(shown) == 3 * len(store.rows)
+    assert ("virtual", models.of("PVC", "full")) in rig.notes
+
+
+def test_a_relative_answer_is_what_was_behind_the_button(
+    study: Study, models: ModelSets, rig: Any
+) -> None:
     trials = plan_session(study, task="relative", subject=1, session=1).trials
-    stored = rows(result.path)
-    assert list(stored[0]) == [
-        "trial",
-        "phase",
-        "texture",
-        "model",
-        "tray",
-        "layout",
-        "answer",
-        "correct",
-        "presses",
-        "response_time_s",
-        "valid",
-        "repeats",
-        "simulated",
-    ]
+    stored = run("relative", study, models, rig).rows
     for row, trial in zip(stored, trials, strict=True):
-        assert row["layout"].split("|") == list(trial.layout)
+        assert row["layout"] == "|".join(trial.layout)
         assert row["answer"] == trial.layout[1]
-        assert row["correct"] == str(int(trial.layout[1] == trial.texture))
-        assert (row["presses"], row["response_time_s"]) == ("3", "3.25")
+        assert row["correct"] == int(trial.layout[1] == trial.texture)
+        assert (row["presses"], row["response_time_s"]) == (len(trial.layout) + 1, 3.25)
     presented = [note for note in rig.notes if note[0] != "silence"][:4]
     first = trials[0]
     layout = [models.of(texture, first.model) for texture in first.layout]
-    assert presented == [
-        ("real", first.texture),
-        ("virtual", layout[0]),
-        ("virtual", layout[1]),
-        ("virtual", layout[1]),
-    ]
+    assert presented == [("real", first.texture), *(("virtual", model) for model in layout)]
+
+
+def test_an_oddity_trial_has_one_odd_model_behind_each_button_equally_often(
+    study: Study, models: ModelSets, rig: Any
+) -> None:
+    study = with_oddity(study)
+    trials = plan_session(study, task="oddity", subject=1, session=1).trials
+    main = [trial for trial in trials if trial.phase == "main"]
+    cells = Counter((t.texture, t.model, t.odd_position) for t in main)
+    assert set(cells.values()) == {1}
+    assert len(cells) == len(study.textures) * 2 * 3
+    for trial in trials:
+        assert trial.layout[trial.odd_position - 1] == trial.model
+        assert Counter(trial.layout)[trial.model] == 1
+    for row, trial in zip(run("oddity", study, models, rig).rows, trials, strict=True):
+        assert row["answer"] == 2
+        assert row["correct"] == int(trial.odd_position == 2)
+    first = [models.of(trials[0].texture, name) for name in trials[0].layout]
+    shown = [note for note in rig.notes if note[0] != "silence"]
+    assert shown[:4] == [("virtual", model) for model in (first[0], *first)]
 
 
 def test_every_declared_table_has_its_task_and_another_name_is_refused() -> None:
     for name in ANSWER_TABLES:
         assert task_named(name).name == name
-        assert {"training", "main", "closing"} <= set(task_named(name).texts)
-    with pytest.raises(InputError, match="expected the task absolute or relative, got 'os'"):
+    with pytest.raises(InputError, match="expected the task absolute or .*, got 'os'"):
         task_named("os")

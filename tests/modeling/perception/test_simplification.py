@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from random import Random
 
 import numpy as np
@@ -109,7 +110,8 @@ def test_layers_below_in_every_condition_go(make_model: ModelMaker) -> None:
     assert verdicts(result) == ["kept", "dropped", "kept", "dropped"]
     assert [layer.layer for layer in result.layers] == [1, 2, 3, 4]
     assert [layer.distance_db for layer in result.layers] == pytest.approx([6, -20, 0.5, -30])
-    assert result.model == model.with_layers([0, 2])
+    kept = model.with_layers([0, 2])
+    assert result.model == replace(kept, simplified_from=model.sha256)
     assert (result.model.noise_gains == 0.07).all()
     assert result.layers[1].reason == "below threshold in every condition"
 
@@ -521,3 +523,22 @@ def test_reasons_name_the_margin(make_model: ModelMaker) -> None:
     plain = [layer.reason for layer in run(model).layers]
     assert plain[0] == "above threshold in 4 of 4 conditions"
     assert plain[2] == "below threshold in every condition"
+
+
+def test_a_simplified_model_knows_its_full_one_and_a_full_one_keeps_its_hash(
+    make_model: ModelMaker, tmp_path: Path
+) -> None:
+    model = make_model(0.07, at_db(6, -20, 0.5, -30))
+    assert "simplified_from" not in model.to_dict()
+    fewer = run(model).model
+    assert fewer.simplified_from == model.sha256
+    assert fewer.at_rate(8000.0).simplified_from == model.sha256
+    assert fewer.with_layers([0]).simplified_from == model.sha256
+    fewer.save(tmp_path / "fewer.json")
+    assert TextureModel.load(tmp_path / "fewer.json") == fewer
+    again = run(fewer)
+    assert again.identical
+    assert again.model.simplified_from == model.sha256
+    loud = make_model(0.07, at_db(6, 3))
+    assert run(loud).identical
+    assert run(loud).model.simplified_from == ""

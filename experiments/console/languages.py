@@ -1,0 +1,130 @@
+"""What participants read, in files of one language each (docs/method/protocols.md#languages)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from string import Formatter
+from typing import Any
+
+from experiments.study.questions import Question
+from modeling import InputError
+from modeling.errors import shown
+from modeling.files.documents import read_toml
+
+FOLDER = Path(__file__).with_name("texts")
+COMPLETE = "en"  # the language of which every other one has the keys
+
+
+def languages() -> tuple[str, ...]:
+    """The languages that there are: names of files, such as "en" and "ja"."""
+    return tuple(sorted(file.stem for file in FOLDER.glob("*.toml")))
+
+
+@dataclass(frozen=True)
+class Texts:
+    """All texts of the console in one language.
+
+    Parameters
+    ----------
+    language : str
+    by_key : mapping of key to text
+        Keys have dots ("absolute.main.title"); texts have {places} for values.
+    """
+
+    language: str
+    by_key: Mapping[str, str]
+
+    @staticmethod
+    def load(language: str) -> Texts:
+        """The texts of one of `languages()`.
+
+        Raises
+        ------
+        InputError
+            If there is no such language, or if its file lacks a key, has one too many, or leaves
+            a place out that the English text has.
+        """
+        if language not in languages():
+            raise InputError(
+                f"expected a language of {', '.join(languages())}, got {shown(language)}; choose "
+                f"one, or add {language}.toml beside the others."
+            )
+        texts, complete = _read(language), _read(COMPLETE)
+        missing = sorted(complete.keys() - texts.keys())
+        if missing:
+            _refuse(language, f"a text for {', '.join(missing)}", "got none; add what is missing")
+        unknown = sorted(texts.keys() - complete.keys())
+        if unknown:
+            _refuse(language, "the texts that English has", f"got {', '.join(unknown)}; remove it")
+        for key, content in texts.items():
+            if _places(content) != _places(complete[key]):
+                _refuse(language, f"the {{places}} of English in {key}", "got others; correct it")
+        return Texts(language, texts)
+
+    def of(self, key: str, **values: object) -> str:
+        """The text of a key, with its places filled in; KeyError for an unknown key."""
+        return self.by_key[key].format_map(values)
+
+    def question(self, question: Question) -> str:
+        """What a participant is asked: the study's own text, or the shipped one."""
+        return question.text.get(self.language) or self.of(f"question.{question.name}.text")
+
+    def level(self, question: Question, level: str) -> str:
+        """How an answer is shown: as it stands where the study asks in its own words."""
+        return level if question.text else self.of(f"question.{question.name}.{level}")
+
+    def stamp(self, words: str) -> str:
+        """Stamps, separated by commas, in this language; unknown ones as they stand."""
+        parts = [word.strip() for word in words.split(",")]
+        return " · ".join(self.by_key.get(f"stamp.{part}", part) for part in parts if part)
+
+    def require(self, questions: Iterable[Question]) -> None:
+        """Refuse a study whose questions cannot be asked in this language.
+
+        Raises
+        ------
+        InputError
+            Naming the first question without a text, or with an answer that has none.
+        """
+        for question in questions:
+            name = question.name
+            if question.text and self.language not in question.text:
+                self._refuse_question(name, f"got it in {', '.join(question.text)} only")
+            needed = [] if question.text else ["text", *question.levels]
+            missing = [key for key in needed if f"question.{name}.{key}" not in self.by_key]
+            if missing:
+                self._refuse_question(name, f"got none for {', '.join(missing)}")
+
+    def _refuse_question(self, name: str, got: str) -> None:
+        raise InputError(
+            f'expected the question "{name}" in the language "{self.language}", {got}; add '
+            f'text.{self.language} = "…" to it in the study file.'
+        )
+
+
+def _read(language: str) -> dict[str, str]:
+    file = FOLDER / f"{language}.toml"
+    texts: dict[str, str] = {}
+    _flatten(read_toml(file, "texts of a language"), "", texts)
+    return texts
+
+
+def _flatten(values: Mapping[str, Any], before: str, texts: dict[str, str]) -> None:
+    for key, value in values.items():
+        if isinstance(value, Mapping):
+            _flatten(value, f"{before}{key}.", texts)
+        else:
+            texts[f"{before}{key}"] = str(value)
+
+
+def _places(content: str) -> set[str]:
+    try:
+        return {name for _, name, _, _ in Formatter().parse(content) if name is not None}
+    except ValueError:  # a brace that is not closed: no place of any text
+        return {"{"}
+
+
+def _refuse(language: str, expected: str, got: str) -> None:
+    raise InputError(f'expected {expected} in the language "{language}", {got} in {language}.toml.')

@@ -1,0 +1,183 @@
+"""The pages of trials: two surfaces to rate, or one of several to choose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from experiments.console.drawing import ORANGE
+from experiments.console.page_runner import PageRunner
+from experiments.console.widgets import Button, RatingScale
+from experiments.sessions.surfaces import Choice, ChoiceTrial, Rating, Surfaces
+from experiments.sessions.task import Task
+from experiments.study.design import Trial
+
+BUTTONS_PER_ROW = 7
+BUTTON_PITCH = 0.15
+SCALES_Y = {"magnitude": 0.06, "frequency": -0.165}
+
+
+def rate(runner: PageRunner, trial: Trial, surfaces: Surfaces) -> Rating:
+    """Two rating scales, and a button for the real and for the virtual surface.
+
+    One can go on once both surfaces have been felt and both scales have a mark.
+    """
+    of = runner.texts.of
+    scales = {name: _scale(runner, name, surfaces) for name in SCALES_Y}
+    real = _real(runner, surfaces, at=(-0.19, 0.29))
+    virtual = runner.button(
+        "virtual",
+        of("surface.virtual"),
+        at=(0.19, 0.29),
+        size=(0.36, 0.078),
+        action=surfaces.present_virtual,
+    )
+    proceed = runner.proceed()
+    needed = _Line(runner, y=-0.305)
+
+    def update() -> None:
+        shows_real = surfaces.shows_real if surfaces.started else _begins_real(trial)
+        real.lit, virtual.lit = shows_real, not shows_real
+        proceed.enabled = surfaces.switches > 0 and all(s.rated for s in scales.values())
+        needed.say("" if proceed.enabled else of("absolute.needed"))
+
+    runner.show(
+        "rate",
+        widgets=(real, virtual, *scales.values(), proceed),
+        decoration=(
+            runner.title(of("absolute.question")),
+            runner.remark(of("surface.felt_now"), y=0.212),
+            *(runner.card(y + 0.012, 0.2) for y in SCALES_Y.values()),
+            needed,
+            *runner.foot(of("absolute.keys")),
+        ),
+        surfaces=surfaces,
+        update=update,
+        shortcuts={"r": real, "v": virtual},
+    )
+    return Rating(
+        magnitude_similarity=scales["magnitude"].rating,
+        frequency_similarity=scales["frequency"].rating,
+        response_time_s=surfaces.response_time_s,
+    )
+
+
+def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
+    """One numbered button per virtual surface, one to confirm, and one for the real surface in
+    tasks that have one."""
+    of = runner.texts.of
+    real = _real(runner, surfaces, at=(0.0, 0.3)) if task.mounts else None
+    rows = -(-surfaces.count // BUTTONS_PER_ROW)
+    numbered = [_numbered(runner, index, surfaces, rows=rows) for index in range(surfaces.count)]
+    confirm = runner.proceed(of(f"{task.name}.confirm"), y=-0.36)
+    told = _Line(runner, y=-0.27)
+
+    def update() -> None:
+        at_first = None if task.mounts else 0  # what the page announces: the task begins with it
+        shown = at_first if not surfaces.started else surfaces.selected
+        shows_real = surfaces.shows_real if surfaces.started else task.mounts
+        if real is not None:
+            real.lit = shows_real
+        for index, button in enumerate(numbered):
+            button.lit = shown == index and not shows_real
+        confirm.enabled = surfaces.selected is not None and _remaining(surfaces) == 0
+        told.say(_told(of, surfaces))
+
+    reals = [] if real is None else [real]
+    runner.show(
+        "choose",
+        widgets=(*reals, *numbered, confirm),
+        decoration=(
+            runner.title(of(f"{task.name}.question")),
+            runner.remark(of("surface.felt_now"), y=0.225),
+            runner.card(0.0, 0.06 + BUTTON_PITCH * rows),
+            told,
+            *runner.foot(of("choice.keys")),
+        ),
+        surfaces=surfaces,
+        update=update,
+        shortcuts={
+            **{str(number): button for number, button in enumerate(numbered[:9], start=1)},
+            **({} if real is None else {"r": real}),
+        },
+    )
+    assert surfaces.selected is not None
+    return Choice(button=surfaces.selected, response_time_s=surfaces.response_time_s)
+
+
+def _begins_real(trial: Trial) -> bool:
+    return getattr(trial, "first_surface", "real") == "real"
+
+
+def _real(runner: PageRunner, surfaces: Surfaces, *, at: tuple[float, float]) -> Button:
+    return runner.button(
+        "real",
+        runner.texts.of("surface.real"),
+        at=at,
+        size=(0.36, 0.078),
+        action=surfaces.present_real,
+        color=ORANGE,
+    )
+
+
+def _scale(runner: PageRunner, name: str, surfaces: Surfaces) -> RatingScale:
+    of = runner.texts.of
+    return RatingScale(
+        runner.window,
+        name,
+        label=of(f"absolute.{name}"),
+        ends=(of("absolute.lowest"), of("absolute.highest")),
+        at=(0.0, SCALES_Y[name]),
+        width=0.95,
+        told=lambda value: surfaces.note("slider", scale=name, value=round(value, 1)),
+    )
+
+
+def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, *, rows: int) -> Button:
+    row, column = divmod(index, BUTTONS_PER_ROW)
+    in_row = min(BUTTONS_PER_ROW, surfaces.count - row * BUTTONS_PER_ROW)
+    at = (
+        BUTTON_PITCH * (column - (in_row - 1) / 2),
+        BUTTON_PITCH * ((rows - 1) / 2 - row),
+    )
+    return runner.button(
+        f"button {index + 1}",
+        str(index + 1),
+        at=at,
+        size=(0.12, 0.12),
+        action=lambda: surfaces.present_virtual(index),
+    )
+
+
+def _remaining(surfaces: Surfaces) -> int:
+    """How many surfaces have still to be felt before one can answer."""
+    return surfaces.count - len(surfaces.felt) if surfaces.feel_all else 0
+
+
+def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
+    """What there is to do: press a number, feel the rest, or confirm the choice."""
+    selected = surfaces.selected
+    told = of("choice.press") if selected is None else of("choice.so_far", number=selected + 1)
+    if count := _remaining(surfaces):
+        told += "\n" + of("choice.remaining", count=count)
+    return told
+
+
+class _Line:
+    """A remark whose words change; it is made anew when they do."""
+
+    def __init__(self, runner: PageRunner, *, y: float) -> None:
+        self._runner, self._y = runner, y
+        self._words = ""
+        self._drawn: Any = None
+
+    def say(self, words: str) -> None:
+        """Show these words from now on."""
+        if words != self._words:
+            self._words = words
+            self._drawn = self._runner.remark(words, y=self._y) if words else None
+
+    def draw(self) -> None:
+        """Draw the words, if there are any."""
+        if self._drawn is not None:
+            self._drawn.draw()

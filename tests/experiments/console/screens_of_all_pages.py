@@ -1,0 +1,222 @@
+"""Shows every page of the console and tells where everything on it is.
+
+    python screens_of_all_pages.py FOLDER LANGUAGE:WIDTHxHEIGHT ...
+
+Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
+"texts": [[words, box]], "shapes": [box]}; boxes are (left, bottom, right, top) in pixels from the
+window's middle. Each page is kept in the folder as a picture; for the folder "-", none is.
+"""
+
+import json
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+from psychopy import visual
+from pyglet.window import key
+
+from experiments.console.console import Console
+from experiments.console.languages import Texts
+from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
+from experiments.study.questions import Question
+from experiments.study.study import Study
+from experiments.tasks.absolute import AbsoluteTrial
+from experiments.tasks.oddity import OddityTrial
+from experiments.tasks.relative import RelativeTrial
+from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
+
+drawn = []
+
+
+def noted(kind):
+    draw = kind.draw
+
+    def note(stimulus, *given, **options):
+        draw(stimulus, *given, **options)
+        drawn.append(stimulus)
+
+    kind.draw = note
+
+
+noted(visual.TextStim)
+noted(visual.shape.BaseShapeStim)
+
+
+def text_box(stimulus):
+    (x, y), (width, height) = stimulus.posPix, stimulus.boundingBox
+    left = x - {"left": 0, "center": 0.5, "right": 1}[stimulus.anchorHoriz] * width
+    return [float(v) for v in (left, y - height / 2, left + width, y + height / 2)]
+
+
+def shape_box(stimulus):
+    corners = stimulus.verticesPix
+    return [float(v) for v in (*corners.min(axis=0), *corners.max(axis=0))]
+
+
+class Visitor:
+    """Presses and looks, as the steps for a page say: one step every other frame."""
+
+    def __init__(self, screen, folder):
+        self.screen, self.folder = screen, folder
+        self.plan, self.handles, self.wanted, self.steps = {}, {}, None, iter(())
+
+    def sit_down(self, window):
+        self.window, self._flip = window, window.flip
+        window.flip = self.flip
+
+    def on_page(self, page, handles):
+        self.handles = handles
+        self.steps = self.go(self.plan[page])
+
+    def flip(self):
+        if self.wanted is not None:
+            self.tell(self.wanted)
+            self.wanted = None
+        drawn.clear()
+        self._flip()
+        next(self.steps, None)
+
+    def tell(self, name):
+        texts = [[s.text, text_box(s)] for s in drawn if isinstance(s, visual.TextStim) and s.text]
+        shapes = [shape_box(s) for s in drawn if isinstance(s, visual.shape.BaseShapeStim)]
+        told = {"screen": self.screen, "page": name, "texts": texts, "shapes": shapes}
+        print(json.dumps(told), flush=True)
+        if self.folder is not None:
+            self.window.getMovieFrame(buffer="back")
+            name = f"{name} {self.screen.replace(':', ' ')}.png"
+            self.window.saveMovieFrames(str(self.folder / name))
+
+    def go(self, steps):
+        for step in steps:
+            verb, _, what = step.partition(" ")
+            getattr(self, verb)(what)
+            yield
+            yield
+
+    def look(self, name):
+        self.wanted = name
+
+    def press(self, handle):
+        x, y = self.handles[handle]
+        y = self.window.winHandle.get_size()[1] - y
+        self.window.winHandle.dispatch_event("on_mouse_press", x, y, 1, 0)
+        self.window.winHandle.dispatch_event("on_mouse_release", x, y, 1, 0)
+
+    def key(self, name):
+        self.window.winHandle.dispatch_event("on_key_press", getattr(key, name), 0)
+
+
+def surfaces_of(count, *, feel_all=False, real=True):
+    rig = SimulatedRig()
+    rig.open()
+    return Surfaces(
+        rig,
+        texture="canvas",
+        models=[planted_texture("canvas")] * count,
+        begin=Surfaces.present_real if real else Surfaces.present_virtual,
+        note=lambda event, **fields: None,
+        feel_all=feel_all,
+    )
+
+
+def ask_everything(console, visitor):
+    questions = (*Study.load().questions, OWN)
+    visitor.plan = {
+        "consent": ["key TAB", "look consent", "press yes"],
+        "code": ["look code", "press continue"],
+        "known": ["look known", "press yes"],
+        "question age": [
+            *("press digit 2", "press digit 5", "look question-age", "press digit 9"),
+            *("look question-age-outside", "press delete", "press continue"),
+        ],
+        **{
+            f"question {question.name}": [
+                f"press level {question.levels[1]}",
+                f"look question-{question.name}",
+                "press continue",
+            ]
+            for question in questions
+            if question.levels
+        },
+    }
+    new = Intake(consent="2026-11", code="TAKI-46", known=False, questions=questions)
+    console.welcome(new)
+    console.welcome(Intake(consent="", code="TAKI-46", known=True, questions=questions))
+
+
+def announce_everything(console, visitor, texts):
+    asked = ("consent", "code", "known", "wait", "stopping")
+    pages = [k.removesuffix(".title") for k in texts.by_key if k.endswith(".title")]
+    for page in pages:
+        if page not in asked:
+            visitor.plan = {page: [f"look {page}", "press continue"]}
+            console.announce(page, **({"percent": 64} if page.startswith("strokes") else {}))
+
+
+def try_everything(console, visitor):
+    console.progress(12, 28)
+    visitor.plan = {
+        "rate": [
+            *("look rate", "key TAB", "key TAB", "look rate-focus", "press virtual"),
+            *("press magnitude:50", "press frequency:100", "key TAB", "look rate-done"),
+            "press continue",
+        ]
+    }
+    console.rate(ABSOLUTE, surfaces_of(1))
+    visitor.plan = {
+        "choose": [
+            *("look choose-7", "press button 2", "look choose-7-chosen", "press continue"),
+        ]
+    }
+    console.choose(RELATIVE, surfaces_of(7))
+    visitor.plan = {"choose": ["press button 9", "look choose-12-all", "key ESCAPE"]}
+    visitor.plan["stop"] = [
+        *("look stop", "press reason time", "key TAB", "look stop-reason", "press stop now"),
+    ]
+    with suppress(SessionAborted):
+        console.choose(RELATIVE, surfaces_of(12, feel_all=True))
+    buttons = [f"press button {number}" for number in (1, 2, 3)]
+    visitor.plan = {
+        "choose": ["look choose-odd", *buttons, "look choose-odd-all", "press continue"]
+    }
+    console.choose(ODDITY, surfaces_of(3, feel_all=True, real=False))
+    visitor.plan = {"wait": ["look wait"]}
+    ended = iter([False] * 6 + [True])
+    console.wait(lambda: next(ended))
+
+
+TRIAL = {"trial": 1, "phase": "main", "texture": "canvas", "model": "full", "tray": "A"}
+ABSOLUTE = AbsoluteTrial(**TRIAL, virtual_texture="canvas", first_surface="real")
+RELATIVE = RelativeTrial(**TRIAL, layout=("canvas",) * 7)
+ODDITY = OddityTrial(**TRIAL, layout=("full", "full", "simplified"), odd_position=3)
+OWN = Question(
+    name="crafts",
+    levels=tuple(f"{hours} to {hours + 9} hours in each week" for hours in range(0, 120, 10)),
+    text={
+        "en": "How many hours a week have you worked with textiles, wood or metal over the last "
+        "twelve months?",
+        "ja": "この一年間、一週間に平均して何時間くらい、布や木や金属を手で扱う仕事をしましたか",
+    },
+)
+
+
+def look_at_all(screen, folder):
+    language, _, size = screen.partition(":")
+    width, height = map(int, size.split("x"))
+    visitor = Visitor(screen, folder)
+    with Console(
+        language=language,
+        stamp="pilot, simulated rig",
+        size=(width, height),
+        on_page=visitor.on_page,
+    ) as console:
+        visitor.sit_down(console._window)
+        ask_everything(console, visitor)
+        announce_everything(console, visitor, Texts.load(language))
+        try_everything(console, visitor)
+
+
+folder, *screens = sys.argv[1:]
+for screen in screens:
+    look_at_all(screen, None if folder == "-" else Path(folder))

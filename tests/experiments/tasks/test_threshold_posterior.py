@@ -1,0 +1,217 @@
+"""QUEST+ for one frequency: against questplus itself, and observers with a known threshold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from questplus import QuestPlus
+
+from experiments.tasks.threshold_posterior import (
+    LAPSE_RATES,
+    LEVELS_DB,
+    POINT_DB,
+    SLOPES,
+    THRESHOLDS_DB,
+    Answer,
+    answers_of,
+    estimate,
+    next_level_db,
+    posterior,
+)
+from modeling import InputError
+from tests.experiments.tasks.planted_threshold import HIGHEST_DB, asked, rows_of, weibull
+
+
+def answer(level_db: float, correct: bool, *, highest_db: float = HIGHEST_DB) -> Answer:
+    return Answer(frequency_hz=250.0, level_db=level_db, correct=correct, highest_db=highest_db)
+
+
+@pytest.fixture(scope="module")
+def quest_plus() -> QuestPlus:
+    return QuestPlus(
+        stim_domain={"intensity": LEVELS_DB},
+        param_domain={
+            "threshold": THRESHOLDS_DB,
+            "slope": SLOPES,
+            "lower_asymptote": [0.5],
+            "lapse_rate": LAPSE_RATES,
+        },
+        outcome_domain={"response": ["correct", "wrong"]},
+        func="weibull",
+        stim_scale="dB",
+    )
+
+
+# --- Against questplus, and in closed form --------------------------------------------------
+
+
+def test_levels_and_posterior_are_those_of_questplus_trial_by_trial(quest_plus: QuestPlus) -> None:
+    rng = np.random.default_rng(5)
+    correct = weibull(-31.0)
+    answers: list[Answer] = []
+    for _ in range(12):
+        level_db = next_level_db(answers, highest_db=100.0)
+        assert level_db == quest_plus.next_stim["intensity"]
+        right = bool(rng.random() < correct(level_db))
+        answers.append(answer(level_db, right))
+        quest_plus.update(
+            stim={"intensity": level_db}, outcome={"response": "correct" if right else "wrong"}
+        )
+        assert posterior(answers) == pytest.approx(quest_plus.posterior.values, abs=1e-12)
+    # The estimate is of the point of 75 %, not of Weibull's scale (82 %).
+    weights = posterior(answers)
+    shapes = [len(SLOPES), 1, len(LAPSE_RATES), THRESHOLDS_DB.size]
+    assert sorted(weights.shape) == sorted(shapes)
+    mean = quest_plus.param_estimate
+    found = estimate(answers)
+    assert found.slope == pytest.approx(mean["slope"])
+    assert found.lapse_rate == pytest.approx(mean["lapse_rate"])
+    lowest, highest = (mean["threshold"] + POINT_DB / slope for slope in (SLOPES[0], SLOPES[-1]))
+    assert lowest < found.level_db < highest
+
+
+def test_the_point_is_where_three_quarters_are_right() -> None:
+    for slope in SLOPES:
+        share = 1 - 0.5 * np.exp(-(10 ** (slope * (POINT_DB / slope) / 20)))
+        assert share == pytest.approx(0.75)
+
+
+def test_one_answer_moves_the_posterior_as_bayes_rule_says() -> None:
+    before, after = posterior([]), posterior([answer(-30.0, True)])
+    assert before == pytest.approx(np.full(before.shape, 1 / before.size))
+    # Far above the level nothing is felt, far below all but lapses is: 0.5 against 0.97 on average.
+    on_threshold = after.sum(axis=tuple(a for a, n in enumerate(after.shape) if n != 121))
+    assert on_threshold[-1] / on_threshold[0] == pytest.approx(0.5 / 0.97, rel=0.01)
+
+
+@given(st.lists(st.tuples(st.sampled_from(list(LEVELS_DB)), st.booleans()), max_size=60))
+def test_any_answers_give_a_posterior_and_their_order_does_not_matter(
+    given_answers: list[tuple[float, bool]],
+) -> None:
+    answers = [answer(float(level), right) for level, right in given_answers]
+    weights = posterior(answers)
+    assert weights.sum() == pytest.approx(1.0)
+    assert np.isfinite(weights).all()
+    assert (weights >= 0).all()
+    assert posterior(answers[::-1]) == pytest.approx(weights, abs=1e-12)
+
+
+@settings(max_examples=25)
+@given(highest_db=st.floats(-80.0, 40.0), right=st.lists(st.booleans(), max_size=4))
+def test_no_level_is_beyond_what_the_rig_may_present(highest_db: float, right: list[bool]) -> None:
+    level_db = next_level_db([answer(-20.0, one) for one in right], highest_db=highest_db)
+    assert level_db in LEVELS_DB
+    assert level_db <= highest_db + 1e-6
+
+
+def test_a_rig_that_presents_nothing_is_refused() -> None:
+    with pytest.raises(InputError, match="expected a rig that presents -80 dB re 1 g, got -80.5"):
+        next_level_db([], highest_db=-80.5)
+
+
+# --- Observers with a known threshold -------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("slope", "lapse_rate", "planted_db"),
+    [
+        (2.2, 0.02, (-52.3, -44.0, -37.1, -31.6, -26.0, -18.8, -9.5, -2.2)),
+        (6.0, 0.05, (-47.7, -30.9, -14.4)),
+    ],
+    ids=["as assumed", "steep, with many lapses"],
+)
+def test_planted_thresholds_are_recovered_within_2_db_rms(
+    slope: float, lapse_rate: float, planted_db: tuple[float, ...]
+) -> None:
+    rng = np.random.default_rng(7)
+    errors_db = [
+        estimate(asked(weibull(at, slope=slope, lapse_rate=lapse_rate), rng)).level_db - at
+        for at in planted_db
+    ]
+    assert np.sqrt(np.mean(np.square(errors_db))) < 2.0
+
+
+def test_estimates_scatter_as_the_posterior_says() -> None:
+    """Of observers drawn from the prior, whose errors in standard deviations have an RMS of 1."""
+    rng = np.random.default_rng(8)
+    scores = []
+    for at in rng.uniform(-45, -15, 24):
+        slope, lapse_rate = rng.choice(SLOPES), rng.choice(LAPSE_RATES)
+        found = estimate(asked(weibull(at, slope=slope, lapse_rate=lapse_rate), rng, trials=12))
+        scores.append((found.level_db - at) / found.sd_db)
+    assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.35  # 98 % of χ² with 24 degrees of freedom
+
+
+# --- Where it breaks ------------------------------------------------------------------------
+
+
+def test_a_threshold_above_the_rigs_limit_is_a_bound_and_says_so() -> None:
+    found = estimate(asked(weibull(5.0), np.random.default_rng(1), trials=30, highest_db=-11.0))
+    assert found.beyond == "above"
+    assert found.level_db == -11.0
+
+
+def test_one_well_below_the_limit_is_none() -> None:
+    found = estimate(asked(weibull(-25.0), np.random.default_rng(1), trials=30, highest_db=-11.0))
+    assert found.beyond == ""
+    assert found.level_db == pytest.approx(-25.0, abs=6.0)
+
+
+def test_who_guesses_has_a_threshold_above_everything() -> None:
+    found = estimate(asked(lambda level_db: 0.5, np.random.default_rng(0), highest_db=0.0))
+    assert (found.beyond, found.level_db) == ("above", 0.0)
+
+
+def test_who_is_always_right_has_one_below_the_lowest_level() -> None:
+    answers = asked(lambda level_db: 1.0, np.random.default_rng(0))
+    assert min(one.level_db for one in answers) == LEVELS_DB[0]
+    found = estimate(answers)
+    assert (found.beyond, found.level_db) == ("below", LEVELS_DB[0])
+
+
+def test_wrong_answers_far_above_the_threshold_are_lapses() -> None:
+    near = [answer(-30.0, True), answer(-36.0, False)] * 10
+    far = [answer(10.0, True)] * 40
+    careful, careless = estimate(near + far), estimate(near + far + [answer(10.0, False)] * 10)
+    assert careful.lapse_rate < 0.02 < 0.05 < careless.lapse_rate
+    assert careless.level_db == pytest.approx(careful.level_db, abs=2.0)  # not of the threshold
+
+
+# --- Rows -----------------------------------------------------------------------------------
+
+
+def test_rows_are_read_as_numbers_or_text_and_only_what_counts() -> None:
+    answers = [answer(-30.0, True), answer(-32.0, False)]
+    rows = rows_of(answers)
+    as_text = [{name: str(value) for name, value in row.items()} for row in rows]
+    for given_rows in (rows, as_text):
+        found = answers_of(given_rows)
+        assert [(a.level_db, a.correct) for a in found] == [(-30.0, True), (-32.0, False)]
+        assert [a.highest_db for a in found] == pytest.approx([HIGHEST_DB] * 2)
+    assert answers_of([{**rows[0], "phase": "training"}, {**rows[1], "valid": 0}]) == []
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "sentence"),
+    [
+        ("amplitude_g", "nan", "expected a number above 0 for amplitude_g .* got 'nan'"),
+        ("amplitude_g", 0.0, "expected a number above 0 for amplitude_g"),
+        ("amplitude_g", 0.035, "in steps of 2 dB re 1 g"),
+        ("amplitude_g", 1e3, "in steps of 2 dB re 1 g"),
+        ("frequency_hz", "n/a", "expected a number above 0 for frequency_hz"),
+        ("highest_g", "inf", "expected a number above 0 for highest_g"),
+        ("correct", "n/a", "for correct"),
+        ("correct", 2, "got 2 at"),
+    ],
+)
+def test_damaged_rows_are_refused(column: str, value: object, sentence: str) -> None:
+    (row,) = rows_of([answer(-30.0, True)])
+    with pytest.raises(InputError, match=sentence):
+        answers_of([{**row, column: value}])
+
+
+def test_no_answer_gives_no_estimate() -> None:
+    with pytest.raises(InputError, match="expected answers at this frequency, got none"):
+        estimate([])
