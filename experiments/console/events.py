@@ -8,6 +8,7 @@ from experiments.console.drawing import Point
 
 EventKind = Literal["press", "drag", "release"]
 LEFT_BUTTON = 1
+TAB_ON_X = 23  # code of the Tab key, by which alone pyglet knows it while Shift is held
 
 
 class Mouse:
@@ -68,6 +69,8 @@ class Keys:
             *(names.LEFT, names.RIGHT, names.UP, names.DOWN, names.PAGEUP, names.PAGEDOWN),
             *(names.BACKSPACE, names.DELETE),
         }
+        if symbol == names.user_key(TAB_ON_X):
+            symbol = names.TAB
         if symbol not in repeated and not modifiers & (names.MOD_CTRL | names.MOD_ALT):
             self._add(symbol, shift=bool(modifiers & names.MOD_SHIFT))
         return True  # pyglet would close the window at Escape
