@@ -257,7 +257,6 @@ def test_stopping_is_asked_again_in_silence(display: str) -> None:
         person.wait_for_page("stop")
         person.xdotool("mouseup", 1)
         person.click("stop now")  # without a reason: no effect
-        person.say("the rig's button")
         person.click("go on")
         assert person.wait_for("noted") == "stop_withdrawn"
         assert person.wait_for("presented") == "virtual"
