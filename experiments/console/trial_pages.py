@@ -8,7 +8,7 @@ from typing import Any
 from experiments.console.drawing import ORANGE
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button, RatingScale
-from experiments.sessions.surfaces import Choice, ChoiceTrial, Rating, Surfaces
+from experiments.sessions.surfaces import Choice, Rating, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Trial
 
