@@ -53,6 +53,16 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     assert (answers["absolute"].groupby("participant").size() == 14).all()
     assert (answers["relative"].groupby("participant").size() == 42).all()
     assert all(table.simulated.all() for table in answers.values())
+    ratings = answers["absolute"].set_index(["texture", "participant", "model"])
+    ratings = ratings[["magnitude_similarity", "frequency_similarity"]]
+    assert (ratings >= 99.5).to_numpy().mean() < 0.05
+    planted = json.loads((demo / "provenance.json").read_text())["settings"]["planted"]
+    assert {p for points in planted.values() for p in points.values()} == {-12.0, 0.0}
+    differences = ratings.xs("simplified", level="model") - ratings.xs("full", level="model")
+    for texture, points in planted.items():
+        found = differences.loc[texture]
+        errors = found.std() / len(found) ** 0.5
+        assert ((found.mean() - pd.Series(points)).abs() < 4 * errors).all()
     assert json.loads((demo / "provenance.json").read_text())["seed"] == 1
 
     names = ["gfc", "rating_tests", "rate_tests", "correct_rates", "planted_truth"]

@@ -134,13 +134,13 @@ def test_what_is_planted_in_ratings_comes_back(
         lapse_rate=Trait(0.1, 0.02), planted={"MDF": dict.fromkeys(scales, effect)}
     )
     differences = []
-    for subject in range(1, 2001):
+    for subject in range(1, 1201):
         person = somebody(perception, population, subject)
         full, simplified = (rated(person, absolute(m), surfaces) for m in ("full", "simplified"))
         differences.append(np.subtract(simplified, full))
     error = np.std(differences, axis=0) / np.sqrt(len(differences))
     assert (np.abs(np.mean(differences, axis=0) - effect) < 4 * error).all()
-    assert (error < 0.6).all()
+    assert (error < 0.8).all()
 
 
 def test_ratings_have_the_mean_and_noise_that_they_were_given(
@@ -158,12 +158,12 @@ def test_ratings_have_the_mean_and_noise_that_they_were_given(
     )
     person = somebody(perception, population)
     one = surfaces()
-    ratings = [person.rate(absolute("full"), one).magnitude_similarity for _ in range(6000)]
+    ratings = [person.rate(absolute("full"), one).magnitude_similarity for _ in range(3000)]
     sd = 16.0 * 1.5 / 2
-    assert abs(np.mean(ratings) - 50.0) < 4 * sd / np.sqrt(6000)
-    assert np.std(ratings) == pytest.approx(sd, rel=0.04)
-    late = [person.rate(absolute("full", trial=500), one).magnitude_similarity for _ in range(6000)]
-    assert np.std(late) == pytest.approx(8.0, rel=0.04)
+    assert abs(np.mean(ratings) - 50.0) < 4 * sd / np.sqrt(3000)
+    assert np.std(ratings) == pytest.approx(sd, rel=0.06)
+    late = [person.rate(absolute("full", trial=500), one).magnitude_similarity for _ in range(3000)]
+    assert np.std(late) == pytest.approx(8.0, rel=0.06)
 
 
 def test_lapsed_ratings_are_anywhere(perception: Perception, surfaces: MakeSurfaces) -> None:
@@ -259,7 +259,7 @@ def test_what_is_planted_in_choices_comes_back(perception: Perception, effect: f
     population = Psychometrics(planted={"MDF": {"choice": effect}}, temperature_db=4.0)
     right = LAYOUT.index("MDF")
     differences = []
-    for subject in range(1, 2001):
+    for subject in range(1, 1201):
         person = somebody(perception, population, subject)
         full, simplified = (person.shares(relative(m)) for m in ("full", "simplified"))
         planted = effect / 100 * person.person.sensitivity
@@ -306,7 +306,7 @@ def test_odd_ones_are_found_as_in_a_triangle_test(
     person, one = somebody(perception, population), surfaces(3)
     apart = float(np.hypot(*perception.felt().between[:, 0, 1, 1]))
     assert person.odd_distance_db(oddity(odd)) == pytest.approx(apart)
-    found = [person.choose(oddity(odd, 1 + n % 3), one).button == n % 3 for n in range(6000)]
+    found = [person.choose(oddity(odd, 1 + n % 3), one).button == n % 3 for n in range(3000)]
     expected = 0.9 * triangle(apart / 3.0) + 0.1 / 3
     assert 0.4 < expected < 0.95
     assert stats.binomtest(sum(found), len(found), expected).pvalue > 1e-3
