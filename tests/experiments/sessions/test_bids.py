@@ -132,6 +132,10 @@ def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, thr
     }
     found = validated(tmp_path / "data")
     assert [issue for issue in found if issue["severity"] == "error"] == []
+    for path in tmp_path.rglob("*_events.tsv"):
+        shown = table(path).query("trial_type == 'presented'")
+        assert shown["presentation"].is_unique
+        assert shown["model_sha256"].notna().equals(shown["surface"] == "virtual")
 
 
 def test_the_validator_would_find_one(study_on_disk):
