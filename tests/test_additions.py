@@ -70,7 +70,6 @@ def _ask(respondent, trial, surfaces):
 TASK = Task(
     name="pair",
     description="Which of two?",
-    texts={phase: (phase, "Which of two?") for phase in ("training", "main", "closing")},
     trial=PairTrial,
     trials=_trials,
     virtual=lambda models, trial: [models.of(t, trial.model) for t in trial.layout],

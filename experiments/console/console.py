@@ -13,9 +13,16 @@ from experiments.console import intake_pages, trial_pages
 from experiments.console.languages import Texts
 from experiments.console.page_runner import PageHook, PageRunner
 from experiments.console.screens import open_window
-from experiments.sessions.surfaces import Choice, ChoiceTrial, Intake, Note, Rating, Surfaces
+from experiments.sessions.surfaces import (
+    Choice,
+    ChoiceTrial,
+    Intake,
+    Note,
+    RatedTrial,
+    Rating,
+    Surfaces,
+)
 from experiments.sessions.task import Task
-from experiments.study.design import Trial
 from experiments.study.study import TASKS
 from experiments.tasks import task_named
 
@@ -112,7 +119,7 @@ class Console:
         """Show from now on how many trials are done."""
         self._runner.progress = (done, of)
 
-    def rate(self, trial: Trial, surfaces: Surfaces) -> Rating:
+    def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
         """Compare the real with the virtual surface and rate their likeness."""
         return trial_pages.rate(self._runner, trial, surfaces)
 

@@ -8,6 +8,7 @@ from experiments.console.drawing import Point
 
 EventKind = Literal["press", "drag", "release"]
 LEFT_BUTTON = 1
+TAB_ON_X = 23  # code of the Tab key, by which alone pyglet knows it while Shift is held
 
 
 class Mouse:
@@ -50,9 +51,11 @@ class Keys:
         from pyglet.window import key
 
         self._names = key
+        self._handle = window.winHandle
         self._presses: list[Key] = []
         window.winHandle.push_handlers(
             on_key_press=self._press,
+            on_key_release=self._release,
             on_text_motion=lambda motion: self._add(motion, shift=False),
             on_text_motion_select=lambda motion: self._add(motion, shift=True),
         )
@@ -68,9 +71,16 @@ class Keys:
             *(names.LEFT, names.RIGHT, names.UP, names.DOWN, names.PAGEUP, names.PAGEDOWN),
             *(names.BACKSPACE, names.DELETE),
         }
+        if symbol == names.user_key(TAB_ON_X):
+            symbol = names.TAB
         if symbol not in repeated and not modifiers & (names.MOD_CTRL | names.MOD_ALT):
             self._add(symbol, shift=bool(modifiers & names.MOD_SHIFT))
         return True  # pyglet would close the window at Escape
+
+    def _release(self, symbol: int, _modifiers: int) -> None:
+        # On X, where Shift is let go before Tab, pyglet would take Shift-Tab for held ever after.
+        if symbol == self._names.TAB and hasattr(self._handle, "pressed_keys"):
+            self._handle.pressed_keys.discard(self._names.user_key(TAB_ON_X))
 
     def _add(self, symbol: int, *, shift: bool) -> bool:
         name = self._names.symbol_string(symbol).lower().removeprefix("motion_")

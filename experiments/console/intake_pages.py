@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from experiments.console.drawing import CARD, GREY, ORANGE, PALE, text
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button
@@ -110,7 +112,7 @@ def _level(runner: PageRunner, question: Question) -> str:
             runner.texts.level(question, level),
             at=((width + 0.02) * (index // rows - (columns - 1) / 2), 0.2 - 0.088 * (index % rows)),
             size=(width, 0.074),
-            action=lambda level=level: picked.append(level),
+            action=partial(picked.append, level),
         )
         for index, level in enumerate(question.levels)
     ]
@@ -233,7 +235,7 @@ def _digit_pad(runner: PageRunner, typed: _Typed) -> dict[str, Button]:
             digit,
             at=(0.1 * column, 0.075 + 0.1 * row),
             size=(0.088, 0.088),
-            action=lambda digit=digit: typed.add(digit),
+            action=partial(typed.add, digit),
         )
         for digit, (column, row) in DIGIT_PLACES.items()
     }

@@ -8,16 +8,15 @@ from typing import Any
 from experiments.console.drawing import ORANGE
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button, RatingScale
-from experiments.sessions.surfaces import Choice, ChoiceTrial, Rating, Surfaces
+from experiments.sessions.surfaces import Choice, RatedTrial, Rating, Surfaces
 from experiments.sessions.task import Task
-from experiments.study.design import Trial
 
 BUTTONS_PER_ROW = 7
 BUTTON_PITCH = 0.15
 SCALES_Y = {"magnitude": 0.06, "frequency": -0.165}
 
 
-def rate(runner: PageRunner, trial: Trial, surfaces: Surfaces) -> Rating:
+def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
     """Two rating scales, and a button for the real and for the virtual surface.
 
     One can go on once both surfaces have been felt and both scales have a mark.
@@ -105,7 +104,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     return Choice(button=surfaces.selected, response_time_s=surfaces.response_time_s)
 
 
-def _begins_real(trial: Trial) -> bool:
+def _begins_real(trial: RatedTrial) -> bool:
     return getattr(trial, "first_surface", "real") == "real"
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from experiments.observers.experimenter import SimulatedExperimenter
@@ -20,7 +20,7 @@ from modeling.models.loading import AnyModel
 from rig.interface import HandRows, PresentationRecord, RigReading
 from rig.twin import SimulatedRig
 
-Row = Mapping[str, object]
+Row = dict[str, object]
 Occasion = tuple[str, int, int]  # task, subject, session
 _NO_ROWS = HandRows.joined([])
 _AT_REST = RigReading(0.0, 0.0, 0.0, False, simulated=True)
@@ -46,6 +46,13 @@ class _UnfeltRig(SimulatedRig):
 
     def take_presentations(self) -> tuple[PresentationRecord, ...]:
         return ()
+
+
+class _Answers(MemoryStore):
+    """Keeps answers alone."""
+
+    def log(self, event: str, **fields: object) -> None:
+        pass
 
 
 def simulate_sessions(
@@ -150,7 +157,7 @@ def _rows_of(
             subject=subject,
             occasion=occasion_of(task, session),
         )
-        store = MemoryStore()
+        store = _Answers()
         run_trials(
             draw_session(study, kind, subject=subject, session=session, slot=slot),
             kind,

@@ -144,6 +144,7 @@ class Perception:
 
     Attributes
     ----------
+    threshold : Threshold
     textures, names : tuple of str
         Of the study; of the sets of models.
     identical : frozenset of str
@@ -170,6 +171,7 @@ class Perception:
                 f"expected the truth behind each real surface, got none for {', '.join(missing)}; "
                 "give a model for each."
             )
+        self.threshold = threshold
         self.textures = tuple(study.textures)
         self.names = tuple(models.names)
         self.identical = frozenset(models.identical(study.textures))

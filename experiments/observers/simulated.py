@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from math import hypot, log
+from math import expm1, hypot, isnan, log, log10
 
 import numpy as np
 
@@ -32,10 +32,12 @@ from experiments.sessions.surfaces import (
 )
 from experiments.study.questions import Question
 from experiments.study.study import TASKS
+from experiments.tasks.threshold import ThresholdTrial
 from modeling import InputError
 from modeling.seeds import generator
 
 MEDIAN_TIME_S = 20.0
+DETECTION_SLOPE = 2.2  # Weibull's, of amplitudes
 TIME_SD = 0.4  # of the logarithm of response times
 LOOKS = 2.0  # comparisons beside those that every answer takes, on average
 WAITING_S = 0.01
@@ -162,11 +164,13 @@ class SimulatedParticipant:
         return HIGHEST_RATING * float(self._rng.beta(share * size, (1 - share) * size))
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
-        """Feel every surface, then choose the one most like the real one, or the odd one out."""
+        """Feel all; choose what is most like the real one, the odd one out, or what was felt."""
         surfaces.start()
         for button in range(surfaces.count):
             surfaces.present_virtual(button)
-        if trial.texture in trial.layout:
+        if isinstance(trial, ThresholdTrial):
+            button = self._interval(trial) - 1
+        elif trial.texture in trial.layout:
             for _ in range(1 + self._looks()):
                 surfaces.toggle()
             button = self._drawn(self.shares(trial))
@@ -176,6 +180,17 @@ class SimulatedParticipant:
             button = self._odd_one(trial)
         surfaces.present_virtual(button)
         return Choice(button=button, response_time_s=self._response_time_s())
+
+    def _interval(self, trial: ThresholdTrial) -> int:
+        """The interval in which the tone was felt, by its level above the threshold; 1 or 2."""
+        assert trial.amplitude_g is not None
+        threshold_g = float(self._perception.threshold.held(trial.frequency_hz))
+        above_db = 20 * log10(trial.amplitude_g / threshold_g) - self.person.threshold_db
+        # Where no threshold is known nothing is felt.
+        felt = 0.0 if isnan(above_db) else -expm1(-log(2) * 10 ** (DETECTION_SLOPE * above_db / 20))
+        attentive = self._rng.random() >= self.person.lapse_rate
+        right = self._rng.random() < (0.5 + 0.5 * felt if attentive else 0.5)
+        return trial.interval if right else 3 - trial.interval
 
     def shares(self, trial: ChoiceTrial) -> list[float]:
         """Probabilities of the buttons in such a trial of the relative task."""

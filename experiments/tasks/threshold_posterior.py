@@ -153,7 +153,7 @@ def posterior(answers: Sequence[Answer]) -> Floats:
             level = int(np.searchsorted(LEVELS_DB, answer.level_db))
             logs = logs + np.log(likelihoods[int(not answer.correct), level])
     weights: Floats = np.exp(logs - logs.max())
-    return weights / weights.sum()
+    return np.asarray(weights / weights.sum())
 
 
 def next_level_db(answers: Sequence[Answer], *, highest_db: float) -> float:

@@ -509,8 +509,8 @@ def _mean_squares(samples: Floats, plan: RenderPlan) -> Floats:
 
 def _left_of_limit(count: int, plan: RenderPlan) -> Floats:
     """What is left, sample by sample, of a running mean square that was at its limit before."""
-    left: Floats = plan.limits.mean_square * (1 - plan.mean_share) ** np.arange(1, count + 1)
-    return left
+    kept = (1.0 - plan.mean_share) ** np.arange(1, count + 1, dtype=np.float64)
+    return np.asarray(plan.limits.mean_square * kept)
 
 
 def _longest_run(loud: np.ndarray[Any, np.dtype[np.bool_]], pause: int) -> int:

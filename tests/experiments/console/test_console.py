@@ -1,4 +1,4 @@
-"""The console in a real PsychoPy window, operated by a real mouse and keyboard (Xvfb, xdotool)."""
+"""The console in a real PsychoPy window, worked by a real mouse and real keys (Xvfb, xdotool)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from typing import Any
 
 import pytest
 
-from experiments.study.study import Study
-from experiments.tasks import plan_session
+from experiments.console.languages import Texts
 
 ROOT = Path(__file__).parents[3]
 DRIVER = Path(__file__).with_name("console_session.py")
+ALL_PARTS = ("new", "training", "wait", "absolute", "rest", "relative", "oddity", "closing")
 
 
 @pytest.fixture(scope="module")
@@ -33,38 +33,35 @@ class Participant:
     def __init__(self, session: subprocess.Popen[str], environment: dict[str, str]) -> None:
         self.session = session
         self.environment = environment
-        self.presented: list[list[str]] = []
+        self.heard: list[dict[str, Any]] = []
         self.handles: dict[str, tuple[int, int]] = {}
-        self.texts: list[str] = []
 
     def hear(self) -> dict[str, Any]:
         line = self.session.stdout.readline()
         assert line, "the session ended without a word"
         news: dict[str, Any] = json.loads(line)
-        if "presented" in news:
-            self.presented.append(news["presented"])
-        if "page" in news:
-            self.handles, self.texts = news["handles"], news["texts"]
+        self.heard.append(news)
+        self.handles = news.get("handles", self.handles)
         return news
+
+    def wait_for(self, what: str) -> Any:
+        """The next page, presentation, note or result."""
+        while what not in (news := self.hear()):
+            pass
+        return news[what]
 
     def wait_for_page(self, name: str) -> None:
-        while (page := self.hear().get("page")) is None:
-            pass
-        assert page == name
+        assert self.wait_for("page") == name
 
-    def wait_for_surface(self) -> list[str]:
-        while "presented" not in (news := self.hear()):
-            pass
-        surface: list[str] = news["presented"]
-        return surface
-
-    def wait_for_result(self) -> dict[str, Any]:
-        while "result" not in (news := self.hear()):
-            pass
-        return news
+    def say(self, line: str) -> None:
+        self.session.stdin.write(line + "\n")
+        self.session.stdin.flush()
 
     def xdotool(self, *words: object) -> None:
         subprocess.run(["xdotool", *map(str, words)], env=self.environment, check=True, timeout=20)
+
+    def keys(self, *names: str) -> None:
+        self.xdotool("key", "--delay", 30, *names)
 
     def click(self, handle: str) -> None:
         self.xdotool("mousemove", *self.handles[handle], "click", 1)
@@ -79,12 +76,15 @@ class Participant:
         moves = [*("mousemove", *start), *("mousedown", 1), *("mousemove", *middle)]
         self.xdotool(*moves, "mousemove", *end, "mouseup", 1)
 
+    def noted(self, event: str) -> list[dict[str, Any]]:
+        return [news for news in self.heard if news.get("noted") == event]
+
 
 @contextmanager
-def seated(task: str, folder: Path, display: str) -> Iterator[Participant]:
+def seated(language: str, *parts: str, display: str) -> Iterator[Participant]:
     environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
     session = subprocess.Popen(
-        [sys.executable, str(DRIVER), task, str(folder)],
+        [sys.executable, str(DRIVER), language, *parts],
         env=environment,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -97,97 +97,214 @@ def seated(task: str, folder: Path, display: str) -> Iterator[Participant]:
         session.communicate(timeout=10)
 
 
-def no_name_is_shown(texts: list[str], study: Study) -> bool:
-    shown = " ".join(texts).lower()
-    hidden = [*study.textures, "full", "simplified", "model"]
-    return texts != [] and not any(name.lower() in shown for name in hidden)
+def begins_with_its_page(person: Participant, surface: str, words: str) -> bool:
+    """Whether the first presentation came after the frame that announces it, and before others."""
+    first = next(news for news in person.heard if "presented" in news)
+    return first["presented"] == surface and words in first["shown"]
 
 
-def test_an_absolute_trial_by_mouse(tmp_path: Path, display: str, rows: Any) -> None:
-    study = Study.load()
-    trial = plan_session(study, task="absolute", subject=1, session=1).trials[0]
-    with seated("absolute", tmp_path, display) as person:
-        person.wait_for_page("message")
-        person.click("confirm")
-        person.wait_for_page("mount")
-        assert person.presented == []
-        assert f"Put the sample from tray {trial.tray} in place" in person.texts
-        person.click("confirm")
+def test_a_session_by_mouse_alone(display: str) -> None:
+    words = Texts.load("ja").by_key
+    with seated("ja", *ALL_PARTS, display=display) as person:
+        person.wait_for_page("consent")
+        assert words["stamp.pilot"] in person.heard[-1]["shown"]
+        person.click("yes")
+        person.wait_for_page("code")
+        person.click("continue")
+        person.wait_for_page("question age")
+        person.click("digit 1")
+        person.click("continue")  # 1 is no age that is asked for: no effect
+        for button in ("digit 7", "delete", "digit 9"):
+            person.click(button)
+        person.click("continue")
+        person.wait_for_page("question handedness")
+        person.click("continue")  # nothing is chosen: no effect
+        person.click("level right")
+        person.click("level left")
+        person.click("continue")
+        person.wait_for_page("absolute.training")
+        person.click("continue")
+        person.wait_for_page("wait")
+        person.say("ready")
+
         person.wait_for_page("rate")
-        assert person.presented == [[trial.first_surface, trial.texture]]
-
+        assert begins_with_its_page(person, "virtual", words["absolute.question"])
         # Dragging onto a scale from outside rates nothing, so Continue stays without effect.
         for scale in ("magnitude", "frequency"):
             x, y = person.handles[f"{scale}:50"]
             person.drag((x, y + 80), (x, y))
         person.click("continue")
         person.rate("magnitude", 80)
+        assert person.wait_for("noted") == "slider"
         person.click("continue")
         # A drag that begins on the scale counts where it is let go, be it off the line.
         (left, y), (right, _) = person.handles["frequency:0"], person.handles["frequency:100"]
         person.drag((right, y), (left + (right - left) // 4, y + 60))
+        assert person.wait_for("noted") == "slider"
         # Who has felt only one of the two surfaces cannot go on.
         person.click("continue")
-        other = "real" if trial.first_surface == "virtual" else "virtual"
-        person.click(other)
-        assert person.wait_for_surface() == [other, trial.texture]
-        person.session.stdin.write("press\n")
-        person.session.stdin.flush()
-        assert person.wait_for_surface() == [trial.first_surface, trial.texture]
-        person.click("continue")
-        person.wait_for_page("mount")
-        person.xdotool("key", "Escape")
-        result = person.wait_for_result()
-        person.session.wait(timeout=20)
-    path, answered = result["result"]
-    (row,) = rows(Path(path))
-    assert answered == 1
-    assert float(row["magnitude_similarity"]) == pytest.approx(80, abs=0.2)
-    assert float(row["frequency_similarity"]) == pytest.approx(25, abs=0.2)
-    assert (row["toggles"], row["simulated"]) == ("2", "true")
-    assert float(row["response_time_s"]) > 0
-    assert result["vibrated"]
-    assert no_name_is_shown(person.texts, study)
-
-
-def test_a_relative_trial_by_mouse(tmp_path: Path, display: str, rows: Any) -> None:
-    study = Study.load()
-    trial = plan_session(study, task="relative", subject=1, session=1).trials[0]
-    with seated("relative", tmp_path, display) as person:
-        person.wait_for_page("message")
-        person.click("confirm")
-        person.wait_for_page("mount")
-        person.click("confirm")
-        person.wait_for_page("choose")
-        assert person.presented == [["real", trial.texture]]
-        person.click("confirm")  # nothing has been chosen: no effect
-        for button in (1, 7, 3):
-            person.click(f"button {button}")
-            assert person.wait_for_surface() == ["virtual", trial.layout[button - 1]]
         person.click("real")
-        assert person.wait_for_surface() == ["real", trial.texture]
-        person.click("button 5")
-        assert person.wait_for_surface() == ["virtual", trial.layout[4]]
-        person.click("confirm")
-        person.wait_for_page("mount")
-        person.xdotool("key", "Escape")
-        result = person.wait_for_result()
-        person.session.wait(timeout=20)
-    path, answered = result["result"]
-    (row,) = rows(Path(path))
-    assert answered == 1
-    assert row["answer"] == trial.layout[4]
-    assert row["correct"] == str(int(trial.layout[4] == trial.texture))
-    assert (row["layout"], row["presses"]) == ("|".join(trial.layout), "4")
-    assert no_name_is_shown(person.texts, study)
+        assert person.wait_for("presented") == "real"
+        person.say("the rig's button")
+        assert person.wait_for("presented") == "virtual"
+        person.click("continue")
+
+        person.wait_for_page("rest")
+        person.click("continue")
+        person.wait_for_page("choose")
+        person.click("continue")  # nothing has been chosen: no effect
+        for button in (1, 3):
+            person.click(f"button {button}")
+            assert person.wait_for("presented") == "virtual"
+        person.click("real")
+        assert person.wait_for("presented") == "real"
+        person.click("button 2")
+        assert person.wait_for("presented") == "virtual"
+        person.click("continue")
+
+        person.wait_for_page("choose")
+        assert "real" not in person.handles
+        person.click("button 3")
+        assert person.wait_for("presented") == "virtual"
+        person.click("continue")  # the second has not been felt: no effect
+        person.click("button 2")
+        assert person.wait_for("presented") == "virtual"
+        person.click("continue")
+        person.wait_for_page("absolute.closing")
+        person.click("continue")
+        result = person.wait_for("result")
+    answers, _, _, (magnitude, frequency, response_time_s), _, related, odd, _ = result
+    assert answers == {"age": 19, "handedness": "left"}
+    assert magnitude == pytest.approx(80, abs=0.2)
+    assert frequency == pytest.approx(25, abs=0.2)
+    assert response_time_s > 0
+    assert (related, odd) == (1, 1)
+    assert [(n["scale"], n["value"]) for n in person.noted("slider")] == [
+        ("magnitude", pytest.approx(magnitude, abs=0.06)),
+        ("frequency", pytest.approx(frequency, abs=0.06)),
+    ]
+
+
+def test_a_session_by_keys_alone(display: str) -> None:
+    with seated("en", *ALL_PARTS, display=display) as person:
+        person.wait_for_page("consent")
+        person.keys("Return")  # nothing has the focus at first: consent is given by no chance
+        person.keys("Tab", "Tab", "Tab", "Tab", "shift+Tab", "shift+Tab", "shift+Tab", "space")
+        person.wait_for_page("code")
+        person.keys("Return")
+        person.wait_for_page("question age")
+        person.keys("4", "KP_2", "3", "Return", "BackSpace", "shift+Tab", "shift+Tab", "Return")
+        person.wait_for_page("question handedness")
+        person.keys("Tab", "Tab", "Tab", "space", "Tab", "Return")
+        person.wait_for_page("absolute.training")
+        person.keys("Return")
+        person.wait_for_page("wait")
+        person.keys("Return")  # it is not the participant who ends it
+        person.say("ready")
+
+        person.wait_for_page("rate")
+        assert begins_with_its_page(person, "virtual", "How alike are the two surfaces?")
+        person.keys("Tab", "Return")
+        assert person.wait_for("presented") == "real"
+        person.keys("v")
+        assert person.wait_for("presented") == "virtual"
+        person.keys("r")
+        assert person.wait_for("presented") == "real"
+        # The first key puts the mark to the end that it comes from.
+        person.keys("Tab", "Tab", "Right", "Right", "Up", "shift+Right", "Prior", "Left")
+        person.keys("Tab", "Left", "Left", "Right", "Right", "Next", "Down", "shift+Left")
+        person.keys("Tab", "Return")
+        person.wait_for_page("rest")
+        person.keys("Return")
+
+        person.wait_for_page("choose")
+        person.keys("2")
+        assert person.wait_for("presented") == "virtual"
+        person.keys("r")
+        assert person.wait_for("presented") == "real"
+        person.keys("KP_3")
+        assert person.wait_for("presented") == "virtual"
+        person.keys("shift+Tab", "shift+Tab", "Return")
+        person.wait_for_page("choose")
+        person.keys("r", "shift+Tab", "shift+Tab", "Return", "3")
+        assert person.wait_for("presented") == "virtual"
+        person.keys("2", "1")
+        person.keys("shift+Tab", "shift+Tab", "Return")
+        person.wait_for_page("absolute.closing")
+        person.keys("space")
+        result = person.wait_for("result")
+    answers, _, _, (magnitude, frequency, _), _, related, odd, _ = result
+    assert answers == {"age": 42, "handedness": "both"}
+    assert (related, odd) == (2, 0)
+    values: dict[str, list[float]] = {"magnitude": [], "frequency": []}
+    for note in person.noted("slider"):
+        values[note["scale"]].append(note["value"])
+    assert values["magnitude"] == [0, 1, 2, 12, 22, 21]
+    assert values["frequency"] == [100, 99, 100, 100, 90, 89, 79]
+    assert (magnitude, frequency) == (21, 79)
+
+
+def test_stopping_is_asked_again_in_silence(display: str) -> None:
+    with seated("en", "absolute", display=display) as person:
+        person.wait_for_page("rate")
+        person.rate("magnitude", 30)
+        assert person.wait_for("noted") == "slider"
+        # A press that is held while the question comes up counts for nothing.
+        person.xdotool("mousemove", *person.handles["magnitude:100"], "mousedown", 1)
+        person.keys("Escape")
+        assert person.wait_for("silent")
+        assert person.wait_for("noted") == "stop_asked"
+        person.wait_for_page("stop")
+        person.xdotool("mouseup", 1)
+        person.click("stop now")  # without a reason: no effect
+        person.click("go on")
+        assert person.wait_for("noted") == "stop_withdrawn"
+        assert person.wait_for("presented") == "virtual"
+        person.wait_for_page("rate")
+        person.click("stop")
+        assert person.wait_for("silent")
+        person.wait_for_page("stop")
+        person.keys("Escape")  # who does not mean it goes on
+        assert person.wait_for("presented") == "virtual"
+        person.wait_for_page("rate")
+        person.keys("Escape")
+        person.wait_for_page("stop")
+        person.click("reason discomfort")
+        person.click("reason device")
+        person.click("stop now")
+        assert person.wait_for("result") == ["device", "participant"]
+    presentations = [news for news in person.heard if "presented" in news]
+    assert [news["presented"] for news in presentations] == ["virtual"] * 3
+    assert [note["value"] for note in person.noted("slider")] == [pytest.approx(30, abs=0.2)]
+
+
+def test_who_refuses_or_has_another_code_ends_the_session(display: str) -> None:
+    with seated("en", "new", display=display) as person:
+        person.wait_for_page("consent")
+        person.click("no")
+        assert person.wait_for("result") == ["consent refused", "participant"]
+    with seated("ja", "known", display=display) as person:
+        person.wait_for_page("known")
+        person.keys("Tab", "Tab", "Return")
+        assert person.wait_for("result") == ["the code is another person's", "participant"]
+
+
+def test_who_is_known_is_asked_for_the_code_alone(display: str) -> None:
+    with seated("en", "known", "wait", display=display) as person:
+        person.wait_for_page("known")
+        assert "Is TAKI-46 your code?" in person.heard[-1]["shown"]
+        person.click("yes")
+        person.wait_for_page("wait")
+        person.say("stop")
+        assert person.wait_for("result") == ["the rig is broken", "experimenter"]
 
 
 OPEN = """
 import sys
-from tactileq.commands.session import open_console
+from experiments.console.console import Console
 for screen in map(int, sys.argv[1:]):
     try:
-        with open_console(fullscreen=False, screen=screen) as console:
+        with Console(screen=screen) as console:
             print("open")
     except ValueError as refusal:
         print(refusal)

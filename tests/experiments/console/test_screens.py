@@ -1,11 +1,25 @@
-"""Numbers of screens, without one."""
+"""Numbers of screens, without one; and every page, in every language and at two sizes."""
 
 from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 from experiments.console import screens
+from experiments.console.languages import languages
+from experiments.study.study import Study
 from modeling import InputError
+
+ROOT = Path(__file__).parents[3]
+SCRIPT = Path(__file__).with_name("screens_of_all_pages.py")
+SIZES = ((1024, 768), (1920, 1080))
+Box = list[float]
 
 
 def test_the_only_screen_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -13,3 +27,64 @@ def test_the_only_screen_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     screens.check_screen(0)
     with pytest.raises(InputError, match=r"a screen \(0, the only one\), got 1;"):
         screens.check_screen(1)
+
+
+def apart(a: Box, b: Box) -> bool:
+    return a[2] <= b[0] + 1 or b[2] <= a[0] + 1 or a[3] <= b[1] + 1 or b[3] <= a[1] + 1
+
+
+def within(a: Box, b: Box) -> bool:
+    return a[0] >= b[0] - 1 and a[1] >= b[1] - 1 and a[2] <= b[2] + 1 and a[3] <= b[3] + 1
+
+
+def faults(page: dict[str, Any], window: Box) -> list[str]:
+    """Texts that overlap, that a shape's edge cuts, and what reaches beyond the window."""
+    texts, shapes = page["texts"], page["shapes"]
+    found = [f"{words!r} is cut" for words, box in texts if not within(box, window)]
+    found += [f"shape {box} is cut" for box in shapes if not within(box, window)]
+    for index, (words, box) in enumerate(texts):
+        overlapping = [other for other, there in texts[:index] if not apart(box, there)]
+        found += [f"{words!r} overlaps {other!r}" for other in overlapping]
+        crossed = [s for s in shapes if not apart(box, s) and not within(box, s)]
+        found += [f"{words!r} crosses the edge of {shape}" for shape in crossed]
+    return found
+
+
+def test_faults_of_a_page_are_found() -> None:
+    window = [-100.0, -100.0, 100.0, 100.0]
+    good = {"texts": [["a", [0, 0, 9, 9]], ["b", [10, 0, 19, 9]]], "shapes": [[-1, -1, 20, 20]]}
+    assert faults(good, window) == []
+    bad = {"texts": [["a", [0, 0, 9, 9]], ["b", [5, 5, 19, 102]]], "shapes": [[-1, -1, 7, 120]]}
+    assert faults(bad, window) == [
+        "'b' is cut",
+        "shape [-1, -1, 7, 120] is cut",
+        "'a' crosses the edge of [-1, -1, 7, 120]",
+        "'b' overlaps 'a'",
+        "'b' crosses the edge of [-1, -1, 7, 120]",
+    ]
+
+
+@pytest.mark.parametrize("language", languages())
+def test_on_no_page_is_anything_cut_or_covered(language: str, display: str) -> None:
+    wanted = {f"{language}:{w}x{h}": [-w / 2, -h / 2, w / 2, h / 2] for w, h in SIZES}
+    shown = subprocess.run(
+        [sys.executable, str(SCRIPT), "-", *wanted],
+        env={**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        timeout=400,
+    )
+    assert shown.returncode == 0, shown.stderr[-2000:]
+    pages = [json.loads(line) for line in shown.stdout.splitlines()]
+    assert len(pages) == 2 * len({page["page"] for page in pages})
+    for page in pages:
+        assert faults(page, wanted[page["screen"]]) == [], page["page"]
+        assert tells_nothing([words for words, _ in page["texts"]]), page["page"]
+
+
+def tells_nothing(texts: list[str]) -> bool:
+    """Whether neither a texture, nor a set of models, nor a tray is named."""
+    study = Study.load()
+    hidden = [*study.textures, *study.models, "tray", "トレイ", "model", "モデル"]
+    words = " ".join(texts).lower()
+    return texts != [] and not any(name.lower() in words for name in hidden)

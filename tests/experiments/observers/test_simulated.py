@@ -20,7 +20,10 @@ from experiments.study.study import Study
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.oddity import OddityTrial
 from experiments.tasks.relative import RelativeTrial
+from experiments.tasks.threshold import ThresholdTrial
 from modeling import InputError, TextureModel, Threshold
+from rig.interface import ToneBurst
+from rig.twin import SimulatedRig
 
 EXACT = Psychometrics(
     threshold_db=Trait(0.0),
@@ -372,3 +375,47 @@ def test_effects_are_planted_on_textures_whose_models_differ(
         require_plantable(perception, Psychometrics(planted={"PVC": {"choice": -5.0}}))
     with pytest.raises(InputError, match="expected effects on canvas, MDF, PVC, got one on cork"):
         require_plantable(perception, Psychometrics(planted={"cork": {"choice": 0.0}}))
+
+
+# --- Thresholds -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("above_db", "lapse_rate", "share"),
+    [(0.0, 0.0, 0.75), (40.0, 0.0, 1.0), (-60.0, 0.0, 0.5), (40.0, 0.2, 0.9), (None, 0.0, 0.5)],
+)
+def test_a_tone_is_found_as_its_level_above_the_threshold_says(
+    perception: Perception,
+    threshold: Threshold,
+    above_db: float | None,
+    lapse_rate: float,
+    share: float,
+) -> None:
+    """Three quarters at the threshold of this person, which is 3 dB above the study's."""
+    population = replace(EXACT, threshold_db=Trait(3.0), lapse_rate=Trait(lapse_rate))
+    person = somebody(perception, population)
+    frequency_hz = 250.0 if above_db is not None else threshold.valid_range_hz[0] / 2
+    level_db = 20 * np.log10(threshold.at(250.0)) + 3.0 + (above_db or 0.0)
+    trial = ThresholdTrial(
+        trial=1,
+        phase="main",
+        texture="n/a",
+        model="n/a",
+        tray="",
+        frequency_hz=frequency_hz,
+        interval=2,
+        amplitude_g=float(10 ** (level_db / 20)),
+    )
+    bursts = [ToneBurst(frequency_hz=250.0, amplitude_g=0.0, duration_s=0.01)] * 2
+    right = 0
+    for _ in range(400):
+        surfaces = Surfaces(
+            SimulatedRig(),
+            texture="n/a",
+            models=bursts,
+            begin=lambda of: None,
+            note=lambda event, **fields: None,
+        )
+        right += person.choose(trial, surfaces).button == 1
+        assert surfaces.felt == {0, 1}
+    assert abs(right / 400 - share) <= 4 * np.sqrt(share * (1 - share) / 400)

@@ -1,0 +1,131 @@
+"""What participants read: complete in every language, and broken into lines as it is read."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from experiments.console import languages as module
+from experiments.console.drawing import NARROW_EM, NOT_FIRST, NOT_LAST, wrapped
+from experiments.console.languages import Texts, languages
+from experiments.console.page_runner import REASONS
+from experiments.study.questions import Question
+from experiments.study.study import Study
+from modeling import InputError
+
+
+def test_every_language_has_every_text() -> None:
+    assert {"en", "ja"} <= set(languages())
+    english = Texts.load("en").by_key
+    for language in languages():
+        texts = Texts.load(language).by_key
+        assert texts.keys() == english.keys()
+        assert all(text.strip() == text != "" for text in texts.values())
+
+
+def test_every_page_that_is_announced_has_a_text() -> None:
+    texts = Texts.load("en").by_key
+    phases = ("training", "main", "closing")
+    tasks = ("absolute", "relative", "oddity", "threshold")
+    pages = [f"{task}.{phase}" for task in tasks for phase in phases]
+    pages += [f"strokes.too_{how}" for how in ("slow", "fast", "light", "hard")]
+    for page in (*pages, "rest", "wait", "code", "known", "consent", "stopping"):
+        assert {f"{page}.title", f"{page}.text"} <= texts.keys()
+    assert {f"stopping.{reason}" for reason in REASONS} <= texts.keys()
+
+
+def test_the_shipped_study_can_be_asked_in_every_language() -> None:
+    for language in languages():
+        texts = Texts.load(language)
+        texts.require(Study.load().questions)
+        for question in Study.load().questions:
+            shown = [texts.question(question), *(texts.level(question, x) for x in question.levels)]
+            assert len(set(shown)) == 1 + len(question.levels)
+
+
+def test_a_language_that_is_not_there_is_refused() -> None:
+    with pytest.raises(InputError, match="expected a language of en, ja, got 'fr'; choose one"):
+        Texts.load("fr")
+
+
+@pytest.mark.parametrize(
+    ("line", "refusal"),
+    [
+        ('b = "{n} Dinge"', 'a text for c.d in the language "xx", got none; add what is missing'),
+        ('b = "{n} Dinge"\nc.d = "D"\ne = "E"', "the texts that English has .* got e; remove it"),
+        ('b = "Dinge"\nc.d = "D"', r"the \{places\} of English in b .* got others; correct it"),
+        ('b = "{n Dinge"\nc.d = "D"', r"the \{places\} of English in b .* got others; correct it"),
+    ],
+)
+def test_an_incomplete_language_is_refused(
+    line: str, refusal: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "en.toml").write_text('b = "{n} things"\n[c]\nd = "D"\n')
+    (tmp_path / "xx.toml").write_text(line)
+    monkeypatch.setattr(module, "FOLDER", tmp_path)
+    assert Texts.load("en").of("b", n=3) == "3 things"
+    with pytest.raises(InputError, match=refusal):
+        Texts.load("xx")
+
+
+def test_a_question_without_a_translation_is_refused() -> None:
+    german = Question(name="pets", levels=("0", "1"), text={"de": "Haustiere?"})
+    with pytest.raises(InputError, match=r'"pets" in the language "ja", got it in de only; add'):
+        Texts.load("ja").require([german])
+    with pytest.raises(InputError, match=r"got none for text, 0, 1; add text.en = "):
+        Texts.load("en").require([Question(name="pets", levels=("0", "1"))])
+    with pytest.raises(InputError, match=r'"sex" in the language "en", got none for m; add'):
+        Texts.load("en").require([Question(name="sex", levels=("female", "m"))])
+    own = Question(name="sex", levels=("f", "m"), text={"en": "Your sex?"})
+    texts = Texts.load("en")
+    texts.require([own])
+    assert (texts.question(own), texts.level(own, "m")) == ("Your sex?", "m")
+
+
+def test_stamps_are_translated() -> None:
+    assert Texts.load("en").stamp("pilot, simulated rig") == (
+        "Pilot: these answers do not count · Simulated rig"
+    )
+    assert Texts.load("ja").stamp("simulated rig") == "模擬装置"
+    assert Texts.load("ja").stamp("") == ""
+
+
+# --- Lines of Japanese ----------------------------------------------------------------------
+
+
+def test_a_line_ends_before_a_phrase() -> None:
+    assert wrapped("二つの表面を比べてください", 8) == "二つの表面を\n比べてください"
+    assert wrapped("短い文です。", 8) == "短い文です。"
+    assert wrapped("一行目\n二行目", 20) == "一行目\n二行目"
+
+
+JAPANESE = st.text(
+    st.sampled_from("二表面振動のをはがくてっょーアカ、。「」（）Tab12 "), max_size=60
+)
+
+
+@given(JAPANESE, st.integers(8, 30))
+def test_no_line_is_too_long_or_breaks_a_rule(content: str, width: int) -> None:
+    lines = wrapped(content, width).split("\n")
+    assert "".join(lines).replace(" ", "") == content.replace(" ", "")
+    for before, after in pairwise(lines):
+        assert before[-1:] not in NOT_LAST
+        assert after[:1] not in NOT_FIRST
+    # A line is longer only where its first part that may be broken off is.
+    for line in map(str.rstrip, lines):
+        cuts = [i for i in range(1, len(line)) if may_break(line[i - 1], line[i])]
+        assert width_em(line) <= width or all(width_em(line[:cut]) > width for cut in cuts)
+
+
+def width_em(line: str) -> float:
+    return sum(1 if ord(letter) > 0x2E80 else NARROW_EM for letter in line)
+
+
+def may_break(before: str, after: str) -> bool:
+    if after in NOT_FIRST or before in NOT_LAST or after == " ":
+        return False
+    return before == " " or not (before + after).isascii()
