@@ -218,7 +218,9 @@ class _Following:
 
 
 def _same(answered: Any, planned: object) -> bool:
-    if planned is None or planned == "":
+    if planned is None:  # left open: an adaptive task draws it from the answers
+        return True
+    if planned in ("", "n/a"):
         return bool(pd.isna(answered))
     if isinstance(planned, list):  # a layout
         planned = "|".join(map(str, planned))
@@ -228,6 +230,6 @@ def _same(answered: Any, planned: object) -> bool:
 def _shown(value: Any) -> str:
     if isinstance(value, list):
         return "|".join(map(str, value))
-    if value is None or value == "" or pd.isna(value):
+    if value in (None, "", "n/a") or pd.isna(value):
         return "n/a"
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -96,7 +96,7 @@ def event_rows(
     for row in presentations:
         shown.setdefault(row["trial"], []).append(row)
     rows = [
-        _row(event, onset, shown.get(str(event.get("trial")), ()))
+        _row(event, onset, shown.get(str(event.get("trial")), []))
         for event, onset in zip(events, onsets, strict=True)
     ]
     return sorted(rows, key=lambda row: float(str(row["onset"])))
@@ -129,7 +129,7 @@ def _moment(event: Event) -> datetime:
     return datetime.fromisoformat(event["utc"])
 
 
-def _row(event: Event, onset: float, of_trial: Sequence[Mapping[str, str]]) -> dict[str, object]:
+def _row(event: Event, onset: float, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
     kept = {k: v for k, v in event.items() if k not in (*_ELSEWHERE, *OWN_FIELDS)}
     kept = {name: value for name, value in kept.items() if name in _OWN and value is not None}
     index = event.get("index")
@@ -144,13 +144,18 @@ def _row(event: Event, onset: float, of_trial: Sequence[Mapping[str, str]]) -> d
     }
 
 
-def _presentation(event: Event, of_trial: Sequence[Mapping[str, str]]) -> dict[str, object]:
-    """What the rig says of a presentation, where it was stored."""
+def _presentation(event: Event, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
+    """What the rig says of a presentation, where it was stored; taken from the trial's, each once.
+
+    A simulated rig, whose clock stands still between presses, starts several at one time.
+    """
     start_s = event.get("start_s")
     if not isinstance(start_s, int | float):
         return {}
-    for row in of_trial:
-        if abs(float(row["start_s"]) - start_s) < SAME_START_S:
+    for place, row in enumerate(of_trial):
+        same_start = abs(float(row["start_s"]) - start_s) < SAME_START_S
+        if same_start and row["surface"] == event.get("surface"):
+            of_trial.pop(place)
             found: dict[str, object] = {name: row[name] for name in _FROM_PRESENTATIONS}
             duration_s = float(row["end_s"]) - float(row["start_s"])
             return {**found, "duration": round(duration_s, 6)}

@@ -458,7 +458,7 @@ def test_anchors_stand_apart(study_folder, write_task, absolute_rows):
 
 
 ODDITY = "trial phase texture model layout odd_position answer correct presses response_time_s"
-THRESHOLD = "trial phase frequency_hz amplitude_g interval answer correct response_time_s"
+THRESHOLD = "trial phase frequency_hz amplitude_g highest_g interval answer correct response_time_s"
 
 
 def _others(task):
@@ -467,7 +467,7 @@ def _others(task):
         middle = [["canvas", "full", "full|simplified|simplified", "1", "1", "1", "6", "9.5"]] * 3
         columns = ODDITY.split()
     else:
-        middle = [[hertz, "0.01", "2", "2", "1", "3.5"] for hertz in ("30", "100", "300")]
+        middle = [[hertz, "0.01", "1.5", "2", "2", "1", "3.5"] for hertz in ("30", "100", "300")]
         columns = THRESHOLD.split()
     rows = [[str(n), "main", *cells, "n/a", "false"] for n, cells in enumerate(middle, start=1)]
     if task == "threshold":

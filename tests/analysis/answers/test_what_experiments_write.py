@@ -46,6 +46,9 @@ def folder(tmp_path_factory) -> Path:
                 "oddity": TaskPlan(
                     participants=1, schedule="interleaved", repeats=2, training_trials=1
                 ),
+                "threshold": TaskPlan(
+                    participants=1, schedule="interleaved", repeats=1, training_trials=1
+                ),
             },
         ),
         real=truths,
@@ -77,6 +80,8 @@ def test_every_answer_arrives(responses):
     assert set(responses.anchors["absolute"]["virtual_texture"]) == {"PVC"}
     assert len(responses.relative) == 4 * 3 * 2 * 2
     assert len(responses.answers["oddity"]) == 3 * 2
+    assert len(responses.answers["threshold"]) >= 7
+    assert (responses.answers["threshold"]["frequency_hz"] > 0).all()
     assert len(responses.training["absolute"]) == 3
     assert len(responses.training["relative"]) == 4 * 2
     assert set(responses.absolute["texture"]) == set(TEXTURES)

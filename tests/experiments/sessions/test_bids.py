@@ -17,14 +17,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from experiments.observers.whole_study import simulate_study
 from experiments.sessions.bids import export_all, export_session
 from experiments.sessions.bids_events import onsets_s
 from experiments.sessions.bids_physio import RATE_HZ, at_regular_times
 from experiments.sessions.bids_tables import cell, table_bytes
 from experiments.sessions.files import SessionFiles
+from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.store import SessionStore
-from modeling import InputError
+from experiments.study.models import ModelSets
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
+from modeling import InputError, simplify
 from modeling.files.answer_tables import ANSWER_TABLES
+from rig.twin import SimulatedRig
 
 VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 PERSON = {"age": 31, "sex": "not said", "handedness": "right", "hours_of_sleep": 7.5}
@@ -96,6 +102,41 @@ def test_the_validator_finds_no_error(study_on_disk, write_session, tmp_path, ki
         "TOO_FEW_AUTHORS",
     }
     assert {issue["code"] for issue in found} <= allowed
+
+
+def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, threshold):
+    simplified = {name: simplify(truth, threshold).model for name, truth in truths.items()}
+    plan = {"participants": 1, "schedule": "interleaved", "training_trials": 1}
+    simulate_study(
+        Study(
+            name="Every task",
+            seed=5,
+            textures=tuple(truths),
+            trays=dict(zip(truths, "ABC", strict=True)),
+            tasks={
+                "absolute": TaskPlan(**plan, anchors={"canvas": "PVC"}),
+                "relative": TaskPlan(**plan, repeats=1),
+                "oddity": TaskPlan(**plan, repeats=2),
+                "threshold": TaskPlan(**plan, repeats=1),
+            },
+        ),
+        real=truths,
+        models=ModelSets(sets={"full": truths, "simplified": simplified}),
+        rig=SimulatedRig(truths, seed=1),
+        data_folder=tmp_path / "data",
+        seed=7,
+        threshold=threshold,
+    )
+    assert {path.name.split("_")[2] for path in tmp_path.rglob("*_beh.tsv")} == {
+        f"task-{task}" for task in ANSWER_TABLES
+    }
+    found = validated(tmp_path / "data")
+    assert [issue for issue in found if issue["severity"] == "error"] == []
+    for path in tmp_path.rglob("*_events.tsv"):
+        shown = table(path).query("trial_type == 'presented'")
+        assert shown["presentation"].is_unique
+        modelled = (shown["surface"] == "virtual") & ("threshold" not in path.name)  # tones are not
+        assert shown["model_sha256"].notna().tolist() == modelled.tolist()
 
 
 def test_the_validator_would_find_one(study_on_disk):
@@ -196,8 +237,6 @@ def test_what_was_answered_since_is_added(write_session):
 
 def test_a_running_session_is_left_alone(write_session):
     files = write_session(answered=3, status="aborted")
-    from experiments.sessions.manifest import SessionManifest
-
     with SessionStore.resume(files.root, SessionManifest.load(files.manifest)):
         assert export_all(files.root) == ()
         assert not beh(files, "beh.tsv").exists()
