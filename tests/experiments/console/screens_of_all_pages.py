@@ -55,7 +55,7 @@ def shape_box(stimulus):
 
 
 class Visitor:
-    """Presses and looks, as the steps for a page say: one step every other frame."""
+    """Presses and looks, as the steps for a page say: one step a frame."""
 
     def __init__(self, screen, folder):
         self.screen, self.folder = screen, folder
@@ -91,7 +91,6 @@ class Visitor:
         for step in steps:
             verb, _, what = step.partition(" ")
             getattr(self, verb)(what)
-            yield
             yield
 
     def look(self, name):

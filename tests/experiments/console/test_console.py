@@ -226,10 +226,9 @@ def test_a_session_by_keys_alone(display: str) -> None:
         assert person.wait_for("presented") == "virtual"
         person.keys("shift+Tab", "shift+Tab", "Return")
         person.wait_for_page("choose")
-        person.keys("r", "shift+Tab", "shift+Tab", "Return", "3")
+        person.keys("r", "Return", "shift+Tab", "shift+Tab", "Return")  # one cannot confirm yet
         assert person.wait_for("presented") == "virtual"
-        person.keys("2", "1")
-        person.keys("shift+Tab", "shift+Tab", "Return")
+        person.keys("2", "1", "Tab", "Return")
         person.wait_for_page("absolute.closing")
         person.keys("space")
         result = person.wait_for("result")
