@@ -200,6 +200,7 @@ class Surfaces:
 
     def resume(self) -> None:
         """Present again what was presented before the pause."""
+        self._rig.read()  # a press of the rig's button meanwhile is not one in the trial
         if self.shows_real:
             self._again("real", self._rig.present_real(self._texture))
         elif self._selected is not None:
