@@ -133,15 +133,23 @@ def test_planted_thresholds_are_recovered_within_2_db_rms(
     assert np.sqrt(np.mean(np.square(errors_db))) < 2.0
 
 
-def test_estimates_scatter_as_the_posterior_says() -> None:
-    """Of observers drawn from the prior, whose errors in standard deviations have an RMS of 1."""
-    rng = np.random.default_rng(8)
-    scores = []
-    for at in rng.uniform(-45, -15, 24):
-        slope, lapse_rate = rng.choice(SLOPES), rng.choice(LAPSE_RATES)
-        found = estimate(asked(weibull(at, slope=slope, lapse_rate=lapse_rate), rng, trials=12))
-        scores.append((found.level_db - at) / found.sd_db)
-    assert 0.7 < np.sqrt(np.mean(np.square(scores))) < 1.35  # 98 % of χ² with 24 degrees of freedom
+def test_mean_and_deviation_are_those_of_bayes_rule_written_out() -> None:
+    answers = [answer(db, db > -34 or db == -38) for db in (-10, -20, -30, -38, -36, -34, -32, -26)]
+    threshold, slope, lapse_rate = np.meshgrid(THRESHOLDS_DB, SLOPES, LAPSE_RATES, indexing="ij")
+    weights = np.ones(threshold.shape)
+    for one in answers:
+        undetected = np.exp(-(10 ** (slope * (one.level_db - threshold) / 20)))
+        right = 1 - lapse_rate - (0.5 - lapse_rate) * undetected
+        weights *= right if one.correct else 1 - right
+    weights /= weights.sum()
+    point_db = threshold + 20 * np.log10(np.log(2)) / slope
+    mean_db = (weights * point_db).sum()
+    found = estimate(answers)
+    assert found.level_db == pytest.approx(mean_db)
+    assert found.sd_db == pytest.approx(np.sqrt((weights * (point_db - mean_db) ** 2).sum()))
+    assert found.slope == pytest.approx((weights * slope).sum())
+    assert found.lapse_rate == pytest.approx((weights * lapse_rate).sum())
+    assert (found.beyond, found.trials) == ("", 8)
 
 
 # --- Where it breaks ------------------------------------------------------------------------
@@ -171,12 +179,16 @@ def test_who_is_always_right_has_one_below_the_lowest_level() -> None:
     assert (found.beyond, found.level_db) == ("below", LEVELS_DB[0])
 
 
-def test_wrong_answers_far_above_the_threshold_are_lapses() -> None:
+def test_wrong_answers_far_above_the_threshold_are_lapses_up_to_a_point() -> None:
     near = [answer(-30.0, True), answer(-36.0, False)] * 10
-    far = [answer(10.0, True)] * 40
-    careful, careless = estimate(near + far), estimate(near + far + [answer(10.0, False)] * 10)
-    assert careful.lapse_rate < 0.02 < 0.05 < careless.lapse_rate
+    far = [answer(level_db, True) for level_db in (-10.0, 0.0, 10.0) for _ in range(20)]
+    careful = estimate(near + far)
+    careless = estimate([*near, *far, *(answer(db, False) for db in (-10.0, 0.0, 10.0))])
+    assert careful.lapse_rate < 0.02 < 0.035 < careless.lapse_rate
     assert careless.level_db == pytest.approx(careful.level_db, abs=2.0)  # not of the threshold
+    # Lapses in a quarter of them are beyond the prior: the deviation tells, the level is wrong.
+    lost = estimate([*near, *far, *[answer(10.0, False)] * 20])
+    assert lost.sd_db > 2 * careful.sd_db
 
 
 # --- Rows -----------------------------------------------------------------------------------
