@@ -62,6 +62,7 @@ def session(
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
     from experiments.sessions.bids import export_session
+    from experiments.sessions.overrides import Overrides
     from experiments.sessions.running import Circumstances, run_session
     from experiments.sessions.trial_loop import People
     from experiments.study.study import Study
@@ -73,6 +74,7 @@ def session(
     circumstances = Circumstances(
         pilot=pilot, language=language, override=override, resume=resume, sources=sources
     )
+    sets.require(plan, allow=Overrides(override).allow)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
@@ -154,12 +156,15 @@ def models_of_study(
     second one.
     """
     from experiments.study.models import load_model_sets
+    from modeling.scenes.loading import scene_files
 
     if simplified is not None and scene is not None:
         raise ValueError(
             f"expected simplified models or a scene, got both ({simplified} and {scene}); remove "
             "--simplified or --scene."
         )
+    if scene is not None:
+        scene_files(scene)  # a folder of models is none
     given = dict(zip(plan.models, (models, simplified or scene), strict=False))
     overriding = {name: place for name, place in given.items() if place is not None}
     folder = Path() if study is None else study.parent

@@ -12,7 +12,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from experiments.observers.simulated import Perception, Psychometrics, SimulatedParticipant
+from experiments.observers.experimenter import SimulatedExperimenter
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import Psychometrics
+from experiments.observers.simulated import SimulatedParticipant
+from experiments.sessions.manifest import SessionManifest
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from modeling import Scene, TextureModel, Threshold, compile_scene
@@ -277,17 +281,17 @@ def test_a_session_presents_the_models_of_a_scene(
     )
     someone = SimulatedParticipant(perception, Psychometrics(), seed=1, subject=1, occasion=(1,))
     monkeypatch.setattr(
-        "tactileq.commands.session.open_console", lambda **screen: nullcontext(someone)
+        "tactileq.commands.session.open_console", lambda *_, **of: nullcontext(someone)
     )
+    monkeypatch.setattr("tactileq.experimenter.Terminal", SimulatedExperimenter)
     words = ("--task", "relative", "--subject", 1, "--study", "study.toml")
     done = main("session", *words, "--scene", "both.toml", "--data", "data")
     assert done.returncode == 0, done.stderr
-    assert "completed: data/sub-01" in done.stdout
-    (path,) = (study / "data/sourcedata").glob("*_provenance.json")
-    note = json.loads(path.read_text())
-    assert set(note["inputs_sha256"]) == {"models", "both.toml"}
-    assert note["settings"]["scene"] == "light touch"
-    presented = note["settings"]["models_sha256"]
+    assert "completed: data/sourcedata/sub-01" in done.stdout
+    (path,) = (study / "data/sourcedata").rglob("*_manifest.json")
+    manifest = SessionManifest.load(path)
+    assert manifest.model_sources == {"full": "models", "simplified": "both.toml"}
+    presented = manifest.models_sha256
     assert {name: presented[name]["simplified"] for name in presented} == {
         name: model.sha256 for name, model in least.items()
     }

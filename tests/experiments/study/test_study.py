@@ -156,7 +156,12 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             '[oddity]\nparticipants = 2\nschedule = "interleaved"\nrepeats = 3\n[plan]\n',
             "an even number of repeats",
         ),
-        ("[plan]\n", "[threshold]\nparticipants = 2\n[plan]\n", "got threshold"),
+        ("[plan]\n", "[threshold]\nparticipants = 2\n[plan]\n", r"schedule in \[threshold\]"),
+        (
+            "[plan]\n",
+            '[threshold]\nparticipants = 2\nschedule = "by-day"\n[plan]\n',
+            r"the schedule interleaved in \[threshold\]",
+        ),
         ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
         ('simplified = "simplified"\n', 'simplified = "models"\n', "different places of models"),
         ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
