@@ -204,4 +204,4 @@ def test_a_session_leads_to_the_thresholds_that_its_rows_hold(
     assert {a.level_db for a in answers} <= set(LEVELS_DB)
     found = [estimate(answers, frequency_hz) for frequency_hz in FREQUENCIES_HZ]
     assert [one.trials for one in found] == [3] * 8
-    assert len({one.slope for one in found}) == 1  # of the person
+    assert [one.slope for one in found] == pytest.approx([found[0].slope] * 8)  # of the person
