@@ -28,12 +28,14 @@ def threshold(
     Example: tactileq threshold --data data --subject 1 --out mine.tsv, then tactileq simplify
     models/canvas.json --threshold mine.tsv
     """
+    from experiments.sessions.bids import export_all
     from experiments.tasks.threshold_table import mean_thresholds, read_answers, threshold_text
     from modeling.files.provenance import provenance_of
 
     if out.suffix != ".tsv":
         raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")
     note = note_of_file(out, "threshold")
+    export_all(data)  # of sessions that were killed
     answered = read_answers(data, subject=subject)
     means = mean_thresholds(answered.estimates)
     people = len(answered.estimates)
