@@ -200,8 +200,10 @@ def figure(table: pd.DataFrame) -> Figure:
             rows.groupby("method", sort=False), ("#0072B2", "#D55E00"), "os", strict=True
         ):
             axes.plot(own["trials"], own["rms_db"], color=color, marker=marker, label=method)
-        axes.set_title(str(kind), fontsize=9)
-        axes.set_ylim(0, 6)
+        axes.set_title(str(kind), fontsize=8, loc="left")
+        axes.set(yscale="log", ylim=(0.7, 40))
+        axes.set_yticks([1, 2, 5, 10, 20], ["1", "2", "5", "10", "20"])
+        axes.minorticks_off()
         finish_axes(axes)
     for axes in panels[4:]:
         axes.set_xlabel("Trials of each frequency")

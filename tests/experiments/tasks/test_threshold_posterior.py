@@ -1,4 +1,4 @@
-"""QUEST+ for one frequency: against questplus itself, and observers with a known threshold."""
+"""QUEST+ for a person's thresholds: against questplus itself, and against Bayes' rule."""
 
 from __future__ import annotations
 
