@@ -10,7 +10,7 @@ Example: python docs/studies/detection_threshold_study.py writes detection_thres
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import erf, sqrt
 from pathlib import Path
@@ -25,7 +25,7 @@ from analysis.figures.drawing import stamp_if_simulated as stamp
 from experiments.tasks.threshold import FREQUENCIES_HZ
 from experiments.tasks.threshold_posterior import POINT_DB, Answer, estimate, next_level_db
 
-OBSERVERS = 12  # of each kind
+OBSERVERS = 6  # of each kind
 TRIALS = (20, 30, 40, 50, 60)
 HIGHEST_DB = 14.0  # 5 g
 STAIRCASE_POINT = 0.5 ** (1 / 3)
@@ -35,7 +35,7 @@ UNUSED_REVERSALS = 4  # while the steps shrink
 
 @dataclass(frozen=True)
 class Kind:
-    """Observers of one kind: Weibull's slope (or a normal curve's SD in dB), lapses, drift in dB.
+    """Observers of one kind: Weibull's slope (or a normal curve's SD in dB), lapses, drift.
 
     `drift_db` is how much the threshold rises over the session.
     """
@@ -53,6 +53,14 @@ class Kind:
         else:
             detected = 1 - np.exp(-(10 ** ((self.slope * above_db + POINT_DB) / 20)))
         return float(0.5 + (0.5 - self.lapse_rate) * detected)
+
+    def drifted_db(self, trial: int) -> float:
+        """How far the threshold has risen at a trial (from 0) above its level at half-time."""
+        return self.drift_db * (trial / TRIALS[-1] - 0.5)
+
+    def mean_drift_db(self, trials: int) -> float:
+        """The mean of that over so many trials."""
+        return self.drift_db * ((trials - 1) / TRIALS[-1] - 1) / 2
 
     def above_db(self, share: float) -> float:
         """How far above the threshold this share is right; infinite where it never is."""
@@ -82,76 +90,86 @@ def thresholds_db(rng: np.random.Generator) -> np.ndarray:
     return np.asarray(np.clip(rng.uniform(-40, -25) + smooth + rise, -70, 8))
 
 
-def quest_errors(kind: Kind, threshold_db: float, rng: np.random.Generator) -> Iterator[float]:
-    """Error of the estimate (dB) after so many trials each."""
+def quest_errors(
+    kind: Kind, curve_db: np.ndarray, rng: np.random.Generator
+) -> Iterator[tuple[int, int, float]]:
+    """Place of the frequency, trials at it so far, and error of the estimate (dB)."""
     answers: list[Answer] = []
     for trial in range(TRIALS[-1]):
-        level_db = next_level_db(answers, highest_db=HIGHEST_DB)
-        drift_db = kind.drift_db * (trial / TRIALS[-1] - 0.5)
-        right = rng.random() < kind.correct(level_db - threshold_db - drift_db)
-        answers.append(
-            Answer(frequency_hz=20, level_db=level_db, correct=bool(right), highest_db=HIGHEST_DB)
-        )
+        for frequency_hz, threshold_db in zip(FREQUENCIES_HZ, curve_db, strict=True):
+            level_db = next_level_db(answers, frequency_hz, highest_db=HIGHEST_DB)
+            right = rng.random() < kind.correct(level_db - threshold_db - kind.drifted_db(trial))
+            answers.append(
+                Answer(
+                    frequency_hz=frequency_hz,
+                    level_db=level_db,
+                    correct=bool(right),
+                    highest_db=HIGHEST_DB,
+                )
+            )
         if trial + 1 in TRIALS:
-            so_far_db = kind.drift_db * ((trial + 1) / TRIALS[-1] - 1) / 2
-            yield estimate(answers).level_db - threshold_db - so_far_db
+            for place, frequency_hz in enumerate(FREQUENCIES_HZ):
+                found_db = estimate(answers, frequency_hz).level_db
+                yield place, trial + 1, found_db - curve_db[place] - kind.mean_drift_db(trial + 1)
 
 
-def staircase_errors(kind: Kind, threshold_db: float, rng: np.random.Generator) -> Iterator[float]:
-    """The same of a 3-down 1-up staircase, against the point to which it converges."""
+def staircase_errors(
+    kind: Kind, curve_db: np.ndarray, rng: np.random.Generator
+) -> Iterator[tuple[int, int, float]]:
+    """The same of 3-down 1-up staircases, against the point to which they converge."""
+    for place, threshold_db in enumerate(curve_db):
+        target_db = threshold_db + kind.above_db(STAIRCASE_POINT)
+        for trials, level_db in staircase(kind, float(threshold_db), rng):
+            yield place, trials, level_db - target_db - kind.mean_drift_db(trials)
+
+
+def staircase(
+    kind: Kind, threshold_db: float, rng: np.random.Generator
+) -> Iterator[tuple[int, float]]:
+    """What a staircase finds after so many trials: the mean of its reversals in steps of 2 dB."""
     from psychopy.data import StairHandler
 
     stairs = StairHandler(
         startVal=-10.0,
         nTrials=TRIALS[-1],
-        nReversals=1,
+        nReversals=len(STEPS_DB),
         nUp=1,
         nDown=3,
         stepSizes=STEPS_DB,
         stepType="lin",
-        minVal=-80.0,
+        minVal=-70.0,
         maxVal=HIGHEST_DB,
     )
-    target_db = threshold_db + kind.above_db(STAIRCASE_POINT)
     for trial in range(TRIALS[-1]):
         stairs.finished = False  # goes on however many reversals there were
         level_db = float(next(stairs))
-        drift_db = kind.drift_db * (trial / TRIALS[-1] - 0.5)
-        right = rng.random() < kind.correct(level_db - threshold_db - drift_db)
+        right = rng.random() < kind.correct(level_db - threshold_db - kind.drifted_db(trial))
         stairs.addResponse(int(right))
         if trial + 1 in TRIALS:
             turned = stairs.reversalIntensities[UNUSED_REVERSALS:]
-            so_far_db = kind.drift_db * ((trial + 1) / TRIALS[-1] - 1) / 2
-            yield float(np.mean(turned or [level_db])) - target_db - so_far_db
+            yield trial + 1, float(np.mean(turned or [level_db]))
 
 
-METHODS: dict[str, Callable[[Kind, float, np.random.Generator], Iterator[float]]] = {
-    "QUEST+": quest_errors,
-    "3-down 1-up": staircase_errors,
-}
+METHODS = {"QUEST+": quest_errors, "3-down 1-up": staircase_errors}
 
 
 def observer(kind: int, number: int) -> list[dict[str, object]]:
     """Errors of one observer at all frequencies, by method and trials."""
-    curve = thresholds_db(np.random.default_rng([16, number]))
-    rows: list[dict[str, object]] = []
-    for method, errors in METHODS.items():
-        rng = np.random.default_rng([17, kind, number, len(method)])
-        for frequency_hz, threshold_db in zip(FREQUENCIES_HZ, curve, strict=True):
-            rows += [
-                {
-                    "kind": KINDS[kind].name,
-                    "method": method,
-                    "observer": number,
-                    "frequency_hz": frequency_hz,
-                    "trials": trials,
-                    "error_db": error_db,
-                }
-                for trials, error_db in zip(
-                    TRIALS, errors(KINDS[kind], float(threshold_db), rng), strict=True
-                )
-            ]
-    return rows
+    curve_db = thresholds_db(np.random.default_rng([16, number]))
+    return [
+        {
+            "kind": KINDS[kind].name,
+            "method": method,
+            "observer": number,
+            "frequency_hz": FREQUENCIES_HZ[place],
+            "trials": trials,
+            "error_db": error_db,
+        }
+        for method, errors in METHODS.items()
+        for place, trials, error_db in errors(
+            KINDS[kind], curve_db, np.random.default_rng([17, kind, number, len(method)])
+        )
+    ]
 
 
 def summary(errors: pd.DataFrame) -> pd.DataFrame:

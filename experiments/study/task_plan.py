@@ -22,7 +22,7 @@ Schedule = Literal["by-day", "interleaved"]
 SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
 
 # The usual repeats of a task whose table does not say; 1 in any other.
-REPEATS = {"relative": 3, "oddity": 6, "threshold": 40}
+REPEATS = {"relative": 3, "oddity": 6, "threshold": 60}
 MOST_TRAINING_TRIALS = 100
 
 

@@ -95,8 +95,7 @@ def _adapt(
     if trial.phase == "training":
         level_db = min(PRACTICE_LEVEL_DB, highest_db)
     else:
-        answers = [a for a in answers_of(rows) if a.frequency_hz == trial.frequency_hz]
-        level_db = next_level_db(answers, highest_db=highest_db)
+        level_db = next_level_db(answers_of(rows), trial.frequency_hz, highest_db=highest_db)
     return replace(trial, amplitude_g=10 ** (level_db / 20), highest_g=highest_g)
 
 

@@ -1,7 +1,8 @@
-"""QUEST+ for one frequency: what is known after some answers, and what to present next.
+"""QUEST+: what is known of a person's thresholds after some answers, and what to present next.
 
 docs/method/protocols.md#detection-threshold, Watson 2017 (QUEST+). Everything follows from the
-answers alone, so nothing has to be kept when a session is resumed.
+answers alone, so nothing has to be kept when a session is resumed. Slope and lapse rate are those
+of the person: what the answers at other frequencies say of them counts, too.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ if TYPE_CHECKING:
 # --- Parameters -----------------------------------------------------------------------------
 
 # Levels are of the sinusoid's peak, in dB re 1 g. 2 dB are finer than what 40 trials can tell.
-LEVELS_DB: Floats = np.arange(-80.0, 21.0, 2.0)
+LEVELS_DB: Floats = np.arange(-70.0, 21.0, 2.0)
 # Beyond the levels on both sides, so that a threshold beyond them can be told from one at them.
-THRESHOLDS_DB: Floats = np.arange(-90.0, 31.0, 1.0)
+THRESHOLDS_DB: Floats = np.arange(-80.0, 31.0, 1.0)
+# Normal, broad: the shipped thresholds lie from -42 to -16 dB. One wrong answer to a strong tone
+# then does not cost a dozen trials.
+EXPECTED_DB, EXPECTED_SD_DB = -30.0, 15.0
 SLOPES = (1.0, 1.5, 2.2, 3.3, 5.0)
-LAPSE_RATES = (0.0, 0.02, 0.04, 0.06)
+LAPSE_RATES = (0.0, 0.02, 0.04, 0.06)  # shares that are wrong however strong the tone
 CHANCE = 0.5
 # The level that is right in 75 % of trials without lapses lies so far from Weibull's scale, times
 # the slope: 1 − ½·exp(−(a/t)^slope) = ¾.
@@ -69,7 +73,7 @@ class Estimate:
     sd_db : float
         Posterior standard deviation.
     slope, lapse_rate : float
-        Posterior means; the slope is Weibull's, over amplitudes.
+        Posterior means, of all frequencies; the slope is Weibull's, over amplitudes.
     trials : int
     beyond : {"", "above", "below"}
         Whether the threshold is more likely than not above the highest level that the rig can
@@ -138,26 +142,48 @@ def _number(row: Mapping[str, object], name: str, *, lowest: float = 1e-9) -> fl
 # --- What is known --------------------------------------------------------------------------
 
 
-def posterior(answers: Sequence[Answer]) -> Floats:
-    """Probability of every slope, lapse rate and threshold, after answers at one frequency.
+def posterior(answers: Sequence[Answer], frequency_hz: float) -> Floats:
+    """Probability of every slope, lapse rate and threshold at one frequency.
 
-    Bayes' rule from an even prior; the shape is that of `QuestPlus.posterior`.
+    By Bayes' rule; the thresholds at other frequencies are summed over. The shape is that of
+    `QuestPlus.posterior`.
+
+    Parameters
+    ----------
+    answers : sequence of Answer
+        Of one person, at any frequencies.
+    frequency_hz : float
     """
-    made = _quest_plus()
-    grid = made.prior.dims
-    likelihoods = made.likelihoods.transpose("response", "intensity", *grid).values
-    # Sums of logarithms: a product of many small numbers would become 0.
-    with np.errstate(divide="ignore"):
-        logs = np.log(made.prior.values)
-        for answer in answers:
-            level = int(np.searchsorted(LEVELS_DB, answer.level_db))
-            logs = logs + np.log(likelihoods[int(not answer.correct), level])
-    weights: Floats = np.exp(logs - logs.max())
+    logs = _log_weights([a for a in answers if a.frequency_hz == frequency_hz])
+    axis = _quest_plus().prior.get_axis_num("threshold")
+    for other in {a.frequency_hz for a in answers} - {frequency_hz}:
+        weights = _log_weights([a for a in answers if a.frequency_hz == other])
+        highest = weights.max()
+        logs = logs + np.log(np.exp(weights - highest).sum(axis=axis, keepdims=True))
+    weights = np.exp(logs - logs.max())
     return np.asarray(weights / weights.sum())
 
 
-def next_level_db(answers: Sequence[Answer], *, highest_db: float) -> float:
+def _log_weights(answers: Sequence[Answer]) -> Floats:
+    """Logarithm of prior times likelihood; of a product, which might be too small a number."""
+    counts = np.zeros((2, LEVELS_DB.size))
+    for answer in answers:
+        counts[int(not answer.correct), int(np.searchsorted(LEVELS_DB, answer.level_db))] += 1
+    log_prior, log_likelihoods = _logs()
+    return np.asarray(log_prior + np.tensordot(counts, log_likelihoods))
+
+
+def next_level_db(answers: Sequence[Answer], frequency_hz: float, *, highest_db: float) -> float:
     """The level whose answer leaves the least entropy to be expected (QUEST+), up to the highest.
+
+    Parameters
+    ----------
+    answers : sequence of Answer
+        Of one person so far, at any frequencies.
+    frequency_hz : float
+        What is presented next.
+    highest_db : float
+        The highest level that the rig can present.
 
     Raises
     ------
@@ -172,22 +198,29 @@ def next_level_db(answers: Sequence[Answer], *, highest_db: float) -> float:
         )
     made = _quest_plus()
     chooser = copy(made)
-    chooser.posterior = made.prior.copy(data=posterior(answers))
+    chooser.posterior = made.prior.copy(data=posterior(answers, frequency_hz))
     chooser.likelihoods = made.likelihoods.sel(intensity=allowed)
     return float(chooser.next_stim["intensity"])
 
 
-def estimate(answers: Sequence[Answer]) -> Estimate:
-    """The threshold at one frequency, from at least one answer.
+def estimate(answers: Sequence[Answer], frequency_hz: float) -> Estimate:
+    """A person's threshold at one frequency, with at least one answer there.
+
+    Parameters
+    ----------
+    answers : sequence of Answer
+        Of one person, at any frequencies.
+    frequency_hz : float
 
     Raises
     ------
     InputError
-        For no answer.
+        For no answer at this frequency.
     """
-    if not answers:
+    own = [answer for answer in answers if answer.frequency_hz == frequency_hz]
+    if not own:
         raise InputError("expected answers at this frequency, got none; run the session.")
-    weights = posterior(answers)
+    weights = posterior(answers, frequency_hz)
     threshold_db, slope, lapse_rate = _parameters()
     point_db = threshold_db + POINT_DB / slope
     mean = {
@@ -195,19 +228,19 @@ def estimate(answers: Sequence[Answer]) -> Estimate:
         for name, value in (("db", point_db), ("slope", slope), ("lapse", lapse_rate))
     }
     sd_db = float(np.sqrt((weights * (point_db - mean["db"]) ** 2).sum()))
-    highest_db = min(max(answer.highest_db for answer in answers), float(LEVELS_DB[-1]))
+    highest_db = min(max(answer.highest_db for answer in own), float(LEVELS_DB[-1]))
     beyond, level_db = "", mean["db"]
     if weights[point_db > highest_db].sum() > 0.5:
         beyond, level_db = "above", highest_db
     elif weights[point_db < LEVELS_DB[0]].sum() > 0.5:
         beyond, level_db = "below", float(LEVELS_DB[0])
     return Estimate(
-        frequency_hz=answers[0].frequency_hz,
+        frequency_hz=frequency_hz,
         level_db=level_db,
         sd_db=sd_db,
         slope=mean["slope"],
         lapse_rate=mean["lapse"],
-        trials=len(answers),
+        trials=len(own),
         beyond=beyond,
     )
 
@@ -226,11 +259,22 @@ def _quest_plus() -> QuestPlus:
             "lapse_rate": list(LAPSE_RATES),
         },
         outcome_domain={"response": ["correct", "wrong"]},
+        prior={"threshold": np.exp(-(((THRESHOLDS_DB - EXPECTED_DB) / EXPECTED_SD_DB) ** 2) / 2)},
         func="weibull",
         stim_scale="dB",
     )
 
 
+@cache
+def _logs() -> tuple[Floats, Floats]:
+    """Logarithms of the prior, and of the likelihoods by answer and level."""
+    made = _quest_plus()
+    likelihoods = made.likelihoods.transpose("response", "intensity", *made.prior.dims).values
+    # A likelihood of 0 stays far below all others, and 0 times its logarithm is 0.
+    return np.log(made.prior.values), np.log(np.maximum(likelihoods, 1e-300))
+
+
+@cache
 def _parameters() -> tuple[Floats, Floats, Floats]:
     """Threshold, slope and lapse rate at every place of the posterior."""
     prior = _quest_plus().prior

@@ -123,7 +123,7 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
 def _estimates(rows: Sequence[Mapping[str, object]]) -> dict[float, Estimate]:
     answers = answers_of(rows)
     return {
-        frequency_hz: estimate([a for a in answers if a.frequency_hz == frequency_hz])
+        frequency_hz: estimate(answers, frequency_hz)
         for frequency_hz in sorted({a.frequency_hz for a in answers})
     }
 

@@ -39,7 +39,7 @@ def asked(
     """The answers of such an observer to what QUEST+ asks."""
     answers: list[Answer] = []
     for _ in range(trials):
-        level_db = next_level_db(answers, highest_db=highest_db)
+        level_db = next_level_db(answers, frequency_hz, highest_db=highest_db)
         answers.append(
             Answer(
                 frequency_hz=frequency_hz,

@@ -125,7 +125,7 @@ def test_answers_are_read_from_the_files_of_one_or_all(tmp_path: Path) -> None:
     assert [list(own) for own in both.estimates.values()] == [[20.0, 250.0, 1000.0], [20.0, 250.0]]
     own = read_answers(tmp_path, subject=2).estimates
     assert list(own) == ["sub-02"]
-    expected = estimate([a for a in answers_of(session(-34, -44)) if a.frequency_hz == 250.0])
+    expected = estimate(answers_of(session(-34, -44)), 250.0)
     assert own["sub-02"][250.0] == expected
     assert expected.level_db == pytest.approx(-44.0, abs=4.0)
 
