@@ -156,15 +156,18 @@ def models_of_study(
     second one.
     """
     from experiments.study.models import load_model_sets
-    from modeling.scenes.loading import scene_files
+    from modeling.scenes.compiled import FILE as SCENE
 
     if simplified is not None and scene is not None:
         raise ValueError(
             f"expected simplified models or a scene, got both ({simplified} and {scene}); remove "
             "--simplified or --scene."
         )
-    if scene is not None:
-        scene_files(scene)  # a folder of models is none
+    if scene is not None and scene.is_dir() and not (scene / SCENE).is_file():
+        raise ValueError(
+            f"expected a compiled scene at {scene}, got a folder without {SCENE}; compile one with "
+            "tactileq scene, or name models with --simplified."
+        )
     given = dict(zip(plan.models, (models, simplified or scene), strict=False))
     overriding = {name: place for name, place in given.items() if place is not None}
     folder = Path() if study is None else study.parent
