@@ -11,6 +11,7 @@ from threading import Thread
 from typing import TextIO
 
 from rich.console import Console
+from rich.markup import escape
 
 from experiments.sessions.surfaces import SessionAborted, Standing
 
@@ -36,16 +37,22 @@ class Terminal:
         self._console = console or Console(highlight=False)
         self._typed: SimpleQueue[str | None] = SimpleQueue()
         self._stopping = False
+        self._asked = False
         # A daemon, since nothing can end a wait for a line.
         Thread(target=self._listen, args=(lines,), daemon=True).start()
 
     def ask_mount(self, tray: str) -> None:
         """Ask for the sample of a tray."""
-        self._ask(f"[bold]Tray {tray}[/]: put its sample in place")
+        self._ask(f"[bold]Tray {escape(tray)}[/]: put its sample in place")
 
     def call(self, told: str) -> None:
         """Tell what failed, and ask to mend it; the trial will be repeated."""
-        self._ask(f"[bold]The rig failed in this trial.[/] {told} Mend it")
+        self._ask(f"[bold]The rig failed in this trial.[/] {escape(told)} Mend it")
+
+    def go_on(self) -> None:
+        """Ask for nothing; a stop that was typed meanwhile counts."""
+        self._asked = False
+        self._forget_lines()
 
     def tell(self, standing: Standing) -> None:
         """Show how far the session is, and how the rig is."""
@@ -54,7 +61,7 @@ class Terminal:
         if standing.minutes_left is not None:
             parts.append(f"about {max(1, round(standing.minutes_left))} min left")
         parts.append("rig: " + (" ".join(standing.problems) or "ready"))
-        self._console.print("\n" + " · ".join(parts))
+        self._console.print("\n" + " · ".join(parts), markup=False)
 
     def ready(self) -> bool:
         """Whether what was asked last has been confirmed.
@@ -64,6 +71,8 @@ class Terminal:
         SessionAborted
             Where the experimenter stops the session, or the terminal is closed.
         """
+        if not (self._asked or self._stopping):
+            return True
         line = self._next()
         if self._stopping:
             if line is None:
@@ -76,13 +85,17 @@ class Terminal:
         return line is not None
 
     def _ask(self, what: str) -> None:
-        # An Enter from before must not confirm what is asked only now; a stop counts.
-        while (line := self._next()) is not None:
-            self._stopping |= line.lower() == STOP
-        if self._stopping:
-            self._console.print("Stopping. Why? (one line, then Enter)")
-        else:
+        self._asked = True
+        self._forget_lines()
+        if not self._stopping:
             self._console.print(f"{what}, then press Enter (or type {STOP}).")
+
+    def _forget_lines(self) -> None:
+        """An Enter from before must not confirm what is asked only now; a stop counts."""
+        while (line := self._next()) is not None:
+            if line.lower() == STOP and not self._stopping:
+                self._stopping = True
+                self._console.print("Stopping. Why? (one line, then Enter)")
 
     def _next(self) -> str | None:
         try:

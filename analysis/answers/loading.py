@@ -296,8 +296,12 @@ def _load_task(
             warnings.append(f"{what} {told}")
         check_order(table, planned, path=path)
         table = _valid(table, what, warnings=warnings)
-        if (table["pilot"] == "true").any():
-            warnings.append(f"{what} was a pilot; its answers are no data of the study.")
+        if (pilot := table["pilot"] == "true").any():
+            told = "its answers are no data of the study"
+            if not origin.get("Pilot", False):
+                table = table[~pilot].reset_index(drop=True)
+                told += " and are left out"
+            warnings.append(f"{what} was a pilot; {told}.")
         table.insert(0, "participant_id", participant)
         table.insert(1, "session", session)
         sessions.append(table)

@@ -28,6 +28,9 @@ class SimulatedExperimenter:
         """What failed is mended at once."""
         self.calls.append(told)
 
+    def go_on(self) -> None:
+        """Never wants to stop."""
+
     def ready(self) -> bool:
         """Always."""
         return True

@@ -78,7 +78,7 @@ def _require_day_before(
             f"expected {before.stem} complete before session {manifest.session}, got {got}; "
             "complete that one first",
         )
-    if state.begun_utc and not manifest.simulated_participant and _is_today(state.begun_utc):
+    if state.last_utc and not manifest.simulated_participant and _is_today(state.last_utc):
         overrides.allow(
             "same date",
             f"expected session {manifest.session} on a later date than {before.stem}, got the same "

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from modeling import InputError
 from modeling.errors import shown
 
@@ -13,6 +15,8 @@ class Overrides:
     ----------
     reason : str, optional
         Printable text; without one nothing is allowed.
+    tell : callable, optional
+        Told each rule that is broken, in one sentence.
 
     Raises
     ------
@@ -20,12 +24,15 @@ class Overrides:
         For a reason that says nothing.
     """
 
-    def __init__(self, reason: str | None = None) -> None:
+    def __init__(
+        self, reason: str | None = None, *, tell: Callable[[str], None] | None = None
+    ) -> None:
         if reason is not None and not (reason.strip() and reason.isprintable()):
             raise InputError(
                 f"expected a reason in words after --override, got {shown(reason)}; say why."
             )
         self._reason = reason.strip() if reason else ""
+        self._tell = tell
         self.recorded: list[dict[str, str]] = []
 
     def allow(self, what: str, sentence: str) -> None:
@@ -48,3 +55,5 @@ class Overrides:
         record = {"what": what, "reason": self._reason}
         if record not in self.recorded:
             self.recorded.append(record)
+            if self._tell is not None:
+                self._tell(f"overridden ({what}): {sentence}.")

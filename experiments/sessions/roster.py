@@ -15,7 +15,7 @@ from typing import Any
 
 from experiments.sessions.files import make_folder, open_file, put_file, sync_folder, write_all
 from experiments.sessions.log import line_of, read_lines, utc_text
-from experiments.sessions.writer import store_error
+from experiments.sessions.writer import StoreError, store_error
 from modeling import InputError
 from modeling.checks import check_whole
 from modeling.errors import shown
@@ -91,16 +91,35 @@ class Roster:
         StoreError
             If the disk does not take it.
         """
+        with self.enrolling(subject, participants, simulated=simulated, pilot=pilot) as person:
+            return person
+
+    @contextmanager
+    def enrolling(
+        self,
+        subject: int | None,
+        participants: int,
+        *,
+        simulated: bool = False,
+        pilot: bool = False,
+    ) -> Iterator[Person]:
+        """As `enroll`; who is new is not enrolled after all where the block raises."""
         check_whole("subject", 1 if subject is None else subject, low=1, high=9999)
         with self._locked() as entries:
             number = subject if subject is not None else _first_free(entries)
             if number in entries:
-                return self._known(entries[number], participants, simulated=simulated)
+                yield self._known(entries[number], participants, simulated=simulated)
+                return
             slot = _slot(number, participants, entries)
             code = f"SIM-{number:03d}" if simulated else _new_code(entries)
             kind = {"simulated": simulated, "pilot": pilot}
+            before = self.path.stat().st_size if self.path.exists() else 0
             self._append("enrolled", subject=number, slot=slot, code=code, **kind)
-            return Person(subject=number, slot=slot, code=code, known=False)
+            try:
+                yield Person(subject=number, slot=slot, code=code, known=False)
+            except BaseException:
+                os.truncate(self.path, before)
+                raise
 
     def drop(self, subject: int) -> None:
         """Note that a participant will not come again, so that another one gets the slot.
@@ -162,6 +181,8 @@ class Roster:
             with locked(self.path):
                 self._cut_half_line()
                 yield self.subjects()
+        except StoreError:
+            raise
         except OSError as error:
             raise store_error(error, self.path, _ADVICE) from error
 
@@ -251,9 +272,10 @@ def _slot(subject: int, participants: int, entries: Mapping[int, Mapping[str, An
     held: set[int] = {entry["slot"] for entry in entries.values() if not entry["left"]}
     if 1 <= subject <= participants and subject not in held:
         return subject
-    freed: set[int] = {entry["slot"] for entry in entries.values() if entry["left"]} - held
-    if fitting := [slot for slot in freed if slot <= participants]:
-        return min(fitting)
+    # Of somebody who left, or whose number took over another slot.
+    freed = {slot for slot in entries if slot <= participants} - held
+    if freed:
+        return min(freed)
     raise InputError(
         f"expected a subject from 1 to {participants}, or one in the place of a dropout, got "
         f"subject {shown(subject)}; note who dropped out, or plan more participants."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,8 @@ class Circumstances:
         One of the study's; empty for its first.
     override : str, optional
         Reason to go on where a rule is broken; stored.
+    tell : callable, optional
+        Told each rule that is broken for that reason.
     resume : bool
         Whether to go on with a session that was aborted or broke off.
     sources : mapping of set of models to path
@@ -52,6 +54,7 @@ class Circumstances:
     pilot: bool = False
     language: str = ""
     override: str | None = None
+    tell: Callable[[str], None] | None = None
     resume: bool = False
     sources: Mapping[str, str] = field(default_factory=dict)
 
@@ -105,30 +108,36 @@ def run_session(
         If the disk does not take the answers.
     """
     said = circumstances or Circumstances()
-    overrides = Overrides(said.override)
+    overrides = Overrides(said.override, tell=said.tell)
     models.require(study, allow=overrides.allow)
     _require_language(study, said.language)
     root = Path(data_folder)
     rig.open()
     try:
-        person = Roster(root).enroll(
+        enrolling = Roster(root).enrolling(
             subject,
             study.plan_of(task.name).participants,
             simulated=people.respondent.simulated,
             pilot=said.pilot,
         )
-        plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
-        manifest = _manifest(plan, task, models=models, rig=rig, people=people, code=person.code)
-        opened = SessionStore.resume if said.resume else SessionStore.create
-        with opened(root, _with(manifest, said, study), overrides=overrides) as store:
+        # Enrolled only if the session may begin.
+        with enrolling as person:
+            plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
+            manifest = _manifest(
+                plan, task, models=models, rig=rig, people=people, code=person.code
+            )
+            intake = _intake(study, root, person)
+            opened = SessionStore.resume if said.resume else SessionStore.create
+            store = opened(root, _with(manifest, said, study), overrides=overrides)
+        with store:
             result = run_trials(
-                plan,
+                _stored_plan(plan, task, store=store, models=models),
                 task,
                 models=models,
                 rig=rig,
                 people=people,
                 store=store,
-                intake=_intake(study, root, person),
+                intake=intake,
                 agenda=_agenda(task, store),
                 pilot=said.pilot,
             )
@@ -189,12 +198,40 @@ def _require_language(study: Study, language: str) -> None:
 
 
 def _intake(study: Study, root: Path, person: Person) -> Intake:
-    """What to ask first; of somebody who was welcomed before only whether the code is theirs."""
+    """What to ask first; of who gave this consent before, only whether the code is theirs."""
     logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
-    welcomed = any(event["event"] == "welcome" for log in logs for event in read_log(log).events)
     return Intake(
-        consent=study.consent, code=person.code, known=welcomed, questions=study.questions
+        consent=study.consent,
+        code=person.code,
+        known=any(_welcomes(log, study.consent) for log in logs),
+        questions=study.questions,
     )
+
+
+def _welcomes(log: Path, consent: str) -> bool:
+    """Whether somebody was welcomed in this session, and gave this consent."""
+    try:
+        events = read_log(log).events
+    except InputError:
+        return False  # asked again, rather than not at all
+    return any(e["event"] == "welcome" and e.get("consent") == consent for e in events)
+
+
+def _stored_plan(
+    plan: SessionPlan, task: Task, *, store: SessionStore, models: ModelSets
+) -> SessionPlan:
+    """The plan that the manifest on disk holds, whatever the study file says by now.
+
+    Raises
+    ------
+    InputError
+        If there is no model any more for what it plans.
+    """
+    study = Study.from_dict(store.manifest.study)
+    if study.sha256 != plan.study.sha256:
+        models.require(study, allow=lambda what, sentence: None)
+    trials = tuple(_trial(task, values) for values in store.manifest.trials)
+    return replace(plan, study=study, trials=trials)
 
 
 def _agenda(task: Task, store: SessionStore) -> Agenda:

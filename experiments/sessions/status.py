@@ -151,7 +151,7 @@ def _person(
         left=entry["left"],
         sessions=tuple(_session(*one) for one in found),
     )
-    begun = {(one[0].task, one[0].session): one[2].begun_utc for one in found}
+    begun = {(one[0].task, one[0].session): one[2].last_utc for one in found}
     return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
 
 

@@ -359,8 +359,12 @@ class Experimenter(Protocol):
         """Tell what failed, and ask to mend it."""
         ...
 
+    def go_on(self) -> None:
+        """Ask for nothing: ready at once, unless the session is to be stopped."""
+        ...
+
     def ready(self) -> bool:
-        """Whether what was asked last has been confirmed."""
+        """Whether what was asked last has been confirmed; SessionAborted where it is to end."""
         ...
 
     def tell(self, standing: Standing) -> None:

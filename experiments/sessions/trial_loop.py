@@ -102,30 +102,31 @@ def run_trials(
             answers = people.respondent.welcome(intake)
             store.log("welcome", consent=intake.consent, answers=dict(answers))
         running.run()
-        store.finish("complete", "all trials answered", by="program")
-        # Everything is answered: leaving the last page is not an abort.
-        with suppress(SessionAborted):
-            people.respondent.announce(f"{task.name}.closing")
     except SessionAborted as aborted:
-        rig.silence()
-        running.log_faults()
+        running.fall_silent()
         store.finish("aborted", aborted.reason, by=aborted.by)
         return running.result(completed=False, reason=aborted.reason)
     except BaseException as error:
-        # Silent first; and the log must not hide what went wrong, for instance a full disk.
-        rig.silence()
-        by_signal = isinstance(error, SystemExit | KeyboardInterrupt)
-        reason = getattr(error, "signal_name", "") or type(error).__name__
-        told = reason if by_signal else f"{reason}: {error}"
+        running.fall_silent()
+        # The log must not hide what went wrong, for instance a full disk.
         with suppress(OSError):
-            if by_signal:
-                store.finish("aborted", told, by="signal")
-            else:
-                store.finish("crashed", told, by="program")
+            status, reason, by = _ending_of(error)
+            store.finish(status, reason, by=by)
         raise
-    finally:
-        rig.silence()
+    running.fall_silent()
+    store.finish("complete", "all trials answered", by="program")
+    # Everything is answered: leaving the last page is not an abort.
+    with suppress(SessionAborted):
+        people.respondent.announce(f"{task.name}.closing")
     return running.result(completed=True)
+
+
+def _ending_of(error: BaseException) -> tuple[str, str, str]:
+    """Status, reason and by whom, of a session that an exception ends."""
+    name = str(getattr(error, "signal_name", type(error).__name__))
+    if isinstance(error, SystemExit | KeyboardInterrupt):
+        return "aborted", name, "signal"
+    return "crashed", f"{name}: {error}", "program"
 
 
 class _Running:
@@ -159,11 +160,11 @@ class _Running:
 
     def run(self) -> None:
         """Training, then the main trials; each with its invalid trials once more at its end."""
-        if self._agenda.training:
+        if self._agenda.training or self._owed_of("training"):
             self._announce("training", again=self._agenda.training_again)
             self._train(self._agenda.training)
         self._announce("main", again=self._mains_done > 0)
-        failed = [trial for trial in self._agenda.owed if trial.phase == "main"]
+        failed = self._owed_of("main")
         for number, trial in enumerate(self._agenda.main):
             if number and self._planned.break_after and number % self._planned.break_after == 0:
                 self._rest()
@@ -187,6 +188,15 @@ class _Running:
         where = {} if self._at is None else {"trial": self._at}
         self._store.log(event, **where, **fields)
 
+    def fall_silent(self) -> None:
+        """Silence the rig, and log its faults; what fails in that hides nothing else."""
+        for end in (self._rig.silence, self.log_faults):
+            try:
+                end()
+            except Exception as error:
+                with suppress(OSError):
+                    self._store.log("fault", told=f"{type(error).__name__}: {error}")
+
     def log_faults(self) -> tuple[Fault, ...]:
         """Take the rig's faults, and log them."""
         faults = self._rig.take_faults()
@@ -200,7 +210,7 @@ class _Running:
 
     def _train(self, trials: Sequence[Trial]) -> None:
         """As many trials as are planned at least, and on until the strokes are as recorded."""
-        failed: list[Trial] = []
+        failed = self._owed_of("training")
         inside = False
         done = self._agenda.trained
         for trial in trials:
@@ -211,23 +221,28 @@ class _Running:
             done += 1
             if not valid:
                 failed.append(trial)
-        self._repeat([*(t for t in self._agenda.owed if t.phase == "training"), *failed])
+        self._repeat(failed)
         self._store.log("training_over", inside=inside, trials=done)
 
     def _repeat(self, failed: Sequence[Trial]) -> None:
         for trial in failed:
-            self._run_trial(trial, again=True)
             self._owed -= 1
+            self._run_trial(trial, again=True, last=True)
+
+    def _owed_of(self, phase: str) -> list[Trial]:
+        """Trials that the rig failed in before this run, and that were not repeated yet."""
+        return [trial for trial in self._agenda.owed if trial.phase == phase]
 
     def _rest(self) -> None:
         self._store.log("break_began")
         self._respondent.rest()
         self._store.log("break_ended")
 
-    def _run_trial(self, trial: Trial, *, again: bool = False) -> bool:
+    def _run_trial(self, trial: Trial, *, again: bool = False, last: bool = False) -> bool:
         """One trial from mounting to storing; whether it is valid.
 
-        `again` means that its number stands in the file already: it gets the next free one.
+        `again` means that its number stands in the file already: it gets the next free one. A
+        `last` one is not repeated should the rig fail in it.
         """
         repeats = trial.trial if again else None
         if again:
@@ -238,6 +253,10 @@ class _Running:
         self._experimenter.tell(self._standing(trial))
         if self._task.mounts:
             self._mount(trial)
+        else:
+            self._experimenter.go_on()
+            if not self._experimenter.ready():  # the session is to be stopped
+                self._respondent.wait(self._experimenter.ready)
         self._respondent.progress(self._mains_done, self._mains)
         if self._task.adapt is not None:
             trial = self._task.adapt(trial, self._rows, self._rig)
@@ -247,7 +266,7 @@ class _Running:
         row = self._row(trial, answer, valid=valid, repeats=repeats)
         self._store.answer(trial.trial, row)
         self._rows.append(row)
-        self._owed += not valid and not again
+        self._owed += not valid and not last
         self._mains_done += trial.phase == "main" and not again
         self._trace(trial, faults)
         self._durations_s.append(time.monotonic() - began_s)

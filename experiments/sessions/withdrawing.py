@@ -15,6 +15,7 @@ from experiments.sessions.state import is_running
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.places import clear_unfinished
+from modeling.files.writing import write_bytes
 
 
 def withdraw(data_folder: str | Path, subject: int) -> None:
@@ -39,12 +40,16 @@ def withdraw(data_folder: str | Path, subject: int) -> None:
     root = Path(data_folder)
     _require_still(root, subject)
     left = [folder for folder in _folders(root, subject) if folder.exists()]
+    listed = _without(root / "participants.tsv", subject)
     roster = Roster(root)
-    if not left or roster.subjects().get(subject, {}).get("left") != "withdrawn":
+    again = roster.subjects().get(subject, {}).get("left") == "withdrawn"
+    if not (again and (left or listed)):
         roster.withdraw(subject)
     # What the others are made from goes first, so that nothing is made again in between.
     for folder in left:
         shutil.rmtree(folder)
+    if listed is not None:
+        write_bytes(root / "participants.tsv", listed)
     clear_unfinished(root)
     export_all(root)
 
@@ -73,6 +78,15 @@ def files_of(data_folder: str | Path, subject: int) -> tuple[Path, ...]:
     folders = _folders(Path(data_folder), subject)
     found = (path for folder in folders for path in folder.rglob("*") if not path.is_dir())
     return tuple(sorted(found))
+
+
+def _without(table: Path, subject: int) -> bytes | None:
+    """The table of participants without this person; None where the person is not in it."""
+    if not table.is_file():
+        return None
+    lines = table.read_bytes().splitlines(keepends=True)
+    kept = [line for line in lines if not line.startswith(f"sub-{subject:02d}\t".encode())]
+    return b"".join(kept) if len(kept) < len(lines) else None
 
 
 def _folders(root: Path, subject: int) -> tuple[Path, Path]:

@@ -153,6 +153,8 @@ class LogWriter:
             os.fsync(self._handle)
         except OSError as error:
             self._error = store_error(error, self._path)
+            if written == len(data):
+                written = 0  # a disk that failed to keep lines says so once: trust none of them
             return self._cut_back(before, data[:written])
         return len(lines)
 

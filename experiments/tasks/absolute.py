@@ -89,7 +89,7 @@ def _with_anchors(occasion: Occasion, drafts: list[dict[str, Any]]) -> list[dict
     anchors = study.plan_of(occasion.task).anchors
     reference = study.models_of(occasion.task)[0]
     surfaces = dealt(SURFACES, len(anchors), rng)
-    for (real, virtual), first in zip(anchors.items(), surfaces, strict=True):
+    for (real, virtual), first in zip(sorted(anchors.items()), surfaces, strict=True):
         place = int(rng.integers(0, len(drafts) + 1))
         drafts.insert(place, _draft(real, reference, virtual=virtual, first=first))
     return drafts

@@ -9,7 +9,7 @@ import typer
 
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
-from tactileq.telling import share_of, tell_controls
+from tactileq.telling import share_of
 
 if TYPE_CHECKING:
     TaskName = str
@@ -71,15 +71,21 @@ def session(
 
     plan = Study.load(study)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
+    if resume and not language:
+        language = _language_of(data, task=task, subject=subject, session=number)
     circumstances = Circumstances(
-        pilot=pilot, language=language, override=override, resume=resume, sources=sources
+        pilot=pilot,
+        language=language,
+        override=override,
+        tell=print,
+        resume=resume,
+        sources=sources,
     )
     sets.require(plan, allow=Overrides(override).allow)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
         return
-    tell_controls(sets, plan.textures)
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
         print("note: the rig is simulated; its data are marked so.")
@@ -105,6 +111,15 @@ def session(
     else:
         left = f"{result.answered} of {result.planned} trials answered"
         print(f"ended early ({result.reason}), {left}; go on with --resume: {manifest.parent}")
+
+
+def _language_of(data: Path, *, task: str, subject: int, session: int) -> str:
+    """The language in which a session began; empty where there is none yet."""
+    from experiments.sessions.files import SessionFiles
+    from experiments.sessions.manifest import SessionManifest
+
+    files = SessionFiles(root=data, task=task, subject=subject, session=session)
+    return SessionManifest.load(files.manifest).language if files.manifest.exists() else ""
 
 
 def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | None) -> TextureRig:

@@ -70,6 +70,9 @@ class Ready:
     def call(self, told: str) -> None:
         self.called.append(told)
 
+    def go_on(self) -> None:
+        pass
+
     def ready(self) -> bool:
         return True
 

@@ -62,6 +62,27 @@ def test_a_sample_is_asked_for_by_its_tray_and_enter_confirms_it(desk: Desk) -> 
     assert not desk.terminal.ready()  # one line confirms once
 
 
+def test_labels_and_sentences_are_shown_as_they_stand(desk: Desk) -> None:
+    desk.terminal.ask_mount("[b2]")
+    desk.terminal.call("expected a port, got [/dev/ttyACM0].")
+    problem = "plug [/x] in."
+    desk.terminal.tell(Standing(phase="main", done=1, of=2, minutes_left=None, problems=(problem,)))
+    assert "Tray [b2]:" in desk.shown
+    assert "got [/dev/ttyACM0]." in desk.shown
+    assert problem in desk.shown
+
+
+def test_where_nothing_is_mounted_only_a_stop_holds_the_session_up(desk: Desk) -> None:
+    desk.terminal.go_on()
+    assert desk.terminal.ready()
+    desk.typed("stop")
+    desk.terminal.go_on()
+    assert not desk.terminal.ready()
+    desk.typed("late")
+    with pytest.raises(SessionAborted, match="late"):
+        desk.terminal.ready()
+
+
 def test_an_enter_from_before_confirms_nothing(desk: Desk) -> None:
     desk.typed("")
     desk.terminal.ask_mount("C")

@@ -435,8 +435,18 @@ def test_a_session_that_went_on_against_a_rule_is_told(
 def test_pilots_are_told(study_folder, write_task, absolute_rows):
     columns = [*_absolute_columns(), "pilot"]
     write_task("absolute", [[*row, "true"] for row in absolute_rows], columns=columns)
-    (told,) = load_responses(study_folder).warnings
-    assert told == "sub-01 absolute ses-01 was a pilot; its answers are no data of the study."
+    among_others = load_responses(study_folder)
+    told = "sub-01 absolute ses-01 was a pilot; its answers are no data of the study"
+    assert among_others.warnings == (f"{told} and are left out.",)
+    assert among_others.absolute.empty
+    description = study_folder / "dataset_description.json"
+    stated = json.loads(description.read_text())
+    description.write_text(json.dumps({**stated, "Pilot": True}))
+    for sidecar in study_folder.rglob("*_beh.json"):
+        sidecar.write_text(json.dumps({**json.loads(sidecar.read_text()), "Pilot": True}))
+    alone = load_responses(study_folder)
+    assert alone.warnings == (f"{told}.",)
+    assert len(alone.absolute) > 0
 
 
 def test_anchors_stand_apart(study_folder, write_task, absolute_rows):

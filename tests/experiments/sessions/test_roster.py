@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -159,3 +160,26 @@ def test_what_is_no_roster_is_refused(tmp_path: Path, line: str) -> None:
         file.write(line + "\n")
     with pytest.raises(InputError, match=r"line 2 of .*restore the file"):
         roster.subjects()
+
+
+def test_a_task_with_more_participants_gets_all_its_slots_after_a_dropout(tmp_path: Path) -> None:
+    roster = Roster(tmp_path)
+    for number in range(1, 21):
+        roster.enroll(number, 20)
+    roster.drop(3)
+    assert roster.enroll(21, 20).slot == 3
+    slots = [roster.enroll(number, 24).slot for number in (22, 23, 24, 25)]
+    assert slots == [22, 23, 24, 21]
+    with pytest.raises(InputError, match="from 1 to 24"):
+        roster.enroll(26, 24)
+
+
+def test_who_was_being_enrolled_when_something_failed_is_not(tmp_path: Path) -> None:
+    roster = Roster(tmp_path)
+    roster.enroll(1, 3)
+    before = roster.path.read_bytes()
+    with suppress(RuntimeError), roster.enrolling(2, 3):
+        assert roster.subjects()[2]["slot"] == 2
+        raise RuntimeError
+    assert roster.path.read_bytes() == before
+    assert roster.enroll(None, 3).subject == 2

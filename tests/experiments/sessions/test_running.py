@@ -259,6 +259,39 @@ def test_a_replacement_gets_the_slot_of_a_dropout(
     assert [trial["texture"] for trial in stored.trials] == [t.texture for t in plan.trials]
 
 
+def test_who_is_refused_is_not_enrolled(run: Callable[..., Any], tmp_path: Path) -> None:
+    run()
+    person = Scripted()
+    person.simulated = False
+    for wrong in ({"subject": 2, "respondent": person}, {"subject": 2, "session": 7}):
+        with pytest.raises(InputError):
+            run(**wrong)
+    with pytest.raises(InputError, match="leave out --resume"):
+        run(subject=2, resume=True)
+    assert list(Roster(tmp_path).subjects()) == [1]
+    assert run(subject=2)[0].completed
+
+
+def test_another_consent_is_asked_for_again(run: Callable[..., Any], small: Study) -> None:
+    again = Scripted()
+    run(study=replace(small, consent="1"))
+    run(
+        again,
+        task="relative",
+        study=replace(small, consent="2"),
+        override="the ethics committee asked for another form",
+    )
+    assert not again.asked[0].known
+
+
+def test_every_rule_that_is_broken_is_told(run: Callable[..., Any], small: Study) -> None:
+    told: list[str] = []
+    run()
+    run(subject=2, study=replace(small, masking="none"), override="a new room", tell=told.append)
+    (sentence,) = told
+    assert sentence.startswith("overridden (study): expected a data folder of this study")
+
+
 # --- Killed between every two events --------------------------------------------------------
 
 

@@ -383,6 +383,53 @@ def test_stopping_on_the_last_page_is_no_abort(run: Callable[..., Ran]) -> None:
     assert ran.store.status == "complete"
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), RuntimeError("the window is gone")])
+def test_what_ends_the_last_page_does_not_undo_a_complete_session(
+    run: Callable[..., Ran], error: BaseException
+) -> None:
+    class Gone(Scripted):
+        def announce(self, page: str, **values: object) -> None:
+            if page.endswith("closing"):
+                raise error
+
+    store = MemoryStore()
+    with pytest.raises(type(error)):
+        run(Gone(), store=store)
+    assert [event["status"] for event in store.events if event["event"] == "ended"] == ["complete"]
+
+
+def test_a_rig_that_cannot_be_silenced_hides_nothing(run: Callable[..., Ran], rig: Any) -> None:
+    class Falling(Scripted):
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            rig.silence = fail
+            raise RuntimeError("pen fell")
+
+    def fail() -> None:
+        raise OSError("no card")
+
+    store = MemoryStore()
+    with pytest.raises(RuntimeError, match="pen fell"):
+        run(Falling(), store=store)
+    told = [event["told"] for event in store.events if event["event"] == "fault"]
+    assert told == ["OSError: no card"]
+    assert store.events[-1]["reason"] == "RuntimeError: pen fell"
+
+
+@pytest.mark.parametrize("task", ["absolute", "oddity"])
+def test_the_experimenter_can_stop_whether_samples_are_mounted_or_not(
+    run: Callable[..., Ran], study: Study, task: str
+) -> None:
+    class Stopping(Ready):
+        def ready(self) -> bool:
+            raise SessionAborted("fire alarm", by="experimenter")
+
+    plan = TaskPlan(participants=2, schedule="interleaved", repeats=2)
+    study = replace(study, tasks={**study.tasks, "oddity": plan})
+    ran = run(experimenter=Stopping(), task=task, study=study)
+    assert (ran.result.completed, ran.result.reason) == (False, "fire alarm")
+    assert ran.store.rows == []
+
+
 # --- Faults ---------------------------------------------------------------------------------
 
 
@@ -563,6 +610,37 @@ def test_training_comes_again_with_numbers_of_its_own(
         (7, "main", None),
     ]
     assert [event["again"] for event in ran.events("phase")] == [True, True]
+
+
+def test_training_that_the_rig_spoilt_is_repeated_when_the_session_goes_on(
+    run: Callable[..., Ran], study: Study
+) -> None:
+    trials = plan_session(study, task="absolute", subject=1, session=1).trials
+    spoilt = {**run().store.rows[0], "valid": 0}
+    agenda = Agenda(
+        training=(), main=trials[1:], owed=trials[:1], next_number=8, run=2, rows=(spoilt,)
+    )
+    ran = run(agenda=agenda)
+    assert [(row["trial"], row["repeats"]) for row in ran.store.rows][:2] == [(8, 1), (2, None)]
+    assert ran.events("training_over")
+    assert (ran.result.planned, ran.result.answered) == (8, 8)
+
+
+def test_training_again_that_the_rig_spoilt_is_counted_and_repeated(
+    run: Callable[..., Ran], study: Study, rig: Any
+) -> None:
+    trials = plan_session(study, task="absolute", subject=1, session=1).trials
+    agenda = Agenda(
+        training=trials[:1],
+        training_again=True,
+        main=trials[1:],
+        next_number=8,
+        run=2,
+        rows=tuple(run().store.rows[:1]),
+    )
+    ran = run(Unlucky(rig, {1}), agenda=agenda)
+    assert [(r["trial"], r["repeats"]) for r in ran.store.rows][:3] == [(8, 1), (9, 1), (2, None)]
+    assert (ran.result.planned, ran.result.answered) == (9, 9)
 
 
 # --- Traces ---------------------------------------------------------------------------------
