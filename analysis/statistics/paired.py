@@ -1,37 +1,36 @@
-"""Paired t-tests of full and simplified models, with effect sizes."""
+"""Two models compared within participants: paired t-test, effect size, tests beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
-from analysis.columns import TEXTURE, Column, P, names
-from analysis.labels import IDENTICAL, MODELS, SCALES
 from modeling import InputError
 from modeling.arrays import Floats
 
 CONFIDENCE = 0.95
+RESAMPLES = 9999  # of sign flips; all of them where there are fewer, that is up to 13 participants
 
 
 @dataclass(frozen=True)
 class PairedTest:
-    """Full against simplified model over the participants who gave both.
+    """A model against the reference, over the participants who gave both.
 
-    Differences are simplified − full, in the unit of the values. `ci_*` is the 95 % confidence
+    Differences are other − reference, in the unit of the values. `ci_*` is the 95 % confidence
     interval of the mean difference; `d_z` is the mean difference over the standard deviation of
-    the differences. What cannot be computed is NaN and `note` says why.
+    the differences. Where participants do not vary, t and what follows from it are NaN, `note` says
+    why, and `p` is that of the sign flips.
     """
 
     n: int
-    mean_full: float
-    se_full: float
-    mean_simplified: float
-    se_simplified: float
+    mean_reference: float
+    se_reference: float
+    mean_other: float
+    se_other: float
     mean_difference: float
     ci_low: float
     ci_high: float
@@ -44,31 +43,28 @@ class PairedTest:
     shapiro_p: float
     wilcoxon_w: float
     wilcoxon_p: float
+    sign_flips_p: float
     note: str
 
 
-def paired_test(full: ArrayLike, simplified: ArrayLike) -> PairedTest:
-    """Paired t-test, effect size d_z and Wilcoxon signed-rank test.
+def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Generator) -> PairedTest:
+    """Paired t-test and effect size d_z; Wilcoxon's signed-rank test and sign flips beside it.
 
     docs/method/statistics.md#paired-tests
 
     Parameters
     ----------
-    full, simplified : (n,) array_like
+    reference, other : (n,) array_like
         One finite value per participant, in the same order.
-
-    Returns
-    -------
-    PairedTest
-        With t undefined (fewer than two pairs, or all differences equal) t, p, d_z and the
-        interval are NaN.
+    rng : Generator
+        Draws the sign flips of more than 13 participants.
 
     Raises
     ------
     InputError
         For different lengths or values that are not finite.
     """
-    before, after = np.asarray(full, dtype=float), np.asarray(simplified, dtype=float)
+    before, after = np.asarray(reference, dtype=float), np.asarray(other, dtype=float)
     if before.shape != after.shape or before.ndim != 1 or not np.isfinite(before + after).all():
         raise InputError(
             f"expected two lists of finite values of one length, got shapes {before.shape} and "
@@ -78,25 +74,27 @@ def paired_test(full: ArrayLike, simplified: ArrayLike) -> PairedTest:
     undefined = why_undefined(differences)
     t, p, low, high = (np.nan,) * 4 if undefined else t_test(differences)
     d_low, d_high = (np.nan, np.nan) if undefined else d_z_interval(t, differences.size)
-    wilcoxon_w, wilcoxon_p = wilcoxon(differences)
+    wilcoxon_w, wilcoxon_p = wilcoxon(differences, rng=rng)
+    flipped_p = sign_flips_p(differences, rng=rng)
     return PairedTest(
         n=before.size,
-        mean_full=mean(before),
-        se_full=standard_error(before),
-        mean_simplified=mean(after),
-        se_simplified=standard_error(after),
+        mean_reference=mean(before),
+        se_reference=standard_error(before),
+        mean_other=mean(after),
+        se_other=standard_error(after),
         mean_difference=mean(differences),
         ci_low=low,
         ci_high=high,
         t=t,
         df=max(before.size - 1, 0),
-        p=p,
+        p=flipped_p if undefined else p,
         d_z=float(t / np.sqrt(differences.size)) if differences.size else np.nan,
         d_z_low=d_low,
         d_z_high=d_high,
         shapiro_p=_shapiro(differences),
         wilcoxon_w=wilcoxon_w,
         wilcoxon_p=wilcoxon_p,
+        sign_flips_p=flipped_p,
         note=undefined,
     )
 
@@ -139,88 +137,8 @@ def holm(p_values: ArrayLike) -> Floats:
     return adjusted
 
 
-INFERENCE = ("t", "p", "d_z", "d_z_low", "d_z_high", "shapiro_p", "wilcoxon_w", "wilcoxon_p")
-CI_LOW, CI_HIGH = Column("ci_low", "CI from"), Column("ci_high", "to")
-T, DF = Column("t"), Column("df")
-P_HOLM = Column("p_holm", "p (Holm)", is_p_value=True)
-NOTE = Column("note")
-PAIRED_COLUMNS = (
-    TEXTURE,
-    Column("n"),
-    Column("excluded"),
-    Column("mean_full"),
-    Column("se_full", "SE full"),
-    Column("mean_simplified"),
-    Column("se_simplified", "SE simplified"),
-    Column("mean_difference", "difference"),
-    *(CI_LOW, CI_HIGH, T, DF, P),
-    Column("d_z", "d_z"),
-    Column("d_z_low", "CI from"),
-    Column("d_z_high", "to"),
-    Column("shapiro_p", "Shapiro p", is_p_value=True),
-    Column("wilcoxon_w", "Wilcoxon W"),
-    Column("wilcoxon_p", "Wilcoxon p", is_p_value=True),
-    NOTE,
-    P_HOLM,
-)
-RATING_TEST_COLUMNS = (Column("scale", is_name=True), *PAIRED_COLUMNS)
-
-
-def rating_tests(
-    absolute: pd.DataFrame, *, identical: Collection[str] = frozenset()
-) -> pd.DataFrame:
-    """Paired tests of both rating scales (PAPER VIII-A), Holm over the textures of a scale.
-
-    Parameters
-    ----------
-    absolute : DataFrame
-        `Responses.absolute`; ratings 0–100.
-    identical : collection of str
-        Textures whose simplified model is the full one: described, but not tested
-        (docs/method/statistics.md#identical-models).
-
-    Returns
-    -------
-    DataFrame
-        One row per scale and texture: scale, texture, n, excluded (participants without both
-        values, by name), the other fields of `PairedTest`, and p_holm.
-    """
-    families = [
-        paired_family(absolute, column, identical=identical).assign(scale=scale)
-        for column, scale in SCALES.items()
-    ]
-    return pd.concat(families, ignore_index=True)[names(RATING_TEST_COLUMNS)]
-
-
-def rating_means(absolute: pd.DataFrame) -> pd.DataFrame:
-    """`participant_means` of both rating scales, with a column scale."""
-    means = [
-        participant_means(absolute, column).assign(scale=scale) for column, scale in SCALES.items()
-    ]
-    return pd.concat(means, ignore_index=True)
-
-
-def paired_family(
-    table: pd.DataFrame, column: str, *, identical: Collection[str] = frozenset()
-) -> pd.DataFrame:
-    """Test every texture of a table but the identical ones; the Holm family is these textures."""
-    rows = []
-    for texture, means in participant_means(table, column).groupby("texture", sort=False):
-        means = means.set_index("participant_id")[list(MODELS)]
-        both = means.dropna()
-        result = asdict(paired_test(both["full"], both["simplified"]))
-        if texture in identical:
-            result |= dict.fromkeys(INFERENCE, np.nan) | {"note": IDENTICAL}
-        excluded = ", ".join(means.index.difference(both.index))
-        rows.append({"texture": texture, **result, "excluded": excluded})
-    if not rows:
-        raise InputError(f"expected answers in column {column}, got none; run a session first.")
-    family = pd.DataFrame(rows).sort_values("texture", key=ignoring_case)
-    return family.assign(p_holm=holm(family["p"]))
-
-
 def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
-    """What each participant's answers on each texture average to, with either model.
+    """What each participant's answers on each texture average to, with each model.
 
     Parameters
     ----------
@@ -231,8 +149,8 @@ def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        texture, participant_id, full, simplified: a row for every participant of the table and
-        every texture, textures in the order of the answers; NaN where there is no answer.
+        texture, participant_id and a column for each model: a row for every participant of the
+        table and every texture, textures in the order of the answers; NaN where there is no answer.
     """
     means = table.pivot_table(
         index=["texture", "participant_id"],
@@ -241,7 +159,7 @@ def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
         aggfunc="mean",
         dropna=False,
         observed=True,
-    ).reindex(columns=list(MODELS))
+    )
     # Everybody in every texture, so that a whole missing cell is seen too.
     people = sorted(table["participant_id"].unique())
     every = pd.MultiIndex.from_product(
@@ -256,30 +174,56 @@ def t_test(differences: Floats) -> tuple[float, float, float, float]:
     return t, p, low, high
 
 
-def t_tests(differences: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+def t_tests(
+    differences: Floats, *, confidence: float = CONFIDENCE
+) -> tuple[Floats, Floats, Floats, Floats]:
     """The same of each row of (k, n) differences, (k,) each."""
     result = stats.ttest_1samp(differences, 0.0, axis=1)
-    interval = result.confidence_interval(CONFIDENCE)
+    interval = result.confidence_interval(confidence)
     t, p, low, high = np.array([result.statistic, result.pvalue, interval.low, interval.high])
     return t, p, low, high
 
 
-def wilcoxon(differences: Floats) -> tuple[float, float]:
-    """W and two-sided p of the signed-rank test; NaN where there is no difference."""
-    w, p = (float(values[0]) for values in wilcoxon_tests(differences[None, :]))
-    return w, p
+def wilcoxon(differences: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
+    """W and two-sided p of the signed-rank test; NaN where there is no difference.
+
+    Differences of 0 are left out. Where some are tied, by sign flips; else exact up to 50.
+    """
+    moved = differences[differences != 0]
+    if not moved.size:
+        return float("nan"), float("nan")
+    tied = np.unique(np.abs(moved)).size < moved.size
+    method = stats.PermutationMethod(n_resamples=RESAMPLES, rng=rng) if tied else "auto"
+    result = stats.wilcoxon(moved, method=method)
+    return float(result.statistic), float(result.pvalue)
 
 
-def wilcoxon_tests(differences: Floats) -> tuple[Floats, Floats]:
-    """The same of each row of (k, n) differences, (k,) each."""
-    w, p = np.full((2, len(differences)), np.nan)
-    zeros = (differences == 0).sum(axis=1)
-    # SciPy takes one distribution for all rows, and another one where a difference is 0.
-    for whole in (True, False):
-        rows = ((zeros == 0) == whole) & (zeros < differences.shape[1])
-        if rows.any():
-            w[rows], p[rows] = stats.wilcoxon(differences[rows], axis=1)
-    return w, p
+def sign_flips_p(
+    differences: Floats, *, rng: np.random.Generator, alternative: str = "two-sided"
+) -> float:
+    """p of the mean when each participant's difference could as well have the other sign.
+
+    Exact up to 13 participants, else from 9999 draws; NaN of no participant.
+    docs/method/statistics.md#sign-flips
+
+    Parameters
+    ----------
+    differences : (n,) ndarray
+    rng : Generator
+    alternative : {"two-sided", "greater", "less"}
+    """
+    if not differences.size:
+        return float("nan")
+    result = stats.permutation_test(
+        (differences, np.zeros_like(differences)),
+        lambda one, other, axis: (one - other).mean(axis=axis),
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=RESAMPLES,
+        alternative=alternative,
+        rng=rng,
+    )
+    return float(result.pvalue)
 
 
 def _shapiro(differences: Floats) -> float:

@@ -1,0 +1,115 @@
+"""What was claimed before the first answer, as the manifests of the sessions hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
+
+EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Claim:
+    """One claim about two models.
+
+    Parameters
+    ----------
+    name, task, measure : str
+        `measure` is a column of the task's table of answers.
+    models : (str, str)
+        The reference, and the one whose difference from it is claimed about; of the oddity task
+        the difference is that of the share of right answers from chance.
+    bounds : (float, float)
+        In points of the scale, or shares of right answers; below and above 0.
+    test : {"equivalence", "difference"}
+    """
+
+    name: str
+    task: str
+    measure: str
+    models: tuple[str, str]
+    bounds: tuple[float, float]
+    test: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class AnalysisPlan:
+    """What was fixed before the first answer.
+
+    Parameters
+    ----------
+    claims : tuple of Claim
+    exclusions : tuple of str
+        One sentence for each reason to leave somebody or something out.
+    highest_share_at_ends : float
+        Share of ratings at either end of a scale (0 … 1) above which no equality is concluded.
+    sha256 : str
+        Of the plan; empty where none was registered.
+    exploratory : bool
+        Whether the claims were made or changed after the first answer.
+    """
+
+    claims: tuple[Claim, ...]
+    exclusions: tuple[str, ...] = ()
+    highest_share_at_ends: float = 0.2
+    sha256: str = ""
+    exploratory: bool = False
+
+    def claims_about(self, task: str) -> tuple[Claim, ...]:
+        """The claims about one task."""
+        return tuple(claim for claim in self.claims if claim.task == task)
+
+
+def plan_from(values: Mapping[str, Any], *, sha256: str, path: Path) -> AnalysisPlan:
+    """The plan of a study's values, as a manifest holds them.
+
+    Parameters
+    ----------
+    values : mapping
+        The table `plan` of the study.
+    sha256 : str
+        That names the plan.
+    path : Path
+        The file, for what is said of it.
+
+    Raises
+    ------
+    InputError
+        For claims that are not such as a study file can state.
+    """
+    try:
+        claims = tuple(_claim(one) for one in values.get("claims", ()))
+        return AnalysisPlan(
+            claims=claims,
+            exclusions=tuple(map(str, values.get("exclusions", ()))),
+            highest_share_at_ends=float(values.get("highest_share_at_ends", 0.2)),
+            sha256=sha256,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"expected the claims of a study's [plan] in {path}, got something else ({error}); "
+            "restore the file."
+        ) from None
+
+
+def _claim(values: Mapping[str, Any]) -> Claim:
+    reference, other = map(str, values["models"])
+    low, high = map(float, values["bounds"])
+    task, measure, test = (str(values[name]) for name in ("task", "measure", "test"))
+    if not low < 0 < high or test not in (EQUIVALENCE, DIFFERENCE):
+        raise ValueError(f"bounds {low:g} and {high:g}, test {test}")
+    if measure not in {column.name for column in ANSWER_TABLES[task]}:
+        raise ValueError(f"measure {measure}")
+    return Claim(
+        name=str(values["name"]),
+        task=task,
+        measure=measure,
+        models=(reference, other),
+        bounds=(low, high),
+        test=test,
+    )

@@ -1,0 +1,300 @@
+"""Verdicts by the plan: for each claim the mean over textures, then every texture.
+
+docs/method/statistics.md#verdicts
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+import pandas as pd
+
+from analysis.answers.plan import Claim
+from analysis.columns import TEXTURE, Column, P, names
+from analysis.labels import ALL_TEXTURES, IDENTICAL
+from analysis.statistics.equivalence import (
+    ALPHA,
+    EQUIVALENT,
+    Bounds,
+    bayes_factor_null,
+    equivalence_test,
+    verdict,
+)
+from analysis.statistics.paired import (
+    holm,
+    ignoring_case,
+    paired_test,
+    participant_means,
+    without_rounding_noise,
+)
+from modeling import InputError
+
+WITHHELD = "equivalence withheld"
+INTERIM = "interim, no verdict"
+CONTROL = "control"
+SAME_IN_EVERY_SESSION = 1e-9
+
+CLAIM_COLUMNS = (
+    Column("claim", is_name=True),
+    TEXTURE,
+    Column("verdict", is_name=True),
+    Column("reference", is_name=True),
+    Column("other", is_name=True),
+    Column("n"),
+    Column("mean_reference", "mean of reference"),
+    Column("se_reference", "SE"),
+    Column("mean_other", "mean of other"),
+    Column("se_other", "SE"),
+    Column("mean_difference", "difference"),
+    Column("ci90_low", "90 % CI from"),
+    Column("ci90_high", "to"),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+    Column("bound_low", "bounds from"),
+    Column("bound_high", "to"),
+    Column("t"),
+    Column("df"),
+    P,
+    Column("p_holm", "p (Holm)", is_p_value=True),
+    Column("p_equivalence", "p of TOST", is_p_value=True),
+    Column("p_equivalence_holm", "p of TOST (Holm)", is_p_value=True),
+    Column("d_z", "d_z"),
+    Column("d_z_low", "CI from"),
+    Column("d_z_high", "to"),
+    Column("bf01", "BF₀₁"),
+    Column("bf01_highest", "highest BF₀₁ at this n"),
+    Column("shapiro_p", "Shapiro p", is_p_value=True),
+    Column("wilcoxon_w", "Wilcoxon W"),
+    Column("wilcoxon_p", "Wilcoxon p", is_p_value=True),
+    Column("sign_flips_p", "sign flips p", is_p_value=True),
+    Column("share_at_ends", "share at ends"),
+    Column("excluded"),
+    Column("note"),
+)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Values:
+    """What a claim is about: a value of each participant and texture with either model.
+
+    Parameters
+    ----------
+    table : DataFrame
+        texture, participant_id, reference, other; NaN where a cell is not complete.
+    share_at_ends : mapping of texture to float
+        Share of single answers of both models that lie at an end of the scale; `ALL_TEXTURES` is
+        that of all that are compared. Empty of a measure that has no ends.
+    """
+
+    table: pd.DataFrame
+    share_at_ends: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Standing:
+    """What stands against a verdict, whatever the tests say.
+
+    Parameters
+    ----------
+    identical : collection of str
+        Textures whose two models are the same: controls, described but never tested.
+    highest_share_at_ends : float
+        Above it no equality is concluded.
+    insensitive : str
+        Why people may not have been able to tell models apart had they differed; empty where the
+        data show that they are.
+    unfinished : bool
+        Whether participants or sessions are missing.
+    """
+
+    identical: Collection[str] = ()
+    highest_share_at_ends: float = 1.0
+    insensitive: str = ""
+    unfinished: bool = False
+
+
+def claim_tests(
+    claim: Claim, values: Values, *, standing: Standing, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Every test of one claim: the mean over textures whose models differ, then each texture.
+
+    Parameters
+    ----------
+    claim : Claim
+    values : Values
+    standing : Standing
+    rng : Generator
+        Draws sign flips.
+
+    Returns
+    -------
+    DataFrame
+        `CLAIM_COLUMNS`. The first row, of all textures, has complete participants only, each
+        texture counting once, and is a family of its own. The textures are another, Holm for tests
+        of difference and of equivalence separately; their verdicts rest on these. Identical
+        textures come last, without tests.
+
+    Raises
+    ------
+    InputError
+        Where no texture is left to compare, or nobody has both models.
+    """
+    compared = values.table[~values.table["texture"].isin(list(standing.identical))]
+    if compared.empty or compared[["reference", "other"]].dropna().empty:
+        raise InputError(
+            f"expected participants with complete answers on both models for the claim "
+            f"{claim.name}, got none; run more sessions, or leave the claim out."
+        )
+    overall = _row(_over_textures(compared), claim.bounds, rng=rng)
+    overall |= {"texture": ALL_TEXTURES, "p_holm": overall["p"]}
+    overall["p_equivalence_holm"] = overall["p_equivalence"]
+    textures = pd.DataFrame(
+        {"texture": texture, **_row(rows, claim.bounds, rng=rng)}
+        for texture, rows in compared.groupby("texture", sort=False)
+    ).sort_values("texture", key=ignoring_case)
+    textures["p_holm"] = holm(textures["p"])
+    textures["p_equivalence_holm"] = holm(textures["p_equivalence"])
+    table = pd.concat([pd.DataFrame([overall]), textures], ignore_index=True)
+    shares = table["texture"].map(values.share_at_ends).astype(float)
+    table["share_at_ends"] = shares
+    table["verdict"] = [
+        _verdict(row, share, standing)
+        for row, share in zip(table.to_dict("records"), shares, strict=True)
+    ]
+    table = pd.concat([table, _controls(values, claim, standing, rng=rng)], ignore_index=True)
+    reference, other = claim.models
+    return table.assign(
+        claim=claim.name,
+        reference=reference,
+        other=other,
+        bound_low=claim.bounds[0],
+        bound_high=claim.bounds[1],
+    )[names(CLAIM_COLUMNS)]
+
+
+def all_equivalent(tests: pd.DataFrame) -> bool:
+    """Whether every texture that is compared is equivalent: the largest unadjusted p of TOST.
+
+    An intersection–union test (Berger 1982), which needs no correction.
+    docs/method/statistics.md#all-textures-equivalent
+
+    Parameters
+    ----------
+    tests : DataFrame
+        Of one claim, from `claim_tests`.
+    """
+    textures = tests[(tests["texture"] != ALL_TEXTURES) & (tests["verdict"] != CONTROL)]
+    held_back = textures["verdict"].isin([WITHHELD, INTERIM])
+    return bool((textures["p_equivalence"] < ALPHA).all() and not held_back.any())
+
+
+def _over_textures(compared: pd.DataFrame) -> pd.DataFrame:
+    """Means over the textures of each participant; NaN of who is not complete in all of them."""
+    means = compared.groupby("participant_id")[["reference", "other"]].agg(
+        lambda column: column.mean(skipna=False)
+    )
+    return means.reset_index()
+
+
+def _row(rows: pd.DataFrame, bounds: Bounds, *, rng: np.random.Generator) -> dict[str, object]:
+    """Both tests over the participants of one texture, or of the means over all."""
+    both = rows.dropna(subset=["reference", "other"])
+    result = paired_test(both["reference"], both["other"], rng=rng)
+    differences = without_rounding_noise((both["other"] - both["reference"]).to_numpy(float))
+    equal = equivalence_test(differences, bounds, rng=rng)
+    return {
+        **asdict(result),
+        "ci90_low": equal.ci_low,
+        "ci90_high": equal.ci_high,
+        "p_equivalence": equal.p,
+        "bf01": bayes_factor_null(result.t, result.n),
+        "bf01_highest": bayes_factor_null(0.0, result.n) if result.n > 1 else float("nan"),
+        "excluded": ", ".join(sorted(set(rows["participant_id"]) - set(both["participant_id"]))),
+    }
+
+
+def _verdict(row: dict[str, object], share_at_ends: float, standing: Standing) -> str:
+    if standing.unfinished:
+        return INTERIM
+    found = verdict(float(str(row["p_holm"])), float(str(row["p_equivalence_holm"])))
+    doubted = bool(standing.insensitive) or share_at_ends > standing.highest_share_at_ends
+    return WITHHELD if found == EQUIVALENT and doubted else found
+
+
+def _controls(
+    values: Values, claim: Claim, standing: Standing, *, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Textures whose models are the same: described, without tests and verdict."""
+    described = ("n", "excluded", "mean_reference", "se_reference", "mean_other", "se_other")
+    described += ("mean_difference", "ci_low", "ci_high")
+    rows = []
+    for texture, of_texture in values.table.groupby("texture", sort=False):
+        if texture in standing.identical:
+            found = _row(of_texture, claim.bounds, rng=rng)
+            kept = {name: found[name] for name in described}
+            rows.append({"texture": texture, "verdict": CONTROL, "note": IDENTICAL, **kept})
+    table = pd.DataFrame(rows, columns=names(CLAIM_COLUMNS))
+    return table.sort_values("texture", key=ignoring_case) if rows else table
+
+
+def complete_means(
+    table: pd.DataFrame, column: str, *, models: tuple[str, str], repeats: int
+) -> pd.DataFrame:
+    """Means of participants who answered every repeat of a texture with a model.
+
+    An aborted session gives only the cells that it completed.
+
+    Parameters
+    ----------
+    table : DataFrame
+        participant_id, texture, model and `column`; one row per answer.
+    column : str
+    models : (str, str)
+        The reference, and the other one.
+    repeats : int
+        Answers that make a cell complete.
+
+    Returns
+    -------
+    DataFrame
+        texture, participant_id, reference, other; NaN where a cell is not complete.
+    """
+    of_pair = table[table["model"].isin(models)]
+    means = participant_means(of_pair, column).rename(
+        columns=dict(zip(models, ("reference", "other"), strict=True))
+    )
+    answered = participant_means(
+        of_pair.assign(**{column: of_pair[column].notna().astype(float)}), column
+    )
+    del answered
+    counts = of_pair.groupby(["texture", "participant_id", "model"])[column].count()
+    for name, model in zip(("reference", "other"), models, strict=True):
+        cells = pd.MultiIndex.from_arrays(
+            [means["texture"], means["participant_id"], [model] * len(means)]
+        )
+        complete = counts.reindex(cells, fill_value=0).to_numpy() >= repeats
+        means[name] = means[name].where(complete) if name in means else np.nan
+    return means[["texture", "participant_id", "reference", "other"]]
+
+
+def share_at_ends(
+    table: pd.DataFrame, column: str, *, identical: Collection[str], ends: tuple[float, float]
+) -> dict[str, float]:
+    """Share of answers at an end of their scale, by texture and over all that are compared.
+
+    Parameters
+    ----------
+    table : DataFrame
+        texture and `column`; one row per answer.
+    column : str
+    identical : collection of str
+        Textures that are not compared.
+    ends : (float, float)
+    """
+    answered = table[table[column].notna()]
+    at_end = answered[column].isin(ends)
+    shares = at_end.groupby(answered["texture"]).mean().to_dict()
+    compared = ~answered["texture"].isin(list(identical))
+    return {**shares, ALL_TEXTURES: float(at_end[compared].mean())}
