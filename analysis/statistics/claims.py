@@ -34,7 +34,6 @@ from modeling import InputError
 WITHHELD = "equivalence withheld"
 INTERIM = "interim, no verdict"
 CONTROL = "control"
-SAME_IN_EVERY_SESSION = 1e-9
 
 CLAIM_COLUMNS = (
     Column("claim", is_name=True),
@@ -265,10 +264,6 @@ def complete_means(
     means = participant_means(of_pair, column).rename(
         columns=dict(zip(models, ("reference", "other"), strict=True))
     )
-    answered = participant_means(
-        of_pair.assign(**{column: of_pair[column].notna().astype(float)}), column
-    )
-    del answered
     counts = of_pair.groupby(["texture", "participant_id", "model"])[column].count()
     for name, model in zip(("reference", "other"), models, strict=True):
         cells = pd.MultiIndex.from_arrays(
