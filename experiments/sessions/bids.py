@@ -173,7 +173,7 @@ def _hand(files: SessionFiles, held: Held) -> dict[Path, bytes]:
         ) from None
     onsets = bids_events.onsets_s(held.state.events)
     made: dict[Path, bytes] = {}
-    for run, readings in bids_physio.by_run(hand, held.state.events).items():
+    for run, readings in bids_physio.by_run(hand).items():
         stem = f"{files.stem}_recording-start{run}_physio"
         start_s = bids_physio.start_onset_s(readings, held.state.events, onsets, run=run)
         made[_beh(files) / f"{stem}.json"] = json_bytes(
@@ -223,7 +223,7 @@ def _circumstances(held: Held) -> dict[str, Any]:
         "StudySHA256": manifest.study_sha256,
         "PlanSHA256": manifest.plan_sha256,
         "ModelsSHA256": manifest.models_sha256,
-        "Identical": list(manifest.identical),
+        "Identical": manifest.identical,
         "Overrides": overrides,
         "Rig": manifest.rig,
     }

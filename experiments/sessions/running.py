@@ -173,7 +173,7 @@ def _manifest(
         plan_sha256=plan_sha256(study, sha256),
         models_sha256=sha256,
         model_sources={},
-        identical=models.identical(study.textures, study.models_of(plan.task)),
+        identical=models.equal_models(study.textures, study.models_of(plan.task)),
         rig=rig.stated,
         description=task.description,
         trials=[asdict(trial) for trial in plan.trials],

@@ -13,7 +13,14 @@ from experiments.sessions.strokes import Outside, outside_grid
 from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
 
 _CLOCK = "seconds since the rig was opened"
+_RUN = {
+    "run": {
+        "Description": "In which start of the session, from 1; a trial that broke off in one is "
+        "presented again in a later one, which has its answer"
+    },
+}
 HAND_COLUMNS: dict[str, dict[str, Any]] = {
+    **_RUN,
     "trial": {"Description": "Number of the trial"},
     "presentation": {"Description": "Number of the presentation; 0 where nothing was presented"},
     "time_s": {"Description": f"Time of the reading, {_CLOCK}", "Units": "s"},
@@ -52,6 +59,7 @@ _COUNTERS = {
     "limited_duration": "Samples that the limit of the duration muted",
 }
 PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
+    **_RUN,
     "trial": {"Description": "Number of the trial"},
     "presentation": {"Description": "Number of the presentation, since the rig was opened"},
     "surface": {"Description": "real or virtual"},
@@ -74,8 +82,8 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
 }
 
 
-def hand_table(trial: int, rows: HandRows) -> Iterator[Mapping[str, object]]:
-    """The rows of a trial's history as the table holds them."""
+def hand_table(trial: int, rows: HandRows, *, run: int) -> Iterator[Mapping[str, object]]:
+    """The rows of a trial's history in one start of the session, as the table holds them."""
     columns = zip(
         rows.presentation.tolist(),
         rows.time_s.tolist(),
@@ -87,6 +95,7 @@ def hand_table(trial: int, rows: HandRows) -> Iterator[Mapping[str, object]]:
     )
     for presentation, time_s, speed_mm_s, force_n, surface, assumed in columns:
         yield {
+            "run": run,
             "trial": trial,
             "presentation": presentation,
             "time_s": round(time_s, 6),
@@ -98,15 +107,21 @@ def hand_table(trial: int, rows: HandRows) -> Iterator[Mapping[str, object]]:
 
 
 def presentation_table(
-    trial: int, records: Sequence[PresentationRecord], *, rows: HandRows, faults: Sequence[Fault]
+    trial: int,
+    records: Sequence[PresentationRecord],
+    *,
+    run: int,
+    rows: HandRows,
+    faults: Sequence[Fault],
 ) -> Iterator[Mapping[str, object]]:
-    """The presentations of a trial as the table holds them."""
+    """The presentations of a trial in one start of the session, as the table holds them."""
     next_s = [*(record.start_s for record in records[1:]), inf]
     for record, until_s in zip(records, next_s, strict=False):
         outside = outside_grid(rows, [record]) or Outside()
         # A fault may be noticed when a presentation has ended.
         told = [fault.told for fault in faults if record.start_s <= fault.time_s < until_s]
         yield {
+            "run": run,
             "trial": trial,
             "presentation": record.number,
             "surface": record.surface,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import NoReturn
 
@@ -71,14 +72,40 @@ class ModelSets:
             if all(self.of(texture, first) == self.of(texture, name) for name in others)
         )
 
-    def exchanged(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
-        """Textures whose reference was made from the model of another set, with that set's name."""
-        reference, *others = self.names
+    def equal_models(
+        self, textures: Sequence[str], names: Sequence[str] | None = None
+    ) -> dict[str, tuple[tuple[str, ...], ...]]:
+        """Of all (or these) sets those whose models of a texture are equal, group by group.
+
+        Returns
+        -------
+        dict
+            Texture to groups of two names at least; without textures that have none.
+        """
+        found = {}
+        for texture in textures:
+            groups: list[list[str]] = []
+            for name in names or self.names:
+                model = self.of(texture, name)
+                equal = [group for group in groups if self.of(texture, group[0]) == model]
+                if equal:
+                    equal[0].append(name)
+                else:
+                    groups.append([name])
+            if several := tuple(tuple(group) for group in groups if len(group) > 1):
+                found[texture] = several
+        return found
+
+    def exchanged(self, textures: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+        """Textures whose model in one set was made from the one in a later set: both sets' names.
+
+        The first is the set that should come later.
+        """
         return tuple(
-            (texture, name)
+            (texture, earlier, later)
             for texture in textures
-            for name in others
-            if self.of(texture, name).sha256 in made_from(self.of(texture, reference))
+            for earlier, later in combinations(self.names, 2)
+            if self.of(texture, later).sha256 in made_from(self.of(texture, earlier))
         )
 
     def of_others(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -104,7 +131,7 @@ class ModelSets:
         ------
         InputError
             Naming textures and sets: of missing models; where the models of all textures are equal;
-            where the reference was made from another set's model.
+            where a model was made from one of a later set.
         """
         self._require_all(study)
         for task in study.tasks:
@@ -116,12 +143,12 @@ class ModelSets:
                     "threshold or margin, or add other textures."
                 )
         if exchanged := self.exchanged(study.textures):
-            texture, name = exchanged[0]
+            texture, earlier, later = exchanged[0]
             allow(
                 "exchanged models",
-                f"expected the reference set {self.names[0]} to hold the models that others were "
-                f"made from, got one of {texture} that was made from the one in {name}; exchange "
-                "the two sets.",
+                "expected models to be made from those of a set that is named before theirs, got "
+                f"the {earlier} model of {texture}, made from the {later} one; exchange the two "
+                "sets.",
             )
 
     def _require_all(self, study: Study) -> None:

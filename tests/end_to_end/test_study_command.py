@@ -84,7 +84,9 @@ def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -
     for words in (("check",), ("plan", "--out", "plan.md")):
         refused = study(place, words[0], "study.toml", *words[1:])
         assert refused.returncode == 1
-        assert refused.stderr.startswith("error: expected the reference set full to hold the mod")
+        assert refused.stderr.startswith(
+            "error: expected models to be made from those of a set that is"
+        )
         assert refused.stderr.count("\n") == 1
     assert not (place / "plan.md").exists()
     (place / "models/1.json").unlink()

@@ -96,7 +96,7 @@ def a_manifest(
         "plan_sha256": "0" * 64,
         "models_sha256": MODELS,
         "model_sources": {name: name for name in SETS},
-        "identical": [],
+        "identical": {},
         "rig": {},
         "description": f"The task {task}.",
         "trials": planned(task),
@@ -215,7 +215,7 @@ def _manifest(**changed: Any) -> SessionManifest:
         "plan_sha256": "bb",
         "models_sha256": {"canvas": {"full": "cc", "simplified": "dd"}},
         "model_sources": {"full": "models", "simplified": "simplified"},
-        "identical": [],
+        "identical": {},
         "rig": {"firmware": "1.2", "latency_s": 0.1 + 0.2},
         "description": "Compare a real and a virtual surface",
         "trials": [

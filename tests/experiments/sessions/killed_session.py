@@ -56,7 +56,7 @@ def manifest(subject=1):
         plan_sha256="bb",
         models_sha256={"canvas": {"full": "cc", "simplified": "dd"}},
         model_sources={},
-        identical=[],
+        identical={},
         rig={},
         description="Compare",
         trials=[{"trial": n, "phase": phase} for n, phase in enumerate(phases, start=1)],

@@ -19,7 +19,7 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.state import session_state
 from experiments.sessions.store import SessionStore
-from experiments.sessions.surfaces import SessionAborted
+from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
@@ -27,6 +27,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
+from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 
 TRIALS = 5  # one for training, two textures with two models
@@ -122,7 +123,7 @@ def test_textures_whose_models_are_equal_are_marked(
         sets={"full": full, "simplified": {**models.sets["simplified"], "PVC": full["PVC"]}}
     )
     _, manifest = run(models=one)
-    assert "PVC" in SessionManifest.load(manifest).identical
+    assert SessionManifest.load(manifest).identical == {"PVC": [["full", "simplified"]]}
     same = ModelSets(sets={"full": full, "simplified": full})
     with pytest.raises(InputError, match="identical ones for all"):
         run(models=same, folder=tmp_path / "all")
@@ -183,6 +184,54 @@ def test_an_aborted_session_goes_on_at_the_next_open_trial(run: Callable[..., An
     assert [row["run"] for row in rows] == [1, 1, 1, 2, 2]
     with pytest.raises(InputError, match="complete"):
         run(resume=True)
+
+
+def test_both_tries_of_a_trial_that_broke_off_keep_their_own_hand_and_presentations(
+    run: Callable[..., Any], rows: Callable[[Path], list[dict[str, str]]]
+) -> None:
+    class Stroking(Scripted):
+        """Strokes for so many readings at each surface; may leave in the second trial."""
+
+        def __init__(self, rig: SimulatedRig, readings: int, *, leaves: bool) -> None:
+            super().__init__()
+            self._rig, self._readings, self._leaves = rig, readings, leaves
+
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            surfaces.start()
+            for _ in range(2):
+                for _ in range(self._readings):
+                    self._rig.read()
+                surfaces.toggle()
+            if self._leaves and self.answered == 1:
+                raise SessionAborted("tired")
+            self.answered += 1
+            return Rating(magnitude_similarity=1.0, frequency_similarity=2.0, response_time_s=3.0)
+
+    twin = SimulatedRig()
+    _, manifest = run(Stroking(twin, 10, leaves=True), rig=twin)
+    twin = SimulatedRig()  # whose clock begins anew
+    run(Stroking(twin, 30, leaves=False), rig=twin, resume=True)
+    stem = str(manifest).removesuffix("manifest.json")
+    hand, shown = (rows(Path(f"{stem}{name}.tsv")) for name in ("hand", "presentations"))
+    of_second = [row for row in hand if row["trial"] == "2"]
+    assert Counter(row["run"] for row in of_second) == {
+        "1": 21 * 5,
+        "2": 61 * 5,
+    }  # one as it begins
+    assert {row["run"] for row in hand if row["trial"] == "1"} == {"1"}
+    assert {row["run"] for row in hand if row["trial"] == "3"} == {"2"}
+    assert [(r["run"], r["trial"]) for r in shown][:9:3] == [("1", "1"), ("1", "2"), ("2", "2")]
+    data = manifest.parents[3]
+    export_session(data, manifest)
+    (events,) = data.rglob("*_events.tsv")
+    presented = [row for row in rows(events) if row["trial_type"] == "presented"]
+    durations = {
+        run: [float(row["duration"]) for row in presented if (row["run"], row["trial"]) == run]
+        for run in (("1", "2"), ("2", "2"))
+    }
+    assert durations["1", "2"] == pytest.approx([0.1, 0.1, 0.0])
+    assert durations["2", "2"] == pytest.approx([0.3, 0.3, 0.0])
+    assert len(list(data.rglob("*_physio.tsv.gz"))) == 2
 
 
 def test_after_a_long_gap_training_comes_again(

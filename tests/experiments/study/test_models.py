@@ -51,6 +51,10 @@ def pair(simplified: object, full: object = None) -> ModelSets:
     return ModelSets(sets={"full": full or FULL, "simplified": simplified})
 
 
+def other_rate(models: dict[str, TextureModel]) -> dict[str, TextureModel]:
+    return {name: model.at_rate(8000.0) for name, model in models.items()}
+
+
 def test_models_of_a_scene_stand_where_simplified_ones_stand() -> None:
     least = {name: replace(regressed(model), compiled_for=NOTE) for name, model in FULL.items()}
     sets = pair(least)
@@ -86,31 +90,42 @@ def test_equal_models_of_all_textures_are_nothing_to_compare() -> None:
     three = ModelSets(sets={**one.sets, "other": LEAST})
     assert three.identical(("canvas", "MDF")) == ()
     assert three.identical(("canvas", "MDF"), ("simplified", "other")) == ("canvas",)
+    assert three.equal_models(("canvas", "MDF")) == {
+        "canvas": (("simplified", "other"),),
+        "MDF": (("full", "simplified"),),
+    }
+    assert three.equal_models(("canvas", "MDF"), ("full", "simplified")) == {
+        "MDF": (("full", "simplified"),)
+    }
+    four = ModelSets(sets={**three.sets, "again": {**FULL}})
+    assert four.equal_models(("canvas",))["canvas"] == (("full", "again"), ("simplified", "other"))
 
 
 def test_exchanged_sets_are_refused_or_go_on_for_a_reason() -> None:
     turned = pair(FULL, full=LEAST)
     assert turned.exchanged(("canvas", "MDF")) == (
-        ("canvas", "simplified"),
-        ("MDF", "simplified"),
+        ("canvas", "full", "simplified"),
+        ("MDF", "full", "simplified"),
     )
-    told = "the reference set full to hold .* got one of canvas that was made from the one in simp"
+    told = "got the full model of canvas, made from the simplified one; exchange"
     with pytest.raises(InputError, match=told):
         turned.require(study())
     allowed: list[str] = []
     turned.require(study(), allow=lambda what, sentence: allowed.append(what))
     assert allowed == ["exchanged models"]
     assert pair(LEAST).exchanged(("canvas", "MDF")) == ()
+    between = ModelSets(sets={"paper": other_rate(FULL), "simplified": LEAST, "full": FULL})
+    assert between.exchanged(("MDF",)) == (("MDF", "simplified", "full"),)
 
 
 def test_the_full_model_of_a_compiled_one_is_known_too() -> None:
     note = replace(NOTE, full_sha256=FULL["MDF"].sha256)
     least = {**FULL, "MDF": replace(FULL["MDF"], compiled_for=note)}
-    assert pair(FULL, full=least).exchanged(("canvas", "MDF")) == (("MDF", "simplified"),)
+    assert pair(FULL, full=least).exchanged(("canvas", "MDF")) == (("MDF", "full", "simplified"),)
 
 
 def test_a_model_that_was_made_from_one_of_no_set_is_told() -> None:
-    other = {name: model.at_rate(8000.0) for name, model in FULL.items()}
+    other = other_rate(FULL)
     assert pair(LEAST).of_others(("canvas", "MDF")) == ()
     assert pair(LEAST, full=other).of_others(("MDF",)) == (("MDF", "simplified"),)
 
