@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from experiments.sessions.strokes import Outside, outside_grid
+from modeling import InputError
 from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
 
 _CLOCK = "seconds since the rig was opened"
@@ -82,28 +83,36 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
 }
 
 
-def hand_table(trial: int, rows: HandRows, *, run: int) -> Iterator[Mapping[str, object]]:
-    """The rows of a trial's history in one start of the session, as the table holds them."""
+def hand_lines(trial: int, rows: HandRows, *, run: int) -> Iterator[str]:
+    """The rows of a trial's history in one start of the session, as lines of the table.
+
+    Written directly, since there are up to thousands in a second.
+
+    Raises
+    ------
+    InputError
+        For an infinite number.
+    """
+    measured = {name: getattr(rows, name) for name in ("time_s", "speed_mm_s", "force_n")}
+    for name, values in measured.items():
+        if np.isinf(values).any():
+            raise InputError(f"expected a finite {name} of the hand, got infinity; present again.")
     columns = zip(
         rows.presentation.tolist(),
-        rows.time_s.tolist(),
-        rows.speed_mm_s.tolist(),
-        rows.force_n.tolist(),
+        *(values.tolist() for values in measured.values()),
         rows.surface.tolist(),
         rows.force_assumed.tolist(),
         strict=True,
     )
     for presentation, time_s, speed_mm_s, force_n, surface, assumed in columns:
-        yield {
-            "run": run,
-            "trial": trial,
-            "presentation": presentation,
-            "time_s": round(time_s, 6),
-            "speed_mm_s": round(speed_mm_s, 4),
-            "force_n": round(force_n, 5),
-            "surface": SURFACES[surface],
-            "force_assumed": int(assumed),
-        }
+        yield (
+            f"{run}\t{trial}\t{presentation}\t{_number(time_s, 6)}\t{_number(speed_mm_s, 4)}\t"
+            f"{_number(force_n, 5)}\t{SURFACES[surface]}\t{int(assumed)}\n"
+        )
+
+
+def _number(value: float, digits: int) -> str:
+    return "n/a" if value != value else f"{round(value, digits):.10g}"
 
 
 def presentation_table(
