@@ -12,12 +12,14 @@ from experiments.study.study import Study
 from modeling import InputError, TextureModel
 from modeling.checks import check_keys
 from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import AnyModel, load_any_models
+from modeling.models.loading import load_any_models
+from modeling.models.loading import made_from as model_made_from
 from modeling.scenes.compiled import FILE as SCENE
 from modeling.scenes.loading import scene_files, scene_models
+from rig.interface import Presentable, Stimulus
+from rig.sound.signals import MANIFEST as STIMULI
+from rig.sound.signals import stimuli_of_surfaces
 
-Presentable = AnyModel
-STIMULI = "manifest.tsv"  # stands in a folder of tactileq stimuli
 # What may go on where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
 
@@ -105,7 +107,7 @@ class ModelSets:
             (texture, earlier, later)
             for texture in textures
             for earlier, later in combinations(self.names, 2)
-            if self.of(texture, later).sha256 in made_from(self.of(texture, earlier))
+            if model_sha256(self.of(texture, later)) in made_from(self.of(texture, earlier))
         )
 
     def of_others(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -115,7 +117,7 @@ class ModelSets:
             for texture in textures
             for name in self.names
             if (sources := made_from(self.of(texture, name)))
-            and not sources & {self.of(texture, other).sha256 for other in self.names}
+            and not sources & {model_sha256(self.of(texture, other)) for other in self.names}
         )
 
     def require(self, study: Study, *, allow: Allow = refuse) -> None:
@@ -171,11 +173,14 @@ class ModelSets:
                 )
 
 
-def made_from(model: Presentable) -> set[str]:
-    """SHA-256 of the models that a model says it was simplified or compiled from."""
-    note = getattr(model, "compiled_for", None)
-    stated = {getattr(model, "simplified_from", ""), note.full_sha256 if note else ""}
-    return stated - {""}
+def made_from(shown: Presentable) -> frozenset[str]:
+    """SHA-256 of the models that a model, or that of a stimulus, says it was made from."""
+    return shown.made_from if isinstance(shown, Stimulus) else model_made_from(shown)
+
+
+def model_sha256(shown: Presentable) -> str:
+    """SHA-256 of a model, or of that of a stimulus."""
+    return shown.model_sha256 if isinstance(shown, Stimulus) else shown.sha256
 
 
 def load_model_sets(
@@ -211,7 +216,7 @@ def load_model_sets(
         place = given.get(name, Path(folder) / stated)
         reference = next(iter(sets.values()), None)
         try:
-            sets[name], read = _models_at(place, reference, progress=progress)
+            sets[name], read = _models_at(place, reference, study, name=name, progress=progress)
         except InputError as error:
             raise InputError(f"models {name}: {error}") from None
         files += read
@@ -221,15 +226,18 @@ def load_model_sets(
 def _models_at(
     place: Path,
     reference: Mapping[str, Presentable] | None,
+    study: Study,
     *,
+    name: str,
     progress: Callable[[float, str], None],
 ) -> tuple[Mapping[str, Presentable], list[Path]]:
-    """The models of a folder or a scene; of a scene those that belong to the reference's."""
-    if place.is_dir() and (place / STIMULI).is_file():
-        raise InputError(
-            f"expected models in {place}, got a stimulus set of tactileq stimuli, whose signals "
-            "do not follow a hand; give the models that it was rendered from."
-        )
+    """The models of a folder or a scene, or the files of a stimulus set.
+
+    Of a scene those that belong to the reference's; of a stimulus set those labelled as the set.
+    """
+    if (place / STIMULI).is_file():
+        found = stimuli_of_surfaces(place, label=name, textures=study.textures)
+        return found, [place]
     if place.suffix == ".toml" or (place / SCENE).is_file():
         full = _grids(reference)
         return scene_models(place, full, progress=progress), [*scene_files(place)]

@@ -16,7 +16,7 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, dealt
 from experiments.study.models import ModelSets
-from modeling.models.loading import AnyModel
+from rig.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -66,7 +66,7 @@ def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     return drafts
 
 
-def _virtual(models: ModelSets, trial: OddityTrial) -> list[AnyModel]:
+def _virtual(models: ModelSets, trial: OddityTrial) -> list[Presentable]:
     return [models.of(trial.texture, name) for name in trial.layout]
 
 

@@ -24,6 +24,7 @@ from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
 from rig.desk.pen import Pen
+from rig.desk.stimuli import check_made_for
 from rig.hand.reader import HandReader
 from rig.interface import (
     Acceleration,
@@ -32,6 +33,7 @@ from rig.interface import (
     PresentationRecord,
     RigHealth,
     RigReading,
+    Stimulus,
     Surface,
     ToneBurst,
     grid_of,
@@ -216,22 +218,37 @@ class DeskRig:
             forces_n=forces,
         )
 
-    def present_signal(self, burst: ToneBurst) -> float:
-        """Play a burst once, compensated; returns when its first sample has left.
+    def present_signal(self, signal: ToneBurst | Stimulus) -> float:
+        """Play a signal once; returns when its first sample has left.
 
-        One that still plays ends first. Where nothing plays any more, that is a fault.
+        A burst, compensated, after one that still plays; a stimulus at once. Where nothing plays
+        any more, that is a fault.
 
         Raises
         ------
         InputError
-            For a burst beyond the limits.
+            For a signal beyond the limits; of a stimulus also one that `check_stimuli` refuses.
         """
+        if isinstance(signal, Stimulus):
+            return self._present_stimulus(signal)
         time.sleep(max(0.0, self._signal_end_s - now_s()))
         self.silence()
-        sound, samples = self.parts.sound, self._samples(burst)
+        sound, samples = self.parts.sound, self._samples(signal)
         start_s = self._started(lambda: sound.play_signal(samples))
-        self._signal_end_s = start_s + burst.duration_s
-        return self._begin("virtual", f"{burst.frequency_hz:g} Hz", start_s=start_s)
+        self._signal_end_s = start_s + signal.duration_s
+        return self._begin("virtual", f"{signal.frequency_hz:g} Hz", start_s=start_s)
+
+    def _present_stimulus(self, stimulus: Stimulus) -> float:
+        self.silence()
+        check_made_for(self._file, stimulus)
+        sound, compensated = self.parts.sound, stimulus.vibrator_sha256 is not None
+        start_s = self._started(
+            lambda: sound.play_signal(stimulus.samples_g, compensated=compensated)
+        )
+        self._signal_end_s = 0.0
+        return self._begin(
+            "virtual", stimulus.texture, start_s=start_s, model_sha256=stimulus.sha256
+        )
 
     def strongest_g(self, burst: ToneBurst) -> float:
         """The highest amplitude of such a burst within the limits, compensation included."""

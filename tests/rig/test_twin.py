@@ -9,7 +9,7 @@ import pytest
 
 from modeling import InputError, Renderer, regressed
 from modeling.models.loading import Layered
-from rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
+from rig.interface import SURFACES, RigReading, Stimulus, TextureRig, ToneBurst
 from rig.sound.signals import tone_burst
 from rig.twin import SimulatedRig
 from tests.rig.planted import planted_model as model
@@ -213,3 +213,50 @@ def test_a_burst_beyond_its_highest_amplitude_is_refused() -> None:
     rig.present_signal(replace(burst, amplitude_g=highest_g))
     with pytest.raises(InputError, match="expected a signal of at most 5 g, got 5.01 g"):
         rig.present_signal(replace(burst, amplitude_g=highest_g + 0.01))
+
+
+def test_a_stimulus_is_felt_as_time_goes_on_and_from_its_beginning_each_time() -> None:
+    rig = SimulatedRig()
+    rig.open()
+    samples = 0.1 + 0.001 * np.arange(100.0)
+    stimulus = Stimulus(
+        samples_g=samples,
+        rate_hz=4000.0,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
+    )
+    rig.present_signal(stimulus)
+    felt = [feel(rig, 1) for _ in range(4)]
+    np.testing.assert_array_equal(np.concatenate(felt), samples)
+    assert [part.size for part in felt] == [40, 40, 20, 0]
+    rig.present_signal(stimulus)
+    np.testing.assert_array_equal(feel(rig, 1), samples[:40])
+    rig.present_real("PVC")
+    assert feel(rig, 1).size == 0
+    rig.silence()
+    whole, broken_off, _ = rig.take_presentations()
+    assert (whole.model_sha256, whole.texture, whole.speeds_mm_s) == ("a" * 64, "PVC", None)
+    assert whole.dose_g2_s == pytest.approx(float(samples @ samples) / 4000)
+    assert whole.played_s == pytest.approx(0.025)
+    assert broken_off.played_s == pytest.approx(0.01)
+
+
+def test_a_stimulus_that_this_rig_cannot_present_is_refused() -> None:
+    rig = SimulatedRig()
+    stimulus = Stimulus(
+        samples_g=np.full(10, 5.01),
+        rate_hz=4000.0,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
+    )
+    with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
+        rig.present_signal(stimulus)
+    driven = replace(stimulus, samples_g=np.zeros(10), vibrator_sha256="c" * 64)
+    with pytest.raises(InputError, match="without compensation .* one of PVC that drives one"):
+        rig.check_stimulus(driven)

@@ -163,7 +163,6 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             r"the schedule interleaved in \[threshold\]",
         ),
         ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
-        ('simplified = "simplified"\n', 'simplified = "models"\n', "different places of models"),
         ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
         ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
         ('["en", "ja"]', "[]", "one language at least"),

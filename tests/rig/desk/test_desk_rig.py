@@ -18,7 +18,8 @@ import pytest
 from modeling import InputError, TextureModel
 from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
-from rig.interface import SURFACES, TextureRig, ToneBurst
+from rig.desk.stimuli import check_stimuli
+from rig.interface import SURFACES, Stimulus, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import failures, rig_file
 
@@ -104,6 +105,57 @@ def test_bursts_play_one_after_the_other_whatever_the_hand_does(
     dose_g2_s = 0.5 * 0.5**2 * (0.3 - 0.04 + 2 * 0.02 * 3 / 8)
     assert records[0].dose_g2_s == pytest.approx(dose_g2_s, rel=0.02)
     assert records[0].speeds_mm_s is None
+
+
+def test_a_stimulus_leaves_bit_for_bit_and_is_broken_off_at_once(
+    jack_server: Jack, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(3)
+    samples = (0.2 * rng.uniform(-1, 1, 48000)).astype(np.float32).astype(np.float64)
+    stimulus = Stimulus(
+        samples_g=samples,
+        rate_hz=48000.0,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
+    )
+    with jack_server(block=128), DeskRig(rig_file(tmp_path)) as rig:
+        first_s = rig.present_signal(stimulus)
+        wait(rig, 0.2)
+        second_s = rig.present_signal(stimulus)  # does not wait for the first one's end
+        wait(rig, 1.3)
+        rig.silence()
+        first, second = rig.take_presentations()
+        assert failures(rig.take_faults()) == []
+        with pytest.raises(InputError, match="got the stimulus of PVC at 44100 Hz; make"):
+            rig.present_signal(replace(stimulus, rate_hz=44100.0))
+        with pytest.raises(InputError, match="compensated for another one"):
+            rig.present_signal(replace(stimulus, vibrator_sha256="c" * 64))
+    assert second_s - first_s < 0.6
+    assert (first.model_sha256, first.texture, first.speeds_mm_s) == ("a" * 64, "PVC", None)
+    assert first.dose_g2_s < 0.6 * second.dose_g2_s
+    assert second.dose_g2_s == pytest.approx(float(samples @ samples) / 48000, rel=1e-5)
+    assert second.peak_g == pytest.approx(np.abs(samples).max(), rel=1e-6)
+
+
+def test_stimuli_are_checked_without_a_device(tmp_path: Path) -> None:
+    quiet = Stimulus(
+        samples_g=np.full(480, 0.1),
+        rate_hz=48000.0,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
+    )
+    file = rig_file(tmp_path)
+    check_stimuli(file, [quiet])
+    with pytest.raises(InputError, match="the stimulus of PVC: expected a signal of at most 5 g"):
+        check_stimuli(file, [quiet, replace(quiet, samples_g=np.full(480, 5.1))])
+    with pytest.raises(InputError, match="44100 Hz"):
+        check_stimuli(file, [replace(quiet, rate_hz=44100.0)])
 
 
 def test_no_burst_is_stronger_than_the_limits_allow(server: Any, tmp_path: Path) -> None:
