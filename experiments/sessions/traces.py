@@ -65,7 +65,9 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
     "presentation": {"Description": "Number of the presentation, since the rig was opened"},
     "surface": {"Description": "real or virtual"},
     "texture": {"Description": "Of the real surface, or of the model"},
-    "model_sha256": {"Description": "Of the model; n/a of a real surface"},
+    "model_sha256": {
+        "Description": "Of the model, or of the file of a stimulus set; n/a of a real surface"
+    },
     "start_s": {"Description": f"When its first sample left, {_CLOCK}", "Units": "s"},
     "end_s": {"Description": f"When its last sample left, {_CLOCK}", "Units": "s"},
     **{
