@@ -14,6 +14,7 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from experiments.sessions.withdrawing import drop_out, files_of, withdraw
 from modeling import InputError
+from tests.experiments.sessions.enrolling import enrolled
 
 PEOPLE = {"simulated_participant": False, "simulated_rig": False}
 
@@ -55,8 +56,8 @@ def test_nothing_remains_of_somebody_who_withdraws(root):
 def test_the_slot_goes_to_a_replacement_and_the_number_to_nobody(root, write_session):
     withdraw(root, 1)
     with pytest.raises(InputError, match="withdrew"):
-        Roster(root).enroll(1, 2)
-    assert Roster(root).enroll(3, 2).slot == 1
+        enrolled(Roster(root), 1, 2)
+    assert enrolled(Roster(root), 3, 2).slot == 1
     write_session(subject=3, **PEOPLE)
 
 
@@ -66,7 +67,7 @@ def test_a_dropout_keeps_the_data(root):
     assert files_of(root, 1) == before
     people = pd.read_csv(root / "participants.tsv", sep="\t")
     assert people["status"].tolist() == ["dropped", "enrolled"]
-    assert Roster(root).enroll(3, 2).slot == 1
+    assert enrolled(Roster(root), 3, 2).slot == 1
     withdraw(root, 1)
     assert files_of(root, 1) == ()
 
