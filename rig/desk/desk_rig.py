@@ -125,6 +125,7 @@ class DeskRig:
         if self._open is not None:
             found = {
                 "HandDevice": self._open.reader.device_name,
+                "HandFirmware": self._open.reader.firmware() or "n/a",
                 "OutputLatencyS": self._open.sound.latency_s,
             }
         return {

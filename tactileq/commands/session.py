@@ -61,6 +61,7 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
+    from experiments.console.languages import require_texts
     from experiments.sessions.bids import export_session
     from experiments.sessions.overrides import Overrides
     from experiments.sessions.running import Circumstances, run_session
@@ -70,6 +71,7 @@ def session(
     from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
+    require_texts(plan)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     if resume and not language:
         language = _language_of(data, task=task, subject=subject, session=number)
@@ -207,12 +209,9 @@ def models_of_study(
 def open_console(
     plan: Study, *, language: str, stamp: str, fullscreen: bool, screen: int
 ) -> Console:
-    """The console's window in the participant's language, which must have all texts."""
+    """The console's window in the participant's language."""
     from experiments.console.console import Console
-    from experiments.console.languages import Texts
 
-    for name in plan.languages:
-        Texts.load(name).require(plan.questions)
     return Console(
         language=language or plan.languages[0], stamp=stamp, fullscreen=fullscreen, screen=screen
     )

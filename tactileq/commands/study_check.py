@@ -37,10 +37,12 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     InputError
         For a study or models that cannot be used.
     """
+    from experiments.console.languages import require_texts
     from experiments.study.models import load_model_sets
     from experiments.study.study import Study
 
     plan = Study.load(path)
+    require_texts(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as tell:
             sets, files = load_model_sets(plan, path.parent, progress=tell)

@@ -166,6 +166,34 @@ def test_models_made_from_others_are_warned_of(place: Path) -> None:
     )
 
 
+def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
+    place: Path,
+) -> None:
+    file = place / "study.toml"
+    whole = file.read_text(encoding="utf-8")
+    craft = '[[questions]]\nname = "craft"\nlevels = ["no", "yes"]\ntext.en = "Any craft?"\n'
+    wrong = {
+        whole.replace('"en", "ja"', '"en", "fr"'): "expected a language of en, ja, got 'fr'",
+        f"{whole}\n{craft}": "expected the question craft in en, ja, got none in ja",
+        f'{whole}\n{craft}text.ja = "手仕事は?"': "expected the levels of the question craft in "
+        "en, ja, got none in ja; write levels_text.ja = [",
+        whole.replace('"right", "left", "both"', '"right", "left", "neither"'): "expected the "
+        'question "handedness" in the language "en", got none for neither',
+    }
+    session = [sys.executable, "-m", "tactileq", "session", "--task", "absolute", "--study"]
+    for text, sentence in wrong.items():
+        file.write_text(text, encoding="utf-8")
+        refused = (
+            study(place, "check", "study.toml"),
+            subprocess.run([*session, "study.toml"], cwd=place, capture_output=True, text=True),
+        )
+        for done in refused:
+            assert done.returncode == 1
+            assert sentence in done.stderr
+            assert done.stderr.count("\n") == 1
+    assert not (place / "data").exists()
+
+
 def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -> None:
     (place / "models").rename(place / "other")
     (place / "simplified").rename(place / "models")

@@ -18,7 +18,7 @@ from pyglet.window import key
 from experiments.console.console import Console
 from experiments.console.languages import Texts
 from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
-from experiments.study.questions import Question
+from experiments.study.questions import MOST_LEVELS, Question
 from experiments.study.study import Study
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.oddity import OddityTrial
@@ -189,14 +189,16 @@ TRIAL = {"trial": 1, "phase": "main", "texture": "canvas", "model": "full", "tra
 ABSOLUTE = AbsoluteTrial(**TRIAL, virtual_texture="canvas", first_surface="real")
 RELATIVE = RelativeTrial(**TRIAL, layout=("canvas",) * 7)
 ODDITY = OddityTrial(**TRIAL, layout=("full", "full", "simplified"), odd_position=3)
+HOURS = range(0, 10 * MOST_LEVELS, 10)
 OWN = Question(
     name="crafts",
-    levels=tuple(f"{hours} to {hours + 9} hours in each week" for hours in range(0, 120, 10)),
+    levels=tuple(f"{hours} to {hours + 9} hours in each week" for hours in HOURS),
     text={
         "en": "How many hours a week have you worked with textiles, wood or metal over the last "
         "twelve months?",
         "ja": "この一年間、一週間に平均して何時間くらい、布や木や金属を手で扱う仕事をしましたか",
     },
+    levels_text={"ja": tuple(f"一週間に{hours}時間から{hours + 9}時間まで" for hours in HOURS)},
 )
 
 

@@ -15,6 +15,7 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from modeling.files.hashes import sha256_of_values
 from rig.interface import HandRows, PresentationRecord
+from tests.experiments.sessions.enrolling import enrolled
 
 SURFACES = ("canvas", 'say "velvet", or', "和紙")
 SETS = ("full", "simplified")
@@ -168,8 +169,8 @@ def write_session(tmp_path: Path) -> WriteSession:
         **others: Any,
     ) -> SessionFiles:
         folder = tmp_path / "data"
-        person = Roster(folder).enroll(
-            subject, 2, simulated=others.get("simulated_participant", True)
+        person = enrolled(
+            Roster(folder), subject, 2, simulated=others.get("simulated_participant", True)
         )
         manifest = a_manifest(
             task=task,

@@ -94,8 +94,10 @@ def rows_of(manifest: Path) -> list[dict[str, Any]]:
 
 
 def test_the_manifest_is_complete_before_the_first_trial(
-    run: Callable[..., Any], small: Study, models: ModelSets, tmp_path: Path
+    run: Callable[..., Any], small: Study, models: ModelSets, rig: Any, tmp_path: Path
 ) -> None:
+    rig.stated = {"HandFirmware": "wheel 1.0"}
+
     class Watchful(Scripted):
         def rate(self, trial: Any, surfaces: Any) -> Any:
             (path,) = tmp_path.rglob("*_manifest.json")
@@ -113,6 +115,7 @@ def test_the_manifest_is_complete_before_the_first_trial(
     assert manifest.model_sources == {"full": "models", "simplified": "fewer"}
     assert manifest.program["versions"]["numpy"]
     assert len(manifest.plan_sha256) == 64
+    assert manifest.rig == {"HandFirmware": "wheel 1.0"}
 
 
 def test_textures_whose_models_are_equal_are_marked(

@@ -22,6 +22,8 @@ from rig.desk.stimuli import check_stimuli
 from rig.interface import SURFACES, Stimulus, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
 from tests.rig.desk.rig_files import failures, rig_file
+from tests.rig.hand.board import Board, stating
+from tests.rig.hand.board import at_constant_speed as plain
 
 Jack = Callable[..., AbstractContextManager[Any]]
 
@@ -83,6 +85,21 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
     assert np.isfinite(rows.force_n[of["virtual"]]).mean() > 0.5
     assert np.isnan(rows.speed_mm_s[of["real"]]).all()  # nothing measures the hand there
     assert np.isnan(rows.force_n[of["real"]]).all()
+
+
+@pytest.mark.parametrize(("lines", "told"), [(stating(b"wheel 2"), "wheel 2"), (plain, "n/a")])
+def test_the_firmware_that_the_hands_sensor_states_is_stated(
+    server: Any, tmp_path: Path, lines: Callable[[int], bytes], told: str
+) -> None:
+    board = Board()
+    board.send(lines)
+    hand = f'kind = "serial"\ndevice = "{board.path}"'
+    with DeskRig(rig_file(tmp_path, ('kind = "scripted"', hand))) as rig:
+        stated = rig.stated
+        assert not failures(rig.take_faults())
+    board.unplug()
+    assert stated["HandFirmware"] == told
+    assert stated["HandDevice"] == f"serial sensor at {board.path}"
 
 
 def test_bursts_play_one_after_the_other_whatever_the_hand_does(
