@@ -19,7 +19,7 @@ from modeling import InputError
 from modeling.arrays import Floats
 from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
-from rig.desk.checks import Requirements, check_rig, layered
+from rig.desk.checks import Requirements, check_rig
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
@@ -204,11 +204,11 @@ class DeskRig:
         Raises
         ------
         InputError
-            For an AR model, or one of a higher rate than the card's.
+            For one of a higher rate than the card's, or an AR model that `lattice_fields` refuses.
         """
         self.silence()
         sound = self.parts.sound
-        start_s = self._started(lambda: sound.play(layered(model)))
+        start_s = self._started(lambda: sound.play(model))
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",

@@ -21,6 +21,7 @@ from rig.desk.desk_rig import DeskRig
 from rig.desk.stimuli import check_stimuli
 from rig.interface import SURFACES, Stimulus, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
+from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.rig_files import failures, rig_file
 from tests.rig.hand.board import Board, stating
 from tests.rig.hand.board import at_constant_speed as plain
@@ -100,6 +101,37 @@ def test_the_firmware_that_the_hands_sensor_states_is_stated(
     board.unplug()
     assert stated["HandFirmware"] == told
     assert stated["HandDevice"] == f"serial sensor at {board.path}"
+
+
+def test_an_all_pole_model_is_presented_as_a_layered_one_is(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    rival = planted_ar(0.02)
+    with DeskRig(rig_file(tmp_path)) as rig:
+        for presented in (rival, model, rival):
+            rig.present_model(presented)
+            wait(rig, 0.4)
+        rig.silence()
+        records = rig.take_presentations()
+        assert failures(rig.take_faults()) == []
+    assert [record.texture for record in records] == ["planted", "PVC", "planted"]
+    assert [record.number for record in records] == [1, 2, 3]
+    assert [record.model_sha256 for record in records] == [
+        made.sha256 for made in (rival, model, rival)
+    ]
+    assert all(record.played_s > 0.1 and 0 < record.rms_g < 2.0 for record in records)
+    assert records[0].counters.limited_peak == 0
+
+
+def test_the_limits_of_the_rig_hold_for_all_pole_models(server: Any, tmp_path: Path) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(planted_ar(20.0))
+        wait(rig, 0.4)
+        rig.silence()
+        (record,) = rig.take_presentations()
+    assert record.peak_g == pytest.approx(5.0)  # of its limit
+    assert record.counters.limited_peak > 0
+    assert record.counters.limited_rms > 0
 
 
 def test_bursts_play_one_after_the_other_whatever_the_hand_does(

@@ -22,6 +22,7 @@ from modeling.hand import Hand
 from modeling.rendering.limits import Limits
 from rig.live.memory import BLOCK, CONTACT, GONE, STALE, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
+from tests.modeling.rendering.lattices import in_python, planted_ar
 from tests.rig.planted import planted_model as model
 from tests.rig.waiting import wait_until
 
@@ -152,6 +153,44 @@ def test_a_minute_leaves_with_the_bits_of_the_renderer(
     together = min(wanted.size, captured.size - first)
     assert together >= (seconds - 1) * RATE_HZ
     np.testing.assert_array_equal(captured[first : first + together], wanted[:together])
+
+
+def test_an_all_pole_model_leaves_as_python_filters_it(jack_server: Jack, tmp_path: Path) -> None:
+    """At 48 kHz what the model does at 5 kHz, brought there by SciPy, for the hands of the log."""
+    made, block = planted_ar(), 1024
+    with (
+        jack_server(block=block) as server,
+        Live.create() as live,
+        stroking(live, quick_strokes),
+        output(live, block=block, seed=7) as sound,
+    ):
+        recorder = Recorder(server, tmp_path / "captured.npy", block=block)
+        sound.play(model())  # what is done once takes its time before the server runs free
+        sound.silence()
+        server.freewheel(True)
+        before = live.blocks_written
+        presented = sound.play(made)
+        rows = wait_for_blocks(live, before, 20 * RATE_HZ // block, of=presented.presentation)
+        server.freewheel(False)
+        captured = recorder.recorded()[:, 0]
+    rows = rows[rows["presentation"] == presented.presentation]
+    assert np.ptp(rows["speed_mm_s"]) > 300
+    frames = rows["frames"].astype(int)
+    hand = np.repeat(rows["speed_mm_s"], frames), np.repeat(rows["force_n"], frames)
+    number = presented.presentation
+    wanted = in_python(made, *hand, rate_hz=RATE_HZ, seed=7, stream=number) * SCALE
+    # It begins with its fade: look for its first block without one.
+    close = np.abs(captured - wanted[FADE]) <= 1e-6 * np.abs(wanted).max()
+    after = np.abs(np.roll(captured, -block) - wanted[FADE + block]) <= 1e-6 * np.abs(wanted).max()
+    first = int(np.flatnonzero(close & after)[0]) - FADE
+    together = min(wanted.size, captured.size - first)
+    assert together >= 19 * RATE_HZ
+    np.testing.assert_allclose(
+        captured[first + FADE : first + together],
+        wanted[FADE:together],
+        rtol=0,
+        atol=1e-6 * np.abs(wanted).max(),
+    )
 
 
 def wait_for_blocks(live: Live, before: int, count: int, *, of: int = 0) -> Array:
