@@ -68,6 +68,11 @@ class Texts:
         """The text of a key, with its places filled in; KeyError for an unknown key."""
         return self.by_key[key].format_map(values)
 
+    def of_task(self, task: str, key: str, **values: object) -> str:
+        """The text of a key, in the words of a task where it has its own."""
+        own = f"{task}.{key.rpartition('.')[2]}"
+        return self.of(own if own in self.by_key else key, **values)
+
     def question(self, question: Question) -> str:
         """What a participant is asked: the study's own text, or the shipped one."""
         return question.text.get(self.language) or self.of(f"question.{question.name}.text")

@@ -143,6 +143,11 @@ class Surfaces:
         return len(self._models)
 
     @property
+    def bursts(self) -> bool:
+        """Whether bursts stand for surfaces: nothing is presented before a button is pressed."""
+        return any(isinstance(shown, ToneBurst) for shown in self._models)
+
+    @property
     def response_time_s(self) -> float:
         """Time since the first sample of the first presentation left; 0 before."""
         return 0.0 if self._began_s is None else time.perf_counter() - self._began_s

@@ -23,6 +23,8 @@ from experiments.study.study import Study
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.oddity import OddityTrial
 from experiments.tasks.relative import RelativeTrial
+from experiments.tasks.threshold import ThresholdTrial
+from rig.interface import ToneBurst
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 
@@ -119,6 +121,18 @@ def surfaces_of(count, *, feel_all=False, real=True):
     )
 
 
+def intervals():
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.5)
+    return Surfaces(
+        SimulatedRig(),
+        texture="",
+        models=[burst, burst],
+        begin=lambda of: None,
+        note=lambda event, **fields: None,
+        feel_all=True,
+    )
+
+
 def ask_everything(console, visitor):
     questions = (*Study.load().questions, OWN)
     visitor.plan = {
@@ -180,6 +194,13 @@ def try_everything(console, visitor):
         "choose": ["look choose-odd", *buttons, "look choose-odd-all", "press continue"]
     }
     console.choose(ODDITY, surfaces_of(3, feel_all=True, real=False))
+    visitor.plan = {
+        "choose": [
+            *("look choose-interval", "press button 1", "look choose-interval-first"),
+            *("press button 2", "look choose-interval-second", "press continue"),
+        ]
+    }
+    console.choose(THRESHOLD, intervals())
     visitor.plan = {"wait": ["look wait"]}
     ended = iter([False] * 6 + [True])
     console.wait(lambda: next(ended))
@@ -189,6 +210,13 @@ TRIAL = {"trial": 1, "phase": "main", "texture": "canvas", "model": "full", "tra
 ABSOLUTE = AbsoluteTrial(**TRIAL, virtual_texture="canvas", first_surface="real")
 RELATIVE = RelativeTrial(**TRIAL, layout=("canvas",) * 7)
 ODDITY = OddityTrial(**TRIAL, layout=("full", "full", "simplified"), odd_position=3)
+THRESHOLD = ThresholdTrial(
+    **{**TRIAL, "texture": "", "model": "", "tray": ""},
+    frequency_hz=100.0,
+    interval=1,
+    amplitude_g=0.1,
+    highest_g=1.0,
+)
 HOURS = range(0, 10 * MOST_LEVELS, 10)
 OWN = Question(
     name="crafts",

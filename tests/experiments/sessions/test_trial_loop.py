@@ -19,7 +19,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
-from rig.interface import Acceleration, Fault
+from rig.interface import Acceleration, Fault, ToneBurst
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 
@@ -242,6 +242,12 @@ def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets,
     assert surfaces.shows_real
     assert surfaces.switches == 2
     assert surfaces.presses == 1
+
+
+def test_bursts_wait_for_a_press(models: ModelSets, rig: Any) -> None:
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.1)
+    assert surfaces_of(rig, [burst, burst]).bursts
+    assert not surfaces_of(rig, [models.of("MDF", "full")]).bursts
 
 
 def test_toggling_among_several_returns_to_the_one_presented_last(
