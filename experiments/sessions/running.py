@@ -126,18 +126,18 @@ def run_session(
             manifest = _manifest(
                 plan, task, models=models, rig=rig, people=people, code=person.code
             )
-            intake = _intake(study, root, person)
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, _with(manifest, said, study), overrides=overrides)
         with store:
+            stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
-                _stored_plan(plan, task, store=store, models=models),
+                stored,
                 task,
                 models=models,
                 rig=rig,
                 people=people,
                 store=store,
-                intake=intake,
+                intake=_intake(stored.study, root, person),
                 agenda=_agenda(task, store),
                 pilot=said.pilot,
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections import Counter
@@ -19,8 +20,9 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.state import session_state
 from experiments.sessions.store import SessionStore
-from experiments.sessions.surfaces import Rating, SessionAborted, Surfaces
+from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
+from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
 from experiments.study.study import Study
@@ -270,6 +272,94 @@ def test_a_changed_study_is_refused_on_resuming_or_recorded_and_the_stored_order
     by_number = {trial["trial"]: trial for trial in before}
     for row in rows_of(manifest):
         assert row["texture"] == by_number[row["trial"]]["texture"]
+
+
+class Leaves(Scripted):
+    """Stops before anything was asked."""
+
+    def welcome(self, intake: Intake) -> dict[str, str | int]:
+        raise SessionAborted("tired")
+
+
+def test_a_session_goes_on_as_its_manifest_says_whatever_the_study_says_by_now(
+    run: Callable[..., Any], small: Study
+) -> None:
+    age = Question(name="age", least=18, most=99)
+    began = replace(small, consent="1", questions=(age,))
+    run(Leaves(), study=began)
+    absolute = replace(small.plan_of("absolute"), repeats=2, break_after=1)
+    other = replace(
+        small,
+        consent="2",
+        textures=("canvas", "MDF"),
+        trays={"canvas": "A", "MDF": "B"},
+        tasks={**small.tasks, "absolute": absolute},
+    )
+    person = Scripted()
+    result, manifest = run(person, study=other, resume=True, override="another room")
+    assert result.completed
+    planned = SessionManifest.load(manifest).trials
+    kept = ("trial", "texture", "model", "tray", "first_surface")
+    for row, trial in zip(rows_of(manifest), planned, strict=True):
+        assert [row[name] for name in kept] == [trial[name] for name in kept]
+    assert {trial["texture"] for trial in planned} == {"canvas", "PVC"}
+    assert person.rests == 0
+    assert [(asked.consent, asked.questions) for asked in person.asked] == [("1", (age,))]
+
+
+def test_a_session_of_which_a_model_is_gone_is_refused_and_can_still_go_on(
+    run: Callable[..., Any], small: Study, models: ModelSets
+) -> None:
+    _, manifest = run(Tired(2))
+    other = replace(small, textures=("canvas", "MDF"), trays={"canvas": "A", "MDF": "B"})
+    fewer = {name: {t: of[t] for t in ("canvas", "MDF")} for name, of in models.sets.items()}
+    changed = {"study": other, "resume": True, "override": "PVC is lost"}
+    with pytest.raises(InputError, match="PVC") as refused:
+        run(models=ModelSets(sets=fewer), **changed)
+    assert "\n" not in str(refused.value)
+    assert [row["trial"] for row in rows_of(manifest)] == [1, 2]
+    result, _ = run(resume=True)
+    assert result.completed
+    assert [row["trial"] for row in rows_of(manifest)] == [1, 2, 3, 4, 5]
+
+
+def test_another_language_on_going_on_is_noted_and_the_manifest_stays(
+    run: Callable[..., Any], small: Study
+) -> None:
+    both = replace(small, languages=("en", "ja"))
+    _, manifest = run(Tired(2), study=both, language="ja")
+    run(Tired(1), study=both, language="ja", resume=True)
+    run(study=both, language="en", resume=True)
+    assert SessionManifest.load(manifest).language == "ja"
+    opened = [e for e in read_log(log_beside(manifest)).events if e["event"] == "opened"]
+    assert [event.get("changed", {}).get("language") for event in opened] == [None, None, "en"]
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC])
+def test_an_answer_that_the_disk_did_not_keep_is_asked_for_again(
+    run: Callable[..., Any], rig: Any, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    class Unlucky(Scripted):
+        def rate(self, trial: Any, surfaces: Any) -> Any:
+            rating = super().rate(trial, surfaces)
+            if self.answered == 3:
+                monkeypatch.setattr(os, "fsync", refuse)
+            return rating
+
+    def refuse(handle: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with pytest.raises(
+        StoreError, match=r"^expected to write to .*: make room, then go on"
+    ) as told:
+        run(Unlucky())
+    monkeypatch.undo()
+    assert "\n" not in str(told.value)
+    assert not rig.opened
+    result, manifest = run(resume=True)
+    assert result.completed
+    rows = rows_of(manifest)
+    assert [(row["trial"], row["run"]) for row in rows] == [(1, 1), (2, 1), (3, 2), (4, 2), (5, 2)]
 
 
 def test_the_second_day_comes_after_the_first_and_on_another_date(run: Callable[..., Any]) -> None:
