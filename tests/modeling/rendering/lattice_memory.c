@@ -1,6 +1,7 @@
 /* Lattices of all small orders and numbers of taps in memory of just their size, to be watched by
    sanitizers; prints the sum of all samples. */
 
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -26,6 +27,8 @@ static double rendered(int order, int taps, int up, int down)
     for (i = 0; i < up * taps; i++)
         lowpass[i] = 1;
     memory = malloc(tq_lattice_memory(&lattice) * sizeof *memory);
+    for (i = 0; i < (int)tq_lattice_memory(&lattice); i++)
+        memory[i] = NAN; /* whatever was in it before */
     tq_lattice_start(&texture, &lattice, &state, &filter, memory, 1);
     for (i = 0; i < 5; i++)
         tq_lattice_render_held(&texture, &lattice, &state, &filter, i * 100, i, out + 40 * i, 40);

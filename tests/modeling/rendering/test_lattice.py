@@ -87,6 +87,38 @@ def test_fitted_models_of_all_orders_are_those_of_python(order: int) -> None:
     np.testing.assert_allclose(played, wanted, rtol=0, atol=1e-12 * np.abs(wanted).max())
 
 
+def test_a_stroke_over_the_whole_grid_is_followed_as_in_python() -> None:
+    """Where the hand is extrapolated, also from one cell of the grid to the next."""
+    conditions = [(poles((0.97, 0.05 + 0.1 * n), (0.8, 2.0)), 0.1 + n / 10) for n in range(9)]
+    model = ar_model(*conditions, shape=(3, 3))
+    time_s = np.arange(10_000) / 5000
+    speeds = 380 * np.sin(2 * np.pi * 2 * time_s)
+    forces = 2 + 2 * np.sin(2 * np.pi * 3.1 * time_s)
+    wanted = Renderer(model).render(speeds, forces)
+    played = CompiledLattice(model, rate_hz=5000.0).blocks(speeds, forces, block=1)
+    np.testing.assert_allclose(played, wanted, rtol=0, atol=1e-11 * np.abs(wanted).max())
+
+
+def test_filters_on_the_brink_are_finite_and_leave_nothing_behind() -> None:
+    """Neighbouring numbers as line spectral frequencies: a coefficient of 1, none below it."""
+    for place in np.linspace(0.1, 3.0, 100):
+        close = [place, np.nextafter(place, 4)]
+        model = ARModel(
+            texture="brink",
+            rate_hz=5000.0,
+            speeds_mm_s=[50.0, 350.0],
+            forces_n=[1.0],
+            line_spectral_frequencies=[[close], [[0.5, 1.0]]],
+            gains=[[1e-9], [0.1]],
+            level_sd_db=[[0.0], [0.0]],
+        )
+        lattice = CompiledLattice(model, rate_hz=5000.0, limits=Limits(peak=1.0))
+        assert np.isfinite(lattice.held(50.0, 1.0, samples=500)).all()
+        assert np.isfinite(lattice.states).all()
+        after = lattice.held(350.0, 1.0, samples=500)
+        assert after[100:].std() > 0.05
+
+
 @pytest.mark.parametrize("rates_hz", [*RATES_HZ, (10000.0, 48000.0), (3000.0, 48000.0)])
 def test_at_the_cards_rate_it_is_upfirdn_of_the_python_lattice(
     rates_hz: tuple[float, float],
