@@ -3,7 +3,7 @@
     python screens_of_all_pages.py FOLDER LANGUAGE:WIDTHxHEIGHT ...
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
-"texts": [[words, box]], "shapes": [box]}; boxes are (left, bottom, right, top) in pixels from the
+"texts": [[words, box]], "shapes": [box], "places": [[x, y]] of the texts}; boxes are (left, bottom, right, top) in pixels from the
 window's middle. Each page is kept in the folder as a picture; for the folder "-", none is.
 """
 
@@ -82,7 +82,11 @@ class Visitor:
     def tell(self, name):
         texts = [[s.text, text_box(s)] for s in drawn if isinstance(s, visual.TextStim) and s.text]
         shapes = [shape_box(s) for s in drawn if isinstance(s, visual.shape.BaseShapeStim)]
+        places = [
+            [float(v) for v in s.posPix] for s in drawn if isinstance(s, visual.TextStim) and s.text
+        ]
         told = {"screen": self.screen, "page": name, "texts": texts, "shapes": shapes}
+        told["places"] = places
         print(json.dumps(told), flush=True)
         if self.folder is not None:
             self.window.getMovieFrame(buffer="back")
