@@ -97,7 +97,7 @@ class Stimulus(PreparedSignal):
     sha256 : str
         Of the file.
     model_sha256 : str
-        Of the model that it was rendered from.
+        Of the model that it was rendered from; of the model's file where the set has no copy.
     made_from : frozenset of str
         SHA-256 of the models that this model says it was made from.
     condition : tuple of str
@@ -329,6 +329,15 @@ class TextureRig(Protocol):
         ------
         InputError
             For a signal beyond the rig's limits, or a stimulus that is not made for this rig.
+        """
+
+    def check_stimulus(self, stimulus: Stimulus) -> None:
+        """Refuse a stimulus that the rig cannot play; it need not be open.
+
+        Raises
+        ------
+        InputError
+            For one at another rate, for another vibrator, or beyond the limits.
         """
 
     def strongest_g(self, burst: ToneBurst) -> float:

@@ -288,7 +288,7 @@ class SimulatedRig:
 
 
 def _check_amplitude(amplitude_g: float) -> None:
-    if amplitude_g > HIGHEST_SIGNAL_G:
+    if not amplitude_g <= HIGHEST_SIGNAL_G:
         raise InputError(
             f"expected a signal of at most {HIGHEST_SIGNAL_G:g} g, got {amplitude_g:g} g; lower it."
         )

@@ -112,6 +112,8 @@ def run_session(
     models.require(study, allow=overrides.allow)
     _require_language(study, said.language)
     root = Path(data_folder)
+    for stimulus in models.stimuli:
+        rig.check_stimulus(stimulus)
     rig.open()
     try:
         enrolling = Roster(root).enrolling(

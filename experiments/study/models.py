@@ -52,6 +52,12 @@ class ModelSets:
         notes = (getattr(model, "compiled_for", None) for model in every)
         return next((note for note in notes if note), None)
 
+    @property
+    def stimuli(self) -> tuple[Stimulus, ...]:
+        """All files of stimulus sets among them."""
+        every = (shown for models in self.sets.values() for shown in models.values())
+        return tuple(shown for shown in every if isinstance(shown, Stimulus))
+
     def of(self, texture: str, name: str) -> Presentable:
         """The model of one texture in one set."""
         return self.sets[name][texture]

@@ -24,7 +24,7 @@ from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
 from rig.desk.pen import Pen
-from rig.desk.stimuli import check_made_for
+from rig.desk.stimuli import check_made_for, check_stimulus
 from rig.hand.reader import HandReader
 from rig.interface import (
     Acceleration,
@@ -228,7 +228,7 @@ class DeskRig:
         Raises
         ------
         InputError
-            For a signal beyond the limits; of a stimulus also one that `check_stimuli` refuses.
+            For a signal beyond the limits; of a stimulus also one that `check_stimulus` refuses.
         """
         if isinstance(signal, Stimulus):
             return self._present_stimulus(signal)
@@ -238,6 +238,15 @@ class DeskRig:
         start_s = self._started(lambda: sound.play_signal(samples))
         self._signal_end_s = start_s + signal.duration_s
         return self._begin("virtual", f"{signal.frequency_hz:g} Hz", start_s=start_s)
+
+    def check_stimulus(self, stimulus: Stimulus) -> None:
+        """Refuse a stimulus at another rate or for another vibrator than this rig's, or too strong.
+
+        Raises
+        ------
+        InputError
+        """
+        check_stimulus(self._file, stimulus)
 
     def _present_stimulus(self, stimulus: Stimulus) -> float:
         self.silence()

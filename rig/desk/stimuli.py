@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
 
 from modeling import InputError
 from modeling.files.reading import read_bytes
@@ -13,22 +12,21 @@ from rig.live.memory import Live
 from rig.setup.rig_file import RigFile
 
 
-def check_stimuli(rig: RigFile, stimuli: Iterable[Stimulus]) -> None:
-    """Refuse stimuli that a rig cannot play; needs no device.
+def check_stimulus(rig: RigFile, stimulus: Stimulus) -> None:
+    """Refuse a stimulus that a rig cannot play; needs no device.
 
     Raises
     ------
     InputError
         As `check_made_for`, and for one beyond the rig's limits.
     """
+    check_made_for(rig, stimulus)
     with Live.create() as live:
         sound = sound_output(rig, live)
-        for stimulus in stimuli:
-            check_made_for(rig, stimulus)
-            try:
-                sound.checked(stimulus.samples_g, compensated=stimulus.vibrator_sha256 is not None)
-            except InputError as error:
-                raise InputError(f"the stimulus of {stimulus.texture}: {error}") from None
+        try:
+            sound.checked(stimulus.samples_g, compensated=stimulus.vibrator_sha256 is not None)
+        except InputError as error:
+            raise InputError(f"the stimulus of {stimulus.texture}: {error}") from None
 
 
 def check_made_for(rig: RigFile, signal: PreparedSignal, which: str = "") -> None:

@@ -15,7 +15,7 @@ from modeling.errors import InputError, shown
 from modeling.files.reading import read_bytes
 from modeling.files.tables import number, read_table
 from modeling.files.wav import read_wav
-from modeling.models.loading import load_model, made_from
+from modeling.models.loading import AnyModel, load_model, made_from
 from rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
@@ -138,22 +138,23 @@ def stimuli_of_surfaces(
 
 def _stimulus(folder: Path, row: dict[str, str]) -> Stimulus:
     prepared = _prepared(folder, row)
+    model = _source(folder / _SOURCES, row["model_sha256"])
     return Stimulus(
         **vars(prepared),
         texture=row["texture"],
         sha256=row["sha256"],
-        model_sha256=row["model_sha256"],
-        made_from=_made_from(folder / _SOURCES, row["model_sha256"]),
+        model_sha256=row["model_sha256"] if model is None else model.sha256,
+        made_from=frozenset() if model is None else made_from(model),
         condition=tuple(row[name] for name in _CONDITION),
     )
 
 
-def _made_from(sources: Path, sha256: str) -> frozenset[str]:
-    """What the model with this hash says it was made from; nothing where its copy is gone."""
+def _source(sources: Path, sha256: str) -> AnyModel | None:
+    """The copy of a model whose file has this hash, None where it is gone."""
     for path in sorted(sources.glob("*.json")):
         if hashlib.sha256(read_bytes(path, "a model")).hexdigest() == sha256:
-            return made_from(load_model(path))
-    return frozenset()
+            return load_model(path)
+    return None
 
 
 def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:

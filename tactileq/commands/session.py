@@ -146,25 +146,19 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     """
     from rig.desk.checks import Requirements, check_models
     from rig.desk.desk_rig import DeskRig
-    from rig.desk.stimuli import check_stimuli
     from rig.interface import Stimulus
     from rig.setup.rig_file import RigFile
     from rig.twin import SimulatedRig
 
     every = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
-    stimuli = [shown for shown in every if isinstance(shown, Stimulus)]
     if rig is None:
-        twin = SimulatedRig()
-        for stimulus in stimuli:
-            twin.check_stimulus(stimulus)
-        return twin
+        return SimulatedRig()
     file = RigFile.load(rig)
     wanted = Requirements(
         calibration_days=plan.calibration_days, measured_force=plan.measured_force
     )
     device = DeskRig(file, requirements=wanted, override=override)
     check_models(file, [shown for shown in every if not isinstance(shown, Stimulus)])
-    check_stimuli(file, stimuli)
     return device
 
 

@@ -3,8 +3,9 @@
     python screens_of_all_pages.py FOLDER LANGUAGE:WIDTHxHEIGHT ...
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
-"texts": [[words, box]], "shapes": [box], "places": [[x, y]] of the texts}; boxes are (left, bottom, right, top) in pixels from the
-window's middle. Each page is kept in the folder as a picture; for the folder "-", none is.
+"texts": [[words, box]], "shapes": [box], "places": [[x, y]] of the texts}; boxes are (left, bottom,
+right, top), all in pixels from the window's middle. Each page is kept in the folder as a picture;
+for the folder "-", none is.
 """
 
 import json

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from experiments.sessions.bids import export_all, export_session
@@ -29,6 +30,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
+from rig.interface import Stimulus
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 
@@ -156,6 +158,24 @@ def test_a_rig_that_refuses_leaves_nothing(
     with pytest.raises(InputError, match="expected a card"):
         run(folder=tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+def test_a_stimulus_that_the_rig_cannot_play_is_refused_before_anything_is_written(
+    run: Callable[..., Any], models: ModelSets, tmp_path: Path
+) -> None:
+    loud = Stimulus(
+        samples_g=np.full(10, 5.01),
+        rate_hz=5000.0,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
+    )
+    one = ModelSets(sets={**models.sets, "simplified": {**models.sets["simplified"], "PVC": loud}})
+    with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
+        run(models=one, rig=SimulatedRig(), folder=tmp_path / "data")
+    assert not (tmp_path / "data").exists()
 
 
 def test_consent_and_questions_come_first_and_once(

@@ -18,7 +18,7 @@ import pytest
 from modeling import InputError, TextureModel
 from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
-from rig.desk.stimuli import check_stimuli
+from rig.desk.stimuli import check_stimulus
 from rig.interface import SURFACES, Stimulus, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
@@ -200,11 +200,11 @@ def test_stimuli_are_checked_without_a_device(tmp_path: Path) -> None:
         model_sha256="b" * 64,
     )
     file = rig_file(tmp_path)
-    check_stimuli(file, [quiet])
+    check_stimulus(file, quiet)
     with pytest.raises(InputError, match="the stimulus of PVC: expected a signal of at most 5 g"):
-        check_stimuli(file, [quiet, replace(quiet, samples_g=np.full(480, 5.1))])
+        check_stimulus(file, replace(quiet, samples_g=np.full(480, 5.1)))
     with pytest.raises(InputError, match="44100 Hz"):
-        check_stimuli(file, [replace(quiet, rate_hz=44100.0)])
+        check_stimulus(file, replace(quiet, rate_hz=44100.0))
 
 
 def test_no_burst_is_stronger_than_the_limits_allow(server: Any, tmp_path: Path) -> None:
