@@ -21,8 +21,8 @@ from rig.interface import Presentable
 # --- Parameters -----------------------------------------------------------------------------
 
 DESCRIPTION = (
-    "Oddity task: of three virtual surfaces of one texture, one per button, two render the same "
-    "model and one another; which is the odd one out? Chance is 1/3."
+    "Of three virtual surfaces of one texture, one per button, two render the same model and one "
+    "another; which is the odd one out? Chance is 1/3."
 )
 BUTTONS = 3
 

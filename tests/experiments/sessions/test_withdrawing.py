@@ -174,5 +174,5 @@ def test_a_running_session_and_a_stranger_are_refused(root, leave):
     for number in (0, 9):
         with pytest.raises(InputError, match="expected a subject who takes part"):
             leave(root, number)
-    with pytest.raises(InputError, match="expected a data folder"):
+    with pytest.raises(InputError, match="expected the data folder of a study, got none at"):
         leave(root / "elsewhere", 1)
