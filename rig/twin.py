@@ -86,8 +86,9 @@ class SimulatedRig:
         return {}
 
     def open(self) -> None:
-        """Forget what was presented before; the hand strokes on."""
+        """Forget what was presented before; clock, presentations and the stroke begin anew."""
         self.silence()
+        self._steps = self._presentations = 0
         self._ended, self._rows, self._faults = [], [], []
 
     def close(self) -> None:

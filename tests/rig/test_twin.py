@@ -179,6 +179,12 @@ def test_a_fault_is_told_once_and_opening_forgets_what_was_before() -> None:
     assert rig.take_faults() == ()
     rig.open()
     assert (len(rig.take_history()), rig.take_presentations()) == (0, ())
+    assert rig.now_s() == 0.0
+    rig.present_model(model())
+    rig.read()
+    rig.silence()
+    (record,) = rig.take_presentations()
+    assert (record.number, record.start_s, rig.read().time_s) == (1, 0.0, 2 * STEP_S)
 
 
 def test_a_burst_is_felt_once_to_its_end_whatever_the_hand_does() -> None:
