@@ -9,10 +9,11 @@ import pytest
 
 from modeling import InputError, Renderer, regressed
 from modeling.models.loading import Layered
-from rig.interface import SURFACES, RigReading, Stimulus, TextureRig, ToneBurst
+from rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
 from rig.sound.signals import tone_burst
 from rig.twin import SimulatedRig
 from tests.rig.planted import planted_model as model
+from tests.rig.planted import planted_stimulus
 
 STEP_S = 0.01
 
@@ -225,15 +226,7 @@ def test_a_stimulus_is_felt_as_time_goes_on_and_from_its_beginning_each_time() -
     rig = SimulatedRig()
     rig.open()
     samples = 0.1 + 0.001 * np.arange(100.0)
-    stimulus = Stimulus(
-        samples_g=samples,
-        rate_hz=4000.0,
-        vibrator_sha256=None,
-        simulated=True,
-        texture="PVC",
-        sha256="a" * 64,
-        model_sha256="b" * 64,
-    )
+    stimulus = planted_stimulus(samples, rate_hz=4000.0)
     rig.present_signal(stimulus)
     felt = [feel(rig, 1) for _ in range(4)]
     np.testing.assert_array_equal(np.concatenate(felt), samples)
@@ -252,15 +245,7 @@ def test_a_stimulus_is_felt_as_time_goes_on_and_from_its_beginning_each_time() -
 
 def test_a_stimulus_that_this_rig_cannot_present_is_refused() -> None:
     rig = SimulatedRig()
-    stimulus = Stimulus(
-        samples_g=np.full(10, 5.01),
-        rate_hz=4000.0,
-        vibrator_sha256=None,
-        simulated=True,
-        texture="PVC",
-        sha256="a" * 64,
-        model_sha256="b" * 64,
-    )
+    stimulus = planted_stimulus(np.full(10, 5.01), rate_hz=4000.0)
     with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
         rig.present_signal(stimulus)
     driven = replace(stimulus, samples_g=np.zeros(10), vibrator_sha256="c" * 64)

@@ -30,9 +30,9 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
-from rig.interface import Stimulus
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
+from tests.rig.planted import planted_stimulus
 
 TRIALS = 5  # one for training, two textures with two models
 
@@ -163,15 +163,7 @@ def test_a_rig_that_refuses_leaves_nothing(
 def test_a_stimulus_that_the_rig_cannot_play_is_refused_before_anything_is_written(
     run: Callable[..., Any], models: ModelSets, tmp_path: Path
 ) -> None:
-    loud = Stimulus(
-        samples_g=np.full(10, 5.01),
-        rate_hz=5000.0,
-        vibrator_sha256=None,
-        simulated=True,
-        texture="PVC",
-        sha256="a" * 64,
-        model_sha256="b" * 64,
-    )
+    loud = planted_stimulus(np.full(10, 5.01), rate_hz=5000.0)
     one = ModelSets(sets={**models.sets, "simplified": {**models.sets["simplified"], "PVC": loud}})
     with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
         run(models=one, rig=SimulatedRig(), folder=tmp_path / "data")

@@ -19,12 +19,13 @@ from modeling import InputError, TextureModel
 from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
 from rig.desk.stimuli import check_stimulus
-from rig.interface import SURFACES, Stimulus, TextureRig, ToneBurst
+from rig.interface import SURFACES, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.rig_files import failures, rig_file
 from tests.rig.hand.board import Board, stating
 from tests.rig.hand.board import at_constant_speed as plain
+from tests.rig.planted import planted_stimulus
 
 Jack = Callable[..., AbstractContextManager[Any]]
 
@@ -161,15 +162,7 @@ def test_a_stimulus_leaves_bit_for_bit_and_is_broken_off_at_once(
 ) -> None:
     rng = np.random.default_rng(3)
     samples = (0.2 * rng.uniform(-1, 1, 48000)).astype(np.float32).astype(np.float64)
-    stimulus = Stimulus(
-        samples_g=samples,
-        rate_hz=48000.0,
-        vibrator_sha256=None,
-        simulated=True,
-        texture="PVC",
-        sha256="a" * 64,
-        model_sha256="b" * 64,
-    )
+    stimulus = planted_stimulus(samples, rate_hz=48000.0)
     with jack_server(block=128), DeskRig(rig_file(tmp_path)) as rig:
         first_s = rig.present_signal(stimulus)
         wait(rig, 0.2)
@@ -190,15 +183,7 @@ def test_a_stimulus_leaves_bit_for_bit_and_is_broken_off_at_once(
 
 
 def test_stimuli_are_checked_without_a_device(tmp_path: Path) -> None:
-    quiet = Stimulus(
-        samples_g=np.full(480, 0.1),
-        rate_hz=48000.0,
-        vibrator_sha256=None,
-        simulated=True,
-        texture="PVC",
-        sha256="a" * 64,
-        model_sha256="b" * 64,
-    )
+    quiet = planted_stimulus(np.full(480, 0.1), rate_hz=48000.0)
     file = rig_file(tmp_path)
     check_stimulus(file, quiet)
     with pytest.raises(InputError, match="the stimulus of PVC: expected a signal of at most 5 g"):
