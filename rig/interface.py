@@ -64,6 +64,68 @@ class ToneBurst:
     duration_s: float
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PreparedSignal:
+    """A signal and what is to be known of it.
+
+    Parameters
+    ----------
+    samples_g : (n,) ndarray
+    rate_hz : float
+    vibrator_sha256 : str, optional
+        SHA-256 of the vibrator's file for which it is compensated; None for the vibration itself.
+    simulated : bool
+        Whether what it was made from was simulated.
+    """
+
+    samples_g: Floats
+    rate_hz: float
+    vibrator_sha256: str | None
+    simulated: bool
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Stimulus(PreparedSignal):
+    """A file of a stimulus set that stands for a surface, felt by a hand at rest.
+
+    Two are equal where one model was rendered in one condition, though with other noise
+    (docs/method/live.md#signals).
+
+    Parameters
+    ----------
+    texture : str
+    sha256 : str
+        Of the file.
+    model_sha256 : str
+        Of the model that it was rendered from; of the model's file where the set has no copy.
+    made_from : frozenset of str
+        SHA-256 of the models that this model says it was made from.
+    condition : tuple of str
+        Trajectory, speed, force, gain and vibrator, as the manifest of the set states them.
+    """
+
+    texture: str
+    sha256: str
+    model_sha256: str
+    made_from: frozenset[str] = frozenset()
+    condition: tuple[str, ...] = ()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Stimulus) and self._rendered == other._rendered
+
+    def __hash__(self) -> int:
+        return hash(self._rendered)
+
+    @property
+    def _rendered(self) -> tuple[str, tuple[str, ...]]:
+        return self.model_sha256, self.condition
+
+    @property
+    def duration_s(self) -> float:
+        """Its length, fades included."""
+        return self.samples_g.size / self.rate_hz
+
+
 @dataclass(frozen=True)
 class Fault:
     """Something that went wrong.
@@ -138,11 +200,11 @@ class PresentationRecord:
     surface : {"real", "virtual"}
     texture : str
     model_sha256 : str
-        Of the model that was rendered; empty for a real surface.
+        Of the model that was rendered, or of the stimulus's file; empty for a real surface.
     start_s, end_s : float
         On the rig's clock.
     speeds_mm_s, forces_n : (float, float), optional
-        Lowest and highest condition of the model's grid.
+        Lowest and highest condition of the model's grid; None of a signal, which has none.
     counters : RenderCounters
         What the renderer had to correct; samples that the limits touched.
     played_s : float
@@ -253,8 +315,10 @@ class TextureRig(Protocol):
             When the first sample left.
         """
 
-    def present_signal(self, burst: ToneBurst) -> float:
-        """Play a burst once, whatever the hand does; one that still plays ends first.
+    def present_signal(self, signal: ToneBurst | Stimulus) -> float:
+        """Play a signal once, whatever the hand does.
+
+        A burst that still plays ends first; a stimulus is broken off.
 
         Returns
         -------
@@ -264,7 +328,16 @@ class TextureRig(Protocol):
         Raises
         ------
         InputError
-            For a burst beyond the rig's limits.
+            For a signal beyond the rig's limits, or a stimulus that is not made for this rig.
+        """
+
+    def check_stimulus(self, stimulus: Stimulus) -> None:
+        """Refuse a stimulus that the rig cannot play; it need not be open.
+
+        Raises
+        ------
+        InputError
+            For one at another rate, for another vibrator, or beyond the limits.
         """
 
     def strongest_g(self, burst: ToneBurst) -> float:
@@ -290,6 +363,9 @@ class TextureRig(Protocol):
 
     def take_acceleration(self) -> tuple[Acceleration, ...]:
         """What was measured at the pen during them; nothing without an accelerometer."""
+
+
+Presentable = AnyModel | Stimulus
 
 
 def grid_of(model: AnyModel) -> tuple[Range, Range]:

@@ -25,6 +25,7 @@ from rig.interface import (
     PresentationRecord,
     RigHealth,
     RigReading,
+    Stimulus,
     Surface,
     ToneBurst,
     grid_of,
@@ -60,6 +61,8 @@ class SimulatedRig:
         self._seed = seed
         self._streams = 0
         self._presented: AnyModel | None = None
+        self._stimulus: Stimulus | None = None
+        self._stimulus_from_s = 0.0
         self._renderer: Renderer | None = (
             None  # made when the hand first moves on what is presented
         )
@@ -83,8 +86,9 @@ class SimulatedRig:
         return {}
 
     def open(self) -> None:
-        """Forget what was presented before; the hand strokes on."""
+        """Forget what was presented before; clock, presentations and the stroke begin anew."""
         self.silence()
+        self._steps = self._presentations = 0
         self._ended, self._rows, self._faults = [], [], []
 
     def close(self) -> None:
@@ -137,32 +141,50 @@ class SimulatedRig:
         )
         return self.now_s()
 
-    def present_signal(self, burst: ToneBurst) -> float:
-        """Let the hand feel a burst, to its end.
+    def present_signal(self, signal: ToneBurst | Stimulus) -> float:
+        """Let the hand feel a signal: a burst at once and to its end, a stimulus as it moves on.
 
         Raises
         ------
         InputError
-            Above 5 g.
+            Above 5 g; of a stimulus that is compensated for a vibrator.
         """
-        if burst.amplitude_g > HIGHEST_SIGNAL_G:
-            raise InputError(
-                f"expected a signal of at most {HIGHEST_SIGNAL_G:g} g, got {burst.amplitude_g:g} "
-                "g; lower it."
-            )
+        if isinstance(signal, Stimulus):
+            self.check_stimulus(signal)
+            self._begin("virtual", signal.texture, None)
+            assert self._now is not None
+            self._now = replace(self._now, model_sha256=signal.sha256)
+            self._stimulus, self._stimulus_from_s = signal, self.now_s()
+            return self.now_s()
+        _check_amplitude(signal.amplitude_g)
         made = tone_burst(
-            burst.frequency_hz,
-            burst.amplitude_g,
-            duration_s=burst.duration_s,
+            signal.frequency_hz,
+            signal.amplitude_g,
+            duration_s=signal.duration_s,
             rate_hz=SIGNAL_RATE_HZ,
         )
-        self._begin("virtual", f"{burst.frequency_hz:g} Hz", None)
+        self._begin("virtual", f"{signal.frequency_hz:g} Hz", None)
         start_s = self.now_s()
         for part in np.split(made.samples_g, range(_PER_STEP, made.samples_g.size, _PER_STEP)):
             self._move_on()
             self._last_vibration = part
             self._log(part, SIGNAL_RATE_HZ)
         return start_s
+
+    def check_stimulus(self, stimulus: Stimulus) -> None:
+        """Refuse a stimulus that this rig cannot present.
+
+        Raises
+        ------
+        InputError
+            Above 5 g; where it is compensated for a vibrator, of which a twin has none.
+        """
+        _check_amplitude(float(np.abs(stimulus.samples_g).max(initial=0.0)))
+        if stimulus.vibrator_sha256 is not None:
+            raise InputError(
+                "expected a stimulus without compensation at the simulated rig, which has no "
+                f"vibrator, got one of {stimulus.texture} that drives one; make the set without."
+            )
 
     def strongest_g(self, burst: ToneBurst) -> float:
         """5 g, whatever the frequency."""
@@ -198,7 +220,7 @@ class SimulatedRig:
         """Stop all vibration."""
         if self._now is not None:
             self._ended.append(replace(self._now, end_s=self.now_s()))
-        self._presented = self._now = None
+        self._presented = self._now = self._stimulus = None
 
     def press_button(self) -> None:
         """Press the button; the next reading reports it once."""
@@ -212,6 +234,8 @@ class SimulatedRig:
         self._last_vibration = self._felt(time_s)
         if self._renderer is not None:
             self._log(self._last_vibration, self._renderer.rate_hz)
+        elif self._stimulus is not None:
+            self._log(self._last_vibration, self._stimulus.rate_hz)
         pressed, self._button = self._button, False
         return RigReading(time_s, abs(float(speed[0])), float(force[0]), pressed, simulated=True)
 
@@ -237,6 +261,11 @@ class SimulatedRig:
         )
 
     def _felt(self, time_s: float) -> Floats:
+        if self._stimulus is not None:
+            since_s = time_s - self._stimulus_from_s
+            end = round(since_s * self._stimulus.rate_hz)
+            begin = round((since_s - STEP_S) * self._stimulus.rate_hz)
+            return self._stimulus.samples_g[begin:end]
         if self._presented is None:
             return np.zeros(0)
         if self._renderer is None:
@@ -255,7 +284,14 @@ class SimulatedRig:
             counters=counters,
             played_s=self._now.played_s + vibration.size / rate_hz,
             dose_g2_s=self._now.dose_g2_s + float(vibration @ vibration) / rate_hz,
-            peak_g=max(self._now.peak_g, float(np.abs(vibration).max())),
+            peak_g=max(self._now.peak_g, float(np.abs(vibration).max(initial=0.0))),
+        )
+
+
+def _check_amplitude(amplitude_g: float) -> None:
+    if not amplitude_g <= HIGHEST_SIGNAL_G:
+        raise InputError(
+            f"expected a signal of at most {HIGHEST_SIGNAL_G:g} g, got {amplitude_g:g} g; lower it."
         )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -84,12 +85,18 @@ def simulated_note(model: AnyModel) -> str:
     return " (simulated)" if model.simulated else ""
 
 
-def tell_controls(sets: ModelSets, textures: Sequence[str]) -> None:
-    """Name the textures of a study whose simplified model is the full one."""
-    if controls := sets.identical(textures):
+def tell_models(sets: ModelSets, textures: Sequence[str]) -> None:
+    """Name the textures of a study of which two sets hold one model, or models of other ones."""
+    for first, second in combinations(sets.names, 2):
+        if controls := sets.identical(textures, (first, second)):
+            print(
+                f"note: {first} and {second} are identical for {', '.join(controls)}: a control, "
+                "nothing to compare."
+            )
+    for texture, name in sets.of_others(textures):
         print(
-            f"note: the simplified model is identical to the full one for {', '.join(controls)}: "
-            "presented as a control, nothing to compare."
+            f"warning: the {name} model of {texture} was made from a model that is in none of the "
+            "sets; make it again from the one that it is compared with."
         )
 
 

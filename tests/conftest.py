@@ -8,10 +8,11 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -162,6 +163,9 @@ def _values(layout: str, numbers: Iterable[float]) -> str:
     return "".join(f"<value>{layout % number}</value>" for number in numbers)
 
 
+# Before a command: it is killed when this process ends, however that ends (on Linux).
+ENDED_WITH_US = ("setpriv", "--pdeathsig", "KILL") if sys.platform == "linux" else ()
+
 # --- An audio server ------------------------------------------------------------------------------
 
 
@@ -223,16 +227,6 @@ class JackServer:
         self.process.wait()
 
 
-def _wait_for(server: JackServer, told: IO[bytes]) -> None:
-    words = ["jack_wait", "-s", server.name, "-w", "-t", "20"]
-    if subprocess.run(words, capture_output=True, env=server.environment, timeout=30).returncode:
-        server.process.kill()
-        server.process.wait()
-        told.seek(0)
-        said = told.read().decode(errors="replace")
-        raise AssertionError(f"expected an audio server within 20 s: {said[-2000:]}")
-
-
 @pytest.fixture
 def jack_server() -> Callable[..., AbstractContextManager[JackServer]]:
     """`with jack_server(block=128) as server:` an audio server without a sound card; see
@@ -244,43 +238,70 @@ def jack_server() -> Callable[..., AbstractContextManager[JackServer]]:
 def _jack_server(*, rate_hz: int = 48000, block: int = 128) -> Iterator[JackServer]:
     if shutil.which("jackd") is None:
         pytest.skip("expected jackd for the tests of sound; install jackd2")
-    with _free_name() as name:
-        words = f"jackd --no-realtime --no-mlock -n {name} -d dummy -r {rate_hz} -p {block}"
-        # A pipe that nobody reads would be full after a thousand late blocks, and stop the server.
-        with tempfile.TemporaryFile() as told:
-            process = subprocess.Popen(words.split(), stdout=told, stderr=subprocess.STDOUT)
-            with _running(JackServer(name, process), told) as server:
-                yield server
+    # A pipe that nobody reads would be full after a thousand late blocks, and stop the server.
+    with ExitStack() as stack, tempfile.TemporaryFile() as told:
+        server = _started(f"-d dummy -r {rate_hz} -p {block}", told, lock=stack)
+        with _running(server, told):
+            yield server
 
 
-@contextmanager
-def _free_name() -> Iterator[str]:
-    """One of six names that nobody uses now.
+def _started(options: str, told: IO[bytes], *, lock: ExitStack) -> JackServer:
+    """A server under the first free one of six names, which are locked against other tests.
 
-    JACK knows eight servers, killed ones included until one of the same name is started.
+    JACK knows eight servers, killed ones included until one of the same name is started. A name
+    that nobody has locked may still be that of a server whose test was killed.
     """
     end = time.monotonic() + 200
     while time.monotonic() < end:
         for number in range(6):
-            path = Path(tempfile.gettempdir()) / f"tactileq-jack-{number}.lock"
-            with path.open("w") as file:
-                try:
+            with ExitStack() as held:
+                file = held.enter_context(_lock_file(number).open("w"))
+                with suppress(BlockingIOError):
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
-                    continue
-                yield f"tactileq{number}"
-                return
+                    if server := _begun(f"tactileq{number}", options, told):
+                        lock.push(held.pop_all())
+                        return server
         time.sleep(0.1)
-    raise AssertionError("expected a name for an audio server, got six in use for 200 s")
+    raise AssertionError(f"expected an audio server, got none for 200 s: {_text(told)}")
+
+
+def _lock_file(number: int) -> Path:
+    return Path(tempfile.gettempdir()) / f"tactileq-jack-{number}.lock"
+
+
+def _begun(name: str, options: str, told: IO[bytes]) -> JackServer | None:
+    """A server that begins; None where one of its name is active. It ends with this process."""
+    told.seek(0)
+    told.truncate()
+    words = [*ENDED_WITH_US, *f"jackd --no-realtime --no-mlock -n {name} {options}".split()]
+    process = subprocess.Popen(words, stdout=told, stderr=subprocess.STDOUT)
+    end = time.monotonic() + 20
+    while process.poll() is None and time.monotonic() < end:
+        if "JACK server starting" in _text(told):
+            return JackServer(name, process)
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    if "already active" in _text(told):
+        return None
+    raise AssertionError(f"expected an audio server that starts, got its end: {_text(told)}")
+
+
+def _text(told: IO[bytes]) -> str:
+    """The end of what a server told; its own place in the file, at which it writes, stays."""
+    size = os.fstat(told.fileno()).st_size
+    return os.pread(told.fileno(), 2000, max(size - 2000, 0)).decode(errors="replace")
 
 
 @contextmanager
-def _running(server: JackServer, told: IO[bytes]) -> Iterator[JackServer]:
+def _running(server: JackServer, told: IO[bytes]) -> Iterator[None]:
     before = {key: os.environ.get(key) for key in ("JACK_DEFAULT_SERVER", "JACK_NO_START_SERVER")}
     os.environ.update({key: server.environment[key] for key in before})
     try:
-        _wait_for(server, told)
-        yield server
+        words = ["jack_wait", "-s", server.name, "-w", "-t", "20"]
+        if subprocess.run(words, capture_output=True, timeout=30).returncode:
+            raise AssertionError(f"expected an audio server within 20 s: {_text(told)}")
+        yield
     finally:
         for key, value in before.items():
             if value is None:
@@ -312,7 +333,7 @@ def _x_server(*, screens: int = 1, size: tuple[int, int] = (1920, 1080)) -> Iter
     shape = "{}x{}x24".format(*size)
     sizes = [word for number in range(screens) for word in ("-screen", str(number), shape)]
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
+        [*ENDED_WITH_US, "Xvfb", "-displayfd", str(writer), *sizes, "-nolisten", "tcp"],
         pass_fds=[writer],
         stderr=subprocess.DEVNULL,
     )

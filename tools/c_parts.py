@@ -14,6 +14,7 @@ from cffi import FFI
 
 ROOT = Path(__file__).resolve().parent.parent
 KERNEL = ROOT / "modeling" / "rendering" / "kernel.h"
+LATTICE = ROOT / "modeling" / "rendering" / "lattice.h"
 MANY = ROOT / "modeling" / "rendering" / "many.h"
 MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
 RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
@@ -63,7 +64,7 @@ def binding(
 
 kernel = binding("modeling.rendering._kernel", KERNEL)
 kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
-rivals = binding("analysis.benches._rivals", KERNEL, RIVALS)
+rivals = binding("analysis.benches._rivals", KERNEL, RIVALS, included=(LATTICE,))
 many = binding(
     "modeling.rendering._many",
     KERNEL,
@@ -87,13 +88,14 @@ def live_binding() -> FFI:
                 "typedef double tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS, TQ_RING;",
                 "typedef struct tq_live tq_live; typedef struct tq_sound tq_sound;",
                 declarations(KERNEL),
+                declarations(LATTICE),
                 voice[0],
                 declarations(LIVE),
                 declarations(SOUND),
             )
         )
     )
-    headers = (KERNEL, PLAYER, LIVE, SOUND)
+    headers = (KERNEL, LATTICE, PLAYER, LIVE, SOUND)
     builder.set_source(
         "rig.live._live",
         f'#include "{SOUND.name}"',

@@ -9,7 +9,7 @@
 #ifndef TQ_RIVALS_H
 #define TQ_RIVALS_H
 
-#include "kernel.h"
+#include "lattice.h" /* its tq_cosine */
 
 #ifndef TQ_FLAGS
 #define TQ_FLAGS "flags unknown"
@@ -218,18 +218,6 @@ TQ_INLINE void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w
 /* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + order columns, the gain and the
    line spectral frequencies (radians per sample), then anything. */
 enum { TQ_PAST, TQ_WEIGHTS };
-
-/* cos(angle), 0 <= angle <= pi, to 1e-15: minus the sine's series about pi / 2. */
-TQ_INLINE tq_real tq_cosine(tq_real angle)
-{
-    tq_real x = angle - (tq_real)1.5707963267948966, z = x * x;
-    tq_real high = (tq_real)1.6059043836821613e-10 +
-                   z * ((tq_real)-7.647163731819816e-13 +
-                        z * ((tq_real)2.8114572543455206e-15 - z * (tq_real)8.22063524662433e-18));
-    tq_real low = (tq_real)2.7557319223985893e-6 + z * ((tq_real)-2.505210838544172e-8 + z * high);
-    low = (tq_real)8.333333333333333e-3 + z * ((tq_real)-1.984126984126984e-4 + z * low);
-    return -x * (1 + z * ((tq_real)-0.16666666666666666 + z * low));
-}
 
 /* A(z) from half of the coefficients of its symmetric and its antisymmetric part, each the product
    of factors 1 - 2 cos(w) / z + 1 / z^2; the two products run side by side. */

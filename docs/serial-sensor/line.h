@@ -7,6 +7,7 @@
 #include <stdint.h>
 
 #define TQ_LINE 82
+#define TQ_FIRMWARE 40 /* characters of a version; what is longer is cut off */
 #define TQ_NO_FORCE INT32_MIN /* nothing measures it: the field stays empty */
 #define TQ_CONTACT 1u
 #define TQ_BUTTON 2u
@@ -60,10 +61,8 @@ static uint8_t tq_begin(char *line, char kind, uint16_t number, uint32_t time_us
     return tq_put_unsigned(line, at, time_us);
 }
 
-static uint8_t tq_end(char *line, uint8_t at, int32_t force_mn, uint8_t flags)
+static uint8_t tq_close(char *line, uint8_t at)
 {
-    at = tq_put(line, at, force_mn);
-    at = tq_put(line, at, flags);
     uint16_t crc = tq_crc(line + 1, (uint8_t)(at - 1));
     line[at++] = '*';
     for (int8_t shift = 12; shift >= 0; shift = (int8_t)(shift - 4))
@@ -71,6 +70,25 @@ static uint8_t tq_end(char *line, uint8_t at, int32_t force_mn, uint8_t flags)
     line[at++] = '\r';
     line[at++] = '\n';
     return at;
+}
+
+static uint8_t tq_end(char *line, uint8_t at, int32_t force_mn, uint8_t flags)
+{
+    at = tq_put(line, at, force_mn);
+    at = tq_put(line, at, flags);
+    return tq_close(line, at);
+}
+
+/* The version of the firmware: ASCII without $, * and control characters. Twice a second or so. */
+static uint8_t tq_firmware_line(char *line, const char *version)
+{
+    uint8_t at = 0;
+    line[at++] = '$';
+    line[at++] = 'F';
+    line[at++] = ',';
+    for (uint8_t i = 0; i < TQ_FIRMWARE && version[i]; i++)
+        line[at++] = version[i];
+    return tq_close(line, at);
 }
 
 /* Position in µm, force in mN. */

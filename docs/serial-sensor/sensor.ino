@@ -1,7 +1,8 @@
 // A sensor for tactileq: an encoder wheel (A on pin 2, B on pin 3) and a load cell's amplifier on A0.
-// A sketch to start from: set the three constants to your parts. docs/serial-sensor.md
+// A sketch to start from: set the constants to your parts. docs/serial-sensor.md
 #include "line.h"
 
+const char FIRMWARE[] = "wheel and load cell 1.0"; // of this sketch: it stands in the data
 const float UM_PER_COUNT = 25.0;       // of the wheel, by a ruler
 const float MN_PER_STEP = 5.0;         // of the load cell, by a weight laid on
 const int REST_STEPS = 512;            // the load cell without weight
@@ -30,7 +31,12 @@ void loop() {
   interrupts();
   int32_t force_mn = (int32_t)((analogRead(A0) - REST_STEPS) * MN_PER_STEP);
   char line[TQ_LINE];
-  uint8_t length = tq_position_line(line, number++, now_us, (int32_t)(position * UM_PER_COUNT), 0,
-                                    force_mn, TQ_CONTACT);
+  uint8_t length;
+  if (number % 250 == 0) {  // twice a second
+    length = tq_firmware_line(line, FIRMWARE);
+    Serial.write((const uint8_t *)line, length);
+  }
+  length = tq_position_line(line, number++, now_us, (int32_t)(position * UM_PER_COUNT), 0, force_mn,
+                            TQ_CONTACT);
   Serial.write((const uint8_t *)line, length);
 }

@@ -27,6 +27,7 @@ TITLE_HEIGHT = 0.046
 TEXT_HEIGHT = 0.029
 SMALL_HEIGHT = 0.024
 LINE_SPACING = 1.45  # of lines of Japanese, in heights
+HALF_RISE = 0.35  # from the baseline to the middle of a Japanese letter, in heights
 SMALLEST_SHARE = 0.5  # of its height to which a label shrinks
 
 # Where no line of Japanese begins, and where none ends.
@@ -51,10 +52,14 @@ def text(
     """A PsychoPy text in type that comes with packages, the same on every machine.
 
     Latin text is set in PsychoPy's Noto Sans, text with a Japanese letter in IPAexGothic, which
-    has no bold, and of which lines are broken here: PsychoPy breaks them at spaces only.
+    has no bold, and of which lines are broken here: PsychoPy breaks them at spaces only. Place and
+    height are rounded to whole pixels: between two of them thin strokes, such as that of ー, fade.
     """
     from psychopy import visual
 
+    pixels = window.winHandle.get_size()[1]
+    at = (round(at[0] * pixels) / pixels, round(at[1] * pixels) / pixels)
+    height = round(height * pixels) / pixels
     japanese = any(_is_wide(letter) for letter in content)
     drawn = visual.TextStim(
         window,
@@ -72,9 +77,11 @@ def text(
         autoLog=False,
     )
     if japanese and "\n" in drawn.text:
-        # Lines of IPAexGothic would touch each other; PsychoPy has no setting for their distance.
-        pixels = LINE_SPACING * height * window.winHandle.get_size()[1]
-        drawn._pygletTextObj.set_style("line_spacing", round(pixels))
+        # Lines of IPAexGothic would touch each other; PsychoPy has no setting for their distance,
+        # which pyglet also leaves above the first line: raised by that, the text is in the middle.
+        spacing = round(LINE_SPACING * height * pixels)
+        drawn._pygletTextObj.set_style("line_spacing", spacing)
+        drawn.pos = (at[0], at[1] + round(spacing / 2 - HALF_RISE * height * pixels) / pixels)
     return drawn
 
 

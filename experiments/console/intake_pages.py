@@ -8,16 +8,15 @@ from experiments.console.drawing import CARD, GREY, ORANGE, PALE, text
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button
 from experiments.sessions.surfaces import Intake, SessionAborted
-from experiments.study.questions import Question
+from experiments.study.questions import MOST_DIGITS, MOST_LEVELS, Question
 
 REFUSED = "consent refused"
 ANOTHER = "the code is another person's"
-ROWS = 6  # of answers below each other
-COLUMN_WIDTHS = (0.6, 0.5, 0.38)
+COLUMN_WIDTHS = (0.6, 0.5, 0.38)  # where answers stand in one column, in two, in three
+ROWS = MOST_LEVELS // len(COLUMN_WIDTHS)  # of answers below each other
 DIGIT_PLACES = {
     str(digit): ((digit - 1) % 3 - 1, -((digit - 1) // 3)) for digit in range(1, 10)
 } | {"0": (0, -3)}
-MOST_DIGITS = 6
 
 
 def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:

@@ -9,6 +9,7 @@ from string import Formatter
 from typing import Any
 
 from experiments.study.questions import Question
+from experiments.study.study import Study
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import read_toml
@@ -67,12 +68,19 @@ class Texts:
         """The text of a key, with its places filled in; KeyError for an unknown key."""
         return self.by_key[key].format_map(values)
 
+    def of_task(self, task: str, key: str, **values: object) -> str:
+        """The text of a key, in the words of a task where it has its own."""
+        own = f"{task}.{key.rpartition('.')[2]}"
+        return self.of(own if own in self.by_key else key, **values)
+
     def question(self, question: Question) -> str:
         """What a participant is asked: the study's own text, or the shipped one."""
         return question.text.get(self.language) or self.of(f"question.{question.name}.text")
 
     def level(self, question: Question, level: str) -> str:
-        """How an answer is shown: as it stands where the study asks in its own words."""
+        """How an answer is shown: as the study says, else as it stands, or as shipped."""
+        if self.language in question.levels_text:
+            return question.levels_text[self.language][question.levels.index(level)]
         return level if question.text else self.of(f"question.{question.name}.{level}")
 
     def stamp(self, words: str) -> str:
@@ -92,7 +100,8 @@ class Texts:
             name = question.name
             if question.text and self.language not in question.text:
                 self._refuse_question(name, f"got it in {', '.join(question.text)} only")
-            needed = [] if question.text else ["text", *question.levels]
+            levels = () if self.language in question.levels_text else question.levels
+            needed = [] if question.text else ["text", *levels]
             missing = [key for key in needed if f"question.{name}.{key}" not in self.by_key]
             if missing:
                 self._refuse_question(name, f"got none for {', '.join(missing)}")
@@ -102,6 +111,18 @@ class Texts:
             f'expected the question "{name}" in the language "{self.language}", {got}; add '
             f'text.{self.language} = "…" to it in the study file.'
         )
+
+
+def require_texts(study: Study) -> None:
+    """Refuse a study of which a page has no text in one of its languages.
+
+    Raises
+    ------
+    InputError
+        Naming the first language that is not there or lacks a text.
+    """
+    for language in study.languages:
+        Texts.load(language).require(study.questions)
 
 
 def _read(language: str) -> dict[str, str]:

@@ -16,8 +16,7 @@ import numpy as np
 
 from experiments.console.screens import open_window
 from modeling import InputError
-from modeling.models.loading import AnyModel
-from rig.interface import TextureRig
+from rig.interface import Presentable, Stimulus, TextureRig
 
 FLIPS = 240
 PRESSES = 20
@@ -80,7 +79,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
     )
 
 
-def time_presentations(rig: TextureRig, models: Sequence[AnyModel]) -> Timing:
+def time_presentations(rig: TextureRig, models: Sequence[Presentable]) -> Timing:
     """From asking for a virtual surface, as a press does, to its first sample.
 
     Raises
@@ -92,8 +91,12 @@ def time_presentations(rig: TextureRig, models: Sequence[AnyModel]) -> Timing:
     try:
         taken = []
         for number in range(PRESSES):
-            pressed_s = rig.now_s()
-            taken.append(1e3 * (rig.present_model(models[number % len(models)]) - pressed_s))
+            shown, pressed_s = models[number % len(models)], rig.now_s()
+            if isinstance(shown, Stimulus):
+                left_s = rig.present_signal(shown)
+            else:
+                left_s = rig.present_model(shown)
+            taken.append(1e3 * (left_s - pressed_s))
         faults = rig.take_faults()
     finally:
         rig.close()

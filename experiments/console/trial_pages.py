@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from experiments.console.drawing import ORANGE
@@ -72,7 +73,8 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     told = _Line(runner, y=-0.27)
 
     def update() -> None:
-        at_first = None if task.mounts else 0  # what the page announces: the task begins with it
+        # What the page announces: the task begins with it.
+        at_first = None if task.mounts or surfaces.bursts else 0
         shown = at_first if not surfaces.started else surfaces.selected
         shows_real = surfaces.shows_real if surfaces.started else task.mounts
         if real is not None:
@@ -80,7 +82,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         for index, button in enumerate(numbered):
             button.lit = shown == index and not shows_real
         confirm.enabled = surfaces.selected is not None and _remaining(surfaces) == 0
-        told.say(_told(of, surfaces))
+        told.say(_told(partial(runner.texts.of_task, task.name), surfaces))
 
     reals = [] if real is None else [real]
     runner.show(
@@ -88,7 +90,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         widgets=(*reals, *numbered, confirm),
         decoration=(
             runner.title(of(f"{task.name}.question")),
-            runner.remark(of("surface.felt_now"), y=0.225),
+            runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
             runner.card(0.0, 0.06 + BUTTON_PITCH * rows),
             told,
             *runner.foot(of("choice.keys")),

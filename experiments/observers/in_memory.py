@@ -17,7 +17,7 @@ from experiments.study.study import Study
 from experiments.tasks import task_named
 from modeling.checks import check_whole
 from modeling.models.loading import AnyModel
-from rig.interface import HandRows, PresentationRecord, RigReading
+from rig.interface import HandRows, PresentationRecord, RigReading, Stimulus, ToneBurst
 from rig.twin import SimulatedRig
 
 Row = dict[str, object]
@@ -30,6 +30,9 @@ class _UnfeltRig(SimulatedRig):
     """A twin whose hand does not move, and which keeps no record of what it presents."""
 
     def present_model(self, model: AnyModel) -> float:
+        return 0.0
+
+    def present_signal(self, signal: ToneBurst | Stimulus) -> float:
         return 0.0
 
     def present_real(self, texture: str) -> float:

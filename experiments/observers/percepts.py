@@ -18,15 +18,17 @@ from modeling.arrays import Floats
 from modeling.errors import shown
 from modeling.models.ar_model import ARModel
 from modeling.models.loading import AnyModel
+from rig.interface import Presentable, Stimulus
 
 BAND_EDGES_HZ = (10.0, 20.0, 35.0, 60.0, 90.0, 130.0, 180.0, 250.0, 350.0, 480.0)
 STROKES = ((100.0, 1.0), (200.0, 1.5), (300.0, 2.5))  # (mm/s, N)
 STEP_HZ = 1.0
 NOTHING_DB = -300.0  # stands for the level of silence
+_FREQUENCY_HZ = np.arange(BAND_EDGES_HZ[0], BAND_EDGES_HZ[-1], STEP_HZ) + STEP_HZ / 2
 
 
 def sensation_levels(
-    model: AnyModel,
+    model: Presentable,
     threshold: Threshold,
     *,
     strokes: tuple[tuple[float, float], ...] = STROKES,
@@ -40,8 +42,8 @@ def sensation_levels(
 
     Parameters
     ----------
-    model : TextureModel, RegressedModel or ARModel
-        In g.
+    model : TextureModel, RegressedModel, ARModel or Stimulus
+        In g; a stimulus is felt alike in every stroke.
     threshold : Threshold
     strokes : tuple of (speed in mm/s, force in N)
 
@@ -59,27 +61,44 @@ def sensation_levels(
 
 
 def _levels(
-    model: AnyModel, threshold: Threshold, *, strokes: tuple[tuple[float, float], ...] = STROKES
+    shown_as: Presentable,
+    threshold: Threshold,
+    *,
+    strokes: tuple[tuple[float, float], ...] = STROKES,
 ) -> Floats:
     """As `sensation_levels`, but negative below threshold; `NOTHING_DB` of silence."""
-    if model.unit != "g":
+    if isinstance(shown_as, Stimulus):  # felt alike whatever the hand does
+        one = _in_bands(_power_of_signal(shown_as), shown_as.rate_hz, threshold)
+        return np.tile(one, (len(strokes), 1))
+    if shown_as.unit != "g":
         raise InputError(
-            f"expected a model in g for a simulated participant, got one of {model.texture} in "
-            f"unit {shown(model.unit)}; record it with a calibrated sensor."
+            f"expected a model in g for a simulated participant, got one of {shown_as.texture} in "
+            f"unit {shown(shown_as.unit)}; record it with a calibrated sensor."
         )
-    edges = np.array(BAND_EDGES_HZ)
-    frequency_hz = np.arange(edges[0], edges[-1], STEP_HZ) + STEP_HZ / 2
-    limit_g = threshold.at(frequency_hz)
-    known = np.isfinite(limit_g) & (frequency_hz < model.rate_hz / 2)
-    frequency_hz, limit_g = frequency_hz[known], limit_g[known]
-    band = np.searchsorted(edges, frequency_hz, side="right") - 1
-    levels = np.zeros((len(strokes), edges.size - 1))
-    for row, (speed_mm_s, force_n) in enumerate(strokes):
-        made = model.filter if isinstance(model, ARModel) else model.peq
-        response = made(speed_mm_s, force_n).response(frequency_hz)
-        power = 2 * response**2 * (2 / model.rate_hz) * STEP_HZ / limit_g**2
-        total = np.bincount(band, weights=power, minlength=edges.size - 1)
-        levels[row] = 10 * np.log10(np.maximum(total, 10 ** (NOTHING_DB / 10)))
+    made = shown_as.filter if isinstance(shown_as, ARModel) else shown_as.peq
+    responses = (made(*stroke).response(_FREQUENCY_HZ) for stroke in strokes)
+    powers = (response**2 * (2 / shown_as.rate_hz) * STEP_HZ for response in responses)
+    return np.stack([_in_bands(power, shown_as.rate_hz, threshold) for power in powers])
+
+
+def _power_of_signal(stimulus: Stimulus) -> Floats:
+    """Power (g²) of a signal in the steps of `_FREQUENCY_HZ`, averaged over its length (Welch)."""
+    from scipy.signal import welch
+
+    length = min(stimulus.samples_g.size, round(stimulus.rate_hz / STEP_HZ))
+    frequency_hz, density = welch(stimulus.samples_g, fs=stimulus.rate_hz, nperseg=length)
+    power: Floats = np.interp(_FREQUENCY_HZ, frequency_hz, density, right=0.0) * STEP_HZ
+    return power
+
+
+def _in_bands(power_g2: Floats, rate_hz: float, threshold: Threshold) -> Floats:
+    """Power (n,) at `_FREQUENCY_HZ` as levels (9,) above threshold in the bands, in dB."""
+    limit_g = threshold.at(_FREQUENCY_HZ)
+    known = np.isfinite(limit_g) & (rate_hz / 2 > _FREQUENCY_HZ)
+    band = np.searchsorted(BAND_EDGES_HZ, _FREQUENCY_HZ[known], side="right") - 1
+    relative = 2 * power_g2[known] / limit_g[known] ** 2
+    total = np.bincount(band, weights=relative, minlength=len(BAND_EDGES_HZ) - 1)
+    levels: Floats = 10 * np.log10(np.maximum(total, 10 ** (NOTHING_DB / 10)))
     return levels
 
 

@@ -64,7 +64,7 @@ def refuse_begun(files: SessionFiles) -> None:
 def _require_day_before(
     files: SessionFiles, manifest: SessionManifest, *, overrides: Overrides
 ) -> None:
-    """The session before must be complete, and of a person begun on an earlier date."""
+    """The session before must be complete and, of a person, have ended on an earlier date."""
     before = replace(files, session=manifest.session - 1)
     try:
         state = session_state(before.log)

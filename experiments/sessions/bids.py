@@ -55,7 +55,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
     held = _held(files)
     if held.state.events:  # killed before its first event, it has nothing to show
         _write_changed(_session_files(files, held))
-    _export_people(Path(data_folder))
+    _export_people(Path(data_folder), {files: held})
 
 
 def export_all(data_folder: str | Path) -> tuple[str, ...]:
@@ -77,15 +77,15 @@ def export_all(data_folder: str | Path) -> tuple[str, ...]:
         As `export_session`.
     """
     root = Path(data_folder)
-    written = []
+    written, read = [], {}
     for files in sessions_in(root):
-        held = _held(files)
+        read[files] = held = _held(files)
         if held.state.status == "running" or not held.state.events or _is_exported(files):
             continue
         _write_changed(_session_files(files, held))
         written.append(files.stem)
-    if sessions_in(root) or (root / "participants.tsv").exists():
-        _export_people(root)
+    if read or (root / "participants.tsv").exists():
+        _export_people(root, read)
     return tuple(written)
 
 
@@ -173,7 +173,7 @@ def _hand(files: SessionFiles, held: Held) -> dict[Path, bytes]:
         ) from None
     onsets = bids_events.onsets_s(held.state.events)
     made: dict[Path, bytes] = {}
-    for run, readings in bids_physio.by_run(hand, held.state.events).items():
+    for run, readings in bids_physio.by_run(hand).items():
         stem = f"{files.stem}_recording-start{run}_physio"
         start_s = bids_physio.start_onset_s(readings, held.state.events, onsets, run=run)
         made[_beh(files) / f"{stem}.json"] = json_bytes(
@@ -223,7 +223,7 @@ def _circumstances(held: Held) -> dict[str, Any]:
         "StudySHA256": manifest.study_sha256,
         "PlanSHA256": manifest.plan_sha256,
         "ModelsSHA256": manifest.models_sha256,
-        "Identical": list(manifest.identical),
+        "Identical": manifest.identical,
         "Overrides": overrides,
         "Rig": manifest.rig,
     }
@@ -264,15 +264,17 @@ def _is_exported(files: SessionFiles) -> bool:
     return whole and stated.get("DerivedFrom") == _sources(files)
 
 
-def _export_people(root: Path) -> None:
+def _export_people(root: Path, read: Mapping[SessionFiles, Held]) -> None:
     """The tables about people, and what stands beside them, of all sessions that are shown.
 
-    Nothing of a data set that also holds people without source data, as one that was published.
+    `read` are sessions that need not be read again. Nothing of a data set that also holds people
+    without source data, as one that was published.
     """
     sessions = [
         held
         for files in sessions_in(root)
-        if (_beh(files) / f"{files.stem}_beh.tsv").is_file() and (held := _held(files)).state.events
+        if (_beh(files) / f"{files.stem}_beh.tsv").is_file()
+        and (held := read.get(files) or _held(files)).state.events
     ]
     known = {held.participant for held in sessions}
     if any(path.is_dir() and path.name not in known for path in root.glob("sub-*")):

@@ -72,7 +72,7 @@ _OWN: dict[str, dict[str, Any]] = {
 _FROM_PRESENTATIONS = {
     name: described
     for name, described in PRESENTATION_COLUMNS.items()
-    if name not in ("trial", "surface", "start_s", "end_s", "faults")
+    if name not in ("run", "trial", "surface", "start_s", "end_s", "faults")
 }
 COLUMNS: dict[str, dict[str, Any]] = {**_OWN, **_FROM_PRESENTATIONS}
 # Answers are in their own tables, the participants' in participants.tsv.
@@ -92,11 +92,13 @@ def event_rows(
         The rows of the session's table of presentations, as text.
     """
     onsets = onsets_s(events)
-    shown: dict[str, list[Mapping[str, str]]] = {}
+    # By start of the session too: a trial that broke off is presented again in a later one, whose
+    # rig has a clock of its own.
+    shown: dict[tuple[str, str], list[Mapping[str, str]]] = {}
     for row in presentations:
-        shown.setdefault(row["trial"], []).append(row)
+        shown.setdefault((row["run"], row["trial"]), []).append(row)
     rows = [
-        _row(event, onset, shown.get(str(event.get("trial")), []))
+        _row(event, onset, shown.get((str(event["run"]), str(event.get("trial"))), []))
         for event, onset in zip(events, onsets, strict=True)
     ]
     return sorted(rows, key=lambda row: float(str(row["onset"])))

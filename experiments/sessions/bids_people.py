@@ -114,7 +114,8 @@ def _questions(sessions: Iterable[Held]) -> dict[str, dict[str, Any]]:
             wording = question.get("text", {})
             described: dict[str, Any] = {"Description": wording.get("en", name.replace("_", " "))}
             if levels:
-                described["Levels"] = {level: level for level in levels}
+                english = question.get("levels_text", {}).get("en", levels)
+                described["Levels"] = dict(zip(levels, english, strict=True))
             if name == "age":
                 described["Units"] = "year"
             columns.setdefault(name, described)

@@ -53,20 +53,10 @@ COLUMNS: dict[str, dict[str, Any]] = {
 }
 
 
-def by_run(hand: pd.DataFrame, events: Sequence[Event]) -> dict[int, pd.DataFrame]:
-    """The readings of each start of a session, whose rig has a clock of its own, by its number.
-
-    A trial's readings are stored once, right after its answer: they are of the start in which it
-    was answered.
-    """
-    run_of = {
-        event["trial"]: event["run"]
-        for kind in ("presented", "answer")
-        for event in events
-        if event["event"] == kind and "trial" in event
-    }
-    runs = hand["trial"].map(run_of)
-    return {int(run): hand[runs == run] for run in sorted(runs.dropna().unique())}
+def by_run(hand: pd.DataFrame) -> dict[int, pd.DataFrame]:
+    """The readings of each start of a session, whose rig has a clock of its own, by its number."""
+    runs = sorted(set(hand["run"].astype(int)))
+    return {run: hand[hand["run"] == run] for run in runs}
 
 
 def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:

@@ -43,7 +43,10 @@ def table_bytes(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) ->
     """A table with a header; what a row does not have is n/a."""
     names = tuple(columns)
     lines = ["\t".join(names)]
-    lines += ["\t".join(cell(row.get(name)) for name in names) for row in rows]
+    # Most rows have few of the columns, as those of events do.
+    for row in rows:
+        cells = {name: cell(value) for name, value in row.items()}
+        lines.append("\t".join(cells.get(name, MISSING) for name in names))
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 

@@ -8,6 +8,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from modeling import InputError
+from modeling.errors import shown
 from modeling.files.places import unfinished_file
 
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
@@ -135,3 +137,12 @@ def put_file(path: Path, data: bytes) -> None:
             os.close(handle)
         os.replace(hidden, path)
     sync_folder(path.parent)
+
+
+def require_data_folder(root: Path) -> None:
+    """InputError where there is no such folder."""
+    if not root.is_dir():
+        raise InputError(
+            f"expected the data folder of a study, got none at {shown(str(root))}; the first "
+            "session makes it, or name another with --data."
+        )

@@ -45,8 +45,8 @@ class SessionManifest:
     study_sha256, plan_sha256 : str
     models_sha256 : mapping of texture to mapping of set to SHA-256
     model_sources : mapping of set to path
-    identical : sequence of str
-        Textures whose models are all equal.
+    identical : mapping of texture to sequence of sequence of str
+        Of the task's sets those whose models of a texture are equal, group by group: controls.
     rig : mapping
         What the rig states: its file's SHA-256, firmware, what is assumed.
     description : str
@@ -73,7 +73,7 @@ class SessionManifest:
     plan_sha256: str
     models_sha256: Mapping[str, Mapping[str, str]]
     model_sources: Mapping[str, str]
-    identical: Sequence[str]
+    identical: Mapping[str, Sequence[Sequence[str]]]
     rig: Values
     description: str
     trials: Sequence[Values]
@@ -141,8 +141,8 @@ _KINDS: dict[str, Any] = {
     **dict.fromkeys(("task", "code", "language", "study_sha256", "plan_sha256"), str),
     **dict.fromkeys(("subject", "session", "slot"), int),
     **dict.fromkeys(("pilot", "simulated_participant", "simulated_rig"), bool),
-    **dict.fromkeys(("study", "models_sha256", "model_sources", "rig"), dict),
-    **dict.fromkeys(("identical", "trials", "overrides"), list),
+    **dict.fromkeys(("study", "models_sha256", "model_sources", "identical", "rig"), dict),
+    **dict.fromkeys(("trials", "overrides"), list),
     "description": str,
     **_PROGRAM,
 }

@@ -60,15 +60,18 @@ class Roster:
     def __init__(self, data_folder: str | Path) -> None:
         self.path = Path(data_folder) / "sourcedata" / "roster.jsonl"
 
-    def enroll(
+    @contextmanager
+    def enrolling(
         self,
         subject: int | None,
         participants: int,
         *,
         simulated: bool = False,
         pilot: bool = False,
-    ) -> Person:
+    ) -> Iterator[Person]:
         """The participant with this number, enrolled now if never before.
+
+        Who is new is not enrolled after all where the block raises; meanwhile nobody else can be.
 
         Parameters
         ----------
@@ -78,8 +81,8 @@ class Roster:
             How many slots the task's design has.
         simulated, pilot : bool
 
-        Returns
-        -------
+        Yields
+        ------
         Person
             With the slot of its own number if that is free, else with the lowest one that somebody
             left who withdrew or dropped out.
@@ -91,19 +94,6 @@ class Roster:
         StoreError
             If the disk does not take it.
         """
-        with self.enrolling(subject, participants, simulated=simulated, pilot=pilot) as person:
-            return person
-
-    @contextmanager
-    def enrolling(
-        self,
-        subject: int | None,
-        participants: int,
-        *,
-        simulated: bool = False,
-        pilot: bool = False,
-    ) -> Iterator[Person]:
-        """As `enroll`; who is new is not enrolled after all where the block raises."""
         check_whole("subject", 1 if subject is None else subject, low=1, high=9999)
         with self._locked() as entries:
             number = subject if subject is not None else _first_free(entries)

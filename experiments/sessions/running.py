@@ -112,6 +112,8 @@ def run_session(
     models.require(study, allow=overrides.allow)
     _require_language(study, said.language)
     root = Path(data_folder)
+    for stimulus in models.stimuli:
+        rig.check_stimulus(stimulus)
     rig.open()
     try:
         enrolling = Roster(root).enrolling(
@@ -126,18 +128,18 @@ def run_session(
             manifest = _manifest(
                 plan, task, models=models, rig=rig, people=people, code=person.code
             )
-            intake = _intake(study, root, person)
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, _with(manifest, said, study), overrides=overrides)
         with store:
+            stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
-                _stored_plan(plan, task, store=store, models=models),
+                stored,
                 task,
                 models=models,
                 rig=rig,
                 people=people,
                 store=store,
-                intake=intake,
+                intake=_intake(stored.study, root, person),
                 agenda=_agenda(task, store),
                 pilot=said.pilot,
             )
@@ -173,7 +175,7 @@ def _manifest(
         plan_sha256=plan_sha256(study, sha256),
         models_sha256=sha256,
         model_sources={},
-        identical=models.identical(study.textures, study.models_of(plan.task)),
+        identical=models.equal_models(study.textures, study.models_of(plan.task)),
         rig=rig.stated,
         description=task.description,
         trials=[asdict(trial) for trial in plan.trials],

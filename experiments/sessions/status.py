@@ -11,13 +11,12 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import SessionFiles, sessions_in
+from experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import SessionState, Status, session_state
 from experiments.study.study import Study
 from modeling import InputError
-from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 
 
@@ -103,8 +102,7 @@ def study_progress(
         log or the roster cannot be read.
     """
     root = Path(data_folder)
-    if not root.is_dir():
-        raise InputError(f"expected a data folder, got {shown(str(root))}; name it with --data.")
+    require_data_folder(root)
     held = [
         (files, SessionManifest.load(files.manifest), session_state(files.log))
         for files in sessions_in(root)

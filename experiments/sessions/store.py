@@ -31,7 +31,7 @@ from experiments.sessions.tables import GrowingTable
 from experiments.sessions.traces import (
     HAND_COLUMNS,
     PRESENTATION_COLUMNS,
-    hand_table,
+    hand_lines,
     pen_file,
     presentation_table,
 )
@@ -376,8 +376,10 @@ class SessionStore:
         faults: Sequence[Fault],
     ) -> None:
         """See `Store.trace`."""
-        self._shown.extend(presentation_table(trial, presentations, rows=rows, faults=faults))
-        self._hand.extend(hand_table(trial, rows))
+        self._shown.extend(
+            presentation_table(trial, presentations, run=self.run, rows=rows, faults=faults)
+        )
+        self._hand.extend_lines(hand_lines(trial, rows, run=self.run))
 
     def acceleration(self, trial: int, pieces: Sequence[Acceleration]) -> None:
         """See `Store.acceleration`: a WAV file in g for each piece."""

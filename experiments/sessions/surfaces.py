@@ -9,8 +9,7 @@ from typing import Literal, Protocol
 
 from experiments.study.questions import Question
 from modeling import InputError
-from modeling.models.loading import AnyModel
-from rig.interface import TextureRig, ToneBurst
+from rig.interface import Presentable, Stimulus, TextureRig, ToneBurst
 
 HIGHEST_RATING = 100.0
 Whose = Literal["participant", "experimenter", "signal"]
@@ -77,8 +76,9 @@ class Surfaces:
     rig : TextureRig
     texture : str
         The real surface.
-    models : sequence of TextureModel, RegressedModel, ARModel or ToneBurst
-        The virtual surfaces, one per button; a burst is presented once in a trial.
+    models : sequence of TextureModel, RegressedModel, ARModel, Stimulus or ToneBurst
+        The virtual surfaces, one per button; a stimulus plays once each time that it is presented,
+        a burst once in a trial.
     begin : callable
         Presents the first surface; called by `start`.
     note : callable
@@ -106,7 +106,7 @@ class Surfaces:
         rig: TextureRig,
         *,
         texture: str,
-        models: Sequence[AnyModel | ToneBurst],
+        models: Sequence[Presentable | ToneBurst],
         begin: Callable[[Surfaces], None],
         note: Note,
         feel_all: bool = False,
@@ -143,6 +143,11 @@ class Surfaces:
         return len(self._models)
 
     @property
+    def bursts(self) -> bool:
+        """Whether bursts stand for surfaces: nothing is presented before a button is pressed."""
+        return any(isinstance(shown, ToneBurst) for shown in self._models)
+
+    @property
     def response_time_s(self) -> float:
         """Time since the first sample of the first presentation left; 0 before."""
         return 0.0 if self._began_s is None else time.perf_counter() - self._began_s
@@ -175,12 +180,9 @@ class Surfaces:
             )
         self._selected = index
         shown = self._models[index]
-        if isinstance(shown, ToneBurst):
-            if index in self.felt:
-                return
-            left_s = self._rig.present_signal(shown)
-        else:
-            left_s = self._rig.present_model(shown)
+        if isinstance(shown, ToneBurst) and index in self.felt:
+            return
+        left_s = self._present(shown)
         self.presses += 1
         self.felt.add(index)
         self._presented("virtual", left_s, index=index)
@@ -206,13 +208,18 @@ class Surfaces:
         elif self._selected is not None:
             shown = self._models[self._selected]
             if not isinstance(shown, ToneBurst):
-                left_s = self._rig.present_model(shown)
-                self._again("virtual", left_s, index=self._selected)
+                self._again("virtual", self._present(shown), index=self._selected)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""
         if self._rig.read().button:
             self.toggle()
+
+    def _present(self, shown: Presentable | ToneBurst) -> float:
+        """Present a virtual surface, a stimulus from its beginning; when its first sample left."""
+        if isinstance(shown, ToneBurst | Stimulus):
+            return self._rig.present_signal(shown)
+        return self._rig.present_model(shown)
 
     def _again(self, shown: str, left_s: float, **which: int) -> None:
         self._note("presented", surface=shown, start_s=left_s, **which)

@@ -66,9 +66,13 @@ class GrowingTable:
         StoreError
             If the disk does not take them; the rows before them stay as they are.
         """
+        self.extend_lines(map(self._line, rows))
+
+    def extend_lines(self, lines: Iterable[str]) -> None:
+        """Append rows that are lines of cells already, each with its end; raises as `extend`."""
         end = os.fstat(self._handle).st_size
         try:
-            write_all(self._handle, "".join(map(self._line, rows)).encode())
+            write_all(self._handle, "".join(lines).encode())
         except OSError as error:
             # Half a row would spoil the table for every reader: cut it off again.
             with suppress(OSError):
@@ -76,7 +80,7 @@ class GrowingTable:
             raise store_error(error, self.path) from error
 
     def _line(self, row: Mapping[str, object]) -> str:
-        return "\t".join(cell(row[column]) for column in self._columns) + "\n"
+        return "\t".join([cell(row[column]) for column in self._columns]) + "\n"
 
     def close(self) -> None:
         """Close the file."""
@@ -93,6 +97,8 @@ def cell(value: object) -> str:
     InputError
         For an infinite number.
     """
+    if type(value) is int:  # as most are
+        return str(value)
     if value is None or value == "":
         return MISSING
     if isinstance(value, bool | np.bool_):

@@ -10,8 +10,7 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.study.design import Occasion, Order, Trial
 from experiments.study.models import ModelSets
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
-from modeling.models.loading import AnyModel
-from rig.interface import TextureRig, ToneBurst
+from rig.interface import Presentable, TextureRig, ToneBurst
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +51,7 @@ class Task:
     description: str
     trial: type[Trial]
     trials: Callable[[Occasion, Order], list[dict[str, Any]]]
-    virtual: Callable[[ModelSets, Any], Sequence[AnyModel | ToneBurst]]
+    virtual: Callable[[ModelSets, Any], Sequence[Presentable | ToneBurst]]
     begin: Callable[[Any, Surfaces], None]
     ask: Callable[[Respondent, Any, Surfaces], Mapping[str, object]]
     adapt: Callable[[Any, Sequence[Mapping[str, object]], TextureRig], Any] | None = None

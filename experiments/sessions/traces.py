@@ -10,10 +10,18 @@ from typing import Any
 import numpy as np
 
 from experiments.sessions.strokes import Outside, outside_grid
+from modeling import InputError
 from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
 
 _CLOCK = "seconds since the rig was opened"
+_RUN = {
+    "run": {
+        "Description": "In which start of the session, from 1; a trial that broke off in one is "
+        "presented again in a later one, which has its answer"
+    },
+}
 HAND_COLUMNS: dict[str, dict[str, Any]] = {
+    **_RUN,
     "trial": {"Description": "Number of the trial"},
     "presentation": {"Description": "Number of the presentation; 0 where nothing was presented"},
     "time_s": {"Description": f"Time of the reading, {_CLOCK}", "Units": "s"},
@@ -52,11 +60,14 @@ _COUNTERS = {
     "limited_duration": "Samples that the limit of the duration muted",
 }
 PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
+    **_RUN,
     "trial": {"Description": "Number of the trial"},
     "presentation": {"Description": "Number of the presentation, since the rig was opened"},
     "surface": {"Description": "real or virtual"},
     "texture": {"Description": "Of the real surface, or of the model"},
-    "model_sha256": {"Description": "Of the model; n/a of a real surface"},
+    "model_sha256": {
+        "Description": "Of the model, or of the file of a stimulus set; n/a of a real surface"
+    },
     "start_s": {"Description": f"When its first sample left, {_CLOCK}", "Units": "s"},
     "end_s": {"Description": f"When its last sample left, {_CLOCK}", "Units": "s"},
     **{
@@ -74,39 +85,54 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
 }
 
 
-def hand_table(trial: int, rows: HandRows) -> Iterator[Mapping[str, object]]:
-    """The rows of a trial's history as the table holds them."""
+def hand_lines(trial: int, rows: HandRows, *, run: int) -> Iterator[str]:
+    """The rows of a trial's history in one start of the session, as lines of the table.
+
+    Written directly, since there are up to thousands in a second.
+
+    Raises
+    ------
+    InputError
+        For an infinite number.
+    """
+    measured = {name: getattr(rows, name) for name in ("time_s", "speed_mm_s", "force_n")}
+    for name, values in measured.items():
+        if np.isinf(values).any():
+            raise InputError(f"expected a finite {name} of the hand, got infinity; present again.")
     columns = zip(
         rows.presentation.tolist(),
-        rows.time_s.tolist(),
-        rows.speed_mm_s.tolist(),
-        rows.force_n.tolist(),
+        *(values.tolist() for values in measured.values()),
         rows.surface.tolist(),
         rows.force_assumed.tolist(),
         strict=True,
     )
     for presentation, time_s, speed_mm_s, force_n, surface, assumed in columns:
-        yield {
-            "trial": trial,
-            "presentation": presentation,
-            "time_s": round(time_s, 6),
-            "speed_mm_s": round(speed_mm_s, 4),
-            "force_n": round(force_n, 5),
-            "surface": SURFACES[surface],
-            "force_assumed": int(assumed),
-        }
+        yield (
+            f"{run}\t{trial}\t{presentation}\t{_number(time_s, 6)}\t{_number(speed_mm_s, 4)}\t"
+            f"{_number(force_n, 5)}\t{SURFACES[surface]}\t{int(assumed)}\n"
+        )
+
+
+def _number(value: float, digits: int) -> str:
+    return "n/a" if value != value else f"{round(value, digits):.10g}"
 
 
 def presentation_table(
-    trial: int, records: Sequence[PresentationRecord], *, rows: HandRows, faults: Sequence[Fault]
+    trial: int,
+    records: Sequence[PresentationRecord],
+    *,
+    run: int,
+    rows: HandRows,
+    faults: Sequence[Fault],
 ) -> Iterator[Mapping[str, object]]:
-    """The presentations of a trial as the table holds them."""
+    """The presentations of a trial in one start of the session, as the table holds them."""
     next_s = [*(record.start_s for record in records[1:]), inf]
     for record, until_s in zip(records, next_s, strict=False):
         outside = outside_grid(rows, [record]) or Outside()
         # A fault may be noticed when a presentation has ended.
         told = [fault.told for fault in faults if record.start_s <= fault.time_s < until_s]
         yield {
+            "run": run,
             "trial": trial,
             "presentation": record.number,
             "surface": record.surface,

@@ -8,7 +8,7 @@ recorded (docs/method/protocols.md#training).
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from statistics import median
@@ -27,7 +27,7 @@ from experiments.sessions.surfaces import (
 from experiments.sessions.task import Task
 from experiments.study.design import SessionPlan, Trial
 from experiments.study.models import ModelSets
-from rig.interface import Fault, TextureRig
+from rig.interface import Fault, HandRows, PresentationRecord, TextureRig
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,11 +103,11 @@ def run_trials(
             store.log("welcome", consent=intake.consent, answers=dict(answers))
         running.run()
     except SessionAborted as aborted:
-        running.fall_silent()
+        running.break_off()
         store.finish("aborted", aborted.reason, by=aborted.by)
         return running.result(completed=False, reason=aborted.reason)
     except BaseException as error:
-        running.fall_silent()
+        running.break_off()
         # The log must not hide what went wrong, for instance a full disk.
         with suppress(OSError):
             status, reason, by = _ending_of(error)
@@ -152,6 +152,7 @@ class _Running:
         self._rows: list[Mapping[str, object]] = list(agenda.rows)
         self._next_number = agenda.next_number
         self._at: int | None = None  # the trial that runs now
+        self._presents = False  # whether its surfaces are presented, so that the hand counts
         self._durations_s: list[float] = []
         self._inside = True
         self._mains = sum(trial.phase == "main" for trial in plan.trials)
@@ -188,14 +189,27 @@ class _Running:
         where = {} if self._at is None else {"trial": self._at}
         self._store.log(event, **where, **fields)
 
-    def fall_silent(self) -> None:
+    def fall_silent(self) -> list[Fault]:
         """Silence the rig, and log its faults; what fails in that hides nothing else."""
-        for end in (self._rig.silence, self.log_faults):
-            try:
-                end()
-            except Exception as error:
-                with suppress(OSError):
-                    self._store.log("fault", told=f"{type(error).__name__}: {error}")
+        faults: list[Fault] = []
+        self._at_any_rate(self._rig.silence)
+        self._at_any_rate(lambda: faults.extend(self.log_faults()))
+        return faults
+
+    def break_off(self) -> None:
+        """Fall silent, and keep what the hand did and felt in a trial that has no answer."""
+        faults = self.fall_silent()
+        if self._presents and self._at is not None:
+            at = self._at
+            self._at_any_rate(lambda: self._keep(at, faults))
+
+    def _at_any_rate(self, end: Callable[[], object]) -> None:
+        """Do what ends a session; where it fails, that is logged, and hides nothing else."""
+        try:
+            end()
+        except Exception as error:
+            with suppress(OSError):
+                self._store.log("fault", told=f"{type(error).__name__}: {error}")
 
     def log_faults(self) -> tuple[Fault, ...]:
         """Take the rig's faults, and log them."""
@@ -282,6 +296,7 @@ class _Running:
         rig.take_history()
         rig.take_presentations()
         rig.take_acceleration()
+        self._presents = True
         surfaces = Surfaces(
             rig,
             texture=trial.texture,
@@ -338,12 +353,20 @@ class _Running:
 
     def _trace(self, trial: Trial, faults: Sequence[Fault]) -> None:
         """Store what the hand did and felt; tell the participant who mostly stroked outside."""
-        rows, shown = self._rig.take_history(), self._rig.take_presentations()
-        self._store.trace(trial.trial, rows, presentations=shown, faults=faults)
-        self._store.acceleration(trial.trial, self._rig.take_acceleration())
+        rows, shown = self._keep(trial.trial, faults)
         advice = advice_on(outside_grid(rows, shown))
         self._inside = advice is None
         if advice is not None:
             page, percent = advice
             self.note("outside", advice=page, percent=percent)
             self._respondent.announce(page, percent=percent)
+
+    def _keep(
+        self, trial: int, faults: Sequence[Fault]
+    ) -> tuple[HandRows, tuple[PresentationRecord, ...]]:
+        """Store what the rig has kept of a trial, and return it; it is kept once."""
+        self._presents = False
+        rows, shown = self._rig.take_history(), self._rig.take_presentations()
+        self._store.trace(trial, rows, presentations=shown, faults=faults)
+        self._store.acceleration(trial, self._rig.take_acceleration())
+        return rows, shown

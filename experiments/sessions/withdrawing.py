@@ -9,11 +9,10 @@ import shutil
 from pathlib import Path
 
 from experiments.sessions.bids import export_all
-from experiments.sessions.files import sessions_in
+from experiments.sessions.files import require_data_folder, sessions_in
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import is_running
 from modeling import InputError
-from modeling.errors import shown
 from modeling.files.places import clear_unfinished
 from modeling.files.writing import write_bytes
 
@@ -95,8 +94,7 @@ def _folders(root: Path, subject: int) -> tuple[Path, Path]:
 
 
 def _require_still(root: Path, subject: int) -> None:
-    if not root.is_dir():
-        raise InputError(f"expected a data folder, got {shown(str(root))}; name it with --data.")
+    require_data_folder(root)
     for files in sessions_in(root):
         if files.subject == subject and is_running(files.log):
             raise InputError(

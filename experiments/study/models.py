@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import NoReturn
 
@@ -11,12 +12,14 @@ from experiments.study.study import Study
 from modeling import InputError, TextureModel
 from modeling.checks import check_keys
 from modeling.models.compiled_for import CompiledFor
-from modeling.models.loading import AnyModel, load_any_models
+from modeling.models.loading import load_any_models
+from modeling.models.loading import made_from as model_made_from
 from modeling.scenes.compiled import FILE as SCENE
 from modeling.scenes.loading import scene_files, scene_models
+from rig.interface import Presentable, Stimulus
+from rig.sound.signals import MANIFEST as STIMULI
+from rig.sound.signals import stimuli_of_surfaces
 
-Presentable = AnyModel
-STIMULI = "manifest.tsv"  # stands in a folder of tactileq stimuli
 # What may go on where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
 
@@ -49,6 +52,12 @@ class ModelSets:
         notes = (getattr(model, "compiled_for", None) for model in every)
         return next((note for note in notes if note), None)
 
+    @property
+    def stimuli(self) -> tuple[Stimulus, ...]:
+        """All files of stimulus sets among them."""
+        every = (shown for models in self.sets.values() for shown in models.values())
+        return tuple(shown for shown in every if isinstance(shown, Stimulus))
+
     def of(self, texture: str, name: str) -> Presentable:
         """The model of one texture in one set."""
         return self.sets[name][texture]
@@ -71,14 +80,40 @@ class ModelSets:
             if all(self.of(texture, first) == self.of(texture, name) for name in others)
         )
 
-    def exchanged(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
-        """Textures whose reference was made from the model of another set, with that set's name."""
-        reference, *others = self.names
+    def equal_models(
+        self, textures: Sequence[str], names: Sequence[str] | None = None
+    ) -> dict[str, tuple[tuple[str, ...], ...]]:
+        """Of all (or these) sets those whose models of a texture are equal, group by group.
+
+        Returns
+        -------
+        dict
+            Texture to groups of two names at least; without textures that have none.
+        """
+        found = {}
+        for texture in textures:
+            groups: list[list[str]] = []
+            for name in names or self.names:
+                model = self.of(texture, name)
+                equal = [group for group in groups if self.of(texture, group[0]) == model]
+                if equal:
+                    equal[0].append(name)
+                else:
+                    groups.append([name])
+            if several := tuple(tuple(group) for group in groups if len(group) > 1):
+                found[texture] = several
+        return found
+
+    def exchanged(self, textures: Sequence[str]) -> tuple[tuple[str, str, str], ...]:
+        """Textures whose model in one set was made from the one in a later set: both sets' names.
+
+        The first is the set that should come later.
+        """
         return tuple(
-            (texture, name)
+            (texture, earlier, later)
             for texture in textures
-            for name in others
-            if self.of(texture, name).sha256 in made_from(self.of(texture, reference))
+            for earlier, later in combinations(self.names, 2)
+            if model_sha256(self.of(texture, later)) in made_from(self.of(texture, earlier))
         )
 
     def of_others(self, textures: Sequence[str]) -> tuple[tuple[str, str], ...]:
@@ -88,7 +123,7 @@ class ModelSets:
             for texture in textures
             for name in self.names
             if (sources := made_from(self.of(texture, name)))
-            and not sources & {self.of(texture, other).sha256 for other in self.names}
+            and not sources & {model_sha256(self.of(texture, other)) for other in self.names}
         )
 
     def require(self, study: Study, *, allow: Allow = refuse) -> None:
@@ -104,7 +139,7 @@ class ModelSets:
         ------
         InputError
             Naming textures and sets: of missing models; where the models of all textures are equal;
-            where the reference was made from another set's model.
+            where a model was made from one of a later set.
         """
         self._require_all(study)
         for task in study.tasks:
@@ -116,12 +151,12 @@ class ModelSets:
                     "threshold or margin, or add other textures."
                 )
         if exchanged := self.exchanged(study.textures):
-            texture, name = exchanged[0]
+            texture, earlier, later = exchanged[0]
             allow(
                 "exchanged models",
-                f"expected the reference set {self.names[0]} to hold the models that others were "
-                f"made from, got one of {texture} that was made from the one in {name}; exchange "
-                "the two sets.",
+                "expected models to be made from those of a set that is named before theirs, got "
+                f"the {earlier} model of {texture}, made from the {later} one; exchange the two "
+                "sets.",
             )
 
     def _require_all(self, study: Study) -> None:
@@ -144,11 +179,14 @@ class ModelSets:
                 )
 
 
-def made_from(model: Presentable) -> set[str]:
-    """SHA-256 of the models that a model says it was simplified or compiled from."""
-    note = getattr(model, "compiled_for", None)
-    stated = {getattr(model, "simplified_from", ""), note.full_sha256 if note else ""}
-    return stated - {""}
+def made_from(shown: Presentable) -> frozenset[str]:
+    """SHA-256 of the models that a model, or that of a stimulus, says it was made from."""
+    return shown.made_from if isinstance(shown, Stimulus) else model_made_from(shown)
+
+
+def model_sha256(shown: Presentable) -> str:
+    """SHA-256 of a model, or of that of a stimulus."""
+    return shown.model_sha256 if isinstance(shown, Stimulus) else shown.sha256
 
 
 def load_model_sets(
@@ -184,7 +222,7 @@ def load_model_sets(
         place = given.get(name, Path(folder) / stated)
         reference = next(iter(sets.values()), None)
         try:
-            sets[name], read = _models_at(place, reference, progress=progress)
+            sets[name], read = _models_at(place, reference, study, name=name, progress=progress)
         except InputError as error:
             raise InputError(f"models {name}: {error}") from None
         files += read
@@ -194,15 +232,18 @@ def load_model_sets(
 def _models_at(
     place: Path,
     reference: Mapping[str, Presentable] | None,
+    study: Study,
     *,
+    name: str,
     progress: Callable[[float, str], None],
 ) -> tuple[Mapping[str, Presentable], list[Path]]:
-    """The models of a folder or a scene; of a scene those that belong to the reference's."""
-    if place.is_dir() and (place / STIMULI).is_file():
-        raise InputError(
-            f"expected models in {place}, got a stimulus set of tactileq stimuli, whose signals "
-            "do not follow a hand; give the models that it was rendered from."
-        )
+    """The models of a folder or a scene, or the files of a stimulus set.
+
+    Of a scene those that belong to the reference's; of a stimulus set those labelled as the set.
+    """
+    if (place / STIMULI).is_file():
+        found = stimuli_of_surfaces(place, label=name, textures=study.textures)
+        return found, [place]
     if place.suffix == ".toml" or (place / SCENE).is_file():
         full = _grids(reference)
         return scene_models(place, full, progress=progress), [*scene_files(place)]

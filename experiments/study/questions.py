@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from math import ceil, floor
 from typing import Any
 
 from experiments.study.tables import (
@@ -20,6 +21,9 @@ from modeling.errors import shown
 
 # Those whose wording the language files of the console hold.
 SHIPPED = ("age", "sex", "handedness")
+# What the console's page has room for: so many buttons, digits of a number to type.
+MOST_LEVELS = 18
+MOST_DIGITS = 6
 # What the table of participants says of them anyway.
 TAKEN = ("participant_id", "code", "slot", "language", "pilot", "simulated", "status")
 
@@ -33,11 +37,13 @@ class Question:
     name : str
         Small letters, digits and underscores; a column of participants.tsv.
     least, most : float, optional
-        Of a number; both or neither.
+        Of a whole number, 0 … 999 999; both or neither.
     levels : tuple of str
-        Of a choice; two at least, or empty for a number.
+        Of a choice, 2 … 18, as the data name them; empty for a number.
     text : mapping of language to str
         The wording; empty for age, sex and handedness, whose wording is shipped.
+    levels_text : mapping of language to tuple of str
+        How the levels are shown, in their order; where they are not given, as the data name them.
 
     Raises
     ------
@@ -50,10 +56,13 @@ class Question:
     most: float | None = None
     levels: tuple[str, ...] = ()
     text: Mapping[str, str] = field(default_factory=dict)
+    levels_text: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "levels", tuple(self.levels))
         object.__setattr__(self, "text", dict(self.text))
+        shown_as = {language: tuple(words) for language, words in self.levels_text.items()}
+        object.__setattr__(self, "levels_text", shown_as)
         if not (isinstance(self.name, str) and re.fullmatch("[a-z][a-z0-9_]*", self.name)):
             raise InputError(
                 "expected a name of small letters, digits and underscores for a question, got "
@@ -81,6 +90,41 @@ class Question:
                 f"got {shown(self.least)}, {shown(self.most)} and {shown(list(self.levels))}; "
                 "give the one or the other."
             )
+        if self.levels:
+            self._check_levels()
+        else:
+            self._check_range(*ends)
+
+    def _check_levels(self) -> None:
+        if len(self.levels) > MOST_LEVELS:
+            raise InputError(
+                f"expected at most {MOST_LEVELS} levels, which one page has room for, of the "
+                f"question {self.name}, got {len(self.levels)}; put some of them together, or ask "
+                "for a number with least and most."
+            )
+        for language, words in self.levels_text.items():
+            where = f"levels_text.{language} of the question {self.name}"
+            for word in words:
+                require_label(where, word)
+            require_different(where, words)
+            if len(words) != len(self.levels):
+                raise InputError(
+                    f"expected {len(self.levels)} texts in {where}, one for each level, got "
+                    f"{len(words)}; give them in the order of levels."
+                )
+
+    def _check_range(self, least: float, most: float) -> None:
+        if self.levels_text:
+            raise InputError(
+                f"expected levels for the levels_text of the question {self.name}, got least and "
+                "most; remove levels_text."
+            )
+        if not (least >= 0 and most < 10**MOST_DIGITS and ceil(least) <= floor(most)):
+            raise InputError(
+                f"expected a range of whole numbers from 0 to {10**MOST_DIGITS - 1} for the "
+                f"question {self.name}, got {shown(least)} to {shown(most)}; ask in another unit, "
+                "or give levels."
+            )
 
     @property
     def is_number(self) -> bool:
@@ -88,12 +132,23 @@ class Question:
         return not self.levels
 
     def require_texts(self, languages: tuple[str, ...]) -> None:
-        """Refuse a question of the study's own that lacks its wording in a language."""
+        """Refuse a question of the study's own that lacks its wording in a language.
+
+        Likewise where its levels do; in the first language they are shown as they stand.
+        """
         missing = [language for language in languages if language not in self.text]
         if missing and not (self.name in SHIPPED and not self.text):
             raise InputError(
                 f"expected the question {self.name} in {', '.join(languages)}, got none in "
                 f'{", ".join(missing)}; write text.{missing[0]} = "…".'
+            )
+        missing = [language for language in languages[1:] if language not in self.levels_text]
+        if self.text and self.levels and missing:
+            example = ", ".join(['"…"'] * len(self.levels))
+            raise InputError(
+                f"expected the levels of the question {self.name} in {', '.join(languages)}, got "
+                f"none in {', '.join(missing)}; write levels_text.{missing[0]} = "
+                f"[{example}]."
             )
 
     def to_dict(self) -> dict[str, Any]:
@@ -104,6 +159,7 @@ class Question:
             "most": self.most,
             "levels": list(self.levels),
             "text": dict(self.text),
+            "levels_text": {name: list(words) for name, words in self.levels_text.items()},
         }
         return {name: value for name, value in values.items() if value not in (None, [], {})}
 
@@ -127,4 +183,15 @@ class Question:
         text = as_table(table.get("text", {}), where=f"text of {name}", example='text.en = "…"')
         for language, words in text.items():
             require_label(f"text.{language} of {name}", words)
-        return Question(**{**table, "text": text})
+        levels_text = as_table(
+            table.get("levels_text", {}),
+            where=f"levels_text of {name}",
+            example='levels_text.ja = ["…", "…"]',
+        )
+        for language, words in levels_text.items():
+            levels_text[language] = as_list(
+                words,
+                where=f"levels_text.{language} of {name}",
+                example=f'levels_text.{language} = ["…", "…"]',
+            )
+        return Question(**{**table, "text": text, "levels_text": levels_text})

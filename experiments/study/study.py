@@ -144,7 +144,6 @@ class Study:
             require_label("a set of models", name, forbidden='|"\\')
             require_label(f"the place of the models {name}", path)
         check_whole("number of sets of models", len(self.models), low=2, high=MOST_MODELS)
-        require_different("places of models", tuple(self.models.values()))
 
     def _check_questions(self) -> None:
         for language in self.languages:

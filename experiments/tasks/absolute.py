@@ -15,7 +15,7 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, dealt, fisher_yates
 from experiments.study.models import ModelSets
-from modeling.models.loading import AnyModel
+from rig.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -104,7 +104,7 @@ def _draft(texture: str, model: str, *, virtual: str, first: Surface) -> dict[st
     }
 
 
-def _virtual(models: ModelSets, trial: AbsoluteTrial) -> list[AnyModel]:
+def _virtual(models: ModelSets, trial: AbsoluteTrial) -> list[Presentable]:
     return [models.of(trial.virtual_texture, trial.model)]
 
 

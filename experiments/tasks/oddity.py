@@ -16,13 +16,13 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, dealt
 from experiments.study.models import ModelSets
-from modeling.models.loading import AnyModel
+from rig.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 
 DESCRIPTION = (
-    "Oddity task: of three virtual surfaces of one texture, one per button, two render the same "
-    "model and one another; which is the odd one out? Chance is 1/3."
+    "Of three virtual surfaces of one texture, one per button, two render the same model and one "
+    "another; which is the odd one out? Chance is 1/3."
 )
 BUTTONS = 3
 
@@ -66,7 +66,7 @@ def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
     return drafts
 
 
-def _virtual(models: ModelSets, trial: OddityTrial) -> list[AnyModel]:
+def _virtual(models: ModelSets, trial: OddityTrial) -> list[Presentable]:
     return [models.of(trial.texture, name) for name in trial.layout]
 
 

@@ -100,12 +100,13 @@ def _models(study: Study, models: ModelSets) -> Iterator[str]:
     yield "|---|" + "---|" * len(models.names)
     for texture, hashes in models.sha256(study.textures).items():
         yield f"| {texture} | {' | '.join(f'`{hashes[name]}`' for name in models.names)} |"
-    if identical := models.identical(study.textures):
-        yield ""
-        yield (
-            f"All models are equal for {', '.join(identical)}: presented as a control, left out "
-            "of the comparison."
-        )
+    for texture, groups in models.equal_models(study.textures).items():
+        for group in groups:
+            yield ""
+            yield (
+                f"The models of {texture} in {', '.join(group)} are equal: a control, left out of "
+                "their comparison."
+            )
 
 
 def _claims(study: Study) -> Iterator[str]:

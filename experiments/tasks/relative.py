@@ -15,7 +15,7 @@ from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
 from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
-from modeling.models.loading import AnyModel
+from rig.interface import Presentable
 
 # --- Parameters -----------------------------------------------------------------------------
 
@@ -75,7 +75,7 @@ def _layout(occasion: Occasion, texture: str, button: int) -> tuple[str, ...]:
     return tuple(layout)
 
 
-def _virtual(models: ModelSets, trial: RelativeTrial) -> list[AnyModel]:
+def _virtual(models: ModelSets, trial: RelativeTrial) -> list[Presentable]:
     return [models.of(texture, trial.model) for texture in trial.layout]
 
 

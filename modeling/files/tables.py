@@ -44,10 +44,10 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
     header = lines[0].split("\t") if lines else []
     missing = [name for name in required if name not in header]
     if missing:
+        several = "what is missing" if len(missing) > 3 else ", ".join(missing)
         raise InputError(
             f"expected the columns {', '.join(required)} in {source}, got "
-            f"{shortened(', '.join(header)) or 'an empty file'}; add {', '.join(missing)} "
-            "(tab-separated)."
+            f"{shortened(', '.join(header)) or 'an empty file'}; add {several} (tab-separated)."
         )
     check_named_once(header, source)
     rows = []

@@ -22,6 +22,13 @@ _KINDS: dict[str, type[AnyModel]] = {
 _ABOUT_MODELS = ("tactileq.simplification", "tactileq.compiled-scene")
 
 
+def made_from(model: AnyModel) -> frozenset[str]:
+    """SHA-256 of the models that a model says it was simplified or compiled from."""
+    note = getattr(model, "compiled_for", None)
+    stated = {getattr(model, "simplified_from", ""), note.full_sha256 if note else ""}
+    return frozenset(stated - {""})
+
+
 def load_model(path: Path) -> AnyModel:
     """A saved model of any kind, by the format that the file states."""
     # Where it states none, `TextureModel.load` says what is wrong with the file.

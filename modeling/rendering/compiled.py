@@ -37,15 +37,22 @@ def is_compiled() -> bool:
 
 def filled_texture(ffi: Any, fields: dict[str, Any], real: type) -> tuple[Any, list[Any]]:
     """A `tq_texture` of these fields, and the arrays that it only points at."""
-    texture = ffi.new("tq_texture *")
+    return filled(ffi, "tq_texture", fields, real=real)
+
+
+def filled(
+    ffi: Any, structure: str, fields: dict[str, Any], *, real: type
+) -> tuple[Any, list[Any]]:
+    """A structure of these fields, and the arrays that it only points at."""
+    made = ffi.new(f"{structure} *")
     arrays: list[Any] = []
     for name, value in fields.items():
         field = value
         if isinstance(value, np.ndarray):
             arrays.append(np.ascontiguousarray(value, dtype=real))
             field = ffi.from_buffer("tq_real[]", arrays[-1])
-        setattr(texture, name, field)
-    return texture, arrays
+        setattr(made, name, field)
+    return made, arrays
 
 
 def render_counters(counters: Any) -> RenderCounters:

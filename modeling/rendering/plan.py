@@ -196,15 +196,18 @@ class RenderPlan:
             "slope_share": self.slope_share,
             "slews": self.slews(table.largest_gains),
         }
+        return fields | self.restraints()
+
+    def restraints(self) -> dict[str, Any]:
+        """What `tq_texture` holds of compensation and limits.
+
+        Only those that there are: without them the structure's zeros stand for none.
+        """
+        fields: dict[str, Any] = {}
         if self.compensation is not None:
             fields["notch_hz"] = self.compensation.frequency_hz
             fields["notch_width_hz"] = self.compensation.bandwidth_hz
             fields["notch_share"] = self.compensation.band_share
-        return fields | self._limits()
-
-    def _limits(self) -> dict[str, int | float | Floats]:
-        """Those that there are; without them the structure's zeros stand for none."""
-        fields: dict[str, int | float | Floats] = {}
         if np.isfinite(self.limits.peak):
             fields["peak"] = self.limits.peak
         if np.isfinite(self.limits.rms):

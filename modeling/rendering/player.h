@@ -4,9 +4,9 @@
    C11, C++17, or C99 with GCC or Clang. No allocation, no lock, no system call, and no library call but
    those of kernel.h; its lines on compiling and its macros hold here, too.
 
-   A voice is a texture with its own state and memory. One control thread (any thread, but one at a
-   time) prepares voices and says which one it wants, NULL for silence. One callback thread renders.
-   None of these calls ever waits.
+   A voice is a texture, or the lattice of an all-pole model, with its own state and memory. One control
+   thread (any thread, but one at a time) prepares voices and says which one it wants, NULL for silence.
+   One callback thread renders. None of these calls ever waits.
 
    A change is noticed by the next block. The voice that plays fades out linearly; then the wanted one
    starts, fading in as long. So the new voice's first sample is at most one block and one fade late.
@@ -17,9 +17,9 @@
 
    A hand is held for a block. Output depends on the blocks by nothing else: with equal hands, and
    changes between blocks at equal samples, it has equal bits. A voice between its fades is what
-   tq_render makes, rounded to single precision.
+   tq_render or tq_lattice_render_held makes, rounded to single precision.
 
-   Every sample is rendered by one voice at most. So the dearest block costs what tq_render needs for
+   Every sample is rendered by one voice at most. So the dearest block costs what rendering needs for
    it and, where a voice begins, up to 64 squarings more. Stack: 4 TQ_CHUNK reals.
 
    All voices of a player must have the same rate, peak, mean_square, mean_share, longest, pause and
@@ -65,7 +65,7 @@
 #ifndef TQ_PLAYER_H
 #define TQ_PLAYER_H
 
-#include "kernel.h"
+#include "lattice.h"
 
 /* Pointers that two threads share. All loads and stores are sequentially consistent: there is one order
    of them that both threads see, and what a thread wrote before a store is seen by who loads the stored
@@ -92,10 +92,13 @@
 /* A fade of 5 ms, in samples. */
 #define TQ_FADE(rate_hz) ((int)((rate_hz) / 200))
 
-/* The texture and its data, and the state's memory, must stay as they are while the voice is in use. */
+/* The texture, the lattice of an all-pole model (else NULL) and their data, and the memory, must stay as they
+   are while the voice is in use. */
 typedef struct {
     const tq_texture *texture;
+    const tq_lattice *lattice;
     tq_state state;
+    tq_lattice_state filter;
 } tq_voice;
 
 typedef struct {
@@ -123,7 +126,17 @@ static inline void tq_player_start(tq_player *p, int fade)
 static inline void tq_voice_start(tq_voice *v, const tq_texture *t, tq_real *memory, uint64_t key)
 {
     v->texture = t;
+    v->lattice = NULL;
     tq_start(t, &v->state, memory, key);
+}
+
+/* The same for an all-pole model; see tq_lattice_start. */
+static inline void tq_voice_start_lattice(tq_voice *v, const tq_texture *t, const tq_lattice *l,
+                                          tq_real *memory, uint64_t key)
+{
+    v->texture = t;
+    v->lattice = l;
+    tq_lattice_start(t, l, &v->state, &v->filter, memory, key);
 }
 
 /* What shall play from now on; NULL for silence. */
@@ -205,7 +218,10 @@ TQ_INLINE size_t tq_player_chunk(tq_player *p, tq_voice *v, int leaves, tq_real 
     size_t most = count < TQ_CHUNK ? count : TQ_CHUNK, n;
     if (leaves && most > (size_t)p->level)
         most = (size_t)p->level;
-    tq_render_held(v->texture, &v->state, speed, force, chunk, most);
+    if (v->lattice)
+        tq_lattice_render_held(v->texture, v->lattice, &v->state, &v->filter, speed, force, chunk, most);
+    else
+        tq_render_held(v->texture, &v->state, speed, force, chunk, most);
     for (n = 0; n < most && (leaves || p->level < p->fade); n++) {
         p->level += leaves ? -1 : 1;
         chunk[n] *= p->level < p->fade ? (tq_real)p->level * p->step : 1;

@@ -9,7 +9,9 @@ from datetime import date
 from modeling import InputError
 from modeling.errors import shown
 from modeling.models.ar_model import ARModel
-from modeling.models.loading import AnyModel, Layered
+from modeling.models.loading import AnyModel
+from modeling.rendering.lattice import lattice_fields
+from modeling.rendering.plan import plan_for
 from rig.setup.rig_file import RigFile
 
 HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and others 2009)
@@ -69,31 +71,16 @@ def check_rig(
         )
 
 
-def layered(model: AnyModel) -> Layered:
-    """The model, if a desk rig can play one of its kind.
-
-    Raises
-    ------
-    InputError
-        For an AR model, which only the simulated rig renders.
-    """
-    if isinstance(model, ARModel):
-        raise InputError(
-            f"expected a model of layers for a desk rig, got an AR model of {model.texture}; "
-            "compare models of layers there, or use the simulated rig."
-        )
-    return model
-
-
 def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
     """Refuse models that a rig cannot play, or not at their level and rate.
 
     Raises
     ------
     InputError
-        For an AR model, one that is not in g, or of a higher rate than the card's.
+        For one that is not in g, or of a higher rate than the card's; for an AR model that
+        `lattice_fields` refuses.
     """
-    for model in map(layered, models):
+    for model in models:
         if model.unit != "g":
             raise InputError(
                 f"expected models in g for the rig in {rig.path}, got {model.texture} in unit "
@@ -104,6 +91,8 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
                 f"expected models of at most sound.rate_hz, {rig.sound.rate_hz:g} Hz in {rig.path},"
                 f" got {model.texture} of {model.rate_hz:g} Hz; choose a higher rate of the card."
             )
+        if isinstance(model, ARModel):
+            lattice_fields(model, plan_for(model.rate_hz, rate_hz=rig.sound.rate_hz))
 
 
 def _check_latency(rig: RigFile, override: str | None) -> None:

@@ -19,11 +19,12 @@ from modeling import InputError
 from modeling.arrays import Floats
 from modeling.models.loading import AnyModel
 from modeling.rendering.plan import RenderCounters
-from rig.desk.checks import Requirements, check_rig, layered
+from rig.desk.checks import Requirements, check_rig
 from rig.desk.journal import Journal
 from rig.desk.lock import rig_locked
 from rig.desk.parts import hand_settings, sound_output
 from rig.desk.pen import Pen
+from rig.desk.stimuli import check_made_for, check_stimulus
 from rig.hand.reader import HandReader
 from rig.interface import (
     Acceleration,
@@ -32,6 +33,7 @@ from rig.interface import (
     PresentationRecord,
     RigHealth,
     RigReading,
+    Stimulus,
     Surface,
     ToneBurst,
     grid_of,
@@ -123,6 +125,7 @@ class DeskRig:
         if self._open is not None:
             found = {
                 "HandDevice": self._open.reader.device_name,
+                "HandFirmware": self._open.reader.firmware() or "n/a",
                 "OutputLatencyS": self._open.sound.latency_s,
             }
         return {
@@ -201,11 +204,11 @@ class DeskRig:
         Raises
         ------
         InputError
-            For an AR model, or one of a higher rate than the card's.
+            For one of a higher rate than the card's, or an AR model that `lattice_fields` refuses.
         """
         self.silence()
         sound = self.parts.sound
-        start_s = self._started(lambda: sound.play(layered(model)))
+        start_s = self._started(lambda: sound.play(model))
         speeds, forces = grid_of(model)
         return self._begin(
             "virtual",
@@ -216,22 +219,46 @@ class DeskRig:
             forces_n=forces,
         )
 
-    def present_signal(self, burst: ToneBurst) -> float:
-        """Play a burst once, compensated; returns when its first sample has left.
+    def present_signal(self, signal: ToneBurst | Stimulus) -> float:
+        """Play a signal once; returns when its first sample has left.
 
-        One that still plays ends first. Where nothing plays any more, that is a fault.
+        A burst, compensated, after one that still plays; a stimulus at once. Where nothing plays
+        any more, that is a fault.
 
         Raises
         ------
         InputError
-            For a burst beyond the limits.
+            For a signal beyond the limits; of a stimulus also one that `check_stimulus` refuses.
         """
+        if isinstance(signal, Stimulus):
+            return self._present_stimulus(signal)
         time.sleep(max(0.0, self._signal_end_s - now_s()))
         self.silence()
-        sound, samples = self.parts.sound, self._samples(burst)
+        sound, samples = self.parts.sound, self._samples(signal)
         start_s = self._started(lambda: sound.play_signal(samples))
-        self._signal_end_s = start_s + burst.duration_s
-        return self._begin("virtual", f"{burst.frequency_hz:g} Hz", start_s=start_s)
+        self._signal_end_s = start_s + signal.duration_s
+        return self._begin("virtual", f"{signal.frequency_hz:g} Hz", start_s=start_s)
+
+    def check_stimulus(self, stimulus: Stimulus) -> None:
+        """Refuse a stimulus at another rate or for another vibrator than this rig's, or too strong.
+
+        Raises
+        ------
+        InputError
+        """
+        check_stimulus(self._file, stimulus)
+
+    def _present_stimulus(self, stimulus: Stimulus) -> float:
+        self.silence()
+        check_made_for(self._file, stimulus)
+        sound, compensated = self.parts.sound, stimulus.vibrator_sha256 is not None
+        start_s = self._started(
+            lambda: sound.play_signal(stimulus.samples_g, compensated=compensated)
+        )
+        self._signal_end_s = 0.0
+        return self._begin(
+            "virtual", stimulus.texture, start_s=start_s, model_sha256=stimulus.sha256
+        )
 
     def strongest_g(self, burst: ToneBurst) -> float:
         """The highest amplitude of such a burst within the limits, compensation included."""

@@ -122,6 +122,7 @@ class EventDevice:
     """
 
     rest_s = REST_S
+    firmware = ""
 
     def __init__(self, handle: int, name: str, *, hand: Hand) -> None:
         self.name = name

@@ -31,7 +31,8 @@ class HandLoop:
     live : Live
     settings : HandSettings
     tell : callable
-        Takes what the parent should know: {"fault": sentence} or {"counts": {name: number}}.
+        Takes what the parent should know: {"fault": sentence}, {"counts": {name: number}} or
+        {"firmware": version}.
     opening : callable
         Gives the open device; InputError where it cannot.
     """
@@ -59,6 +60,7 @@ class HandLoop:
         self._told = ""  # the last fault, until a sample passes
         self._counts: dict[str, int] = {}
         self._counts_s = 0.0
+        self._firmware = ""
         self.unplugged = False  # on request: as if the plug were pulled
 
     def open(self) -> str:
@@ -105,6 +107,9 @@ class HandLoop:
             if is_due or reading.flags != self._written.flags:
                 self._sample_s = reading.time_s
                 self._write(reading)
+        if device.firmware != self._firmware:
+            self._firmware = device.firmware
+            self._tell({"firmware": self._firmware})
         self._report(device.counts())
 
     def _report(self, counts: dict[str, int]) -> None:

@@ -21,6 +21,7 @@ from rig.live.memory import Live, now_s
 
 START_S = 30.0
 END_S = 2.0
+FIRMWARE_S = 1.0  # a serial sensor states its firmware twice as often
 SILENT_S = 1.0  # without a reading: the process is killed and replaced
 _MOST_FAULTS = 1000
 _WATCH_S = 0.1
@@ -50,8 +51,11 @@ class HandReader:
         self._threads: list[threading.Thread] = []
         self._first: queue.Queue[dict[str, str]] = queue.Queue()
         self._was_ready = False
+        self._ready_s = float("-inf")
         self._alive_s = float("inf")  # since when the process of now has to write readings
         self.device_name = ""
+        self._firmware = ""
+        self._has_firmware = threading.Event()
 
     def open(self) -> None:
         """Start reading; returns once the device is open.
@@ -67,6 +71,8 @@ class HandReader:
             return
         self._closing.clear()
         self._first, self._was_ready = queue.Queue(), False
+        self._firmware = ""
+        self._has_firmware.clear()
         self._threads = [
             threading.Thread(target=target, daemon=True) for target in (self._keep, self._watch)
         ]
@@ -77,6 +83,7 @@ class HandReader:
             self.close()
             raise InputError(told["error"])
         self.device_name = told["ready"]
+        self._ready_s = now_s()
 
     def close(self) -> None:
         """End reading; the last reading says that the device is gone."""
@@ -106,6 +113,16 @@ class HandReader:
         """
         with self._lock:
             return dict(self._counts)
+
+    def firmware(self) -> str:
+        """The version that the device states; empty where it states none.
+
+        A serial sensor is given a second to do so after it was opened.
+        """
+        if self._settings.kind == "serial":
+            self._has_firmware.wait(max(0.0, self._ready_s + FIRMWARE_S - now_s()))
+        with self._lock:
+            return self._firmware
 
     def push(self, x: float, y: float, *, down: bool = True, button: bool = False) -> None:
         """Where the window's pointer is now; for kind "window" only.
@@ -206,6 +223,10 @@ class HandReader:
         if "counts" in told:
             with self._lock:
                 self._counts = told["counts"]
+        if "firmware" in told:
+            with self._lock:
+                self._firmware = told["firmware"]
+            self._has_firmware.set()
         self._alive_s = min(self._alive_s, now_s())
         if "ready" in told or "error" in told:
             self._was_ready = self._was_ready or "ready" in told

@@ -68,6 +68,10 @@ class Device(Protocol):
     name: str
     rest_s: float  # silent for so long, it rests (tracking.REST_S where it reports only changes)
 
+    @property
+    def firmware(self) -> str:
+        """The version that the device stated; empty where it states none, or has not yet."""
+
     def wait(self, seconds: float) -> None:
         """Return when there may be something to read, at the latest after so long."""
 

@@ -96,6 +96,7 @@ class ScriptedHand:
 
     name = "scripted hand"
     rest_s = REST_S
+    firmware = ""
 
     def __init__(self, script: Script) -> None:
         self._script = script

@@ -15,6 +15,7 @@ NUMBERS = 2**16
 CLOCK_US = 2**32
 _LARGEST = 2**31 - 1
 
+_FIRMWARE = re.compile(rb"\$(F,([ -#%-)+-~]{1,40}))\*([0-9A-F]{4})\r?")  # no $, no *
 _FRAME = re.compile(rb"\$([PV](?:,(?:-?\d{1,10})?){5,6})\*([0-9A-F]{4})\r?")
 
 
@@ -72,6 +73,12 @@ def decode(frame: bytes) -> SensorLine | None:
     return line if _is_inside(line) and 0 <= int(flags) <= CONTACT | BUTTON else None
 
 
+def decode_firmware(frame: bytes) -> str:
+    """The version that a line of the kind F states; empty where it is none, or is damaged."""
+    found = _FIRMWARE.fullmatch(frame)
+    return found[2].decode().strip() if found and int(found[3], 16) == crc(found[1]) else ""
+
+
 def _is_inside(line: SensorLine) -> bool:
     return (
         0 <= line.number < NUMBERS
@@ -93,10 +100,13 @@ class LineReader:
     good, bad, missing : int
         Lines that were read; that were damaged; that are missing, as the numbers of the others say.
         What comes before the first line end, in the middle of a line, is not counted.
+    firmware : str
+        What the sensor stated last; empty before.
     """
 
     def __init__(self) -> None:
         self.good = self.bad = self.missing = 0
+        self.firmware = ""
         self._rest = b""
         self._began = False
         self._last: int | None = None
@@ -109,8 +119,11 @@ class LineReader:
         return [line for line in lines if line is not None]
 
     def _line(self, text: bytes) -> SensorLine | None:
-        line = decode(text[max(text.rfind(b"$"), 0) :])
-        if line is None:
+        frame = text[max(text.rfind(b"$"), 0) :]
+        line = decode(frame)
+        if line is None and (stated := decode_firmware(frame)):
+            self.firmware = stated
+        elif line is None:
             self.bad += self._began and bool(text.strip())
         else:
             self.good += 1

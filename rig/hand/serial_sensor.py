@@ -85,6 +85,11 @@ class SerialSensor:
             )
         return samples
 
+    @property
+    def firmware(self) -> str:
+        """See `Device`."""
+        return self._lines.firmware
+
     def counts(self) -> dict[str, int]:
         """Lines that were read, were damaged, are missing."""
         return {"lines": self._lines.good, "bad": self._lines.bad, "missing": self._lines.missing}

@@ -26,6 +26,7 @@ class Pointer:
     """
 
     name = "pointer of the window"
+    firmware = ""
     rest_s = 0.05  # two frames of a screen may be missed
 
     def __init__(self, pixels_per_mm: float) -> None:

@@ -1,4 +1,4 @@
-/* The audio callback of a rig: the texture under the hand as it is now, prepared signals, masking
+/* The audio callback of a rig: the model under the hand as it is now, prepared signals, masking
    noise. docs/method/live.md#callback
 
    PortAudio calls tq_sound_callback with a tq_sound. The hand comes from shared memory; what is played
@@ -6,7 +6,7 @@
    clock is a page that the kernel maps).
 
    One control thread prepares sources and says which one it wants, as of player.h, on which this rests.
-   A source is a voice (a texture) or a signal. Signals begin when no voice plays any more, and voices
+   A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and voices
    when no signal does: all changes pass through silence.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
@@ -75,6 +75,14 @@ static inline void tq_surface_start(tq_surface *u, const tq_texture *t, tq_real 
                                     uint32_t presentation)
 {
     tq_voice_start(&u->voice, t, memory, key);
+    u->presentation = presentation;
+}
+
+/* The same of an all-pole model; see tq_lattice_start. */
+static inline void tq_surface_start_lattice(tq_surface *u, const tq_texture *t, const tq_lattice *l,
+                                            tq_real *memory, uint64_t key, uint32_t presentation)
+{
+    tq_voice_start_lattice(&u->voice, t, l, memory, key);
     u->presentation = presentation;
 }
 

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
-from modeling.models.loading import Layered
+from modeling.models.ar_model import ARModel
+from modeling.models.loading import AnyModel
+from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
@@ -174,29 +176,31 @@ class SoundOutput:
 
     # --- What plays -------------------------------------------------------------------------
 
-    def play(self, model: Layered) -> Presented:
+    def play(self, model: AnyModel) -> Presented:
         """Play a texture under the hand, through silence; return when its first sample has left.
 
         Parameters
         ----------
-        model : TextureModel or RegressedModel
-            Of a rate up to the card's.
+        model : TextureModel, RegressedModel or ARModel
+            Of a rate up to the card's. An ARModel is filtered at its own rate and brought to the
+            card's, which adds a delay: docs/method/rendering.md#ar-models-at-a-cards-rate
 
         Raises
         ------
         InputError
-            For a model of a higher rate.
+            For a model of a higher rate; for an ARModel that `lattice_fields` refuses.
         SoundLost
             Where nothing can be played.
         """
-        plan = self._plan(model.rate_hz, usual_update_s(model))
-        fields = {
-            name: value.tolist() if isinstance(value, np.ndarray) else value
-            for name, value in plan.texture(model).items()
-        }
         number = self._number()
-        key = int(stream_key(self._seed, number))
-        wanted = {"do": "surface", "presentation": number, "texture": fields, "key": key}
+        wanted: dict[str, Any] = {"do": "surface", "presentation": number}
+        wanted["key"] = int(stream_key(self._seed, number))
+        plan = self._plan(model.rate_hz, usual_update_s(model))
+        if isinstance(model, ARModel):
+            fields = lattice_fields(model, plan)
+            wanted |= {"texture": _listed(fields.texture), "lattice": _listed(fields.lattice)}
+        else:
+            wanted["texture"] = _listed(plan.texture(model))
         return self._begin(number, wanted)
 
     def play_signal(
@@ -448,6 +452,14 @@ class SoundOutput:
             limits=self._limits,
             compensation=self._compensation,
         )
+
+
+def _listed(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Members of a structure, as JSON can hold them."""
+    return {
+        name: value.tolist() if isinstance(value, np.ndarray) else value
+        for name, value in fields.items()
+    }
 
 
 def check_signal(samples: Floats, plan: RenderPlan) -> None:

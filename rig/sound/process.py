@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from modeling.errors import InputError
-from modeling.rendering.compiled import filled_texture, render_counters
+from modeling.rendering.compiled import filled, render_counters
 from rig.live.driven import settings_from_parent, tell
 from rig.live.memory import Live, compiled
 from rig.sound.devices import check_rate, find_device, portaudio
@@ -102,21 +102,31 @@ class Playing:
         return float(self._stream.latency)
 
     def surface(self, wanted: Mapping[str, Any]) -> None:
-        """Play a texture from now on."""
-        real = np.float64
-        fields = {
-            name: np.array(value, dtype=real) if isinstance(value, list) else value
-            for name, value in wanted["texture"].items()
-        }
-        texture, arrays = filled_texture(self._ffi, fields, real)
-        row = -(-texture.layers // self._lib.TQ_LANES) * self._lib.TQ_LANES
-        reals = self._lib.TQ_ROWS * row + texture.taps - 1 + self._lib.TQ_CHUNK  # TQ_MEMORY
-        memory = self._ffi.new("tq_real[]", reals)
+        """Play a texture, or an all-pole model's lattice, from now on."""
+        texture, arrays = self._filled("tq_texture", wanted["texture"])
         source = self._ffi.new("tq_surface *")
-        number = wanted["presentation"]
-        self._lib.tq_surface_start(source, texture, memory, wanted["key"], number)
+        number, key = wanted["presentation"], wanted["key"]
+        if "lattice" in wanted:
+            lattice, more = self._filled("tq_lattice", wanted["lattice"])
+            memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(lattice))
+            start = self._lib.tq_surface_start_lattice
+            start(source, texture, lattice, memory, key, number)
+            arrays += [lattice, *more]
+        else:
+            row = -(-texture.layers // self._lib.TQ_LANES) * self._lib.TQ_LANES
+            reals = self._lib.TQ_ROWS * row + texture.taps - 1 + self._lib.TQ_CHUNK  # TQ_MEMORY
+            memory = self._ffi.new("tq_real[]", reals)
+            self._lib.tq_surface_start(source, texture, memory, key, number)
         self._sources[number] = _Source("surface", source, (texture, arrays, memory))
         self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+
+    def _filled(self, structure: str, told: Mapping[str, Any]) -> tuple[Any, list[Any]]:
+        """A structure of the kernel, and the arrays that it only points at."""
+        fields = {
+            name: np.array(value) if isinstance(value, list) else value
+            for name, value in told.items()
+        }
+        return filled(self._ffi, structure, fields, real=np.float64)
 
     def signal(self, wanted: Mapping[str, Any]) -> None:
         """Play a signal once."""

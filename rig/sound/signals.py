@@ -6,40 +6,25 @@ docs/method/live.md#signals
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from modeling.arrays import Floats
 from modeling.errors import InputError, shown
 from modeling.files.reading import read_bytes
 from modeling.files.tables import number, read_table
 from modeling.files.wav import read_wav
+from modeling.models.loading import AnyModel, load_model, made_from
+from rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
-_MANIFEST = "manifest.tsv"
+MANIFEST = "manifest.tsv"
+_SOURCES = "sources"
 _COLUMNS = ("file", "unit", "format", "full_scale_g", "sha256", "vibrator_sha256", "simulated")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PreparedSignal:
-    """A signal and what is to be known of it.
-
-    Parameters
-    ----------
-    samples_g : (n,) ndarray
-    rate_hz : float
-    vibrator_sha256 : str, optional
-        SHA-256 of the vibrator's file for which it is compensated; None for the vibration itself.
-    simulated : bool
-        Whether what it was made from was simulated.
-    """
-
-    samples_g: Floats
-    rate_hz: float
-    vibrator_sha256: str | None
-    simulated: bool
+_WHERE = ("trajectory", "speed_mm_s", "force_n", "gain_db")
+_CONDITION = (*_WHERE, "vibrator_sha256")
+_OF_SURFACES = (*_COLUMNS, "texture", "model", "model_sha256", *_WHERE)
 
 
 def tone_burst(
@@ -95,7 +80,7 @@ def stimulus(folder: Path, which: str) -> PreparedSignal:
     InputError
         For no such file, one that has changed, or one without a calibrated unit.
     """
-    rows = read_table(folder / _MANIFEST, _COLUMNS)
+    rows = read_table(folder / MANIFEST, _COLUMNS)
     fitting = [
         row
         for row in rows
@@ -104,9 +89,72 @@ def stimulus(folder: Path, which: str) -> PreparedSignal:
     if len(fitting) != 1:
         raise InputError(
             f"expected the name or SHA-256 of one file of the set {folder}, got {shown(which)}, "
-            f"which fits {len(fitting)} of {len(rows)}; see its {_MANIFEST}."
+            f"which fits {len(fitting)} of {len(rows)}; see its {MANIFEST}."
         )
     return _prepared(folder, fitting[0])
+
+
+def stimuli_of_surfaces(
+    folder: Path, *, label: str, textures: Sequence[str]
+) -> dict[str, Stimulus]:
+    """The files of a stimulus set that stand for the surfaces of a study, by texture.
+
+    Parameters
+    ----------
+    folder : path
+        Of tactileq stimuli.
+    label : str
+        Of the models in its recipe; where the recipe has one label only, any will do.
+    textures : sequence of str
+        Those that have no file are left out.
+
+    Raises
+    ------
+    InputError
+        Where no file has this label, several stand for one texture, or one cannot be used (see
+        `stimulus`).
+    """
+    rows = read_table(folder / MANIFEST, _OF_SURFACES)
+    labels = sorted({row["model"] for row in rows})
+    if label not in labels and len(labels) > 1:
+        raise InputError(
+            f"expected files of models labelled {shown(label)} in the stimulus set {folder}, got "
+            f"{', '.join(labels)}; name the study's set of models after one of them."
+        )
+    wanted = label if len(labels) != 1 else labels[0]
+    found: dict[str, Stimulus] = {}
+    for texture in textures:
+        fitting = [row for row in rows if (row["texture"], row["model"]) == (texture, wanted)]
+        if len(fitting) > 1:
+            raise InputError(
+                f"expected one file of {texture} in the stimulus set {folder}, got {len(fitting)} "
+                f"({fitting[0]['file']} and {fitting[1]['file']} among them); make a set with one "
+                "trajectory, one seed and one rate."
+            )
+        if fitting:
+            found[texture] = _stimulus(folder, fitting[0])
+    return found
+
+
+def _stimulus(folder: Path, row: dict[str, str]) -> Stimulus:
+    prepared = _prepared(folder, row)
+    model = _source(folder / _SOURCES, row["model_sha256"])
+    return Stimulus(
+        **vars(prepared),
+        texture=row["texture"],
+        sha256=row["sha256"],
+        model_sha256=row["model_sha256"] if model is None else model.sha256,
+        made_from=frozenset() if model is None else made_from(model),
+        condition=tuple(row[name] for name in _CONDITION),
+    )
+
+
+def _source(sources: Path, sha256: str) -> AnyModel | None:
+    """The copy of a model whose file has this hash, None where it is gone."""
+    for path in sorted(sources.glob("*.json")):
+        if hashlib.sha256(read_bytes(path, "a model")).hexdigest() == sha256:
+            return load_model(path)
+    return None
 
 
 def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:

@@ -15,7 +15,7 @@ from tactileq.options import RigPath
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from modeling.models.loading import Layered
+    from modeling.models.loading import AnyModel
     from modeling.rendering.plan import RenderCounters
     from rig.monitoring.figures import Range, Snapshot
     from rig.setup.rig_file import RigFile
@@ -40,20 +40,14 @@ def rig_monitor(
 
     Example: tactileq rig monitor models/canvas.json --rig rig.toml
     """
-    from modeling.models.ar_model import ARModel
     from modeling.models.loading import load_model
     from rig.setup.rig_file import RigFile
 
     loaded = RigFile.load(rig)
-    if model is None:
-        return _watch(loaded, None, seconds)
-    playing = load_model(model)
-    if isinstance(playing, ARModel):
-        raise ValueError(f"expected a model of layers, got an AR model in {model}; choose another.")
-    return _watch(loaded, playing, seconds)
+    _watch(loaded, None if model is None else load_model(model), seconds)
 
 
-def _watch(rig: RigFile, model: Layered | None, seconds: float | None) -> None:
+def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     """Open the rig and show it until it is ended; the last line sums up."""
     from rich.live import Live as Screen
 
@@ -96,7 +90,7 @@ def _watch(rig: RigFile, model: Layered | None, seconds: float | None) -> None:
     print(_summary(snapshot, missed, time.monotonic() - start, limited=limited))
 
 
-def _grid(model: Layered | None) -> tuple[Range, Range] | None:
+def _grid(model: AnyModel | None) -> tuple[Range, Range] | None:
     """Speeds and forces of a model's conditions, lowest and highest."""
     if model is None:
         return None

@@ -10,8 +10,8 @@ import typer
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
+    from rig.interface import PreparedSignal
     from rig.setup.rig_file import RigFile
-    from rig.sound.signals import PreparedSignal
 
 
 def rig_play(
@@ -63,6 +63,7 @@ def chosen_signal(
     ValueError
         For neither or both; another rate than the card's; another vibrator than the rig's.
     """
+    from rig.desk.stimuli import check_made_for
     from rig.sound.signals import stimulus, tone_burst
 
     if (tone_hz is None) == (stimuli is None) or (stimuli is None) != (which is None):
@@ -75,33 +76,8 @@ def chosen_signal(
     assert stimuli is not None
     assert which is not None
     signal = stimulus(stimuli, which)
-    if signal.rate_hz != rig.sound.rate_hz:
-        raise ValueError(
-            f"expected a file at {rig.sound.rate_hz:g} Hz, the rate of the card, got {which} at "
-            f"{signal.rate_hz:g} Hz; make the set with that rate_hz."
-        )
-    check_vibrator(rig, signal, which)
+    check_made_for(rig, signal, which)
     return signal
-
-
-def check_vibrator(rig: RigFile, signal: PreparedSignal, which: str) -> None:
-    """Refuse a file that is compensated for another vibrator than the rig's."""
-    import hashlib
-
-    from modeling.files.reading import read_bytes
-
-    wanted = signal.vibrator_sha256
-    if wanted is None:
-        return
-    file = rig.vibrator.file
-    own = None
-    if file is not None:
-        own = hashlib.sha256(read_bytes(rig.path.parent / file, "the vibrator")).hexdigest()
-    if own != wanted:
-        raise ValueError(
-            f"expected a file for the vibrator of {rig.path}, got {which}, which is compensated "
-            "for another one; make the set with the rig's vibrator, or without any."
-        )
 
 
 def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:

@@ -9,7 +9,7 @@ import typer
 
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
-from tactileq.telling import share_of
+from tactileq.telling import share_of, tell_models
 
 if TYPE_CHECKING:
     TaskName = str
@@ -61,6 +61,7 @@ def session(
 
     Example: tactileq session --task absolute --subject 1 --rig rig.toml --data data
     """
+    from experiments.console.languages import require_texts
     from experiments.sessions.bids import export_session
     from experiments.sessions.overrides import Overrides
     from experiments.sessions.running import Circumstances, run_session
@@ -70,6 +71,7 @@ def session(
     from tactileq.experimenter import Terminal
 
     plan = Study.load(study)
+    require_texts(plan)
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
     if resume and not language:
         language = _language_of(data, task=task, subject=subject, session=number)
@@ -82,6 +84,7 @@ def session(
         sources=sources,
     )
     sets.require(plan, allow=Overrides(override).allow)
+    tell_models(sets, plan.textures)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)
@@ -143,9 +146,11 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     """
     from rig.desk.checks import Requirements, check_models
     from rig.desk.desk_rig import DeskRig
+    from rig.interface import Stimulus
     from rig.setup.rig_file import RigFile
     from rig.twin import SimulatedRig
 
+    every = [sets.of(texture, name) for name in sets.names for texture in plan.textures]
     if rig is None:
         return SimulatedRig()
     file = RigFile.load(rig)
@@ -153,7 +158,7 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
         calibration_days=plan.calibration_days, measured_force=plan.measured_force
     )
     device = DeskRig(file, requirements=wanted, override=override)
-    check_models(file, [sets.of(texture, name) for name in sets.names for texture in plan.textures])
+    check_models(file, [shown for shown in every if not isinstance(shown, Stimulus)])
     return device
 
 
@@ -198,12 +203,9 @@ def models_of_study(
 def open_console(
     plan: Study, *, language: str, stamp: str, fullscreen: bool, screen: int
 ) -> Console:
-    """The console's window in the participant's language, which must have all texts."""
+    """The console's window in the participant's language."""
     from experiments.console.console import Console
-    from experiments.console.languages import Texts
 
-    for name in plan.languages:
-        Texts.load(name).require(plan.questions)
     return Console(
         language=language or plan.languages[0], stamp=stamp, fullscreen=fullscreen, screen=screen
     )

@@ -16,7 +16,7 @@ from tactileq.options import (
     StudyFile,
     ThresholdName,
 )
-from tactileq.telling import progress, tell_controls
+from tactileq.telling import progress, tell_models
 
 if TYPE_CHECKING:
     from experiments.observers.psychometrics import Psychometrics
@@ -107,7 +107,7 @@ def run_study(
     from experiments.observers.whole_study import simulate_study
     from rig.twin import SimulatedRig
 
-    tell_controls(models, plan.textures)
+    tell_models(models, plan.textures)
     sessions = sum(task.participants * plan.sessions(name) for name, task in plan.tasks.items())
     with progress("Simulated participants", sessions) as advance:
         simulate_study(

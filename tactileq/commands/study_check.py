@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tactileq.options import StudyArgument
-from tactileq.telling import share_of
+from tactileq.telling import share_of, tell_models
 
 if TYPE_CHECKING:
     from experiments.study.models import ModelSets
@@ -22,7 +22,7 @@ def study_check(path: StudyArgument) -> None:
     print(f"study: {plan.name}, {len(plan.textures)} textures, SHA-256 {plan.sha256[:12]}…")
     told = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
     print(f"models: one of each texture in {told}")
-    _tell_models(plan, sets)
+    tell_models(sets, plan.textures)
     _tell_sessions(plan)
     _tell_balance(plan)
     claims = len(plan.plan.claims)
@@ -37,10 +37,12 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     InputError
         For a study or models that cannot be used.
     """
+    from experiments.console.languages import require_texts
     from experiments.study.models import load_model_sets
     from experiments.study.study import Study
 
     plan = Study.load(path)
+    require_texts(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
         with share_of("Compiling the scene") as tell:
             sets, files = load_model_sets(plan, path.parent, progress=tell)
@@ -48,22 +50,6 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
         sets, files = load_model_sets(plan, path.parent)
     sets.require(plan)
     return plan, sets, [path, *files]
-
-
-def _tell_models(plan: Study, sets: ModelSets) -> None:
-    from itertools import combinations
-
-    for first, second in combinations(sets.names, 2):
-        if identical := sets.identical(plan.textures, (first, second)):
-            print(
-                f"note: {first} and {second} are identical for {', '.join(identical)}: a control, "
-                "nothing to compare"
-            )
-    for texture, name in sets.of_others(plan.textures):
-        print(
-            f"warning: the {name} model of {texture} was made from a model that is in none of the "
-            "sets; make it again from the one that it is compared with"
-        )
 
 
 def _tell_sessions(plan: Study) -> None:

@@ -49,10 +49,12 @@ from rig.importing.files import Label, import_csv, import_wav, labels_from_table
 from rig.importing.hatt import load_hatt
 from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
 from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
+from rig.sound.signals import stimuli_of_surfaces
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.sources import load_sources
+from stimuli.sets.writing import write_set
 
 MUTATIONS = 100  # of each kind; the answers of a study are five files
 LONGEST_MESSAGE = 400
@@ -260,11 +262,35 @@ def use_hatt(path: Path) -> Iterable[object]:
     yield from usable_samples(texture.recordings([160.0], [1.5], duration_s=0.1))
 
 
+TOUCH = """
+version = 1
+[set]
+name = "touch"
+rate_hz = [5000]
+format = "pcm24"
+duration_s = 0.1
+[level]
+full_scale_g = 4.0
+[[model]]
+path = "model.json"
+label = "full"
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.0
+"""
+
+
 def use_recipe(path: Path) -> Iterable[object]:
     recipe = Recipe.load(path)
     (path.parent / "again.toml").write_text(recipe.to_toml(), encoding="utf-8")
     sources = load_sources(recipe)
     yield [trajectory.duration_s for trajectory in sources.trajectories]
+
+
+def use_stimuli(path: Path) -> Iterable[object]:
+    found = stimuli_of_surfaces(path.parent, label="full", textures=[TEXTURE.texture])
+    for stimulus in found.values():
+        yield from (stimulus.samples_g, stimulus.duration_s)
 
 
 def use_scene(path: Path) -> Iterable[object]:
@@ -518,6 +544,7 @@ KINDS: dict[str, tuple[str, Use]] = {
     "samples of a set": ("set/0001.csv", use_set),
     "toolkit": ("Models_Planted.xml", use_hatt),
     "recipe": ("set.toml", use_recipe),
+    "stimuli of a study": ("touch/manifest.tsv", use_stimuli),
     "scene": ("scene.toml", use_scene),
     "scene of a distribution": ("places.toml", use_scene),
     "scene of a recorded hand": ("recorded.toml", use_scene),
@@ -572,6 +599,8 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
     compiled_scene().save(folder / "compiled")
+    (folder / "touch.toml").write_text(TOUCH)
+    write_set(folder / "touch", Recipe.load(folder / "touch.toml"))
 
 
 def complaint(use: Use, path: Path) -> str:

@@ -17,10 +17,12 @@ from typing import Any
 
 import pytest
 
+from modeling import ARModel, TextureModel
 from rig.setup.rig_file import RigFile
 from rig.simulated.card import DEVICE, SimulatedCard
 from rig.simulated.vibrator import SimulatedVibrator
 from stimuli.planted.textures import planted_texture
+from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.calibration.card import rig_file
 
 Jack = Callable[..., AbstractContextManager[Any]]
@@ -77,9 +79,12 @@ def test_check_shows_what_is_there_and_why_it_is_not_enough(rig: Path, run: Run)
     assert "Traceback" not in done.stderr
 
 
-def test_monitor_ends_by_itself_with_a_line(rig: Path, run: Run, tmp_path: Path) -> None:
-    planted_texture("canvas").save(tmp_path / "canvas.json")
-    done = run("rig", "monitor", "canvas.json", "--seconds", "1.5")
+@pytest.mark.parametrize("model", [planted_texture("canvas"), planted_ar()])
+def test_monitor_ends_by_itself_with_a_line(
+    rig: Path, run: Run, tmp_path: Path, model: TextureModel | ARModel
+) -> None:
+    model.save(tmp_path / "model.json")
+    done = run("rig", "monitor", "model.json", "--seconds", "1.5")
     assert done.returncode == 0, done.stderr
     line = done.stdout.splitlines()[-1]
     blocks = re.search(r"(\d+) of (\d+) blocks missed \(a bare thread (\d+) of (\d+)", line)

@@ -11,14 +11,19 @@ import pytest
 
 from experiments.study.study import SHIPPED_STUDY, Study
 from modeling import Threshold, simplify
+from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 
 
-def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tactileq", "study", *arguments]
+def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "tactileq", *arguments]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+
+
+def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return run(folder, "study", *arguments)
 
 
 @pytest.fixture
@@ -68,6 +73,90 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path) -> N
     assert "warning" not in done.stdout
 
 
+def test_the_same_models_twice_are_refused(place: Path) -> None:
+    text = (place / "study.toml").read_text(encoding="utf-8")
+    (place / "study.toml").write_text(
+        text.replace('simplified = "simplified"', 'simplified = "models"'), encoding="utf-8"
+    )
+    refused = study(place, "check", "study.toml")
+    assert refused.returncode == 1
+    assert "got identical ones for all, so that there is nothing to compare" in refused.stderr
+
+
+RECIPE = """
+version = 1
+[set]
+name = "surfaces"
+rate_hz = [5000]
+format = "float32"
+duration_s = 0.5
+[[model]]
+path = "models"
+label = "full"
+[[model]]
+path = "simplified"
+label = "simplified"
+[[trajectory]]
+speed_mm_s = 200
+force_n = 1.5
+"""
+TWO = """
+name = "Two surfaces at a resting hand"
+seed = 1
+textures = ["canvas", "MDF"]
+trays = {canvas = "A", MDF = "B"}
+[models]
+full = "set"
+simplified = "set"
+[absolute]
+participants = 2
+schedule = "interleaved"
+training_trials = 1
+most_training_trials = 4
+[relative]
+participants = 1
+schedule = "interleaved"
+repeats = 1
+training_trials = 1
+"""
+
+
+def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path) -> None:
+    (place / "recipe.toml").write_text(RECIPE)
+    (place / "two.toml").write_text(TWO)
+    made = run(place, "stimuli", "recipe.toml", "--out", "set")
+    assert made.returncode == 0, made.stderr
+    checked = study(place, "check", "two.toml")
+    assert checked.returncode == 0, checked.stderr
+    assert "note: full and simplified are identical for MDF: a control" in checked.stdout
+    simulated = run(place, "simulate", "--study", "two.toml", "--data", "data")
+    assert simulated.returncode == 0, simulated.stderr
+    tables = [
+        read_table(path, ["model_sha256", "surface", "outside_share"])
+        for path in sorted((place / "data").rglob("*_presentations.tsv"))
+    ]
+    assert len(tables) == 3
+    shown = {row["model_sha256"] for rows in tables for row in rows if row["surface"] == "virtual"}
+    files = {
+        row["sha256"]
+        for row in read_table(place / "set/manifest.tsv", ["sha256", "texture"])
+        if row["texture"] in ("canvas", "MDF")
+    }
+    assert shown == files
+    # A signal has no grid of speeds and forces: nobody strokes outside of it, or trains for it.
+    assert {row["outside_share"] for rows in tables for row in rows} == {"n/a"}
+    for path in (place / "data").glob("sub-*/ses-*/beh/*_task-absolute_beh.tsv"):
+        phases = [row["phase"] for row in read_table(path, ["phase"])]
+        assert phases == ["training"] + ["main"] * 4
+    analyzed = run(place, "analyze", "data", "--out", "results")
+    assert analyzed.returncode == 0, analyzed.stderr
+    wav = next((place / "set").glob("canvas_full*.wav"))
+    wav.write_bytes(wav.read_bytes()[:-4] + bytes(4))
+    refused = study(place, "check", "two.toml")
+    assert refused.returncode == 1
+    assert refused.stderr.startswith("error: models full: expected set/canvas_full_200mms_1.5N.wav")
+
+
 def test_models_made_from_others_are_warned_of(place: Path) -> None:
     planted_texture("canvas", **SMALL).at_rate(8000.0).save(place / "models/1.json")
     done = study(place, "check", "study.toml")
@@ -77,6 +166,34 @@ def test_models_made_from_others_are_warned_of(place: Path) -> None:
     )
 
 
+def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
+    place: Path,
+) -> None:
+    file = place / "study.toml"
+    whole = file.read_text(encoding="utf-8")
+    craft = '[[questions]]\nname = "craft"\nlevels = ["no", "yes"]\ntext.en = "Any craft?"\n'
+    wrong = {
+        whole.replace('"en", "ja"', '"en", "fr"'): "expected a language of en, ja, got 'fr'",
+        f"{whole}\n{craft}": "expected the question craft in en, ja, got none in ja",
+        f'{whole}\n{craft}text.ja = "手仕事は?"': "expected the levels of the question craft in "
+        "en, ja, got none in ja; write levels_text.ja = [",
+        whole.replace('"right", "left", "both"', '"right", "left", "neither"'): "expected the "
+        'question "handedness" in the language "en", got none for neither',
+    }
+    session = [sys.executable, "-m", "tactileq", "session", "--task", "absolute", "--study"]
+    for text, sentence in wrong.items():
+        file.write_text(text, encoding="utf-8")
+        refused = (
+            study(place, "check", "study.toml"),
+            subprocess.run([*session, "study.toml"], cwd=place, capture_output=True, text=True),
+        )
+        for done in refused:
+            assert done.returncode == 1
+            assert sentence in done.stderr
+            assert done.stderr.count("\n") == 1
+    assert not (place / "data").exists()
+
+
 def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -> None:
     (place / "models").rename(place / "other")
     (place / "simplified").rename(place / "models")
@@ -84,7 +201,9 @@ def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -
     for words in (("check",), ("plan", "--out", "plan.md")):
         refused = study(place, words[0], "study.toml", *words[1:])
         assert refused.returncode == 1
-        assert refused.stderr.startswith("error: expected the reference set full to hold the mod")
+        assert refused.stderr.startswith(
+            "error: expected models to be made from those of a set that is"
+        )
         assert refused.stderr.count("\n") == 1
     assert not (place / "plan.md").exists()
     (place / "models/1.json").unlink()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from modeling import TextureModel
+from modeling.arrays import Floats
+from rig.interface import Stimulus
 
 
 def planted_model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel:
@@ -21,4 +23,17 @@ def planted_model(gain: float = 0.2, *, rate_hz: float = 5000.0) -> TextureModel
         level_sd_db=np.zeros((2, 2, 1)),
         estimator="planted",
         simulated=True,
+    )
+
+
+def planted_stimulus(samples_g: Floats, *, rate_hz: float) -> Stimulus:
+    """A file of a stimulus set that stands for PVC; of no file."""
+    return Stimulus(
+        samples_g=samples_g,
+        rate_hz=rate_hz,
+        vibrator_sha256=None,
+        simulated=True,
+        texture="PVC",
+        sha256="a" * 64,
+        model_sha256="b" * 64,
     )

@@ -13,6 +13,7 @@ from rig.interface import SURFACES, RigReading, TextureRig, ToneBurst
 from rig.sound.signals import tone_burst
 from rig.twin import SimulatedRig
 from tests.rig.planted import planted_model as model
+from tests.rig.planted import planted_stimulus
 
 STEP_S = 0.01
 
@@ -179,6 +180,12 @@ def test_a_fault_is_told_once_and_opening_forgets_what_was_before() -> None:
     assert rig.take_faults() == ()
     rig.open()
     assert (len(rig.take_history()), rig.take_presentations()) == (0, ())
+    assert rig.now_s() == 0.0
+    rig.present_model(model())
+    rig.read()
+    rig.silence()
+    (record,) = rig.take_presentations()
+    assert (record.number, record.start_s, rig.read().time_s) == (1, 0.0, 2 * STEP_S)
 
 
 def test_a_burst_is_felt_once_to_its_end_whatever_the_hand_does() -> None:
@@ -213,3 +220,34 @@ def test_a_burst_beyond_its_highest_amplitude_is_refused() -> None:
     rig.present_signal(replace(burst, amplitude_g=highest_g))
     with pytest.raises(InputError, match="expected a signal of at most 5 g, got 5.01 g"):
         rig.present_signal(replace(burst, amplitude_g=highest_g + 0.01))
+
+
+def test_a_stimulus_is_felt_as_time_goes_on_and_from_its_beginning_each_time() -> None:
+    rig = SimulatedRig()
+    rig.open()
+    samples = 0.1 + 0.001 * np.arange(100.0)
+    stimulus = planted_stimulus(samples, rate_hz=4000.0)
+    rig.present_signal(stimulus)
+    felt = [feel(rig, 1) for _ in range(4)]
+    np.testing.assert_array_equal(np.concatenate(felt), samples)
+    assert [part.size for part in felt] == [40, 40, 20, 0]
+    rig.present_signal(stimulus)
+    np.testing.assert_array_equal(feel(rig, 1), samples[:40])
+    rig.present_real("PVC")
+    assert feel(rig, 1).size == 0
+    rig.silence()
+    whole, broken_off, _ = rig.take_presentations()
+    assert (whole.model_sha256, whole.texture, whole.speeds_mm_s) == ("a" * 64, "PVC", None)
+    assert whole.dose_g2_s == pytest.approx(float(samples @ samples) / 4000)
+    assert whole.played_s == pytest.approx(0.025)
+    assert broken_off.played_s == pytest.approx(0.01)
+
+
+def test_a_stimulus_that_this_rig_cannot_present_is_refused() -> None:
+    rig = SimulatedRig()
+    stimulus = planted_stimulus(np.full(10, 5.01), rate_hz=4000.0)
+    with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
+        rig.present_signal(stimulus)
+    driven = replace(stimulus, samples_g=np.zeros(10), vibrator_sha256="c" * 64)
+    with pytest.raises(InputError, match="without compensation .* one of PVC that drives one"):
+        rig.check_stimulus(driven)

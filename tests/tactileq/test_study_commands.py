@@ -19,6 +19,7 @@ from experiments.sessions.status import (
 )
 from tactileq.commands.study_status import table_of
 from tactileq.commands.study_withdraw import study_dropout, study_withdraw
+from tests.experiments.sessions.enrolling import enrolled
 
 
 def test_every_person_and_session_has_its_place():
@@ -48,7 +49,7 @@ def app() -> typer.Typer:
 
 @pytest.fixture
 def data(tmp_path: Path) -> Path:
-    Roster(tmp_path).enroll(1, 2)
+    enrolled(Roster(tmp_path), 1, 2)
     beh = tmp_path / "sub-01" / "ses-01" / "beh"
     beh.mkdir(parents=True)
     (beh / "answers.tsv").write_text("mine")

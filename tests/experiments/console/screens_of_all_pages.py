@@ -3,8 +3,9 @@
     python screens_of_all_pages.py FOLDER LANGUAGE:WIDTHxHEIGHT ...
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
-"texts": [[words, box]], "shapes": [box]}; boxes are (left, bottom, right, top) in pixels from the
-window's middle. Each page is kept in the folder as a picture; for the folder "-", none is.
+"texts": [[words, box]], "shapes": [box], "places": [[x, y]] of the texts}; boxes are (left, bottom,
+right, top), all in pixels from the window's middle. Each page is kept in the folder as a picture;
+for the folder "-", none is.
 """
 
 import json
@@ -18,11 +19,13 @@ from pyglet.window import key
 from experiments.console.console import Console
 from experiments.console.languages import Texts
 from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
-from experiments.study.questions import Question
+from experiments.study.questions import MOST_LEVELS, Question
 from experiments.study.study import Study
 from experiments.tasks.absolute import AbsoluteTrial
 from experiments.tasks.oddity import OddityTrial
 from experiments.tasks.relative import RelativeTrial
+from experiments.tasks.threshold import ThresholdTrial
+from rig.interface import ToneBurst
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 
@@ -80,7 +83,11 @@ class Visitor:
     def tell(self, name):
         texts = [[s.text, text_box(s)] for s in drawn if isinstance(s, visual.TextStim) and s.text]
         shapes = [shape_box(s) for s in drawn if isinstance(s, visual.shape.BaseShapeStim)]
+        places = [
+            [float(v) for v in s.posPix] for s in drawn if isinstance(s, visual.TextStim) and s.text
+        ]
         told = {"screen": self.screen, "page": name, "texts": texts, "shapes": shapes}
+        told["places"] = places
         print(json.dumps(told), flush=True)
         if self.folder is not None:
             self.window.getMovieFrame(buffer="back")
@@ -116,6 +123,18 @@ def surfaces_of(count, *, feel_all=False, real=True):
         begin=Surfaces.present_real if real else Surfaces.present_virtual,
         note=lambda event, **fields: None,
         feel_all=feel_all,
+    )
+
+
+def intervals():
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.5)
+    return Surfaces(
+        SimulatedRig(),
+        texture="",
+        models=[burst, burst],
+        begin=lambda of: None,
+        note=lambda event, **fields: None,
+        feel_all=True,
     )
 
 
@@ -180,6 +199,13 @@ def try_everything(console, visitor):
         "choose": ["look choose-odd", *buttons, "look choose-odd-all", "press continue"]
     }
     console.choose(ODDITY, surfaces_of(3, feel_all=True, real=False))
+    visitor.plan = {
+        "choose": [
+            *("look choose-interval", "press button 1", "look choose-interval-first"),
+            *("press button 2", "look choose-interval-second", "press continue"),
+        ]
+    }
+    console.choose(THRESHOLD, intervals())
     visitor.plan = {"wait": ["look wait"]}
     ended = iter([False] * 6 + [True])
     console.wait(lambda: next(ended))
@@ -189,14 +215,23 @@ TRIAL = {"trial": 1, "phase": "main", "texture": "canvas", "model": "full", "tra
 ABSOLUTE = AbsoluteTrial(**TRIAL, virtual_texture="canvas", first_surface="real")
 RELATIVE = RelativeTrial(**TRIAL, layout=("canvas",) * 7)
 ODDITY = OddityTrial(**TRIAL, layout=("full", "full", "simplified"), odd_position=3)
+THRESHOLD = ThresholdTrial(
+    **{**TRIAL, "texture": "", "model": "", "tray": ""},
+    frequency_hz=100.0,
+    interval=1,
+    amplitude_g=0.1,
+    highest_g=1.0,
+)
+HOURS = range(0, 10 * MOST_LEVELS, 10)
 OWN = Question(
     name="crafts",
-    levels=tuple(f"{hours} to {hours + 9} hours in each week" for hours in range(0, 120, 10)),
+    levels=tuple(f"{hours} to {hours + 9} hours in each week" for hours in HOURS),
     text={
         "en": "How many hours a week have you worked with textiles, wood or metal over the last "
         "twelve months?",
         "ja": "この一年間、一週間に平均して何時間くらい、布や木や金属を手で扱う仕事をしましたか",
     },
+    levels_text={"ja": tuple(f"一週間に{hours}時間から{hours + 9}時間まで" for hours in HOURS)},
 )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 
 from experiments.console import languages as module
 from experiments.console.drawing import NARROW_EM, NOT_FIRST, NOT_LAST, wrapped
-from experiments.console.languages import Texts, languages
+from experiments.console.languages import Texts, languages, require_texts
 from experiments.console.page_runner import REASONS
 from experiments.study.questions import Question
 from experiments.study.study import Study
@@ -84,6 +85,44 @@ def test_a_question_without_a_translation_is_refused() -> None:
     texts = Texts.load("en")
     texts.require([own])
     assert (texts.question(own), texts.level(own, "m")) == ("Your sex?", "m")
+
+
+def test_levels_are_shown_in_the_words_of_the_language_else_as_they_stand() -> None:
+    pets = Question(
+        name="pets",
+        levels=("none", "one"),
+        text={"en": "Pets?", "ja": "ペットは?"},
+        levels_text={"ja": ("いない", "いる")},
+    )
+    told = {
+        language: [Texts.load(language).level(pets, level) for level in pets.levels]
+        for language in ("en", "ja")
+    }
+    assert told == {"en": ["none", "one"], "ja": ["いない", "いる"]}
+    sex = Question(name="sex", levels=("female", "x"), levels_text={"en": ("Woman", "Neither")})
+    texts = Texts.load("en")
+    texts.require([sex])
+    assert [texts.level(sex, level) for level in sex.levels] == ["Woman", "Neither"]
+    with pytest.raises(InputError, match='"sex" in the language "ja", got none for x'):
+        Texts.load("ja").require([sex])
+
+
+def test_a_study_in_a_language_without_texts_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shipped = Study.load()
+    require_texts(shipped)
+    with pytest.raises(InputError, match="expected a language of en, ja, got 'fr'"):
+        require_texts(replace(shipped, languages=("en", "fr")))
+    for language in ("en", "ja"):
+        texts = (module.FOLDER / f"{language}.toml").read_text(encoding="utf-8")
+        (tmp_path / f"{language}.toml").write_text(texts, encoding="utf-8")
+    with (tmp_path / "en.toml").open("a") as file:
+        file.write('\n[new]\ntitle = "New"\n')
+    monkeypatch.setattr(module, "FOLDER", tmp_path)
+    require_texts(replace(shipped, languages=("en",)))
+    with pytest.raises(InputError, match='a text for new.title in the language "ja", got none'):
+        require_texts(shipped)
 
 
 def test_stamps_are_translated() -> None:

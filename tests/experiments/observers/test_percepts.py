@@ -23,6 +23,7 @@ from experiments.study.study import Study
 from modeling import InputError, TextureModel, Threshold
 from modeling.models.ar_model import ARModel
 from tests.experiments.observers.planted_models import flat_threshold, texture_model
+from tests.rig.planted import planted_stimulus
 
 PERCEPTS = arrays(np.float64, (3, 9), elements=st.floats(0.0, 80.0))
 
@@ -43,6 +44,27 @@ def test_a_narrow_layer_is_felt_as_the_sinusoid_of_equal_power() -> None:
     model = texture_model(0.0, ((215.0, bandwidth_hz, gain),))
     level = sensation_levels(model, flat_threshold(limit_g))[:, 6]  # 180 … 250 Hz
     np.testing.assert_allclose(level, 20 * np.log10(amplitude_g / limit_g), atol=0.1)
+
+
+def test_a_stimulus_is_felt_by_its_spectrum_alike_in_every_stroke() -> None:
+    rate_hz, amplitude_g, noise_g, limit_g = 5000.0, 0.05, 0.02, 0.001
+    time_s = np.arange(round(60 * rate_hz)) / rate_hz
+    tone = amplitude_g * np.sin(2 * np.pi * 215.3 * time_s)
+    levels = sensation_levels(planted_stimulus(tone, rate_hz=rate_hz), flat_threshold(limit_g))
+    np.testing.assert_allclose(levels[:, 6], 20 * np.log10(amplitude_g / limit_g), atol=0.01)
+    noise = noise_g * np.random.default_rng(1).standard_normal(time_s.size)
+    levels = sensation_levels(planted_stimulus(noise, rate_hz=rate_hz), flat_threshold(limit_g))
+    power = noise_g**2 * (2 / rate_hz) * np.diff(BAND_EDGES_HZ)
+    expected = 20 * np.log10(np.sqrt(2 * power) / limit_g)
+    # The narrowest band, 10 Hz, for a minute: a standard deviation of 1/√600, or 0.18 dB.
+    np.testing.assert_allclose(levels, np.tile(expected, (len(STROKES), 1)), atol=0.6)
+    assert (levels == levels[0]).all()
+
+
+def test_silence_and_a_very_short_stimulus_are_felt_as_nothing() -> None:
+    for samples in (np.zeros(2500), np.zeros(2)):
+        stimulus = planted_stimulus(samples, rate_hz=5000.0)
+        assert (sensation_levels(stimulus, flat_threshold(0.001)) == 0.0).all()
 
 
 def test_an_autoregressive_model_of_white_noise_is_felt_as_one_in_layers() -> None:

@@ -15,6 +15,7 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from modeling.files.hashes import sha256_of_values
 from rig.interface import HandRows, PresentationRecord
+from tests.experiments.sessions.enrolling import enrolled
 
 SURFACES = ("canvas", 'say "velvet", or', "和紙")
 SETS = ("full", "simplified")
@@ -96,7 +97,7 @@ def a_manifest(
         "plan_sha256": "0" * 64,
         "models_sha256": MODELS,
         "model_sources": {name: name for name in SETS},
-        "identical": [],
+        "identical": {},
         "rig": {},
         "description": f"The task {task}.",
         "trials": planned(task),
@@ -168,8 +169,8 @@ def write_session(tmp_path: Path) -> WriteSession:
         **others: Any,
     ) -> SessionFiles:
         folder = tmp_path / "data"
-        person = Roster(folder).enroll(
-            subject, 2, simulated=others.get("simulated_participant", True)
+        person = enrolled(
+            Roster(folder), subject, 2, simulated=others.get("simulated_participant", True)
         )
         manifest = a_manifest(
             task=task,
@@ -215,7 +216,7 @@ def _manifest(**changed: Any) -> SessionManifest:
         "plan_sha256": "bb",
         "models_sha256": {"canvas": {"full": "cc", "simplified": "dd"}},
         "model_sources": {"full": "models", "simplified": "simplified"},
-        "identical": [],
+        "identical": {},
         "rig": {"firmware": "1.2", "latency_s": 0.1 + 0.2},
         "description": "Compare a real and a virtual surface",
         "trials": [

@@ -56,7 +56,7 @@ def manifest(subject=1):
         plan_sha256="bb",
         models_sha256={"canvas": {"full": "cc", "simplified": "dd"}},
         model_sources={},
-        identical=[],
+        identical={},
         rig={},
         description="Compare",
         trials=[{"trial": n, "phase": phase} for n, phase in enumerate(phases, start=1)],
@@ -72,9 +72,10 @@ def manifest(subject=1):
 
 def run(folder, tell, resumed=False):
     """One session, from its enrolment or its resumption to the end."""
-    Roster(folder).enroll(1, 4)
     begin = SessionStore.resume if resumed else SessionStore.create
-    with begin(folder, manifest()) as store:
+    with Roster(folder).enrolling(1, 4):
+        store = begin(folder, manifest())
+    with store:
         left = resumption(store.manifest, store.before, longest_gap_min=30)
         for trial in left.next_trials:
             number = trial["trial"]
@@ -169,8 +170,10 @@ def race(root):
             tell = teller(root / f"{number}.told")
             try:
                 time.sleep(max(go - time.monotonic(), 0))
-                Roster(root / "data").enroll(number % 2 + 1, 4)
-                with SessionStore.create(root / "data", manifest(number % 2 + 1)) as store:
+                subject = number % 2 + 1
+                with Roster(root / "data").enrolling(subject, 4):
+                    store = SessionStore.create(root / "data", manifest(subject))
+                with store:
                     store.answer(1, {"trial": 1, "valid": True})
                     time.sleep(0.3)
                     store.finish("complete")

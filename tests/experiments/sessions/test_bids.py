@@ -31,6 +31,7 @@ from experiments.study.task_plan import TaskPlan
 from modeling import InputError, simplify
 from modeling.files.answer_tables import ANSWER_TABLES
 from rig.twin import SimulatedRig
+from tests.experiments.sessions.conftest import STUDY
 
 VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
 PERSON = {"age": 31, "sex": "not said", "handedness": "right", "hours_of_sleep": 7.5}
@@ -384,3 +385,20 @@ def test_what_is_no_manifest_is_refused(tmp_path, write_session):
     for path in (files.log, tmp_path / "nothing_manifest.json"):
         with pytest.raises(InputError, match="expected the manifest of a session"):
             export_session(files.root, path)
+
+
+def test_levels_are_stored_untranslated_and_described_in_english(write_session) -> None:
+    asked = {
+        "name": "craft",
+        "levels": ["一", "二"],
+        "text": {"ja": "手仕事は?", "en": "Any craft?"},
+        "levels_text": {"en": ["None", "Some"]},
+    }
+    study = {**STUDY, "questions": [asked]}
+    files = write_session(answers={"craft": "二"}, study=study, language="en")
+    export_all(files.root)
+    people = pd.read_csv(files.root / "participants.tsv", sep="\t")
+    assert people["craft"].tolist() == ["二"]
+    described = json.loads((files.root / "participants.json").read_text(encoding="utf-8"))
+    assert described["craft"]["Levels"] == {"一": "None", "二": "Some"}
+    assert described["craft"]["Description"] == "Any craft?"

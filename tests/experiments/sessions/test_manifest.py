@@ -21,7 +21,9 @@ ManifestOf = Callable[..., SessionManifest]
 
 def test_it_loads_back_equal(tmp_path: Path, manifest_of: ManifestOf) -> None:
     made = manifest_of(
-        code="たき", overrides=[{"what": "study", "reason": "lamp"}], identical=("canvas",)
+        code="たき",
+        overrides=[{"what": "study", "reason": "lamp"}],
+        identical={"canvas": [["full", "simplified"]]},
     )
     path = tmp_path / "manifest.json"
     path.write_text(made.text, encoding="utf-8")

@@ -166,7 +166,7 @@ def test_however_often_it_breaks_off_every_trial_is_asked_once(
         models_sha256={},
         rig={},
         model_sources={},
-        identical=[],
+        identical={},
         description="",
         program={},
         trials=[{"trial": n, "phase": "training" if n <= 2 else "main"} for n in NUMBERS],

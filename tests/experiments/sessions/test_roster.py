@@ -14,53 +14,54 @@ from hypothesis import strategies as st
 from experiments.sessions.roster import Roster
 from experiments.sessions.writer import StoreError
 from modeling import InputError
+from tests.experiments.sessions.enrolling import enrolled
 
 
 def test_everybody_gets_the_slot_of_the_own_number(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    people = [roster.enroll(number, 4) for number in (2, None, None, 4)]
+    people = [enrolled(roster, number, 4) for number in (2, None, None, 4)]
     assert [(p.subject, p.slot, p.known) for p in people] == [
         (2, 2, False),
         (1, 1, False),
         (3, 3, False),
         (4, 4, False),
     ]
-    assert roster.enroll(3, 4) == Roster(tmp_path).enroll(3, 4)
-    assert roster.enroll(3, 4).known
-    assert roster.enroll(3, 4).code == people[2].code
+    assert enrolled(roster, 3, 4) == enrolled(Roster(tmp_path), 3, 4)
+    assert enrolled(roster, 3, 4).known
+    assert enrolled(roster, 3, 4).code == people[2].code
     with pytest.raises(InputError, match=r"from 1 to 4, .* got subject 5; note who dropped out"):
-        roster.enroll(None, 4)
+        enrolled(roster, None, 4)
     with pytest.raises(InputError, match="subject"):
-        roster.enroll(0, 4)
+        enrolled(roster, 0, 4)
 
 
 def test_the_slot_of_a_dropout_passes_to_the_replacement(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
     for number in range(1, 5):
-        roster.enroll(number, 4)
+        enrolled(roster, number, 4)
     roster.drop(3)
     roster.withdraw(2)
-    first, second = roster.enroll(7, 4), roster.enroll(None, 4)
+    first, second = enrolled(roster, 7, 4), enrolled(roster, None, 4)
     assert (first.subject, first.slot) == (7, 2)
     assert (second.subject, second.slot) == (5, 3)
     with pytest.raises(InputError, match="in the place of a dropout"):
-        roster.enroll(8, 4)
+        enrolled(roster, 8, 4)
     with pytest.raises(InputError, match="subject 3, who dropped out"):
-        roster.enroll(3, 4)
+        enrolled(roster, 3, 4)
     roster.drop(7)
-    assert roster.enroll(8, 4).slot == 2
+    assert enrolled(roster, 8, 4).slot == 2
 
 
 def test_a_subject_whose_own_slot_was_taken_gets_another(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
     for number in (1, 2):
-        roster.enroll(number, 2)
+        enrolled(roster, number, 2)
     roster.drop(1)
-    assert roster.enroll(3, 2).slot == 1
-    assert roster.enroll(4, 4).slot == 4
-    assert roster.enroll(5, 5).slot == 5
+    assert enrolled(roster, 3, 2).slot == 1
+    assert enrolled(roster, 4, 4).slot == 4
+    assert enrolled(roster, 5, 5).slot == 5
     with pytest.raises(InputError, match="subject 4 with slot 4"):
-        roster.enroll(4, 2)
+        enrolled(roster, 4, 2)
 
 
 @given(
@@ -75,7 +76,7 @@ def test_no_slot_is_ever_held_by_two(
     for what, subject in steps:
         try:
             if what == "enroll":
-                roster.enroll(subject, 5)
+                enrolled(roster, subject, 5)
             else:
                 getattr(roster, what)(subject)
         except InputError:
@@ -87,24 +88,24 @@ def test_no_slot_is_ever_held_by_two(
 
 def test_codes_are_easy_to_say_and_nobody_elses(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    codes = [roster.enroll(None, 200).code for _ in range(60)]
+    codes = [enrolled(roster, None, 200).code for _ in range(60)]
     assert len(set(codes)) == 60
     assert all(re.fullmatch(r"([KMNRST][AEIO]){2}-[1-9][0-9]", code) for code in codes)
     assert len({code[:4] for code in codes}) > 30
-    assert Roster(tmp_path / "b").enroll(7, 9, simulated=True).code == "SIM-007"
+    assert enrolled(Roster(tmp_path / "b"), 7, 9, simulated=True).code == "SIM-007"
 
 
 def test_a_withdrawal_takes_the_code_and_leaves_number_and_slot(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    code = roster.enroll(1, 3).code
-    other = roster.enroll(2, 3).code
+    code = enrolled(roster, 1, 3).code
+    other = enrolled(roster, 2, 3).code
     roster.withdraw(1)
     assert code not in roster.path.read_text()
     assert other in roster.path.read_text()
     entry = roster.subjects()[1]
     assert (entry["slot"], entry["code"], entry["left"]) == (1, "", "withdrawn")
     with pytest.raises(InputError, match="who withdrew"):
-        roster.enroll(1, 3)
+        enrolled(roster, 1, 3)
     for gone in (1, 9):
         with pytest.raises(InputError, match="expected a subject who takes part"):
             roster.withdraw(gone)
@@ -114,14 +115,14 @@ def test_a_withdrawal_takes_the_code_and_leaves_number_and_slot(tmp_path: Path) 
 
 def test_people_and_simulations_are_never_one_subject(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    roster.enroll(1, 3)
+    enrolled(roster, 1, 3)
     with pytest.raises(InputError, match="subject 1 to be a person"):
-        roster.enroll(1, 3, simulated=True)
+        enrolled(roster, 1, 3, simulated=True)
 
 
 def test_many_consoles_at_once_enroll_different_people(tmp_path: Path) -> None:
     with ThreadPoolExecutor(8) as pool:
-        people = list(pool.map(lambda _: Roster(tmp_path).enroll(None, 24), range(24)))
+        people = list(pool.map(lambda _: enrolled(Roster(tmp_path), None, 24), range(24)))
     assert sorted(p.subject for p in people) == list(range(1, 25))
     assert sorted(p.slot for p in people) == list(range(1, 25))
     assert len({p.code for p in people}) == 24
@@ -129,25 +130,25 @@ def test_many_consoles_at_once_enroll_different_people(tmp_path: Path) -> None:
 
 def test_a_half_written_line_enrolled_nobody(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    roster.enroll(1, 3)
+    enrolled(roster, 1, 3)
     before = roster.path.read_bytes()
-    roster.enroll(2, 3)
+    enrolled(roster, 2, 3)
     line = roster.path.read_bytes()[len(before) :]
     for end in range(len(line)):
         roster.path.write_bytes(before + line[:end])
         assert set(roster.subjects()) == {1}
-    assert not roster.enroll(2, 3).known
+    assert not enrolled(roster, 2, 3).known
     assert set(roster.subjects()) == {1, 2}
 
 
 def test_a_full_disk_enrolls_nobody(tmp_path: Path, file_size_limit: object) -> None:
     roster = Roster(tmp_path)
-    roster.enroll(1, 3)
+    enrolled(roster, 1, 3)
     before = roster.path.read_bytes()
     with file_size_limit(len(before) + 20), pytest.raises(StoreError, match="make room"):
-        roster.enroll(2, 3)
+        enrolled(roster, 2, 3)
     assert roster.path.read_bytes() == before
-    assert not roster.enroll(2, 3).known
+    assert not enrolled(roster, 2, 3).known
 
 
 @pytest.mark.parametrize(
@@ -155,7 +156,7 @@ def test_a_full_disk_enrolls_nobody(tmp_path: Path, file_size_limit: object) -> 
 )
 def test_what_is_no_roster_is_refused(tmp_path: Path, line: str) -> None:
     roster = Roster(tmp_path)
-    roster.enroll(1, 3)
+    enrolled(roster, 1, 3)
     with roster.path.open("a") as file:
         file.write(line + "\n")
     with pytest.raises(InputError, match=r"line 2 of .*restore the file"):
@@ -165,21 +166,21 @@ def test_what_is_no_roster_is_refused(tmp_path: Path, line: str) -> None:
 def test_a_task_with_more_participants_gets_all_its_slots_after_a_dropout(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
     for number in range(1, 21):
-        roster.enroll(number, 20)
+        enrolled(roster, number, 20)
     roster.drop(3)
-    assert roster.enroll(21, 20).slot == 3
-    slots = [roster.enroll(number, 24).slot for number in (22, 23, 24, 25)]
+    assert enrolled(roster, 21, 20).slot == 3
+    slots = [enrolled(roster, number, 24).slot for number in (22, 23, 24, 25)]
     assert slots == [22, 23, 24, 21]
     with pytest.raises(InputError, match="from 1 to 24"):
-        roster.enroll(26, 24)
+        enrolled(roster, 26, 24)
 
 
 def test_who_was_being_enrolled_when_something_failed_is_not(tmp_path: Path) -> None:
     roster = Roster(tmp_path)
-    roster.enroll(1, 3)
+    enrolled(roster, 1, 3)
     before = roster.path.read_bytes()
     with suppress(RuntimeError), roster.enrolling(2, 3):
         assert roster.subjects()[2]["slot"] == 2
         raise RuntimeError
     assert roster.path.read_bytes() == before
-    assert roster.enroll(None, 3).subject == 2
+    assert enrolled(roster, None, 3).subject == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections import Counter
@@ -10,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from experiments.sessions.bids import export_all, export_session
@@ -19,15 +21,18 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.state import session_state
 from experiments.sessions.store import SessionStore
-from experiments.sessions.surfaces import SessionAborted
+from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
+from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
+from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
+from tests.rig.planted import planted_stimulus
 
 TRIALS = 5  # one for training, two textures with two models
 
@@ -93,8 +98,10 @@ def rows_of(manifest: Path) -> list[dict[str, Any]]:
 
 
 def test_the_manifest_is_complete_before_the_first_trial(
-    run: Callable[..., Any], small: Study, models: ModelSets, tmp_path: Path
+    run: Callable[..., Any], small: Study, models: ModelSets, rig: Any, tmp_path: Path
 ) -> None:
+    rig.stated = {"HandFirmware": "wheel 1.0"}
+
     class Watchful(Scripted):
         def rate(self, trial: Any, surfaces: Any) -> Any:
             (path,) = tmp_path.rglob("*_manifest.json")
@@ -112,6 +119,7 @@ def test_the_manifest_is_complete_before_the_first_trial(
     assert manifest.model_sources == {"full": "models", "simplified": "fewer"}
     assert manifest.program["versions"]["numpy"]
     assert len(manifest.plan_sha256) == 64
+    assert manifest.rig == {"HandFirmware": "wheel 1.0"}
 
 
 def test_textures_whose_models_are_equal_are_marked(
@@ -122,7 +130,7 @@ def test_textures_whose_models_are_equal_are_marked(
         sets={"full": full, "simplified": {**models.sets["simplified"], "PVC": full["PVC"]}}
     )
     _, manifest = run(models=one)
-    assert "PVC" in SessionManifest.load(manifest).identical
+    assert SessionManifest.load(manifest).identical == {"PVC": [["full", "simplified"]]}
     same = ModelSets(sets={"full": full, "simplified": full})
     with pytest.raises(InputError, match="identical ones for all"):
         run(models=same, folder=tmp_path / "all")
@@ -150,6 +158,16 @@ def test_a_rig_that_refuses_leaves_nothing(
     with pytest.raises(InputError, match="expected a card"):
         run(folder=tmp_path / "none")
     assert not (tmp_path / "none").exists()
+
+
+def test_a_stimulus_that_the_rig_cannot_play_is_refused_before_anything_is_written(
+    run: Callable[..., Any], models: ModelSets, tmp_path: Path
+) -> None:
+    loud = planted_stimulus(np.full(10, 5.01), rate_hz=5000.0)
+    one = ModelSets(sets={**models.sets, "simplified": {**models.sets["simplified"], "PVC": loud}})
+    with pytest.raises(InputError, match="at most 5 g, got 5.01 g"):
+        run(models=one, rig=SimulatedRig(), folder=tmp_path / "data")
+    assert not (tmp_path / "data").exists()
 
 
 def test_consent_and_questions_come_first_and_once(
@@ -185,6 +203,54 @@ def test_an_aborted_session_goes_on_at_the_next_open_trial(run: Callable[..., An
         run(resume=True)
 
 
+def test_both_tries_of_a_trial_that_broke_off_keep_their_own_hand_and_presentations(
+    run: Callable[..., Any], rows: Callable[[Path], list[dict[str, str]]]
+) -> None:
+    class Stroking(Scripted):
+        """Strokes for so many readings at each surface; may leave in the second trial."""
+
+        def __init__(self, rig: SimulatedRig, readings: int, *, leaves: bool) -> None:
+            super().__init__()
+            self._rig, self._readings, self._leaves = rig, readings, leaves
+
+        def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+            surfaces.start()
+            for _ in range(2):
+                for _ in range(self._readings):
+                    self._rig.read()
+                surfaces.toggle()
+            if self._leaves and self.answered == 1:
+                raise SessionAborted("tired")
+            self.answered += 1
+            return Rating(magnitude_similarity=1.0, frequency_similarity=2.0, response_time_s=3.0)
+
+    twin = SimulatedRig()
+    _, manifest = run(Stroking(twin, 10, leaves=True), rig=twin)
+    twin = SimulatedRig()  # whose clock begins anew
+    run(Stroking(twin, 30, leaves=False), rig=twin, resume=True)
+    stem = str(manifest).removesuffix("manifest.json")
+    hand, shown = (rows(Path(f"{stem}{name}.tsv")) for name in ("hand", "presentations"))
+    of_second = [row for row in hand if row["trial"] == "2"]
+    assert Counter(row["run"] for row in of_second) == {
+        "1": 21 * 5,
+        "2": 61 * 5,
+    }  # one as it begins
+    assert {row["run"] for row in hand if row["trial"] == "1"} == {"1"}
+    assert {row["run"] for row in hand if row["trial"] == "3"} == {"2"}
+    assert [(r["run"], r["trial"]) for r in shown][:9:3] == [("1", "1"), ("1", "2"), ("2", "2")]
+    data = manifest.parents[3]
+    export_session(data, manifest)
+    (events,) = data.rglob("*_events.tsv")
+    presented = [row for row in rows(events) if row["trial_type"] == "presented"]
+    durations = {
+        run: [float(row["duration"]) for row in presented if (row["run"], row["trial"]) == run]
+        for run in (("1", "2"), ("2", "2"))
+    }
+    assert durations["1", "2"] == pytest.approx([0.1, 0.1, 0.0])
+    assert durations["2", "2"] == pytest.approx([0.3, 0.3, 0.0])
+    assert len(list(data.rglob("*_physio.tsv.gz"))) == 2
+
+
 def test_after_a_long_gap_training_comes_again(
     run: Callable[..., Any],
 ) -> None:
@@ -218,6 +284,94 @@ def test_a_changed_study_is_refused_on_resuming_or_recorded_and_the_stored_order
     by_number = {trial["trial"]: trial for trial in before}
     for row in rows_of(manifest):
         assert row["texture"] == by_number[row["trial"]]["texture"]
+
+
+class Leaves(Scripted):
+    """Stops before anything was asked."""
+
+    def welcome(self, intake: Intake) -> dict[str, str | int]:
+        raise SessionAborted("tired")
+
+
+def test_a_session_goes_on_as_its_manifest_says_whatever_the_study_says_by_now(
+    run: Callable[..., Any], small: Study
+) -> None:
+    age = Question(name="age", least=18, most=99)
+    began = replace(small, consent="1", questions=(age,))
+    run(Leaves(), study=began)
+    absolute = replace(small.plan_of("absolute"), repeats=2, break_after=1)
+    other = replace(
+        small,
+        consent="2",
+        textures=("canvas", "MDF"),
+        trays={"canvas": "A", "MDF": "B"},
+        tasks={**small.tasks, "absolute": absolute},
+    )
+    person = Scripted()
+    result, manifest = run(person, study=other, resume=True, override="another room")
+    assert result.completed
+    planned = SessionManifest.load(manifest).trials
+    kept = ("trial", "texture", "model", "tray", "first_surface")
+    for row, trial in zip(rows_of(manifest), planned, strict=True):
+        assert [row[name] for name in kept] == [trial[name] for name in kept]
+    assert {trial["texture"] for trial in planned} == {"canvas", "PVC"}
+    assert person.rests == 0
+    assert [(asked.consent, asked.questions) for asked in person.asked] == [("1", (age,))]
+
+
+def test_a_session_of_which_a_model_is_gone_is_refused_and_can_still_go_on(
+    run: Callable[..., Any], small: Study, models: ModelSets
+) -> None:
+    _, manifest = run(Tired(2))
+    other = replace(small, textures=("canvas", "MDF"), trays={"canvas": "A", "MDF": "B"})
+    fewer = {name: {t: of[t] for t in ("canvas", "MDF")} for name, of in models.sets.items()}
+    changed = {"study": other, "resume": True, "override": "PVC is lost"}
+    with pytest.raises(InputError, match="PVC") as refused:
+        run(models=ModelSets(sets=fewer), **changed)
+    assert "\n" not in str(refused.value)
+    assert [row["trial"] for row in rows_of(manifest)] == [1, 2]
+    result, _ = run(resume=True)
+    assert result.completed
+    assert [row["trial"] for row in rows_of(manifest)] == [1, 2, 3, 4, 5]
+
+
+def test_another_language_on_going_on_is_noted_and_the_manifest_stays(
+    run: Callable[..., Any], small: Study
+) -> None:
+    both = replace(small, languages=("en", "ja"))
+    _, manifest = run(Tired(2), study=both, language="ja")
+    run(Tired(1), study=both, language="ja", resume=True)
+    run(study=both, language="en", resume=True)
+    assert SessionManifest.load(manifest).language == "ja"
+    opened = [e for e in read_log(log_beside(manifest)).events if e["event"] == "opened"]
+    assert [event.get("changed", {}).get("language") for event in opened] == [None, None, "en"]
+
+
+@pytest.mark.parametrize("number", [errno.EIO, errno.ENOSPC])
+def test_an_answer_that_the_disk_did_not_keep_is_asked_for_again(
+    run: Callable[..., Any], rig: Any, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    class Unlucky(Scripted):
+        def rate(self, trial: Any, surfaces: Any) -> Any:
+            rating = super().rate(trial, surfaces)
+            if self.answered == 3:
+                monkeypatch.setattr(os, "fsync", refuse)
+            return rating
+
+    def refuse(handle: int) -> None:
+        raise OSError(number, os.strerror(number))
+
+    with pytest.raises(
+        StoreError, match=r"^expected to write to .*: make room, then go on"
+    ) as told:
+        run(Unlucky())
+    monkeypatch.undo()
+    assert "\n" not in str(told.value)
+    assert not rig.opened
+    result, manifest = run(resume=True)
+    assert result.completed
+    rows = rows_of(manifest)
+    assert [(row["trial"], row["run"]) for row in rows] == [(1, 1), (2, 1), (3, 2), (4, 2), (5, 2)]
 
 
 def test_the_second_day_comes_after_the_first_and_on_another_date(run: Callable[..., Any]) -> None:

@@ -80,5 +80,5 @@ def test_no_name_of_a_condition_is_told(write_session):
 def test_a_folder_without_sessions_is_refused(tmp_path):
     with pytest.raises(InputError, match="expected sessions below"):
         study_progress(tmp_path)
-    with pytest.raises(InputError, match="expected a data folder"):
+    with pytest.raises(InputError, match="expected the data folder of a study, got none at"):
         study_progress(tmp_path / "elsewhere")

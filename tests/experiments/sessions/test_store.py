@@ -572,6 +572,24 @@ def test_the_second_day_comes_after_the_first(
     assert len(sessions_in(tmp_path)) == 3
 
 
+def test_the_second_day_is_not_on_the_date_on_which_a_resumed_first_day_ended(
+    tmp_path: Path, manifest_of: ManifestOf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noon = datetime.now().astimezone().replace(hour=12).astimezone(UTC)
+    at(noon, monkeypatch)
+    SessionStore.create(tmp_path, manifest_of()).close()
+    at(noon + timedelta(days=1), monkeypatch)
+    with SessionStore.resume(tmp_path, manifest_of()) as store:
+        store.finish("complete")
+    second = manifest_of(session=2)
+    for hours in (0, 11):
+        at(noon + timedelta(days=1, hours=hours), monkeypatch)
+        with pytest.raises(InputError, match="session 2 on a later date than sub-01_ses-01"):
+            SessionStore.create(tmp_path, second)
+    at(noon + timedelta(days=1, hours=13), monkeypatch)
+    completed(tmp_path, second)
+
+
 def test_days_of_other_subjects_and_tasks_do_not_count(
     tmp_path: Path, manifest_of: ManifestOf
 ) -> None:

@@ -20,6 +20,7 @@ from experiments.sessions.resume import Resumption, resumption
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import session_state
 from experiments.sessions.store import SessionStore
+from tests.experiments.sessions.enrolling import enrolled
 
 ManifestOf = Callable[..., SessionManifest]
 ROOT = Path(__file__).parents[3]
@@ -73,7 +74,7 @@ def check_and_go_on(folder: Path, manifest: SessionManifest, safe: list[int]) ->
     files = files_in(folder)
     if not files.manifest.exists():
         assert not safe
-        Roster(folder).enroll(1, 4)
+        enrolled(Roster(folder), 1, 4)
         with SessionStore.create(folder, manifest) as store:
             answer_rest(store, manifest)
         status = "never begun"
@@ -169,7 +170,7 @@ def test_killed_anywhere_while_it_is_resumed(tmp_path: Path, manifest_of: Manife
     begun, root = tmp_path / "begun", tmp_path / "killed"
     root.mkdir()
     manifest = small(manifest_of)
-    Roster(begun).enroll(1, 4)
+    enrolled(Roster(begun), 1, 4)
     with SessionStore.create(begun, manifest) as store:
         for number in (1, 2):
             store.answer(number, {"trial": number, "value": 10.0 * number, "valid": True})

@@ -19,7 +19,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
-from rig.interface import Acceleration, Fault
+from rig.interface import Acceleration, Fault, ToneBurst
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 
@@ -242,6 +242,12 @@ def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets,
     assert surfaces.shows_real
     assert surfaces.switches == 2
     assert surfaces.presses == 1
+
+
+def test_bursts_wait_for_a_press(models: ModelSets, rig: Any) -> None:
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.1)
+    assert surfaces_of(rig, [burst, burst]).bursts
+    assert not surfaces_of(rig, [models.of("MDF", "full")]).bursts
 
 
 def test_toggling_among_several_returns_to_the_one_presented_last(
@@ -646,17 +652,22 @@ def test_training_again_that_the_rig_spoilt_is_counted_and_repeated(
 # --- Traces ---------------------------------------------------------------------------------
 
 
+class Keeping(MemoryStore):
+    """Keeps traces, too."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.traces: list[Any] = []
+        self.faults: list[Any] = []
+
+    def trace(self, trial: int, rows: Any, *, presentations: Any, faults: Any) -> None:
+        self.traces.append((trial, rows, presentations))
+        self.faults.append([fault.told for fault in faults])
+
+
 def test_the_hands_history_and_the_presentations_of_each_trial_reach_the_store(
     run: Callable[..., Ran],
 ) -> None:
-    class Keeping(MemoryStore):
-        def __init__(self) -> None:
-            super().__init__()
-            self.traces: list[Any] = []
-
-        def trace(self, trial: int, rows: Any, *, presentations: Any, faults: Any) -> None:
-            self.traces.append((trial, rows, presentations))
-
     store = Keeping()
     run(rig=Stroking(), store=store)
     assert [trial for trial, _, _ in store.traces] == list(range(1, 8))
@@ -665,6 +676,71 @@ def test_the_hands_history_and_the_presentations_of_each_trial_reach_the_store(
         assert len(rows) >= 3 * 250
         assert all(0 < b - a < 0.005 for a, b in pairwise(rows.time_s))
         assert min(rows.speed_mm_s) < -200 < 200 < max(rows.speed_mm_s)
+
+
+class Leaving(Scripted):
+    """Leaves in the third trial, once the first surface has been stroked."""
+
+    error: BaseException = SessionAborted("tired")
+    rig: SimulatedRig | None = None
+
+    def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
+        if self.answered < 2:
+            return super().rate(trial, surfaces)
+        surfaces.start()
+        surfaces.toggle()
+        if self.rig is not None:
+            self.rig.break_down("the cable")
+        raise self.error
+
+
+@pytest.mark.parametrize("error", [SessionAborted("tired"), SystemExit(143), OSError("gone")])
+def test_the_hand_of_a_trial_that_broke_off_is_kept_once(
+    run: Callable[..., Ran], error: BaseException
+) -> None:
+    store, leaving, rig = Keeping(), Leaving(), Stroking()
+    leaving.error, leaving.rig = error, rig
+    if isinstance(error, SessionAborted):
+        run(leaving, rig=rig, store=store)
+    else:
+        with pytest.raises(type(error)):
+            run(leaving, rig=rig, store=store)
+    assert [trial for trial, _, _ in store.traces] == [1, 2, 3]
+    _, rows, presentations = store.traces[-1]
+    assert len(rows) >= 250
+    assert len(presentations) == 2
+    assert len(store.rows) == 2
+    assert store.faults == [[], [], ["the cable"]]
+    assert [event["event"] for event in store.events][-1] == "ended"
+
+
+def test_the_hand_between_trials_is_of_no_trial(run: Callable[..., Ran]) -> None:
+    class Waiting(Scripted):
+        def wait(self, until: Callable[[], bool]) -> None:
+            if self.answered == 2:
+                raise SessionAborted("tired")
+
+    store = Keeping()
+    run(Waiting(), rig=Stroking(), store=store)
+    assert [trial for trial, _, _ in store.traces] == [1, 2]
+
+
+def test_a_rig_that_has_lost_its_history_hides_no_end(run: Callable[..., Ran]) -> None:
+    rig, leaving = Stroking(), Leaving()
+    taken = rig.take_history
+
+    def lost() -> Any:
+        if len(store.rows) == 2 and leaving.heard:
+            raise OSError("the memory is gone")
+        return taken()
+
+    store = Keeping()
+    run(leaving, rig=rig, store=store)
+    rig.take_history = lost  # type: ignore[method-assign]
+    store, leaving = Keeping(), Leaving()
+    with pytest.raises(OSError, match="memory"):
+        run(leaving, rig=rig, store=store)
+    assert store.status == "crashed"
 
 
 def test_what_was_measured_at_the_pen_belongs_to_its_trial(

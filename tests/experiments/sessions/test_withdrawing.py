@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+import signal
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -14,6 +20,7 @@ from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from experiments.sessions.withdrawing import drop_out, files_of, withdraw
 from modeling import InputError
+from tests.experiments.sessions.enrolling import enrolled
 
 PEOPLE = {"simulated_participant": False, "simulated_rig": False}
 
@@ -55,8 +62,8 @@ def test_nothing_remains_of_somebody_who_withdraws(root):
 def test_the_slot_goes_to_a_replacement_and_the_number_to_nobody(root, write_session):
     withdraw(root, 1)
     with pytest.raises(InputError, match="withdrew"):
-        Roster(root).enroll(1, 2)
-    assert Roster(root).enroll(3, 2).slot == 1
+        enrolled(Roster(root), 1, 2)
+    assert enrolled(Roster(root), 3, 2).slot == 1
     write_session(subject=3, **PEOPLE)
 
 
@@ -66,7 +73,7 @@ def test_a_dropout_keeps_the_data(root):
     assert files_of(root, 1) == before
     people = pd.read_csv(root / "participants.tsv", sep="\t")
     assert people["status"].tolist() == ["dropped", "enrolled"]
-    assert Roster(root).enroll(3, 2).slot == 1
+    assert enrolled(Roster(root), 3, 2).slot == 1
     withdraw(root, 1)
     assert files_of(root, 1) == ()
 
@@ -97,6 +104,63 @@ def test_begun_again_it_goes_on_where_it_was_stopped(root, monkeypatch, broken):
         withdraw(root, 1)
 
 
+CALLS = ("write", "fsync", "replace", "rename", "unlink", "rmdir", "truncate", "mkdir")
+
+
+def killed_at(call: int, work: Callable[[], object]) -> bool:
+    """Do this in a process that kills itself before such a call that changes the disk."""
+    child = os.fork()
+    if child == 0:
+        counted = Counter[str]()
+
+        def wrapped(real: Callable[..., Any]) -> Callable[..., Any]:
+            def counting(*given: Any, **named: Any) -> Any:
+                counted["calls"] += 1
+                if counted["calls"] == call:
+                    os.kill(os.getpid(), signal.SIGKILL)
+                return real(*given, **named)
+
+            return counting
+
+        for name in CALLS:
+            setattr(os, name, wrapped(getattr(os, name)))
+        try:
+            work()
+        finally:
+            os._exit(0)
+    return os.WIFSIGNALED(os.waitpid(child, 0)[1])
+
+
+def test_killed_anywhere_it_is_begun_again_and_the_others_can_go_on_meanwhile(root, tmp_path):
+    code = Roster(root).subjects()[1]["code"]
+    others = {path: path.read_bytes() for path in root.rglob("*sub-02*") if path.is_file()}
+    killed = 0
+    while True:
+        data = tmp_path / f"killed-{killed}" / "data"
+        shutil.copytree(root, data)
+        if not killed_at(killed + 1, lambda data=data: withdraw(data, 1)):
+            break
+        killed += 1
+        if killed % 2:  # another session ends meanwhile
+            export_all(data)
+        begun = Roster(data).subjects()[1]["left"] == "withdrawn"
+        if begun and not files_of(data, 1) and not holding(data, "sub-01"):
+            with pytest.raises(InputError, match="expected a subject who takes part"):
+                withdraw(data, 1)
+            export_all(data)
+        else:
+            withdraw(data, 1)
+        assert holding(data, code, "6.125", "sub-01") == []
+        assert Roster(data).subjects()[1]["left"] == "withdrawn"
+        for path, contents in others.items():
+            assert (data / path.relative_to(root)).read_bytes() == contents
+        people = pd.read_csv(data / "participants.tsv", sep="\t")
+        assert people["participant_id"].tolist() == ["sub-02"]
+        assert not [path for path in data.rglob(".*") if path.name != ".bidsignore"]
+        shutil.rmtree(data)
+    assert killed > 30
+
+
 @pytest.mark.parametrize("leave", [withdraw, drop_out])
 def test_a_running_session_and_a_stranger_are_refused(root, leave):
     (path,) = root.rglob("sub-01*relative_manifest.json")
@@ -110,5 +174,5 @@ def test_a_running_session_and_a_stranger_are_refused(root, leave):
     for number in (0, 9):
         with pytest.raises(InputError, match="expected a subject who takes part"):
             leave(root, number)
-    with pytest.raises(InputError, match="expected a data folder"):
+    with pytest.raises(InputError, match="expected the data folder of a study, got none at"):
         leave(root / "elsewhere", 1)

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import permutations, product
+from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -377,6 +380,58 @@ def test_anchors_come_once_in_each_session_at_any_place() -> None:
         assert len(trials) == 2 + 14 + 2
         places.update(trial.trial - 2 for trial in anchors)
     assert set(places) == set(range(1, 17))
+
+
+def without_numbers(trials: Iterable[Any]) -> list[Any]:
+    return [replace(trial, trial=0) for trial in trials]
+
+
+NAMES = Study.load().textures
+
+
+@settings(max_examples=50)
+@given(
+    st.integers(0, 2**40),
+    st.sampled_from(["interleaved", "by-day"]),
+    st.dictionaries(st.sampled_from(NAMES), st.integers(1, 6), min_size=1),
+    st.randoms(use_true_random=False),
+)
+def test_anchors_leave_the_rest_as_it_is_and_no_order_of_theirs_matters(
+    seed: int, schedule: Any, steps: dict[str, int], shuffled: Random
+) -> None:
+    """Between the anchors stands exactly the balanced order that there is without any."""
+    anchors = {name: NAMES[(NAMES.index(name) + step) % 7] for name, step in steps.items()}
+    plan = TaskPlan(participants=20, schedule=schedule, repeats=2)
+    anchored = shipped(seed=seed, tasks={"absolute": replace(plan, anchors=anchors)})
+    order = list(anchors.items())
+    shuffled.shuffle(order)
+    same = shipped(seed=seed, tasks={"absolute": replace(plan, anchors=dict(order))})
+    plain = shipped(seed=seed, tasks={"absolute": plan})
+    assert anchored.sha256 == same.sha256
+    for session in range(1, plain.sessions("absolute") + 1):
+        of: dict[str, Any] = {"task": "absolute", "subject": 3, "session": session, "slot": 2}
+        trials = plan_session(anchored, **of).trials
+        assert trials == plan_session(same, **of).trials
+        rest = [trial for trial in trials if trial.virtual_texture == trial.texture]
+        assert without_numbers(rest) == without_numbers(plan_session(plain, **of).trials)
+        assert [trial.trial for trial in trials] == list(range(1, len(trials) + 1))
+        found = [trial for trial in trials if trial.virtual_texture != trial.texture]
+        assert sorted((t.texture, t.virtual_texture) for t in found) == sorted(anchors.items())
+        assert {(t.phase, t.model) for t in found} == {("main", "full")}  # whatever the day
+        first = Counter(trial.first_surface for trial in found)
+        assert abs(first["real"] - first["virtual"]) <= 1
+
+
+def test_every_place_among_the_others_is_as_likely_for_an_anchor() -> None:
+    plan = TaskPlan(participants=20, schedule="interleaved", anchors={"canvas": "PVC"})
+    places: Counter[int] = Counter()
+    for seed in range(600):
+        study = shipped(seed=seed, tasks={"absolute": plan})
+        trials = plan_session(study, task="absolute", subject=1, session=1).trials
+        (anchor,) = [trial for trial in trials if trial.virtual_texture != trial.texture]
+        places[anchor.trial - 2] += 1
+    assert set(places) == set(range(1, 16))
+    assert stats.chisquare(list(places.values())).pvalue > 0.001
 
 
 def test_an_order_follows_from_study_seed_subject_session_slot_and_task() -> None:

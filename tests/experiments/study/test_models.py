@@ -13,6 +13,8 @@ from experiments.study.study import Study
 from modeling import ARModel, InputError, TextureModel, Threshold, regressed, simplify
 from modeling.models.compiled_for import CompiledFor
 from stimuli.planted.textures import planted_texture
+from stimuli.sets.recipe import Recipe
+from stimuli.sets.writing import write_set
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 FULL = {name: planted_texture(name, **SMALL) for name in ("canvas", "MDF")}
@@ -51,6 +53,10 @@ def pair(simplified: object, full: object = None) -> ModelSets:
     return ModelSets(sets={"full": full or FULL, "simplified": simplified})
 
 
+def other_rate(models: dict[str, TextureModel]) -> dict[str, TextureModel]:
+    return {name: model.at_rate(8000.0) for name, model in models.items()}
+
+
 def test_models_of_a_scene_stand_where_simplified_ones_stand() -> None:
     least = {name: replace(regressed(model), compiled_for=NOTE) for name, model in FULL.items()}
     sets = pair(least)
@@ -86,31 +92,42 @@ def test_equal_models_of_all_textures_are_nothing_to_compare() -> None:
     three = ModelSets(sets={**one.sets, "other": LEAST})
     assert three.identical(("canvas", "MDF")) == ()
     assert three.identical(("canvas", "MDF"), ("simplified", "other")) == ("canvas",)
+    assert three.equal_models(("canvas", "MDF")) == {
+        "canvas": (("simplified", "other"),),
+        "MDF": (("full", "simplified"),),
+    }
+    assert three.equal_models(("canvas", "MDF"), ("full", "simplified")) == {
+        "MDF": (("full", "simplified"),)
+    }
+    four = ModelSets(sets={**three.sets, "again": {**FULL}})
+    assert four.equal_models(("canvas",))["canvas"] == (("full", "again"), ("simplified", "other"))
 
 
 def test_exchanged_sets_are_refused_or_go_on_for_a_reason() -> None:
     turned = pair(FULL, full=LEAST)
     assert turned.exchanged(("canvas", "MDF")) == (
-        ("canvas", "simplified"),
-        ("MDF", "simplified"),
+        ("canvas", "full", "simplified"),
+        ("MDF", "full", "simplified"),
     )
-    told = "the reference set full to hold .* got one of canvas that was made from the one in simp"
+    told = "got the full model of canvas, made from the simplified one; exchange"
     with pytest.raises(InputError, match=told):
         turned.require(study())
     allowed: list[str] = []
     turned.require(study(), allow=lambda what, sentence: allowed.append(what))
     assert allowed == ["exchanged models"]
     assert pair(LEAST).exchanged(("canvas", "MDF")) == ()
+    between = ModelSets(sets={"paper": other_rate(FULL), "simplified": LEAST, "full": FULL})
+    assert between.exchanged(("MDF",)) == (("MDF", "simplified", "full"),)
 
 
 def test_the_full_model_of_a_compiled_one_is_known_too() -> None:
     note = replace(NOTE, full_sha256=FULL["MDF"].sha256)
     least = {**FULL, "MDF": replace(FULL["MDF"], compiled_for=note)}
-    assert pair(FULL, full=least).exchanged(("canvas", "MDF")) == (("MDF", "simplified"),)
+    assert pair(FULL, full=least).exchanged(("canvas", "MDF")) == (("MDF", "full", "simplified"),)
 
 
 def test_a_model_that_was_made_from_one_of_no_set_is_told() -> None:
-    other = {name: model.at_rate(8000.0) for name, model in FULL.items()}
+    other = other_rate(FULL)
     assert pair(LEAST).of_others(("canvas", "MDF")) == ()
     assert pair(LEAST, full=other).of_others(("MDF",)) == (("MDF", "simplified"),)
 
@@ -181,6 +198,56 @@ def test_a_scene_is_compiled_from_the_reference(tmp_path: Path) -> None:
         load_model_sets(turned, tmp_path)
 
 
+RECIPE = """
+version = 1
+[set]
+name = "surfaces"
+rate_hz = [5000]
+format = "float32"
+duration_s = 0.2
+[[model]]
+path = "{full}"
+label = "full"
+[[model]]
+path = "{simplified}"
+label = "simplified"
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.0
+"""
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_stimulus_set_stands_where_models_stand(tmp_path: Path, turned: bool) -> None:
+    """Its files are those labelled as the study's sets, and know what their models were made of."""
+    alike = {**LEAST, "MDF": FULL["MDF"]}
+    saved(tmp_path / "models", FULL)
+    saved(tmp_path / "fewer", alike)
+    places = ("fewer", "models") if turned else ("models", "fewer")
+    text = RECIPE.format(full=places[0], simplified=places[1])
+    (tmp_path / "recipe.toml").write_text(text)
+    write_set(tmp_path / "set", Recipe.load(tmp_path / "recipe.toml"))
+    plan = study(full="set", simplified="set")
+    sets, files = load_model_sets(plan, tmp_path)
+    assert files == [tmp_path / "set"] * 2
+    assert {sets.of("canvas", name).texture for name in sets.names} == {"canvas"}
+    assert sets.sha256(["canvas"])["canvas"]["full"] == sets.of("canvas", "full").sha256
+    assert sets.identical(plan.textures) == ("MDF",)
+    assert sets.of_others(plan.textures) == ()
+    if turned:
+        with pytest.raises(InputError, match="the full model of canvas, made from the simplified"):
+            sets.require(plan)
+        return
+    sets.require(plan)
+    mixed, _ = load_model_sets(study(full="models", simplified="set"), tmp_path)
+    mixed.require(plan)
+    assert mixed.of_others(plan.textures) == ()
+    with pytest.raises(InputError, match="a full model of each texture of the study, got none of"):
+        load_model_sets(
+            study(full="set", simplified="set"), tmp_path, overriding={"full": tmp_path / "set"}
+        )[0].require(replace(plan, textures=("canvas", "PVC"), trays={"canvas": "A", "PVC": "B"}))
+
+
 def test_places_without_models_are_refused(tmp_path: Path) -> None:
     saved(tmp_path / "models", FULL)
     with pytest.raises(InputError, match="models simplified: expected a folder of models or a sc"):
@@ -189,7 +256,7 @@ def test_places_without_models_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="models simplified: expected model files in"):
         load_model_sets(study(), tmp_path)
     (tmp_path / "simplified" / "manifest.tsv").write_text("file\n")
-    with pytest.raises(InputError, match="got a stimulus set of tactileq stimuli"):
+    with pytest.raises(InputError, match=r"models simplified: expected the columns file, unit"):
         load_model_sets(study(), tmp_path)
     saved(tmp_path / "twice", {**LEAST, "again": LEAST["MDF"]})
     with pytest.raises(InputError, match="one model of each texture in .*, got two of 'MDF'"):

@@ -22,6 +22,9 @@ def edited(folder: Path, old: str, new: str) -> Path:
     return path
 
 
+SWAPPED = {"ja": ("はい", "いいえ")}
+
+
 def rich() -> Study:
     """A study that uses every table."""
     claim = Claim(
@@ -33,11 +36,17 @@ def rich() -> Study:
         test="difference",
     )
     mood = Question(name="mood", least=0, most=10, text={"en": "Mood?", "ja": "気分は?"})
+    craft = Question(
+        name="craft",
+        levels=("no", "yes"),
+        text={"en": "Any craft?", "ja": "手仕事は?"},
+        levels_text={"ja": ("いいえ", "はい")},
+    )
     return replace(
         Study.load(),
         models={"full": "models", "AR": "ar", "simplified": "least.toml"},
         consent="2026-11",
-        questions=(Question(name="age", least=18, most=99), mood),
+        questions=(Question(name="age", least=18, most=99), mood, craft),
         plan=Plan(claims=(claim,), exclusions=("None.",), highest_share_at_ends=0.3),
         tasks={
             "absolute": TaskPlan(
@@ -80,6 +89,7 @@ def test_every_change_of_a_study_changes_its_hash() -> None:
         {"longest_gap_min": 31},
         {"consent": "2026-12"},
         {"questions": ()},
+        {"questions": (*study.questions[:2], replace(study.questions[2], levels_text=SWAPPED))},
         {"plan": Plan()},
         {"calibration_days": 30},
         {"measured_force": True},
@@ -118,8 +128,11 @@ def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
     assert {plan.most_training_trials for plan in study.tasks.values()} == {2}
 
 
+ASKED = 'name = "sex"\ntext.en = "Mood?"\ntext.ja = "気分?"\nlevels_text'
+JAPANESE = ["女", "男", "その他", "答えない"]
 ABSOLUTE = 'participants = 20\nschedule = "interleaved"'
 RELATIVE = 'participants = 24\nschedule = "by-day"'
+LEVELS = str([f"level {number}" for number in range(19)])
 CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
 
 
@@ -163,7 +176,6 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             r"the schedule interleaved in \[threshold\]",
         ),
         ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
-        ('simplified = "simplified"\n', 'simplified = "models"\n', "different places of models"),
         ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
         ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
         ('["en", "ja"]', "[]", "one language at least"),
@@ -179,6 +191,17 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('name = "sex"', 'name = "mood"\ntext.en = "Mood?"', "got none in ja"),
         ('name = "sex"', 'name = "sex"\nleast = 3', "least and most, or two levels"),
         ("least = 18\n", "", "least and most, or two levels"),
+        ('levels = ["female",', f"levels = {LEVELS[:-1]},", "at most 18 levels, .* sex, got 22"),
+        ('name = "sex"', f"{ASKED}.de = {JAPANESE}", "levels of the question sex in .* none in ja"),
+        ('name = "sex"', f"{ASKED}.ja = {JAPANESE[1:]}", "4 texts in levels_text.ja .* got 3"),
+        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '女']}", "different levels_text.ja of"),
+        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '']}", "text for levels_text.ja of"),
+        ('name = "sex"', f"{ASKED}.ja = 3", "a list of levels_text.ja of 'sex'"),
+        ('name = "sex"', f"{ASKED} = 3", "a table levels_text of 'sex', got 3; write levels_text."),
+        ("least = 18\n", 'least = 18\nlevels_text.ja = ["一"]\n', "levels for the levels_text"),
+        ("least = 18\n", "least = -1\n", "whole numbers from 0 to 999999 for .* got -1 to 99"),
+        ("least = 18\nmost = 99\n", "least = 1\nmost = 1_000_000\n", "got 1 to 1000000"),
+        ("least = 18\nmost = 99\n", "least = 1.2\nmost = 1.8\n", "got 1.2 to 1.8"),
         ("least = 18\n", "least = 99\n", "least and most, or two levels"),
         ("least = 18\n", "least = 18\nlevels = 3\n", "a list of levels of 'age'"),
         ('"right", "left", "both"', '"right", "right"', "different levels"),

@@ -101,7 +101,7 @@ def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: Mode
     same = {**models.sets["simplified"], "MDF": models.sets["full"]["MDF"]}
     page = plan_page(secret, ModelSets(sets={**models.sets, "simplified": same}))
     assert "7422788540163745" not in page
-    assert "All models are equal for MDF" in page
+    assert "The models of MDF in full, simplified are equal: a control" in page
     assert "None: whatever is found is exploratory." in page
 
 

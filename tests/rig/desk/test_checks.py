@@ -11,6 +11,7 @@ import pytest
 from modeling import InputError
 from rig.desk.checks import Requirements, check_models, check_rig
 from stimuli.planted.textures import planted_texture
+from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.rig_files import rig_file
 
 TODAY = date.today()
@@ -94,6 +95,19 @@ def test_models_in_another_unit_or_of_a_higher_rate_are_refused(tmp_path: Path) 
     slow = rig_file(tmp_path, ("rate_hz = 48000", "rate_hz = 4000"))
     with pytest.raises(InputError, match="got PVC of 5000 Hz; choose a higher rate"):
         check_models(slow, [model])
+
+
+def test_all_pole_models_are_accepted_where_the_cards_rate_can_be_made_of_theirs(
+    tmp_path: Path,
+) -> None:
+    rig, rival = rig_file(tmp_path), planted_ar()
+    check_models(rig, [planted_texture("PVC"), rival, planted_ar(rate_hz=44100.0)])
+    with pytest.raises(
+        InputError, match=r"whole numbers up to 1000, got an AR model of 5000\.1 Hz"
+    ):
+        check_models(rig, [rival, planted_ar(rate_hz=5000.1)])
+    with pytest.raises(InputError, match="models in g .* got planted in unit 'arbitrary'"):
+        check_models(rig, [replace(rival, unit="arbitrary")])
 
 
 def test_a_latency_above_40_ms_needs_a_reason_whatever_the_study(tmp_path: Path) -> None:

@@ -18,9 +18,14 @@ import pytest
 from modeling import InputError, TextureModel
 from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
+from rig.desk.stimuli import check_stimulus
 from rig.interface import SURFACES, TextureRig, ToneBurst
 from stimuli.planted.textures import planted_texture
+from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.rig_files import failures, rig_file
+from tests.rig.hand.board import Board, stating
+from tests.rig.hand.board import at_constant_speed as plain
+from tests.rig.planted import planted_stimulus
 
 Jack = Callable[..., AbstractContextManager[Any]]
 
@@ -84,6 +89,52 @@ def test_what_was_presented_and_what_the_hand_did_is_told(
     assert np.isnan(rows.force_n[of["real"]]).all()
 
 
+@pytest.mark.parametrize(("lines", "told"), [(stating(b"wheel 2"), "wheel 2"), (plain, "n/a")])
+def test_the_firmware_that_the_hands_sensor_states_is_stated(
+    server: Any, tmp_path: Path, lines: Callable[[int], bytes], told: str
+) -> None:
+    board = Board()
+    board.send(lines)
+    hand = f'kind = "serial"\ndevice = "{board.path}"'
+    with DeskRig(rig_file(tmp_path, ('kind = "scripted"', hand))) as rig:
+        stated = rig.stated
+        assert not failures(rig.take_faults())
+    board.unplug()
+    assert stated["HandFirmware"] == told
+    assert stated["HandDevice"] == f"serial sensor at {board.path}"
+
+
+def test_an_all_pole_model_is_presented_as_a_layered_one_is(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    rival = planted_ar(0.02)
+    with DeskRig(rig_file(tmp_path)) as rig:
+        for presented in (rival, model, rival):
+            rig.present_model(presented)
+            wait(rig, 0.4)
+        rig.silence()
+        records = rig.take_presentations()
+        assert failures(rig.take_faults()) == []
+    assert [record.texture for record in records] == ["planted", "PVC", "planted"]
+    assert [record.number for record in records] == [1, 2, 3]
+    assert [record.model_sha256 for record in records] == [
+        made.sha256 for made in (rival, model, rival)
+    ]
+    assert all(record.played_s > 0.1 and 0 < record.rms_g < 2.0 for record in records)
+    assert records[0].counters.limited_peak == 0
+
+
+def test_the_limits_of_the_rig_hold_for_all_pole_models(server: Any, tmp_path: Path) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(planted_ar(20.0))
+        wait(rig, 0.4)
+        rig.silence()
+        (record,) = rig.take_presentations()
+    assert record.peak_g == pytest.approx(5.0)  # of its limit
+    assert record.counters.limited_peak > 0
+    assert record.counters.limited_rms > 0
+
+
 def test_bursts_play_one_after_the_other_whatever_the_hand_does(
     server: Any, tmp_path: Path
 ) -> None:
@@ -104,6 +155,41 @@ def test_bursts_play_one_after_the_other_whatever_the_hand_does(
     dose_g2_s = 0.5 * 0.5**2 * (0.3 - 0.04 + 2 * 0.02 * 3 / 8)
     assert records[0].dose_g2_s == pytest.approx(dose_g2_s, rel=0.02)
     assert records[0].speeds_mm_s is None
+
+
+def test_a_stimulus_leaves_bit_for_bit_and_is_broken_off_at_once(
+    jack_server: Jack, tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(3)
+    samples = (0.2 * rng.uniform(-1, 1, 48000)).astype(np.float32).astype(np.float64)
+    stimulus = planted_stimulus(samples, rate_hz=48000.0)
+    with jack_server(block=128), DeskRig(rig_file(tmp_path)) as rig:
+        first_s = rig.present_signal(stimulus)
+        wait(rig, 0.2)
+        second_s = rig.present_signal(stimulus)  # does not wait for the first one's end
+        wait(rig, 1.3)
+        rig.silence()
+        first, second = rig.take_presentations()
+        assert failures(rig.take_faults()) == []
+        with pytest.raises(InputError, match="got the stimulus of PVC at 44100 Hz; make"):
+            rig.present_signal(replace(stimulus, rate_hz=44100.0))
+        with pytest.raises(InputError, match="compensated for another one"):
+            rig.present_signal(replace(stimulus, vibrator_sha256="c" * 64))
+    assert second_s - first_s < 0.6
+    assert (first.model_sha256, first.texture, first.speeds_mm_s) == ("a" * 64, "PVC", None)
+    assert first.dose_g2_s < 0.6 * second.dose_g2_s
+    assert second.dose_g2_s == pytest.approx(float(samples @ samples) / 48000, rel=1e-5)
+    assert second.peak_g == pytest.approx(np.abs(samples).max(), rel=1e-6)
+
+
+def test_stimuli_are_checked_without_a_device(tmp_path: Path) -> None:
+    quiet = planted_stimulus(np.full(480, 0.1), rate_hz=48000.0)
+    file = rig_file(tmp_path)
+    check_stimulus(file, quiet)
+    with pytest.raises(InputError, match="the stimulus of PVC: expected a signal of at most 5 g"):
+        check_stimulus(file, replace(quiet, samples_g=np.full(480, 5.1)))
+    with pytest.raises(InputError, match="44100 Hz"):
+        check_stimulus(file, replace(quiet, rate_hz=44100.0))
 
 
 def test_no_burst_is_stronger_than_the_limits_allow(server: Any, tmp_path: Path) -> None:

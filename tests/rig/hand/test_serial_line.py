@@ -19,8 +19,10 @@ from rig.hand.serial_line import (
     SensorLine,
     crc,
     decode,
+    decode_firmware,
     encode,
 )
+from tests.rig.hand.board import firmware_line
 
 ROOT = Path(__file__).parents[3]
 LARGEST = 2**31 - 1
@@ -47,6 +49,9 @@ int main(void)
     int32_t a, b, force_mn;
     unsigned flags;
     printf("%04X\n", tq_crc("123456789", 9));
+    fwrite(line, 1, tq_firmware_line(line, "wheel 1.0"), stdout);
+    fwrite(line, 1, tq_firmware_line(line, "a version of more than the forty characters that fit"),
+           stdout);
     while (scanf(" %c %" SCNu16 " %" SCNu32 " %" SCNd32 " %" SCNd32 " %" SCNd32 " %u", &kind,
                  &number, &time_us, &a, &b, &force_mn, &flags) == 7) {
         uint8_t length = kind == 'P'
@@ -106,8 +111,11 @@ def test_the_sketch_and_the_reader_agree(program: Path) -> None:
         cells = (kind, line.number, line.time_us, *moved, force, line.contact + 2 * line.button)
         values += " ".join(map(str, cells)) + "\n"
     run = subprocess.run([program], input=values.encode(), capture_output=True, check=True)
-    check, written = run.stdout.split(b"\n", 1)
+    check, stated, longer, written = run.stdout.split(b"\n", 3)
     assert check == b"31C3"
+    assert decode_firmware(stated) == "wheel 1.0"
+    assert decode_firmware(longer) == "a version of more than the forty charact"
+    assert max(map(len, (stated, longer))) <= LONGEST_LINE
     assert run.stderr == b""
     assert LineReader().feed(written) == drawn
     assert written == b"".join(map(encode, drawn))  # byte by byte
@@ -138,6 +146,7 @@ def test_the_sketch_for_arduino_compiles(tmp_path: Path) -> None:
 def test_the_examples_of_the_page_are_lines() -> None:
     page = (ROOT / "docs/serial-sensor.md").read_text(encoding="utf-8")
     examples = re.findall(r"^    (\$.*\*[0-9A-F]{4})$", page, flags=re.MULTILINE)
+    assert decode_firmware(examples.pop().encode()) == "wheel and load cell 1.0"
     assert [decode(example.encode()) for example in examples] == [
         SensorLine(0, 1_000_000, (12500, -300), 1500, contact=True, button=False),
         SensorLine(65535, 2**32 - 1, (-120_000,), None, contact=True, button=True),
@@ -156,6 +165,31 @@ def test_no_single_damaged_character_passes(line: SensorLine, data: st.DataObjec
     sent = bytearray(encode(line)[:-2])
     sent[data.draw(st.integers(0, len(sent) - 1))] ^= data.draw(st.integers(1, 255))
     assert decode(bytes(sent)) in (None, line)  # a \r at the end says the same
+
+
+versions = st.text(st.characters(codec="ascii", exclude_categories=["Cc"]), max_size=50)
+
+
+@settings(max_examples=200, deadline=None)
+@given(versions, lines, st.data())
+def test_a_version_is_read_and_counts_as_no_line(
+    version: str, line: SensorLine, data: st.DataObject
+) -> None:
+    is_one = 1 <= len(version) <= 40 and not set("$*") & set(version) and version.strip()
+    reader = LineReader()
+    stream = encode(line) + firmware_line(version.encode()) + encode(line)
+    found = [line for piece in cut(data, stream) for line in reader.feed(piece)]
+    assert found == [line, line]
+    assert reader.firmware == (version.strip() if is_one else "")
+    assert (reader.good, reader.bad, reader.missing) == (2, 0 if is_one else 1, 0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_no_damaged_version_passes(data: st.DataObject) -> None:
+    sent = bytearray(firmware_line(b"wheel 1.0")[:-2])
+    sent[data.draw(st.integers(0, len(sent) - 1))] ^= data.draw(st.integers(1, 255))
+    assert decode_firmware(bytes(sent)) in ("", "wheel 1.0")
 
 
 def cut(data: st.DataObject, stream: bytes) -> list[bytes]:

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import os
-import threading
 import time
-import tty
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from itertools import count
 
 import numpy as np
 import pytest
@@ -22,61 +18,8 @@ from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
 from tests.rig.waiting import is_gone, wait_until
-
-PERIOD_US = 2000
-
-
-def at_constant_speed(number: int) -> bytes:
-    """100 mm/s, 1.5 N; the clock wraps around after half a second."""
-    time_us = (2**32 - 500_000 + number * PERIOD_US) % 2**32
-    line = SensorLine(
-        number % 2**16, time_us, (number * 200, 0), 1500, contact=True, button=number % 100 > 50
-    )
-    return encode(line)
-
-
-class Board:
-    """A micro-controller that sends lines at the other end of a pseudo-terminal."""
-
-    def __init__(self) -> None:
-        self._master, self._slave = os.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self.path = os.ttyname(self._slave)
-        self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def write(self, text: bytes) -> None:
-        """Send; as by a real one, what nobody reads in time is lost."""
-        with suppress(BlockingIOError):
-            os.write(self._master, text)
-
-    def send(self, line: Callable[[int], bytes]) -> None:
-        """Send line 0, 1, 2 … every 2 ms, until `quiet` or `unplug`."""
-        self.quiet()
-        self._stop.clear()
-        self._thread = threading.Thread(target=self._run, args=(line,), daemon=True)
-        self._thread.start()
-
-    def _run(self, line: Callable[[int], bytes]) -> None:
-        start_s = time.monotonic()
-        for number in count():
-            wait_s = start_s + number * PERIOD_US * 1e-6 - time.monotonic()
-            if self._stop.wait(max(wait_s, 0)):
-                return
-            self.write(line(number))
-
-    def quiet(self) -> None:
-        self._stop.set()
-        if self._thread is not None:
-            self._thread.join()
-
-    def unplug(self) -> None:
-        self.quiet()
-        for end in (self._master, self._slave):
-            with suppress(OSError):
-                os.close(end)
 
 
 @pytest.fixture
@@ -129,6 +72,27 @@ def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
     assert np.median(after["speed_mm_s"]) == pytest.approx(100, rel=0.02)
     assert set(after["force_n"]) == {1.5}
     assert set(after["flags"]) == {CONTACT, CONTACT | BUTTON}
+
+
+def test_the_firmware_that_a_sensor_states_is_told(board: Board, live: Live) -> None:
+    board.send(stating(b"wheel 1.0"))
+    with HandReader(live, settings_of(board)) as reader:
+        assert reader.firmware() == "wheel 1.0"
+        assert reader.counts().get("bad", 0) == reader.counts().get("missing", 0) == 0
+        board.send(stating(b"wheel 1.1"))  # started anew, with another program
+        wait_until(lambda: reader.firmware() == "wheel 1.1")
+        board.send(at_constant_speed)
+        reader.unplug()
+        wait_until(lambda: is_gone(live))
+        reader.unplug(False)
+        wait_until(lambda: reader.firmware() == "")
+
+
+def test_a_sensor_that_states_no_firmware_has_none(board: Board, live: Live) -> None:
+    board.send(at_constant_speed)
+    with HandReader(live, settings_of(board)) as reader:
+        assert reader.firmware() == ""
+        assert reader.counts().get("bad", 0) == 0
 
 
 def test_a_speed_is_taken_as_it_is(board: Board, live: Live) -> None:

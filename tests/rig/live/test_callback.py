@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from modeling.rendering.compiled import filled_texture
+from modeling.rendering.compiled import filled, filled_texture
+from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
+from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import plan_for
-from rig.live.memory import CONTACT, Live, Rows, compiled, now_s
+from rig.live.memory import CONTACT, STALE, Live, Rows, compiled, now_s
 from stimuli.planted.textures import planted_texture
+from tests.modeling.rendering.lattices import in_python, planted_ar
 
 RATE_HZ = 48000.0
 FADE = 240
@@ -41,6 +44,19 @@ class Callback:
         self._lib.tq_surface_start(source, texture, memory, 1, number)
         self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
 
+    def lattice(self, number: int, limits: Limits, gain: float = 1.0) -> None:
+        """An all-pole model."""
+        made = planted_ar(gain)
+        fields = lattice_fields(made, plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits))
+        texture, arrays = filled(self._ffi, "tq_texture", fields.texture, real=np.float64)
+        lattice, more = filled(self._ffi, "tq_lattice", fields.lattice, real=np.float64)
+        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(lattice))
+        source = self._ffi.new("tq_surface *")
+        self._kept += [texture, lattice, arrays, more, memory, source]
+        key = int(stream_key(0))
+        self._lib.tq_surface_start_lattice(source, texture, lattice, memory, key, number)
+        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+
     def signal(self, number: int, samples_g: Array) -> None:
         samples = samples_g.astype(np.float32)
         held, source = self._ffi.from_buffer("float[]", samples), self._ffi.new("tq_signal *")
@@ -56,6 +72,10 @@ class Callback:
         self.live.write_reading(
             now_s(), 0.0, y_mm=0.0, speed_mm_s=speed_mm_s, force_n=force_n, flags=CONTACT
         )
+        return self.play_on(frames)
+
+    def play_on(self, frames: int) -> Array:
+        """The same for the hand as it was read last."""
         out = np.full((frames, 2), np.nan, dtype=np.float32)
         none = self._ffi.NULL
         into = self._ffi.from_buffer("float[]", out)
@@ -124,7 +144,8 @@ def test_whatever_hand_and_model_the_limits_hold_and_every_sample_is_a_number(
     played = []
     for step in range(300):
         if step % 40 == 0:
-            callback.texture(step + 1, limits, gain)
+            kind = callback.texture if step % 80 else callback.lattice
+            kind(step + 1, limits, gain)
         speed, force = draws.choice(odd, 2)
         frames = int(draws.integers(1, 700))
         played.append(callback.play(frames, speed_mm_s=speed, force_n=force))
@@ -134,3 +155,36 @@ def test_whatever_hand_and_model_the_limits_hold_and_every_sample_is_a_number(
     share = -np.expm1(-1 / (0.05 * RATE_HZ))
     mean_square = lfilter([share], [1, share - 1], signal**2)
     assert np.sqrt(mean_square.max()) <= 0.1 * (1 + 1e-6)
+
+
+def test_all_pole_and_layered_models_follow_each_other_through_silence(live: Live) -> None:
+    """Fades included, what is played of an all-pole model is what Python makes of it."""
+    callback, limits = Callback(live, scale=1.0), Limits(peak=5.0)
+    callback.lattice(1, limits, 0.05)
+    first = callback.play(4800)
+    callback.texture(2, limits)
+    callback.play(4800)
+    callback.lattice(3, limits, 0.05)
+    third = callback.play(4800)
+    callback.silence()
+    last = callback.play(4800)
+    hand = np.full(4800, 150.0), np.full(4800, 1.5)
+    wanted = in_python(planted_ar(0.05), *hand, rate_hz=RATE_HZ)
+    wanted[:FADE] *= np.arange(1, FADE + 1) / FADE
+    np.testing.assert_allclose(first, wanted, rtol=0, atol=1e-6 * np.abs(wanted).max())
+    np.testing.assert_array_equal(third[FADE:], first[:-FADE])
+    assert last[: FADE - 1].all()
+    assert not last[FADE:].any()
+    assert callback.log()["presentation"].tolist() == [1, 2, 3, 3]
+
+
+def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None:
+    callback = Callback(live, scale=1.0)
+    callback.lattice(1, Limits(peak=5.0), 0.05)
+    before = callback.play(4800)
+    live.write_reading(now_s() - 1, 0.0, y_mm=0.0, speed_mm_s=150.0, force_n=1.5, flags=CONTACT)
+    after = callback.play_on(4800)
+    assert np.count_nonzero(before) > 4700
+    # An update, 5 ms of fade, and 88 samples of the low-pass at the model's 5 kHz.
+    assert not after[int((0.001 + 0.005 + 88 / 5000) * RATE_HZ) :].any()
+    assert callback.log()["flags"].tolist() == [0, STALE]

@@ -12,14 +12,14 @@ import soundfile
 from hypothesis import given
 from hypothesis import strategies as st
 
-from modeling import InputError
+from modeling import InputError, TextureModel, Threshold, simplify
 from modeling.files.tables import read_table
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.vibrators.compensation import compensation_for
 from rig.live.memory import Live
 from rig.sound.output import SoundLost, SoundOutput, check_signal, largest_factor
-from rig.sound.signals import stimulus, tone_burst
+from rig.sound.signals import stimuli_of_surfaces, stimulus, tone_burst
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
@@ -64,6 +64,110 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / f"{name}.toml").write_text(text)
         write_set(folder / name, Recipe.load(folder / f"{name}.toml"))
     return folder
+
+
+SURFACES = """
+version = 1
+[set]
+name = "surfaces"
+rate_hz = [{rates}]
+format = "float32"
+seeds = [{seeds}]
+duration_s = 0.2
+[[model]]
+path = "full"
+label = "full"
+{more}
+[[trajectory]]
+speed_mm_s = 100
+force_n = 1.0
+"""
+SIMPLIFIED = '[[model]]\npath = "simplified"\nlabel = "simplified"'
+
+
+@pytest.fixture(scope="module")
+def surfaces(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Sets of two textures: of both models (MDF keeps every layer), of one, of several files."""
+    folder = tmp_path_factory.mktemp("surfaces")
+    for texture in ("canvas", "MDF"):
+        full = planted_texture(texture)
+        few = simplify(full, Threshold.shipped("codec")).model if texture == "canvas" else full
+        for name, model in (("full", full), ("simplified", few)):
+            (folder / name).mkdir(exist_ok=True)
+            model.save(folder / name / f"{texture}.json")
+    for name, rates, seeds, more in (
+        ("both", "48000", "1", SIMPLIFIED),
+        ("one", "48000", "1", ""),
+        ("seeds", "48000", "1, 2", ""),
+        ("rates", "48000, 44100", "1", ""),
+    ):
+        recipe = folder / f"{name}.toml"
+        recipe.write_text(SURFACES.format(rates=rates, seeds=seeds, more=more))
+        write_set(folder / name, Recipe.load(recipe))
+    return folder
+
+
+def test_files_that_stand_for_surfaces_are_found_by_their_label(surfaces: Path) -> None:
+    both = surfaces / "both"
+    full = stimuli_of_surfaces(both, label="full", textures=["canvas", "MDF", "PVC"])
+    few = stimuli_of_surfaces(both, label="simplified", textures=["canvas", "MDF"])
+    assert set(full) == {"canvas", "MDF"}
+    samples, _ = soundfile.read(both / "canvas_full_100mms_1N.wav")
+    np.testing.assert_array_equal(full["canvas"].samples_g, samples)
+    assert full["canvas"].duration_s == pytest.approx(0.2)
+    model = TextureModel.load(surfaces / "full" / "canvas.json")
+    assert full["canvas"].model_sha256 == model.sha256
+    assert full["canvas"].made_from == frozenset()
+    assert few["canvas"].made_from == {model.sha256}
+    assert (
+        few["canvas"].sha256
+        == hashlib.sha256((both / "canvas_simplified_100mms_1N.wav").read_bytes()).hexdigest()
+    )
+
+
+def test_stimuli_are_equal_where_one_model_was_rendered_alike(surfaces: Path) -> None:
+    both = surfaces / "both"
+    full = stimuli_of_surfaces(both, label="full", textures=["canvas", "MDF"])
+    few = stimuli_of_surfaces(both, label="simplified", textures=["canvas", "MDF"])
+    again = stimuli_of_surfaces(surfaces / "one", label="whatever", textures=["canvas"])
+    assert few["MDF"] == full["MDF"]  # one model, other noise
+    assert few["MDF"].sha256 != full["MDF"].sha256
+    assert len({few["MDF"], full["MDF"]}) == 1
+    assert few["canvas"] != full["canvas"]
+    assert again["canvas"] == full["canvas"]
+    assert full["canvas"] != "canvas"
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "sentence"),
+    [
+        (
+            "both",
+            "paper",
+            "expected files of models labelled 'paper' .* got full, simplified; name",
+        ),
+        ("seeds", "full", "expected one file of canvas in the stimulus set .*, got 2"),
+        (
+            "rates",
+            "full",
+            "expected one file of canvas .* make a set with one trajectory, one seed",
+        ),
+    ],
+)
+def test_sets_that_do_not_say_which_file_are_refused(
+    surfaces: Path, name: str, label: str, sentence: str
+) -> None:
+    with pytest.raises(InputError, match=sentence):
+        stimuli_of_surfaces(surfaces / name, label=label, textures=["canvas"])
+
+
+def test_a_stimulus_without_its_source_was_made_from_nothing_known(
+    surfaces: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(surfaces / "both", tmp_path / "set")
+    shutil.rmtree(tmp_path / "set" / "sources")
+    few = stimuli_of_surfaces(tmp_path / "set", label="simplified", textures=["canvas"])
+    assert few["canvas"].made_from == frozenset()
 
 
 def row_of(folder: Path) -> dict[str, str]:
