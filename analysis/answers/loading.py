@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from analysis.answers.order import (
     told_of_open,
     told_of_unordered,
 )
+from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
@@ -36,10 +37,23 @@ _DERIVE = "delete it, and tactileq study status makes it again from the session'
 
 @dataclass(frozen=True)
 class PlannedTask:
-    """How many participants are to do a task, in how many sessions altogether."""
+    """What a study plans of a task.
+
+    Parameters
+    ----------
+    participants : int
+    sessions : int
+        Of all participants.
+    models : tuple of str
+        The sets of models that it compares, the reference first.
+    repeats : int
+        Answers to each texture with each model; in the oddity task to each texture.
+    """
 
     participants: int
     sessions: int
+    models: tuple[str, ...] = MODELS
+    repeats: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,8 +76,12 @@ class Responses:
         the real one's, same columns; no statistic of the models uses them.
     name : str
         The study's name.
-    models : mapping of texture to mapping of kind to SHA-256
-        The full and the simplified model that were presented; empty where the data do not say.
+    models : mapping of texture to mapping of set to SHA-256
+        The models that were presented; empty where the data do not say.
+    equal : mapping of texture to sequence of sequence of str
+        Sets whose models of a texture are equal, group by group, as the sessions say.
+    plan : AnalysisPlan
+        What was claimed before the first answer.
     study_sha256 : str
         Of the study that was run; empty where the data do not say.
     planned : mapping of task to PlannedTask
@@ -79,16 +97,25 @@ class Responses:
     anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    equal: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
+    plan: AnalysisPlan = field(default_factory=lambda: AnalysisPlan(claims=()))
     study_sha256: str = ""
     planned: Mapping[str, PlannedTask] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
 
-    @property
-    def identical(self) -> frozenset[str]:
-        """Textures whose full and simplified model are the same: nothing to compare."""
-        return frozenset(
-            texture for texture, kinds in self.models.items() if len(set(kinds.values())) == 1
-        )
+    def identical(self, pair: tuple[str, str] = MODELS) -> frozenset[str]:
+        """Textures whose models are the same in both sets: nothing to compare."""
+        same = {
+            texture
+            for texture, sets in self.models.items()
+            if all(name in sets for name in pair) and sets[pair[0]] == sets[pair[1]]
+        }
+        stated = {
+            texture
+            for texture, groups in self.equal.items()
+            if any(set(pair) <= set(group) for group in groups)
+        }
+        return frozenset(same | stated)
 
     @property
     def absolute(self) -> pd.DataFrame:
@@ -151,7 +178,7 @@ def load_responses(data_folder: str | Path) -> Responses:
     ------
     InputError
         Where the folder is none, a file is malformed, a value is out of range, answers are not
-        those to the trials that were planned, models are others than full and simplified ones, or
+        those to the trials that were planned, models are not the study's, or
         answers are mixed that differ in whether participants or rig were simulated; or in their
         study, their models or whether they are a pilot, and no session says why.
     """
@@ -161,10 +188,13 @@ def load_responses(data_folder: str | Path) -> Responses:
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
     origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
     warnings: list[str] = []
+    equal: dict[str, list[Sequence[str]]] = {}
+    sets = tuple(next(iter(models.values()), {}))
     participants = simulated["SimulatedParticipant"]
     _check_participants(folder / "participants.tsv", participants)
     tables = {
-        task: _load_task(folder, task, origin=origin, warnings=warnings) for task in ANSWER_TABLES
+        task: _load_task(folder, task, origin=origin, sets=sets, equal=equal, warnings=warnings)
+        for task in ANSWER_TABLES
     }
     if all(table is None for table in tables.values()):
         raise InputError(
@@ -180,6 +210,8 @@ def load_responses(data_folder: str | Path) -> Responses:
         anchors={task: anchors for task, (*_, anchors) in parts.items() if anchors is not None},
         name=str(description.get("Name", "")),
         models=models,
+        equal=equal,
+        plan=_plan(description, folder / "dataset_description.json"),
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
         warnings=tuple(warnings),
@@ -219,6 +251,23 @@ def _description(folder: Path) -> Mapping[str, object]:
     return description
 
 
+def _plan(description: Mapping[str, object], path: Path) -> AnalysisPlan:
+    """The claims of the study that was run; none where the data do not tell the study."""
+    design = description.get("StudyDesign")
+    stated = design.get("plan", {}) if isinstance(design, dict) else {}
+    return plan_from(stated, sha256=str(description.get("PlanSHA256", "")), path=path)
+
+
+def _gather_equal(sidecar: Mapping[str, object], equal: dict[str, list[Sequence[str]]]) -> None:
+    """Add the groups of equal models that a session names."""
+    stated = sidecar.get("Identical")
+    if not isinstance(stated, Mapping):
+        return
+    for texture, groups in stated.items():
+        known = equal.setdefault(str(texture), [])
+        known += [tuple(group) for group in groups if tuple(group) not in known]
+
+
 def _planned(description: Mapping[str, object], path: Path) -> dict[str, PlannedTask]:
     """Participants and sessions of each task in the study's design; none where it is not told."""
     design = description.get("StudyDesign")
@@ -234,7 +283,9 @@ def _planned(description: Mapping[str, object], path: Path) -> dict[str, Planned
             )
         models = plan.get("models", MODELS)
         days = len(models) if plan.get("schedule") == "by-day" else 1
-        planned[task] = PlannedTask(participants, participants * days)
+        planned[task] = PlannedTask(
+            participants, participants * days, tuple(models), int(plan.get("repeats", 1))
+        )
     return planned
 
 
@@ -260,21 +311,24 @@ def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[s
             f'expected "ModelsSHA256" with the models of each texture in {place}, got something '
             "else; restore the file."
         )
-    others = [
-        kinds for kinds in textures if isinstance(kinds, Mapping) and set(kinds) != set(MODELS)
-    ]
-    if others:
+    names = {tuple(kinds) for kinds in textures if isinstance(kinds, Mapping)}
+    if len({frozenset(some) for some in names}) > 1:
         raise InputError(
-            f"expected answers about models called full and simplified in {place}, since only "
-            f"these are compared yet, got {shown(', '.join(others[0]))}; name the study's two sets "
-            "of models so."
+            f"expected models of the same sets for every texture in {place}, got "
+            f"{shown('; '.join(', '.join(some) for some in sorted(names)))}; restore the file."
         )
     assert isinstance(stated, Mapping)
     return {str(t): {str(k): str(v) for k, v in kinds.items()} for t, kinds in stated.items()}
 
 
 def _load_task(
-    folder: Path, task: str, *, origin: Mapping[str, object], warnings: list[str]
+    folder: Path,
+    task: str,
+    *,
+    origin: Mapping[str, object],
+    sets: Sequence[str],
+    equal: dict[str, list[Sequence[str]]],
+    warnings: list[str],
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
     sessions, unordered = [], []
@@ -288,7 +342,8 @@ def _load_task(
         what = f"{participant} {task} {session}"
         sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
         table = _read_lines(path)
-        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]), sets=sets)
+        _gather_equal(sidecar, equal)
         planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
         if planned is None:
             unordered.append(what)
@@ -384,7 +439,9 @@ def _unanswered(folder: Path, task: str) -> list[str]:
     return told
 
 
-def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
+def _check_session(
+    table: pd.DataFrame, task: str, *, path: Path, simulated: bool, sets: Sequence[str]
+) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
     columns = ANSWER_TABLES[task]
     _require_columns(table, tuple(column.name for column in columns), path=path)
@@ -402,9 +459,10 @@ def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: boo
     _check_simulated(table, simulated, path=path)
     neither = ~table["valid"].isin([0.0, 1.0])
     _refuse(neither, table["valid"], expected="1 or 0 in column valid", path=path)
-    other = ~table["model"].isin(MODELS) & table["model"].notna()
-    expected = f"{' or '.join(MODELS)}, which alone are compared yet, in column model"
-    _refuse(other, table["model"], expected=expected, path=path)
+    if sets:
+        other = ~table["model"].isin(list(sets)) & table["model"].notna()
+        expected = f"{' or '.join(sets)}, the study's sets of models, in column model"
+        _refuse(other, table["model"], expected=expected, path=path)
     twice = table.duplicated("trial")
     _refuse(twice, table["trial"], expected="every trial once", path=path)
     _check_choices(table, {column.name: column for column in columns}, path=path)
