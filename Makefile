@@ -9,6 +9,9 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 PYTEST_FLAGS ?=
+# Where Python may keep no bytecode, every process that the tests start compiles the
+# libraries anew; .venv/ and the project keep theirs, whatever the machine is set to.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install demo test bench lint lock clean
 

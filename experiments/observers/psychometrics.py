@@ -264,7 +264,8 @@ def with_effect(
 
 
 def _with_share(shares: Sequence[float], right: int, share: float) -> list[float]:
-    rest = sum(shares) - shares[right]
+    # Not what is left of the sum, of which rounding would be a large part where it is small.
+    rest = sum(other for place, other in enumerate(shares) if place != right)
     if rest > 0:
         changed = [(1.0 - share) * other / rest for other in shares]
     else:

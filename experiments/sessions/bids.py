@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from experiments.sessions.files import SessionFiles, sessions_in
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import session_state
+from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
@@ -151,6 +152,7 @@ def _presentations(files: SessionFiles) -> list[dict[str, str]]:
     if not lines:
         return []
     header, *rows = (csv_cells(line, "a table", delimiter="\t") for line in lines)
+    _require_columns(header, PRESENTATION_COLUMNS, files.named("presentations.tsv"))
     return [dict(zip(header, row, strict=False)) for row in rows]
 
 
@@ -160,6 +162,7 @@ def _hand(files: SessionFiles, held: Held) -> dict[Path, bytes]:
     lines = _whole_lines(path)
     if len(lines) < 2:
         return {}
+    _require_columns(lines[0].split("\t"), HAND_COLUMNS, path)
     import pandas as pd  # late: takes longer to load than all else
 
     from experiments.sessions import bids_physio
@@ -190,6 +193,14 @@ def _hand(files: SessionFiles, held: Held) -> dict[Path, bytes]:
         regular = bids_physio.at_regular_times(readings)
         made[_beh(files) / f"{stem}.tsv.gz"] = bids_physio.physio_bytes(regular)
     return made
+
+
+def _require_columns(header: Sequence[str], columns: Iterable[str], path: Path) -> None:
+    if missing := [name for name in columns if name not in header]:
+        raise InputError(
+            f"expected the column {missing[0]} in {path}, got a table without it; restore the file "
+            "from a copy, or leave a session of an earlier version out."
+        )
 
 
 def _whole_lines(path: Path) -> list[str]:

@@ -103,15 +103,17 @@ def run_trials(
             store.log("welcome", consent=intake.consent, answers=dict(answers))
         running.run()
     except SessionAborted as aborted:
-        running.break_off()
+        faults = running.fall_silent()
         store.finish("aborted", aborted.reason, by=aborted.by)
+        running.keep_broken_off(faults)
         return running.result(completed=False, reason=aborted.reason)
     except BaseException as error:
-        running.break_off()
+        faults = running.fall_silent()
         # The log must not hide what went wrong, for instance a full disk.
         with suppress(OSError):
             status, reason, by = _ending_of(error)
             store.finish(status, reason, by=by)
+        running.keep_broken_off(faults)
         raise
     running.fall_silent()
     store.finish("complete", "all trials answered", by="program")
@@ -196,9 +198,11 @@ class _Running:
         self._at_any_rate(lambda: faults.extend(self.log_faults()))
         return faults
 
-    def break_off(self) -> None:
-        """Fall silent, and keep what the hand did and felt in a trial that has no answer."""
-        faults = self.fall_silent()
+    def keep_broken_off(self, faults: Sequence[Fault]) -> None:
+        """Store what the hand did and felt in a trial that has no answer, once the end is logged.
+
+        That takes longer than the line in the log, which a second signal must not prevent.
+        """
         if self._presents and self._at is not None:
             at = self._at
             self._at_any_rate(lambda: self._keep(at, faults))

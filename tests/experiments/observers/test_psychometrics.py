@@ -111,6 +111,12 @@ def test_choice_shares_follow_luce(evidence: np.ndarray, lapse_rate: float) -> N
     assert (shares[:, None] >= shares[None, :] - 1e-12)[better].all()
 
 
+def test_shares_that_rounding_could_swallow_keep_their_sum() -> None:
+    tiny = 2.220446049250313e-16
+    for changed in with_effect([0.375 / (0.375 + tiny), tiny / (0.375 + tiny)], 0, effect=1.0):
+        assert sum(changed) == pytest.approx(1.0)
+
+
 @given(SHARES, st.floats(-1.0, 1.0), st.data())
 def test_shares_of_two_models_are_as_far_apart_as_planted(
     weights: np.ndarray, effect: float, data: Any

@@ -277,6 +277,16 @@ def test_events_tell_what_happened_in_order(write_session):
     assert set(levels) == set(events["trial_type"])
 
 
+@pytest.mark.parametrize("name", ["hand", "presentations"])
+def test_a_table_of_an_earlier_version_is_refused_in_one_sentence(write_session, name):
+    files = write_session()
+    path = files.named(f"{name}.tsv")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(line.split("\t", 1)[1] for line in lines))
+    with pytest.raises(InputError, match=f"expected the column run in .*{name}.tsv, got a table"):
+        export_session(files.root, files.manifest)
+
+
 def test_a_run_begins_when_its_date_says_and_never_before_the_last_one():
     def event(run: int, t_s: float, utc: str) -> dict[str, object]:
         return {"run": run, "t_s": t_s, "utc": f"2026-11-22T{utc}Z", "event": "x"}

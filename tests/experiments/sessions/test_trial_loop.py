@@ -714,6 +714,20 @@ def test_the_hand_of_a_trial_that_broke_off_is_kept_once(
     assert [event["event"] for event in store.events][-1] == "ended"
 
 
+def test_a_second_signal_finds_the_end_logged(run: Callable[..., Ran]) -> None:
+    class Slow(Keeping):
+        def trace(self, trial: int, rows: Any, *, presentations: Any, faults: Any) -> None:
+            if len(self.rows) == 2 and self.traces[-1:] and self.traces[-1][0] == 2:
+                raise SystemExit(130)  # another one, while the hand is written
+            super().trace(trial, rows, presentations=presentations, faults=faults)
+
+    store, leaving = Slow(), Leaving()
+    leaving.error = SystemExit(143)
+    with pytest.raises(SystemExit, match="130"):
+        run(leaving, rig=Stroking(), store=store)
+    assert store.status == "aborted"
+
+
 def test_the_hand_between_trials_is_of_no_trial(run: Callable[..., Ran]) -> None:
     class Waiting(Scripted):
         def wait(self, until: Callable[[], bool]) -> None:
