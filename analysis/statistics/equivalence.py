@@ -1,4 +1,4 @@
-"""No difference as a claim: two one-sided tests against bounds, and what both tests together say."""
+"""No difference as a claim: two one-sided tests against bounds, and what both tests say."""
 
 from __future__ import annotations
 
@@ -85,7 +85,10 @@ def one_sided_tests(differences: Floats, bounds: Bounds) -> tuple[Floats, Floats
     """t and p against the lower, then against the upper bound, (k,) each, of (k, n) differences."""
     above = stats.ttest_1samp(differences, bounds[0], axis=1, alternative="greater")
     below = stats.ttest_1samp(differences, bounds[1], axis=1, alternative="less")
-    return above.statistic, above.pvalue, below.statistic, below.pvalue
+    t_low, p_low, t_high, p_high = np.array(
+        [above.statistic, above.pvalue, below.statistic, below.pvalue]
+    )
+    return t_low, p_low, t_high, p_high
 
 
 def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) -> str:

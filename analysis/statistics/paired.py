@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,9 @@ from modeling.arrays import Floats
 
 CONFIDENCE = 0.95
 RESAMPLES = 9999  # of sign flips; all of them where there are fewer, that is up to 13 participants
+
+
+Alternative = Literal["two-sided", "greater", "less"]
 
 
 @dataclass(frozen=True)
@@ -193,13 +197,13 @@ def wilcoxon(differences: Floats, *, rng: np.random.Generator) -> tuple[float, f
     if not moved.size:
         return float("nan"), float("nan")
     tied = np.unique(np.abs(moved)).size < moved.size
-    method = stats.PermutationMethod(n_resamples=RESAMPLES, rng=rng) if tied else "auto"
-    result = stats.wilcoxon(moved, method=method)
+    flips = stats.PermutationMethod(n_resamples=RESAMPLES, rng=rng)
+    result = stats.wilcoxon(moved, method=flips) if tied else stats.wilcoxon(moved)
     return float(result.statistic), float(result.pvalue)
 
 
 def sign_flips_p(
-    differences: Floats, *, rng: np.random.Generator, alternative: str = "two-sided"
+    differences: Floats, *, rng: np.random.Generator, alternative: Alternative = "two-sided"
 ) -> float:
     """p of the mean when each participant's difference could as well have the other sign.
 
