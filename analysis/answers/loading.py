@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -214,6 +214,43 @@ def load_responses(data_folder: str | Path) -> Responses:
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
         warnings=tuple(gathered.warnings),
+    )
+
+
+def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
+    """The answers without those of some participants, which `warnings` tell with the reasons.
+
+    Parameters
+    ----------
+    responses : Responses
+    reasons : mapping of participant to reason
+        Participants as in the data, such as sub-05.
+
+    Raises
+    ------
+    InputError
+        For a participant who gave no answers, or an empty reason.
+    """
+    tables = (responses.answers, responses.training, responses.anchors)
+    known = {who for kind in tables for t in kind.values() for who in t["participant_id"]}
+    for who, why in reasons.items():
+        if who not in known or not why.strip():
+            raise InputError(
+                f"expected a participant with answers and a reason to leave them out, got "
+                f"{shown(who)} with {shown(why)}; name one as the data do, such as "
+                f"{min(known, default='sub-01')}."
+            )
+    answers, training, anchors = (
+        {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
+        for kind in tables
+    )
+    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
+    return replace(
+        responses,
+        answers={task: table.reset_index(drop=True) for task, table in answers.items()},
+        training=training,
+        anchors=anchors,
+        warnings=(*responses.warnings, *told),
     )
 
 

@@ -52,14 +52,15 @@ def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
 
 def _plan(responses: Responses) -> str:
     plan = responses.plan
-    if not plan.claims:
+    registered = [claim for claim in plan.claims if claim.planned]
+    if not registered:
         return (
             "No claim was registered before the first answer: everything here is exploratory, and "
-            "nothing can be called equivalent without bounds."
+            "nothing can be called equivalent without bounds that were fixed before."
         )
     pages = ", ".join(shortened_hash(sha256) for sha256 in plan.sha256[:1])
     where = f" (page to preregister: {pages})" if pages else ""
-    return f"Claims fixed before the first answer: {len(plan.claims)}{where}."
+    return f"Claims fixed before the first answer: {len(registered)}{where}."
 
 
 def _changed_plans(responses: Responses) -> list[str]:

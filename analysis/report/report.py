@@ -58,6 +58,7 @@ def write_report(
     benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
+    planted: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
     progress: Progress | None = None,
     mapped: Mapped = map,
@@ -77,6 +78,8 @@ def write_report(
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
+    planted : mapping of texture to mapping of measure to points, optional
+        Differences that simulated participants were given (`verdicts.planted_verdicts`).
     seed : int
         Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
     progress : callable, optional
@@ -101,7 +104,9 @@ def write_report(
     if responses is not None:
         responses = _with_identical(responses, textures)
     found = [] if responses is None else claims_found(responses, rng=rng)
-    sections = _sections(responses, textures, found=found, rng=rng, tell=tell, mapped=mapped)
+    sections = _sections(
+        responses, textures, found=found, planted=planted, rng=rng, tell=tell, mapped=mapped
+    )
     sections += benches
     if not sections:
         raise InputError(
@@ -144,6 +149,7 @@ def _sections(
     textures: Sequence[TextureResult],
     *,
     found: Sequence[ClaimFound],
+    planted: Mapping[str, Mapping[str, float]] | None,
     rng: np.random.Generator,
     tell: Progress,
     mapped: Mapped,
@@ -151,7 +157,7 @@ def _sections(
     # Begun first: other processes compare models while this one analyses answers.
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
     tell(0.0, "analysing answers")
-    answered = _answer_sections(responses, found, rng=rng)
+    answered = _answer_sections(responses, found, planted=planted, rng=rng)
     planted = [result for result in textures if result.truth is not None]
     known = [planted_section(planted)] if planted else []
     if not textures:
@@ -178,13 +184,17 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
 
 
 def _answer_sections(
-    responses: Responses | None, found: Sequence[ClaimFound], *, rng: np.random.Generator
+    responses: Responses | None,
+    found: Sequence[ClaimFound],
+    *,
+    planted: Mapping[str, Mapping[str, float]] | None,
+    rng: np.random.Generator,
 ) -> list[Section]:
     shown = [one for one in found if len(one.tests)]
     if responses is None or not shown:
         return []
     by_task = {task: [one for one in shown if one.claim.task == task] for task in responses.answers}
-    sections = [verdict_section(shown, simulated=responses.simulated)]
+    sections = [verdict_section(shown, simulated=responses.simulated, planted=planted)]
     if by_task.get("absolute"):
         sections.append(rating_section(responses, by_task["absolute"]))
     if by_task.get("relative"):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -24,7 +24,13 @@ from analysis.statistics.confusion import (
     confusion_table,
 )
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
-from analysis.statistics.verdicts import ClaimFound, chance_of, pairs_of
+from analysis.statistics.verdicts import (
+    PLANTED_COLUMNS,
+    ClaimFound,
+    chance_of,
+    pairs_of,
+    planted_verdicts,
+)
 from modeling.files.writing import file_stem
 
 TESTS_SHOWN = chosen(
@@ -39,8 +45,13 @@ CORRECT_RATES_SHOWN = (
 )
 
 
-def verdict_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section:
-    """Every claim with its tests; at least one."""
+def verdict_section(
+    found: Sequence[ClaimFound],
+    *,
+    simulated: bool,
+    planted: Mapping[str, Mapping[str, float]] | None = None,
+) -> Section:
+    """Every claim with its tests; at least one. `planted` as in `verdicts.planted_verdicts`."""
     picture = Picture(
         "forest",
         "Differences and their bounds",
@@ -77,8 +88,27 @@ def verdict_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section:
     return Section(
         "verdicts",
         "Verdicts",
-        (picture, verdicts, Fold("Tests behind the verdicts", (detail,))),
+        (
+            picture,
+            verdicts,
+            *(_planted_table(found, planted),) * bool(planted),
+            Fold("Tests behind the verdicts", (detail,)),
+        ),
         outcomes=tuple(claim_outcomes(found)),
+    )
+
+
+def _planted_table(
+    found: Sequence[ClaimFound], planted: Mapping[str, Mapping[str, float]] | None
+) -> Table:
+    return Table(
+        "planted_effects",
+        "Verdicts beside what was planted",
+        "Points that simulated participants rate the other model higher, and what the tests made "
+        "of their answers. Undecided: inconclusive, or a verdict that was withheld.",
+        planted_verdicts(found, planted or {}),
+        PLANTED_COLUMNS,
+        simulated=True,
     )
 
 

@@ -5,7 +5,7 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +14,19 @@ from scipy import stats
 
 from analysis.answers.loading import Responses
 from analysis.answers.plan import DIFFERENCE, Claim
-from analysis.labels import MEASURES, MODELS, SCALES
-from analysis.statistics.claims import Standing, Values, claim_tests, complete_means, share_at_ends
-from analysis.statistics.equivalence import ALPHA
+from analysis.columns import TEXTURE, Column, names
+from analysis.labels import MEASURES, MODELS, SCALES, TASKS
+from analysis.statistics.claims import (
+    CONTROL,
+    Standing,
+    Values,
+    claim_tests,
+    complete_means,
+    share_at_ends,
+)
+from analysis.statistics.equivalence import ALPHA, DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
 from analysis.statistics.paired import sign_flips_p, why_undefined, without_rounding_noise
+from modeling import InputError
 from modeling.arrays import Floats
 
 ENDS = (0.0, 100.0)  # of the rating scales
@@ -186,6 +195,86 @@ def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:
     if why_undefined(numbers):
         return sign_flips_p(numbers, rng=rng, alternative="greater")
     return float(stats.ttest_1samp(numbers, 0.0, alternative="greater").pvalue)
+
+
+PLANTED_COLUMNS = (
+    Column("claim", is_name=True),
+    TEXTURE,
+    Column("planted"),
+    Column("mean_difference", "difference"),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+    Column("verdict", is_name=True),
+    Column("agreement"),
+)
+
+
+def planted_verdicts(
+    found: Sequence[ClaimFound], planted: Mapping[str, Mapping[str, float]]
+) -> pd.DataFrame:
+    """Verdicts beside the differences that simulated participants were given.
+
+    Parameters
+    ----------
+    found : sequence of ClaimFound
+    planted : mapping of texture to mapping of measure to points
+        Other − reference. Measures without planted differences are left out.
+
+    Returns
+    -------
+    DataFrame
+        `PLANTED_COLUMNS`. A verdict agrees where it says what was planted, contradicts where it
+        says the opposite (a difference where none was planted, equality where the planted one
+        reaches a bound), and is undecided else.
+    """
+    rows = []
+    for one in found:
+        points = {t: of[one.claim.measure] for t, of in planted.items() if one.claim.measure in of}
+        tests = one.tests[one.tests["verdict"] != CONTROL]
+        compared = [texture for texture in tests["texture"] if texture in points]
+        for row in tests.to_dict("records") if compared else ():
+            mean = float(np.mean([points[texture] for texture in compared]))
+            truth = points.get(row["texture"], mean)
+            agreement = _agreement(row["verdict"], truth, bounds=one.claim.bounds)
+            rows.append({**row, "planted": truth, "agreement": agreement})
+    return pd.DataFrame(rows, columns=names(PLANTED_COLUMNS))
+
+
+def _agreement(verdict: str, truth: float, *, bounds: tuple[float, float] | None) -> str:
+    within = bounds is not None and bounds[0] < truth < bounds[1]
+    wrong_equality = not within and verdict in (EQUIVALENT, WITHIN_BOUNDS)
+    wrong_difference = truth == 0 and verdict in (DIFFERENT, WITHIN_BOUNDS)
+    if wrong_equality or wrong_difference:
+        return "contradicts"
+    return "agrees" if verdict in (EQUIVALENT, DIFFERENT, WITHIN_BOUNDS) else "undecided"
+
+
+def check_complete(responses: Responses) -> None:
+    """Refuse participants who lack answers to a texture with one of two models.
+
+    Raises
+    ------
+    InputError
+        Names them, and the textures.
+    """
+    lacking: dict[str, dict[str, None]] = {}
+    for claim in all_claims(responses):
+        standing = Standing(identical=responses.identical(claim.models))
+        values = claim_values(responses, claim).table
+        one = ClaimFound(claim=claim, tests=pd.DataFrame(), values=values, standing=standing)
+        for participant, texture in incomplete(one):
+            lacking.setdefault(participant, {})[f"{TASKS[claim.task]} of {texture}"] = None
+    if not lacking:
+        return
+    (who, what), *others = lacking.items()
+    more = f", and of {len(others)} more ({', '.join(w for w, _ in others[:5])}" if others else ""
+    more += ", …)" if len(others) > 5 else ")" * bool(others)
+    shown = ", ".join(list(what)[:3]) + (", …" if len(what) > 3 else "")
+    raise InputError(
+        f"expected all planned answers on both models of every texture, got too few of {who} "
+        f"({shown}){more}; let them finish, leave them out with a reason (--exclude), or compare "
+        "complete pairs alone (--complete)."
+    )
 
 
 def incomplete(found: ClaimFound) -> Iterator[tuple[str, str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from tactileq.telling import share_of, usable_recordings
 
 if TYPE_CHECKING:
     from analysis.answers.loading import Responses
+    from analysis.answers.plan import AnalysisPlan
     from analysis.textures.results import TextureResult
     from modeling import Simplification, TextureModel
 
@@ -27,17 +29,28 @@ def analyze(
     ] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
     simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="Study file whose claims are tested though it came later.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Participant and why: sub-05='fell asleep'.")
+    ] = None,
+    complete: Annotated[
+        bool, typer.Option("--complete", help="Compare complete pairs, where some are not.")
+    ] = False,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
-    With --recordings, --models and --simplified the report also tells how good and how small the
-    models are; why layers went stands in the folder that tactileq simplify wrote.
+    Claims are those of the study that was run; those of --plan are exploratory. With --recordings,
+    --models and --simplified the report also tells how good and how small the models are; why
+    layers went stands in the folder that tactileq simplify wrote.
 
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
-    from analysis.answers.loading import load_responses
+    from analysis.answers.loading import leave_out, load_responses
     from analysis.report.report import write_report
+    from analysis.statistics.verdicts import check_complete
     from experiments.sessions.bids import export_all
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
@@ -46,7 +59,11 @@ def analyze(
 
     check_own_results(out, "analyze")
     export_all(data)  # of sessions that were killed
-    responses = load_responses(data)
+    responses = leave_out(load_responses(data), dict(map(_with_reason, exclude or ())))
+    if plan is not None:
+        responses = replace(responses, plan=_later_plan(plan, responses.plan))
+    if not complete:
+        check_complete(responses)
     folders = (recordings, models, simplified)
     results = []
     if recordings is not None and models is not None and simplified is not None:
@@ -78,6 +95,21 @@ def analyze(
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())
+
+
+def _with_reason(text: str) -> tuple[str, str]:
+    who, _, why = text.partition("=")
+    return who, why
+
+
+def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
+    """The claims of a study file; those that were not registered are exploratory."""
+    from analysis.answers.plan import plan_from
+    from experiments.study.study import Study
+
+    later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
+    claims = (replace(claim, planned=claim in registered.claims) for claim in later.claims)
+    return replace(later, claims=tuple(claims))
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:

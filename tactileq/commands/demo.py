@@ -92,6 +92,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             results,
             benches=benches.sections(rivals),
             provenance=provenance,
+            planted=population.planted,
             seed=seed,
             mapped=mapped,
         )
@@ -220,6 +221,7 @@ def write_demo_report(
     *,
     benches: Sequence[Section],
     provenance: Mapping[str, object],
+    planted: Mapping[str, Mapping[str, float]],
     seed: int,
     mapped: Mapped,
 ) -> None:
@@ -234,6 +236,7 @@ def write_demo_report(
             textures=results,
             benches=benches,
             provenance=provenance,
+            planted=planted,
             seed=seed,
             progress=tell,
             mapped=mapped,

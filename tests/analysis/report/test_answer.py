@@ -1,4 +1,4 @@
-"""The sentence on top: it answers by the plan, with intervals, and claims no more than was shown."""
+"""The sentence on top: it answers by the plan, with intervals, and claims no more."""
 
 from __future__ import annotations
 

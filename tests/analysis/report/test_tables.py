@@ -41,6 +41,7 @@ from analysis.report.section_stability import stability_section
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS
+from analysis.statistics.verdicts import PLANTED_COLUMNS
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
 from analysis.textures.likeness import GFC_COLUMNS
@@ -64,6 +65,7 @@ PAGE = Path(analysis.report.page.__file__)
 DECLARED = {
     "claims": VERDICT_COLUMNS,
     "claim_tests": CLAIM_COLUMNS,
+    "planted_effects": PLANTED_COLUMNS,
     "correct_rates": CORRECT_RATE_COLUMNS,
     "confusion": CONFUSION_COLUMNS,
     "gfc": GFC_COLUMNS,
@@ -137,7 +139,7 @@ def tables(results, ratings, choices, found) -> list[Table]:
     sections = (
         model_section(textures, pd.concat([each.gfc for each in compared])),
         parameter_section(textures, driving_table([each.driven for each in compared])),
-        verdict_section(found, simulated=True),
+        verdict_section(found, simulated=True, planted={"PVC": {"magnitude_similarity": -30.0}}),
         rating_section(responses, found[:2]),
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
         planted_section(textures),

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses
+from analysis.answers.loading import PlannedTask, Responses, leave_out
 from analysis.answers.plan import AnalysisPlan
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.claims import INTERIM, WITHHELD
@@ -16,12 +16,15 @@ from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT
 from analysis.statistics.verdicts import (
     all_claims,
     chance_of,
+    check_complete,
     claim_standing,
     claim_values,
     claims_found,
     incomplete,
     pairs_of,
+    planted_verdicts,
 )
+from modeling import InputError
 
 
 def rng() -> np.random.Generator:
@@ -170,3 +173,39 @@ def test_the_odd_one_out_is_compared_with_chance(answers, plan):
     verdicts = one.tests.set_index("texture")["verdict"]
     assert verdicts[["canvas", "PVC"]].tolist() == [EQUIVALENT, DIFFERENT]
     assert (one.tests["n"] == 24).all()
+
+
+def test_verdicts_stand_beside_what_was_planted(found):
+    points = {texture: {"magnitude_similarity": 0.0} for texture in found[0].values["texture"]}
+    points["PVC"] = {"magnitude_similarity": -30.0}
+    table = planted_verdicts(found, points)
+    assert set(table["claim"]) == {found[0].claim.name}
+    by = table.set_index("texture")
+    assert by.loc[ALL_TEXTURES, "planted"] == pytest.approx(-30 / 7)
+    assert by.loc["PVC", ["planted", "agreement"]].tolist() == [-30.0, "agrees"]
+    assert "contradicts" not in set(table["agreement"])
+    turned = planted_verdicts(found, points | {"PVC": {"magnitude_similarity": 0.0}})
+    assert turned.set_index("texture").loc["PVC", "agreement"] == "contradicts"
+
+
+def test_incomplete_pairs_are_refused_and_named(answers):
+    check_complete(answers)
+    gone = answers.relative["participant_id"].isin(["sub-03", "sub-09"])
+    gone &= answers.relative["model"] == "full"
+    cut = replace(answers, answers={**answers.answers, "relative": answers.relative[~gone]})
+    with pytest.raises(
+        InputError, match=r"too few of sub-03 \(forced choice of .*1 more \(sub-09\)"
+    ):
+        check_complete(cut)
+    check_complete(leave_out(cut, {"sub-03": "left", "sub-09": "left"}))
+
+
+def test_who_is_left_out_by_hand_is_gone_and_told(answers):
+    fewer = leave_out(answers, {"sub-03": "fell asleep"})
+    for table in fewer.answers.values():
+        assert "sub-03" not in set(table["participant_id"])
+        assert table["participant_id"].nunique() == 15
+    assert fewer.warnings == ("sub-03 was left out by hand: fell asleep.",)
+    for who, why in (("sub-99", "?"), ("sub-03", " ")):
+        with pytest.raises(InputError, match="expected a participant with answers and a reason"):
+            leave_out(answers, {who: why})
