@@ -76,6 +76,8 @@ class Responses:
     anchors : mapping of task to DataFrame
         Of tasks that have them the main trials whose virtual surface modelled another texture than
         the real one's, same columns; no statistic of the models uses them.
+    left_out : mapping of task to DataFrame
+        The main trials of participants who were left out by hand (`leave_out`).
     name : str
         The study's name.
     models : mapping of texture to mapping of set to SHA-256
@@ -97,6 +99,7 @@ class Responses:
     simulated_rig: bool
     training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     equal: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
@@ -137,16 +140,18 @@ class Responses:
 
     def done(self, task: str) -> PlannedTask:
         """How many participants and sessions have answered main trials of a task so far."""
-        answers = self.answers[task]
-        sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
-        return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+        return _done(self.answers[task])
 
     @property
     def unfinished(self) -> tuple[str, ...]:
-        """Tasks that were begun, with fewer participants or sessions than planned."""
+        """Tasks that were begun, with fewer participants or sessions than planned.
+
+        Those who were left out by hand have taken part.
+        """
         short = []
         for task, planned in self.planned.items():
-            done = self.done(task)
+            here = self.answers[task]
+            done = _done(pd.concat([here, self.left_out.get(task, here[:0])]))
             fewer = done.participants < planned.participants or done.sessions < planned.sessions
             if done.participants and fewer:
                 short.append(task)
@@ -217,6 +222,11 @@ def load_responses(data_folder: str | Path) -> Responses:
     )
 
 
+def _done(answers: pd.DataFrame) -> PlannedTask:
+    sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
+    return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+
+
 def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
     """The answers without those of some participants, which `warnings` tell with the reasons.
 
@@ -250,6 +260,10 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         answers={task: table.reset_index(drop=True) for task, table in answers.items()},
         training=training,
         anchors=anchors,
+        left_out={
+            task: table[table["participant_id"].isin(list(reasons))]
+            for task, table in responses.answers.items()
+        },
         warnings=(*responses.warnings, *told),
     )
 

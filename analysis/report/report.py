@@ -158,8 +158,8 @@ def _sections(
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
     tell(0.0, "analysing answers")
     answered = _answer_sections(responses, found, planted=planted, rng=rng)
-    planted = [result for result in textures if result.truth is not None]
-    known = [planted_section(planted)] if planted else []
+    truths = [result for result in textures if result.truth is not None]
+    known = [planted_section(truths)] if truths else []
     if not textures:
         return answered
     gfc, driven = [], []

@@ -205,6 +205,9 @@ def test_who_is_left_out_by_hand_is_gone_and_told(answers):
     for table in fewer.answers.values():
         assert "sub-03" not in set(table["participant_id"])
         assert table["participant_id"].nunique() == 15
+    planned = {"relative": PlannedTask(16, 16, repeats=3)}
+    assert replace(fewer, planned=planned).unfinished == ()
+    assert replace(fewer, planned=planned).done("relative").participants == 15
     assert fewer.warnings == ("sub-03 was left out by hand: fell asleep.",)
     for who, why in (("sub-99", "?"), ("sub-03", " ")):
         with pytest.raises(InputError, match="expected a participant with answers and a reason"):
