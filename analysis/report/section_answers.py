@@ -26,8 +26,10 @@ from analysis.statistics.confusion import (
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
 from analysis.statistics.verdicts import (
     PLANTED_COLUMNS,
+    SETUP_COLUMNS,
     ClaimFound,
     chance_of,
+    differences_by_setup,
     pairs_of,
     planted_verdicts,
 )
@@ -91,11 +93,29 @@ def verdict_section(
         (
             picture,
             verdicts,
+            *_setups_table(found, simulated=simulated),
             *(_planted_table(found, planted),) * bool(planted),
             Fold("Tests behind the verdicts", (detail,)),
         ),
         outcomes=tuple(claim_outcomes(found)),
     )
+
+
+def _setups_table(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Table, ...]:
+    """The differences at each set-up, where there are several."""
+    by_setup = differences_by_setup(found)
+    if by_setup.empty:
+        return ()
+    table = Table(
+        "setups",
+        "Differences at each set-up",
+        "Means over the textures whose models differ, of complete participants; described, not "
+        "tested: verdicts are those of all set-ups together.",
+        by_setup,
+        SETUP_COLUMNS,
+        simulated,
+    )
+    return (table,)
 
 
 def _planted_table(

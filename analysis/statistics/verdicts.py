@@ -14,6 +14,7 @@ from scipy import stats
 
 from analysis.answers.loading import Responses
 from analysis.answers.plan import DIFFERENCE, Claim
+from analysis.answers.setups import setup_of
 from analysis.columns import TEXTURE, Column, names
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
 from analysis.statistics.claims import (
@@ -25,7 +26,12 @@ from analysis.statistics.claims import (
     share_at_ends,
 )
 from analysis.statistics.equivalence import ALPHA, DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
-from analysis.statistics.paired import sign_flips_p, why_undefined, without_rounding_noise
+from analysis.statistics.paired import (
+    sign_flips_p,
+    t_test,
+    why_undefined,
+    without_rounding_noise,
+)
 from modeling import InputError
 from modeling.arrays import Floats
 
@@ -195,6 +201,40 @@ def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:
     if why_undefined(numbers):
         return sign_flips_p(numbers, rng=rng, alternative="greater")
     return float(stats.ttest_1samp(numbers, 0.0, alternative="greater").pvalue)
+
+
+SETUP_COLUMNS = (
+    Column("claim", is_name=True),
+    Column("setup", "set-up", is_name=True),
+    Column("n"),
+    Column("mean_difference", "difference"),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+)
+
+
+def differences_by_setup(found: Sequence[ClaimFound]) -> pd.DataFrame:
+    """The mean difference over all textures at each set-up; no row where there is only one.
+
+    Returns
+    -------
+    DataFrame
+        `SETUP_COLUMNS`; of participants who are complete in all textures that are compared.
+    """
+    rows = []
+    for one in found:
+        compared = one.values[~one.values["texture"].isin(list(one.standing.identical))]
+        lacking = compared["other"].isna() | compared["reference"].isna()
+        incomplete_ones = compared["participant_id"][lacking]
+        whole = compared[~compared["participant_id"].isin(incomplete_ones)]
+        differences = (whole["other"] - whole["reference"]).groupby(whole["participant_id"]).mean()
+        names_of = setup_of(pd.Series(differences.index, index=differences.index, dtype=object))
+        for name, each in differences.groupby(names_of) if names_of.nunique() > 1 else ():
+            values = without_rounding_noise(each.to_numpy(dtype=float))
+            low, high = (np.nan, np.nan) if why_undefined(values) else t_test(values)[2:]
+            row = {"claim": one.claim.name, "setup": name, "n": len(each)}
+            rows.append({**row, "mean_difference": each.mean(), "ci_low": low, "ci_high": high})
+    return pd.DataFrame(rows, columns=names(SETUP_COLUMNS))
 
 
 PLANTED_COLUMNS = (

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 def analyze(
-    data: Annotated[Path, typer.Argument(help="Folder of the study's answers.")],
+    data: Annotated[
+        list[str],
+        typer.Argument(help="Folder of the study's answers; of several set-ups NAME=FOLDER each."),
+    ],
     out: Out = Path("analysis-results"),
     recordings: Annotated[
         Path | None, typer.Option(help="Folder of recording sets, one folder per texture.")
@@ -49,6 +52,7 @@ def analyze(
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
     from analysis.answers.loading import leave_out, load_responses
+    from analysis.answers.setups import pool_setups
     from analysis.report.report import write_report
     from analysis.statistics.verdicts import check_complete
     from experiments.sessions.bids import export_all
@@ -58,8 +62,12 @@ def analyze(
     from modeling.perception.verdicts import load_simplifications
 
     check_own_results(out, "analyze")
-    export_all(data)  # of sessions that were killed
-    responses = leave_out(load_responses(data), dict(map(_with_reason, exclude or ())))
+    places = _places(data)
+    for place in places.values():
+        export_all(place)  # of sessions that were killed
+    setups = {name: load_responses(place) for name, place in places.items()}
+    responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
+    responses = leave_out(responses, dict(map(_with_reason, exclude or ())))
     if plan is not None:
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
     if not complete:
@@ -79,7 +87,7 @@ def analyze(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    inputs = [path for path in (data, *folders) if path is not None]
+    inputs = [path for path in (*places.values(), *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         settings = settings_of(responses, results)
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
@@ -95,6 +103,20 @@ def analyze(
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())
+
+
+def _places(data: Sequence[str]) -> dict[str, Path]:
+    """The folder of each set-up, by its name; one alone needs none."""
+    if len(data) == 1:
+        return {"": Path(data[0])}
+    named = [text.partition("=") for text in data]
+    places = {name: Path(folder) for name, _, folder in named if name and folder}
+    if len(places) < len(data):
+        raise ValueError(
+            f"expected a name of its own for each of several set-ups, got {', '.join(data)}; name "
+            "them, as in leipzig=data nara=other/data."
+        )
+    return places
 
 
 def _with_reason(text: str) -> tuple[str, str]:

@@ -108,6 +108,17 @@ def test_claims_are_those_of_the_study_and_others_exploratory(main, data: Path) 
     assert set(tests[tests["claim"] == "as strong"]["planned"]) == {"yes"}
 
 
+def test_several_set_ups_have_names_and_answers_of_their_own(main, data: Path) -> None:
+    for words, told in (
+        (("data", "data"), "expected a name of its own for each of several set-ups"),
+        (("here=data", "there=data"), "expected answers of its own at the set-up 'there'"),
+    ):
+        refused = main("analyze", *words)
+        assert refused.returncode == 1
+        assert told in refused.stderr
+        assert refused.stderr.count("\n") == 1
+
+
 def test_incomplete_pairs_are_refused_and_complete_ones_offered(main, data: Path) -> None:
     (path,) = data.glob("sub-03/ses-01/beh/*_task-absolute_beh.tsv")
     lines = path.read_text().splitlines(keepends=True)
