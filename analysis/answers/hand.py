@@ -8,9 +8,8 @@ from __future__ import annotations
 import gzip
 import io
 import json
-import re
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ import pandas as pd
 
 from analysis.columns import MODEL, TEXTURE, Column, names
 from modeling import InputError
+from modeling.errors import shown
 from modeling.files.documents import read_json_object
 from modeling.files.reading import read_bytes
 
@@ -76,9 +76,10 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
         table = answers.get(task, pd.DataFrame())
         if table.empty:
             continue
-        for (participant, session), own in table.groupby(["participant_id", "session"], sort=False):
-            stem = Path(data_folder) / participant / session / "beh"
-            of_session = _of_session(stem / f"{participant}_{session}_task-{task}", own)
+        for _, own in table.groupby(["participant_id", "session"], sort=False):
+            participant, session = own[["participant_id", "session"]].iloc[0]
+            beh = Path(data_folder) / participant / session / "beh"
+            of_session = _of_session(beh / f"{participant}_{session}_task-{task}", own)
             trials.append(of_session.assign(task=task))
     if not trials:
         return pd.DataFrame(columns=names(HAND_COLUMNS))
@@ -93,9 +94,13 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
 def _of_session(stem: Path, answers: pd.DataFrame) -> pd.DataFrame:
     """The answers of a session with what the hand did in each of them."""
     of_trial = answers[["participant_id", "texture", "model"]].reset_index(drop=True)
-    keys = pd.MultiIndex.from_frame(answers[_TRIAL].astype(int))
-    starts = sorted(stem.parent.glob(f"{stem.name}_recording-start*_physio.tsv.gz"))
-    touched = pd.concat([_touched(path) for path in starts]) if starts else _NOTHING
+    keys = pd.MultiIndex.from_frame(answers[_TRIAL].astype(float))
+    found = [_NOTHING]
+    for run in sorted(set(keys.get_level_values("run"))):
+        path = Path(f"{stem}_recording-start{run:.0f}_physio.tsv.gz")
+        if path.is_file():
+            found.append(_touched(path).assign(run=run))
+    touched = pd.concat(found).set_index("run", append=True).swaplevel()
     measured = touched.reindex(keys).reset_index(drop=True)
     events = Path(f"{stem}_events.tsv")
     if events.is_file():
@@ -106,8 +111,8 @@ def _of_session(stem: Path, answers: pd.DataFrame) -> pd.DataFrame:
 
 
 _NOTHING = pd.DataFrame(
-    columns=["speed_mm_s", "force_n", "contact_s"],
-    index=pd.MultiIndex.from_arrays([[], []], names=_TRIAL),
+    columns=["speed_mm_s", "force_n", "contact_s", "run"],
+    index=pd.Index([], name="trial"),
     dtype=float,
 )
 
@@ -119,16 +124,13 @@ def _touched(path: Path) -> pd.DataFrame:
     # Readings off the surface have force 0.
     touching = readings[readings["force_n"] > 0]
     measured = touching["force_n"].where(touching["force_assumed"] == 0)
-    by_trial = pd.DataFrame(
+    return pd.DataFrame(
         {
             "speed_mm_s": touching["speed_mm_s"].abs().groupby(touching["trial"]).mean(),
             "force_n": measured.groupby(touching["trial"]).mean(),
             "contact_s": (readings["force_n"] > 0).groupby(readings["trial"]).sum() / rate_hz,
         }
     )
-    run = int(re.findall(r"_recording-start(\d+)_physio", path.name)[0])
-    index = [np.full(len(by_trial), run), by_trial.index.astype(int)]
-    return by_trial.set_index(pd.MultiIndex.from_arrays(index, names=_TRIAL))
 
 
 def _readings(path: Path) -> tuple[pd.DataFrame, float, float]:
@@ -139,12 +141,12 @@ def _readings(path: Path) -> tuple[pd.DataFrame, float, float]:
     if not isinstance(columns, list) or not set(_OF_READINGS) <= set(map(str, columns)):
         raise InputError(
             f"expected Columns with {', '.join(_OF_READINGS)} in {sidecar_path}, got "
-            f"{json.dumps(columns)[:80]}; {_ADVICE}."
+            f"{shown(json.dumps(columns))}; {_ADVICE}."
         )
     if not isinstance(rate_hz, int | float) or not 0 < rate_hz < float("inf"):
         raise InputError(
             f"expected a SamplingFrequency above 0 in {sidecar_path}, got "
-            f"{json.dumps(rate_hz)[:80]}; {_ADVICE}."
+            f"{shown(json.dumps(rate_hz))}; {_ADVICE}."
         )
     surface = sidecar.get("surface")
     levels = surface.get("Levels") if isinstance(surface, Mapping) else None
@@ -155,28 +157,35 @@ def _readings(path: Path) -> tuple[pd.DataFrame, float, float]:
             f'expected one number for "{_VIRTUAL}" among the Levels of surface in {sidecar_path}, '
             f"got {len(found)}; {_ADVICE}."
         )
-    return _table(path, columns=columns, compressed=True), float(rate_hz), float(found[0])
+    readings = _table(path, _OF_READINGS, columns=columns)
+    return readings, float(rate_hz), float(found[0])
 
 
 def _presented(path: Path) -> pd.Series:
     """Number of presentations of virtual surfaces, by start of the session and trial."""
-    events = _table(path)
-    lacking = [n for n in ("trial_type", "surface", *_TRIAL) if n not in events]
-    if lacking:
-        raise InputError(f"expected the column {lacking[0]} in {path}, got none; {_ADVICE}.")
-    shown = events[(events["trial_type"] == "presented") & (events["surface"] == "virtual")]
-    return shown.dropna(subset=_TRIAL).astype(dict.fromkeys(_TRIAL, int)).groupby(_TRIAL).size()
+    events = _table(path, ("trial_type", "surface", *_TRIAL), numbers=_TRIAL)
+    of_virtual = (events["trial_type"] == "presented") & (events["surface"] == "virtual")
+    return events[of_virtual].groupby(_TRIAL).size()
 
 
 def _table(
-    path: Path, *, columns: list[str] | None = None, compressed: bool = False
+    path: Path,
+    needed: Sequence[str],
+    *,
+    columns: Sequence[str] = (),
+    numbers: Sequence[str] = _OF_READINGS,
 ) -> pd.DataFrame:
-    """A table of BIDS; those that are compressed have no header."""
+    """The columns that are needed of a table of BIDS; with `columns` compressed, without header."""
     data = read_bytes(path, "a table of a session")
     try:
-        text = io.BytesIO(gzip.decompress(data) if compressed else data)
-        table = pd.read_csv(text, sep="\t", names=columns, na_values="n/a", encoding="utf-8")
-        return table.astype(dict.fromkeys(_OF_READINGS, float)) if compressed else table
-    except (OSError, EOFError, zlib.error, ValueError) as error:
-        told = str(error).splitlines()[0][:80] if str(error) else type(error).__name__
-        raise InputError(f"expected a table in {path}, got {told}; {_ADVICE}.") from None
+        text = io.BytesIO(gzip.decompress(data) if columns else data)
+        # The names are not given to pandas, which would take what is too much for an index.
+        table = pd.read_csv(text, sep="\t", header=None if columns else 0, na_values="n/a")
+        if columns and len(columns) != table.shape[1]:
+            raise ValueError(f"{table.shape[1]} columns")
+        table = table.set_axis(list(columns), axis=1) if columns else table
+        return table[list(needed)].astype(dict.fromkeys(numbers, float))
+    except (OSError, EOFError, zlib.error, ValueError, KeyError) as error:
+        told = shown((str(error) or type(error).__name__).splitlines()[0])
+        expected = f"a table with {len(columns)} columns" if columns else f"{', '.join(needed)}"
+        raise InputError(f"expected {expected} in {path}, got {told}; {_ADVICE}.") from None

@@ -19,13 +19,6 @@ from matplotlib.text import Text
 
 DEFAULT_FAMILY = "DejaVu Sans"  # comes with Matplotlib
 REGULAR_WEIGHTS = (400, "normal", "regular", "book")
-SVG_SETTINGS = {
-    # Text as outlines: it looks the same wherever the picture ends up, and no machine needs a font
-    # with the characters of a name. It can still be searched in the page and in the tables.
-    "svg.fonttype": "path",
-    # Names of what the file draws once and uses again: the same in every run.
-    "svg.hashsalt": "figure",
-}
 
 Drawing = Callable[[io.BytesIO], None]
 
@@ -61,8 +54,12 @@ def svg_of(figure: Figure) -> tuple[bytes, str]:
 
     def draw(buffer: io.BytesIO) -> None:
         figure.set_dpi(72)
-        with rc_context(SVG_SETTINGS):
-            FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None})
+        # Text as outlines: it looks the same wherever the picture ends up, and no machine needs a
+        # font with the characters of a name; it can be searched in the page and in the tables. The
+        # salt gives what is drawn once and used again the same names in every run.
+        with rc_context({"svg.fonttype": "path", "svg.hashsalt": "figure"}):
+            canvas = FigureCanvasSVG(figure)
+            canvas.print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
 
     return _in_its_fonts(figure, draw)
 

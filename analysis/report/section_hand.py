@@ -5,6 +5,7 @@ docs/method/reliability.md#hand
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
 from typing import Any
 
 import numpy as np
@@ -95,7 +96,7 @@ def _told(tests: pd.DataFrame) -> str:
     return "; ".join(_difference(row) for row in tests.to_dict("records"))
 
 
-def _difference(row: dict[str, Any]) -> str:
+def _difference(row: Mapping[Hashable, Any]) -> str:
     words, unit = MEASURES[row["measure"]]
     digits = 1 if row["measure"] == "speed_mm_s" else 2
     mean, low, high = (

@@ -5,7 +5,8 @@ docs/method/reliability.md
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -163,8 +164,8 @@ def _by_scale(table: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
 
 
 def _agreement_told(own: pd.DataFrame, scale: str) -> str:
-    kinds = own.set_index("kind")
-    one, all_ = (kinds.loc[f"consistency, {what}"] for what in ("one rating", "mean of all"))
+    by_kind = {row["kind"]: row for row in own.to_dict("records")}
+    one, all_ = by_kind["consistency, one rating"], by_kind["consistency, mean of all"]
     if np.isnan(one["icc"]):
         return ""
     return (
@@ -174,7 +175,7 @@ def _agreement_told(own: pd.DataFrame, scale: str) -> str:
     )
 
 
-def _with_interval(row: pd.Series) -> str:
+def _with_interval(row: Mapping[Hashable, Any]) -> str:
     value, low, high = (f"{row[n]:.2f}".replace("-", "−") for n in ("icc", "ci_low", "ci_high"))
     return f"{value} (95% CI {low} to {high})"
 

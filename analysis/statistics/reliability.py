@@ -5,7 +5,9 @@ docs/method/reliability.md
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -115,7 +117,10 @@ def _correlations(complete: pd.DataFrame) -> dict[str, dict[str, float]]:
 
     flat = complete.set_axis(range(complete.shape[1]), axis=1)
     long = flat.melt(ignore_index=False, var_name="cell", value_name="rating").reset_index()
-    table = intraclass_corr(long, targets="cell", raters="participant_id", ratings="rating")
+    with warnings.catch_warnings():
+        # It uses an argument that pandas will drop; nothing of ours.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        table = intraclass_corr(long, targets="cell", raters="participant_id", ratings="rating")
     return {
         row["Type"]: {
             "icc": float(row["ICC"]),
@@ -275,7 +280,9 @@ def answers_at_chance(
     return _signs(found)
 
 
-def _differs(right: float, count: float, rate: float, alternative: str) -> bool:
+def _differs(
+    right: float, count: float, rate: float, alternative: Literal["greater", "less"]
+) -> bool:
     test = stats.binomtest(int(right), int(count), rate, alternative=alternative)
     return bool(test.pvalue < ALPHA)
 
