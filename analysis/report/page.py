@@ -140,6 +140,11 @@ class Fold:
 Item = Table | Picture | Fold
 
 
+def paragraph(heading: str, text: str) -> str:
+    """Plain text below a heading."""
+    return f"<h3>{escape(heading)}</h3><p>{escape(text)}</p>"
+
+
 def bullets(sentences: Sequence[str]) -> str:
     """A list of plain sentences; nothing where there are none."""
     items = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.columns import without
 from analysis.figures.saving import missing_fonts, png_of, svg_of
-from analysis.report.answer import answer, overall_outcomes, unfinished_tasks
+from analysis.labels import MODELS
+from analysis.report.answer import answer, unfinished_tasks
 from analysis.report.outcomes import by_weight
 from analysis.report.page import (
     PICTURE_DPI,
@@ -24,25 +25,27 @@ from analysis.report.page import (
     folded,
     grouped,
     page,
+    paragraph,
     picture_html,
     table_html,
     tiles,
 )
-from analysis.report.section_answers import choice_section, rating_section
+from analysis.report.plan_sentences import deviations, methods_paragraph
+from analysis.report.section_answers import choice_section, rating_section, verdict_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
-from analysis.statistics.overall import OVERALL_COLUMNS, overall_tests
+from analysis.statistics.equivalence import INCONCLUSIVE
+from analysis.statistics.verdicts import ClaimFound, claims_found
 from analysis.textures.compared import Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
 from modeling.files.writing import write_text
 
-OVERALL_SHOWN = without(OVERALL_COLUMNS, "se_full", "se_simplified", "shapiro_p", "wilcoxon_w")
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -95,11 +98,10 @@ def write_report(
     target = Path(path)
     tell = progress or (lambda share, what: None)
     rng = np.random.default_rng(seed)
-    same = frozenset(r.texture for r in textures if r.simplification.identical)
-    identical = same if responses is None else same | responses.identical
-    sections = _sections(
-        responses, textures, identical=identical, rng=rng, tell=tell, mapped=mapped
-    )
+    if responses is not None:
+        responses = _with_identical(responses, textures)
+    found = [] if responses is None else claims_found(responses, rng=rng)
+    sections = _sections(responses, textures, found=found, rng=rng, tell=tell, mapped=mapped)
     sections += benches
     if not sections:
         raise InputError(
@@ -107,30 +109,27 @@ def write_report(
         )
     pictures = _pictures([item for section in sections for item in section.items])
     drawn = mapped(_drawn, pictures)
-    overall = pd.DataFrame()
-    if responses is not None:
-        overall = overall_tests(responses, identical=identical)
-    families = [section.tests for section in sections if section.tests is not None]
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
     for number, (picture, (formats, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
         tell(1 - PICTURES_SHARE * (1 - number / len(pictures)), f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
-    compared = files.html(_overall_items(overall, responses))
     shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
-    overview = _overview(
-        sections, responses, overall=overall, models=bool(textures), undrawn=undrawn
-    )
+    overview = _overview(sections, responses, found=found, models=bool(textures), undrawn=undrawn)
+    methods = ""
+    if responses is not None and found:
+        text = methods_paragraph(responses, found)
+        methods = paragraph("Statistical methods, for a paper", text)
     html = page(
         title=title,
-        answer=answer(overall, families, responses=responses),
+        answer=answer(found, responses),
         lead="Surfaces recorded, modelled, simplified by what can be felt, and judged.",
         banner=_banner(responses, textures),
         sections=[
-            ("overview", "At a glance", overview + compared),
+            ("overview", "At a glance", overview),
             *shown,
-            ("origin", "Provenance", files.html([provenance_table(facts)])),
+            ("origin", "Methods and provenance", methods + files.html([provenance_table(facts)])),
         ],
     )
     write_text(target, html)
@@ -144,7 +143,7 @@ def _sections(
     responses: Responses | None,
     textures: Sequence[TextureResult],
     *,
-    identical: frozenset[str],
+    found: Sequence[ClaimFound],
     rng: np.random.Generator,
     tell: Progress,
     mapped: Mapped,
@@ -152,7 +151,7 @@ def _sections(
     # Begun first: other processes compare models while this one analyses answers.
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
     tell(0.0, "analysing answers")
-    answered = _answer_sections(responses, identical=identical, rng=rng)
+    answered = _answer_sections(responses, found, rng=rng)
     planted = [result for result in textures if result.truth is not None]
     known = [planted_section(planted)] if planted else []
     if not textures:
@@ -169,14 +168,27 @@ def _sections(
     return [models, parameter_section(textures, driving_table(driven)), *answered, *known]
 
 
+def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> Responses:
+    """The answers, with what the models themselves say of being identical."""
+    equal = {texture: list(groups) for texture, groups in responses.equal.items()}
+    for result in textures:
+        if result.simplification.identical:
+            equal.setdefault(result.texture, []).append(MODELS)
+    return replace(responses, equal=equal)
+
+
 def _answer_sections(
-    responses: Responses | None, *, identical: frozenset[str], rng: np.random.Generator
+    responses: Responses | None, found: Sequence[ClaimFound], *, rng: np.random.Generator
 ) -> list[Section]:
-    sections = []
-    if responses is not None and not responses.absolute.empty:
-        sections.append(rating_section(responses, identical=identical))
-    if responses is not None and not responses.relative.empty:
-        sections.append(choice_section(responses, identical=identical, rng=rng))
+    shown = [one for one in found if len(one.tests)]
+    if responses is None or not shown:
+        return []
+    by_task = {task: [one for one in shown if one.claim.task == task] for task in responses.answers}
+    sections = [verdict_section(shown, simulated=responses.simulated)]
+    if by_task.get("absolute"):
+        sections.append(rating_section(responses, by_task["absolute"]))
+    if by_task.get("relative"):
+        sections.append(choice_section(responses, by_task["relative"], rng=rng))
     return sections
 
 
@@ -184,48 +196,34 @@ def _overview(
     sections: Sequence[Section],
     responses: Responses | None,
     *,
-    overall: pd.DataFrame,
+    found: Sequence[ClaimFound],
     models: bool,
     undrawn: str,
 ) -> str:
+    verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
     warned = cautions(
-        [section.tests for section in sections if section.tests is not None],
         simulated_participants=responses is not None and responses.simulated_participants,
         simulated_rig=responses is not None and responses.simulated_rig,
         models=models,
+        inconclusive=bool((verdicts == INCONCLUSIVE).any()),
         unfinished=[] if responses is None else unfinished_tasks(responses),
     )
-    outcomes = overall_outcomes(overall)
-    outcomes += [outcome for section in sections for outcome in section.outcomes]
-    noticed = responses.warnings if responses is not None else ()
+    outcomes = [outcome for section in sections for outcome in section.outcomes]
     done = [sentence for section in sections for sentence in section.done]
-    done += [f"On reading the answers: {warning}" for warning in noticed]
     done += [f"On drawing the pictures: {undrawn}"] * bool(undrawn)
+    otherwise = [] if responses is None else deviations(responses, found)
+    planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
     return (
         tiles([tile for section in sections for tile in section.tiles])
         + "<h3>What came out</h3>"
         + grouped(by_weight(outcomes))
         + '<div class="caution"><h3>What may not be concluded</h3>'
         + bullets(warned)
-        + "</div><h3>What was done</h3>"
+        + "</div>"
+        + planned * bool(otherwise)
+        + "<h3>What was done</h3>"
         + bullets(done)
     )
-
-
-def _overall_items(overall: pd.DataFrame, responses: Responses | None) -> tuple[Item, ...]:
-    if overall.empty or responses is None:
-        return ()
-    table = Table(
-        "overall_tests",
-        "Full against simplified models over all textures",
-        "The comparison behind the sentence on top. A participant's value is the mean over the "
-        "textures that they judged with both models; the correct rate is a share. Differences are "
-        "simplified − full. Holm over the measures. Intervals: 95% each, not corrected.",
-        overall,
-        OVERALL_SHOWN,
-        responses.simulated,
-    )
-    return (table,)
 
 
 def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:
