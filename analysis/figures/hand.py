@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -94,7 +93,7 @@ def plot_measure(
         )
     ax.set_xticks([0, 1], list(models))
     ax.set_xlim(-0.5, 1.5)
-    ax.set_ylim(0, 1.1 * np.max(values))
+    ax.set_ylim(bottom=0)
     ax.set_xlabel("model of the virtual surface")
     ax.set_ylabel(LABELS[measure])
     finish_axes(ax)
