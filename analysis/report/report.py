@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.figures.saving import missing_fonts, png_of
+from analysis.figures.saving import missing_fonts, png_of, svg_of
 from analysis.labels import MODELS
 from analysis.report.answer import answer, unfinished_tasks
 from analysis.report.outcomes import by_weight
@@ -63,7 +63,7 @@ def write_report(
     progress: Progress | None = None,
     mapped: Mapped = map,
 ) -> Path:
-    """Write report.html, and tables/*.tsv and figures/*.png beside it.
+    """Write report.html, and tables/*.tsv, figures/*.png and figures/*.svg beside it.
 
     Parameters
     ----------
@@ -116,9 +116,9 @@ def write_report(
     drawn = mapped(_drawn, pictures)
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
-    for number, (picture, (png, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
+    for number, (picture, (formats, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
         tell(1 - PICTURES_SHARE * (1 - number / len(pictures)), f"drawing {picture.title}")
-        files.add_picture(picture, png, lacking=lacking)
+        files.add_picture(picture, formats, lacking=lacking)
     shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
     overview = _overview(sections, responses, found=found, models=bool(textures), undrawn=undrawn)
@@ -260,9 +260,10 @@ def _pictures(items: Sequence[Item]) -> list[Picture]:
     return found
 
 
-def _drawn(picture: Picture) -> tuple[bytes, str]:
-    """The picture as PNG, and the characters that no font here has."""
-    return png_of(picture.figure, dpi=PICTURE_DPI)
+def _drawn(picture: Picture) -> tuple[dict[str, bytes], str]:
+    """The picture by the endings of its files, and the characters that no font here has."""
+    png, lacking = png_of(picture.figure, dpi=PICTURE_DPI)
+    return {"png": png, "svg": svg_of(picture.figure)[0]}, lacking
 
 
 class _Files:
@@ -273,12 +274,13 @@ class _Files:
         self.lacking: set[str] = set()
         self.pictures: dict[str, bytes] = {}
 
-    def add_picture(self, picture: Picture, png: bytes, *, lacking: str) -> None:
-        """Write a picture's file; `html` will show it."""
-        target = self.folder / "figures" / f"{picture.name}.png"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(png)
-        self.pictures[picture.name] = png
+    def add_picture(self, picture: Picture, formats: Mapping[str, bytes], *, lacking: str) -> None:
+        """Write a picture's files; `html` will show the PNG."""
+        folder = self.folder / "figures"
+        folder.mkdir(parents=True, exist_ok=True)
+        for ending, data in formats.items():
+            (folder / f"{picture.name}.{ending}").write_bytes(data)
+        self.pictures[picture.name] = formats["png"]
         self.lacking.update(lacking)
 
     def html(self, items: Sequence[Item]) -> str:

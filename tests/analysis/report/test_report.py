@@ -217,7 +217,7 @@ def test_links_lead_somewhere(shown):
 
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
-    pictures = {path.stem: path.read_bytes() for path in (folder / "figures").iterdir()}
+    pictures = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.png")}
     assert len(pictures) == 2 * 2 + 1 + 4
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
@@ -227,6 +227,10 @@ def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     assert inline == set(pictures.values())
     for png in inline:
         assert png.startswith(b"\x89PNG")
+    drawn = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.svg")}
+    assert drawn.keys() == pictures.keys()
+    assert all(b"<svg" in svg for svg in drawn.values())
+    assert len(list((folder / "figures").iterdir())) == 2 * len(pictures)
 
 
 def test_every_table_is_in_the_report_and_beside_it(folder, shown):
