@@ -60,6 +60,13 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
     )
 
 
+def named_after(setup: str, table: pd.DataFrame) -> pd.DataFrame:
+    """The table with its participants named after their set-up; as it is without a name."""
+    if not setup:
+        return table
+    return table.assign(participant_id=setup + BETWEEN + table["participant_id"].astype(str))
+
+
 def setup_of(participants: pd.Series) -> pd.Series:
     """The set-up before each participant's name; empty where there is only one."""
     parts = participants.str.split(BETWEEN, n=1)
@@ -94,11 +101,7 @@ def _joined(tables: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, pd.Da
     joined = {}
     for task in tasks:
         here = {name: of_setup[task] for name, of_setup in tables.items() if task in of_setup}
-        named = [
-            table.assign(participant_id=name + BETWEEN + table["participant_id"].astype(str))
-            for name, table in here.items()
-            if len(table)
-        ]
+        named = [named_after(name, table) for name, table in here.items() if len(table)]
         empty = next(iter(here.values()))
         joined[task] = pd.concat(named, ignore_index=True) if named else empty
     return joined

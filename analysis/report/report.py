@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,15 +32,17 @@ from analysis.report.page import (
 )
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
+from analysis.report.section_hand import hand_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
+from analysis.report.section_reliability import reliability_section
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
 from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import ClaimFound, claims_found
-from analysis.textures.compared import Mapped, comparisons
+from analysis.statistics.verdicts import ODDITY_CHANCE, ClaimFound, chance_of, claims_found
+from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
@@ -58,6 +60,7 @@ def write_report(
     benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
+    hand: pd.DataFrame | None = None,
     planted: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
     progress: Progress | None = None,
@@ -78,6 +81,8 @@ def write_report(
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
+    hand : DataFrame, optional
+        How the hand moved with either model (`analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
         Differences that simulated participants were given (`verdicts.planted_verdicts`).
     seed : int
@@ -103,11 +108,14 @@ def write_report(
     rng = np.random.default_rng(seed)
     if responses is not None:
         responses = _with_identical(responses, textures)
+    # Begun first: other processes compare models while this one analyses answers.
+    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
+    tell(0.0, "analysing answers")
     found = [] if responses is None else claims_found(responses, rng=rng)
-    sections = _sections(
-        responses, textures, found=found, planted=planted, rng=rng, tell=tell, mapped=mapped
-    )
-    sections += benches
+    answered = []
+    if responses is not None:
+        answered = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
+    sections = [*_model_sections(textures, compared, answered=answered, tell=tell), *benches]
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
@@ -144,24 +152,16 @@ def write_report(
     return target
 
 
-def _sections(
-    responses: Responses | None,
+def _model_sections(
     textures: Sequence[TextureResult],
+    compared: Iterable[Comparison],
     *,
-    found: Sequence[ClaimFound],
-    planted: Mapping[str, Mapping[str, float]] | None,
-    rng: np.random.Generator,
+    answered: Sequence[Section],
     tell: Progress,
-    mapped: Mapped,
 ) -> list[Section]:
-    # Begun first: other processes compare models while this one analyses answers.
-    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
-    tell(0.0, "analysing answers")
-    answered = _answer_sections(responses, found, planted=planted, rng=rng)
-    truths = [result for result in textures if result.truth is not None]
-    known = [planted_section(truths)] if truths else []
+    """The sections on models, where there are some, around those on the answers."""
     if not textures:
-        return answered
+        return list(answered)
     gfc, driven = [], []
     before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
@@ -171,7 +171,9 @@ def _sections(
         driven.append(comparison.driven)
     tell(1 - PICTURES_SHARE, "regressing parameters on speed and force")
     models = model_section(textures, pd.concat(gfc, ignore_index=True))
-    return [models, parameter_section(textures, driving_table(driven)), *answered, *known]
+    parameters = parameter_section(textures, driving_table(driven))
+    truths = [result for result in textures if result.truth is not None]
+    return [models, parameters, *answered, *([planted_section(truths)] if truths else [])]
 
 
 def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> Responses:
@@ -184,22 +186,41 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
 
 
 def _answer_sections(
-    responses: Responses | None,
+    responses: Responses,
     found: Sequence[ClaimFound],
     *,
+    hand: pd.DataFrame | None,
     planted: Mapping[str, Mapping[str, float]] | None,
     rng: np.random.Generator,
 ) -> list[Section]:
+    """What people answered, and how far that can be relied on."""
     shown = [one for one in found if len(one.tests)]
-    if responses is None or not shown:
+    if not shown:
         return []
+    simulated = responses.simulated
     by_task = {task: [one for one in shown if one.claim.task == task] for task in responses.answers}
-    sections = [verdict_section(shown, simulated=responses.simulated, planted=planted)]
+    sections: list[Section | None] = [verdict_section(shown, simulated=simulated, planted=planted)]
     if by_task.get("absolute"):
         sections.append(rating_section(responses, by_task["absolute"]))
     if by_task.get("relative"):
         sections.append(choice_section(responses, by_task["relative"], rng=rng))
-    return sections
+    tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
+    sections.append(
+        reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
+    )
+    if hand is not None:
+        # Of several pairs of models the first.
+        pair = shown[0].claim.models
+        sections.append(hand_section(hand, models=pair, simulated=simulated, rng=rng))
+    return [section for section in sections if section is not None]
+
+
+def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+    """Rates of guessing participants in the tasks with right answers."""
+    chances = {"oddity": ODDITY_CHANCE}
+    if "relative" in tasks:
+        chances["relative"] = chance_of(tasks["relative"])
+    return chances
 
 
 def _overview(

@@ -15,6 +15,8 @@ from tactileq.options import Out, Seed
 from tactileq.telling import share_of, usable_recordings
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from analysis.answers.loading import Responses
     from analysis.answers.plan import AnalysisPlan
     from analysis.textures.results import TextureResult
@@ -95,6 +97,7 @@ def analyze(
             fresh / "report.html",
             responses=responses,
             textures=results,
+            hand=_hand(places, setups),
             provenance=provenance,
             seed=seed,
             progress=tell,
@@ -117,6 +120,17 @@ def _places(data: Sequence[str]) -> dict[str, Path]:
             "them, as in leipzig=data nara=other/data."
         )
     return places
+
+
+def _hand(places: Mapping[str, Path], setups: Mapping[str, Responses]) -> DataFrame:
+    """How the hand moved at all set-ups, participants named as in the answers."""
+    import pandas as pd
+
+    from analysis.answers.hand import load_hand
+    from analysis.answers.setups import named_after
+
+    tables = [(name, load_hand(place, setups[name].answers)) for name, place in places.items()]
+    return pd.concat([named_after(name, table) for name, table in tables], ignore_index=True)
 
 
 def _with_reason(text: str) -> tuple[str, str]:

@@ -226,14 +226,17 @@ def write_demo_report(
     mapped: Mapped,
 ) -> None:
     """The report of everything in the demo's folder, with a progress bar."""
+    from analysis.answers.hand import load_hand
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
 
+    responses = load_responses(folder / "data")
     with share_of("Analyzing") as tell:
         write_report(
             folder / "report.html",
-            responses=load_responses(folder / "data"),
+            responses=responses,
             textures=results,
+            hand=load_hand(folder / "data", responses.answers),
             benches=benches,
             provenance=provenance,
             planted=planted,
