@@ -146,6 +146,7 @@ def choice_table(
                             "layout": "|".join(TEXTURES),
                             "answer": answer,
                             "correct": float(answer == texture),
+                            "response_time_s": 9.0 + len(rows) % 7,
                         }
                     )
     return pd.DataFrame(rows)
@@ -168,6 +169,7 @@ def rating_table(
                         "model": model,
                         "magnitude_similarity": ratings[0],
                         "frequency_similarity": ratings[1],
+                        "response_time_s": 12.0 + len(rows) % 5,
                     }
                 )
     return pd.DataFrame(rows)

@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 
 import analysis.report.page
+from analysis.answers.hand import HAND_COLUMNS
 from analysis.answers.loading import Responses
 from analysis.benches.atlas import hands
 from analysis.benches.atlas.edges import examine
@@ -32,15 +33,19 @@ from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import PROVENANCE_COLUMNS
+from analysis.report.section_reliability import CARELESS_COLUMNS, reliability_section
 from analysis.report.section_scenes import (
     SCENE_STEP_COLUMNS,
     SCENE_TEXTURE_COLUMNS,
     scene_section,
 )
 from analysis.report.section_stability import stability_section
+from analysis.report.sections import Section
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
+from analysis.statistics.hand import HAND_TEST_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS
+from analysis.statistics.reliability import AGREEMENT_COLUMNS, RATER_COLUMNS
 from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
@@ -67,6 +72,11 @@ DECLARED = {
     "claim_tests": CLAIM_COLUMNS,
     "planted_effects": PLANTED_COLUMNS,
     "setups": SETUP_COLUMNS,
+    "agreement": AGREEMENT_COLUMNS,
+    "raters": RATER_COLUMNS,
+    "careless": CARELESS_COLUMNS,
+    "hand": HAND_COLUMNS,
+    "hand_tests": HAND_TEST_COLUMNS,
     "correct_rates": CORRECT_RATE_COLUMNS,
     "confusion": CONFUSION_COLUMNS,
     "gfc": GFC_COLUMNS,
@@ -91,7 +101,8 @@ DECLARED = {
     "stability_margins": MARGIN_COLUMNS,
     "stability_edges": EDGE_COLUMNS,
 }
-ELSEWHERE = {"provenance", "setups"}  # in no section, or of several set-ups only
+# In no section, of several set-ups, or of hands that were measured.
+ELSEWHERE = {"provenance", "setups", "hand", "hand_tests"}
 EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
 
 
@@ -121,6 +132,17 @@ def compiled_example() -> tuple[CompiledExample, dict[str, Surface]]:
     return CompiledExample(compiled, (windows,)), {"MDF": surface}
 
 
+def reliability(ratings: pd.DataFrame, choices: pd.DataFrame) -> Section:
+    section = reliability_section(
+        {"absolute": ratings, "relative": choices},
+        chances={"relative": 1 / 7},
+        simulated=True,
+        rng=np.random.default_rng(1),
+    )
+    assert section is not None
+    return section
+
+
 @pytest.fixture(scope="module")
 def tables(results, ratings, choices, found) -> list[Table]:
     """All tables of a report but its provenance."""
@@ -143,6 +165,7 @@ def tables(results, ratings, choices, found) -> list[Table]:
         verdict_section(found, simulated=True, planted={"PVC": {"magnitude_similarity": -30.0}}),
         rating_section(responses, found[:2]),
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
+        reliability(ratings, choices),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
         scene_section([compiled_example()]),
