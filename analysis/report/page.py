@@ -68,7 +68,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
 @media print {
   body { background: none; font-size: 10.5pt; }
   main, header > div, footer, .banner div { max-width: none; padding: 0; }
-  header { padding: 0 0 8px; } nav { display: none; }
+  header { padding: 8px 0; } nav { display: none; }
   .banner { padding: 6px 10px; print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   section { border: 0; border-radius: 0; padding: 0; margin: 16px 0; }
   h2, h3, h4, summary, caption { break-after: avoid; }

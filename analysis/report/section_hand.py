@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.answers.hand import HAND_COLUMNS
 from analysis.columns import without
 from analysis.figures.hand import figure_hand
 from analysis.labels import TASKS
@@ -19,7 +18,13 @@ from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import signed
-from analysis.statistics.hand import HAND_TEST_COLUMNS, hand_means, hand_tests
+from analysis.statistics.hand import (
+    HAND_TEST_COLUMNS,
+    PARTICIPANT_COLUMNS,
+    hand_by_participant,
+    hand_means,
+    hand_tests,
+)
 
 ALPHA = 0.05
 TESTS_SHOWN = without(HAND_TEST_COLUMNS, "se_reference", "se_other")
@@ -61,7 +66,7 @@ def hand_section(
     return Section(
         "hand",
         "How the hand moved",
-        (*pictures, *_tables(tests, hand, models=models, simulated=simulated)),
+        (*pictures, *_tables(tests, means, models=models, simulated=simulated)),
         outcomes=(Outcome(Weight.SECONDARY, hand_caveat(tests, models=models)),),
     )
 
@@ -120,7 +125,7 @@ def _picture(
 
 
 def _tables(
-    tests: pd.DataFrame, hand: pd.DataFrame, *, models: tuple[str, str], simulated: bool
+    tests: pd.DataFrame, means: pd.DataFrame, *, models: tuple[str, str], simulated: bool
 ) -> tuple[Table, Fold]:
     reference, other = models
     labels = {
@@ -136,12 +141,14 @@ def _tables(
         TESTS_SHOWN,
         simulated,
     )
-    cells = Table(
+    participants = hand_by_participant(means)
+    each = Table(
         "hand",
-        "The hand by participant, texture and model",
-        "Means over trials. n/a: nothing measured it, or the session stored none of it.",
-        hand.assign(task=hand["task"].map(TASKS)),
-        HAND_COLUMNS,
+        "The hand of each participant",
+        f"Reference: {reference} models; other: {other} models. Means over the textures judged "
+        "with both. n/a: nothing measured it, or no session stored it.",
+        participants.assign(task=participants["task"].map(TASKS)),
+        PARTICIPANT_COLUMNS,
         simulated,
     )
-    return paired, Fold("The hand by participant, texture and model", (cells,))
+    return paired, Fold("The hand of each participant", (each,))

@@ -36,6 +36,19 @@ HAND_TEST_COLUMNS = (
     Column("note"),
 )
 
+PARTICIPANT_COLUMNS = (
+    Column("task", is_name=True),
+    Column("participant_id", "participant", is_name=True),
+    Column("speed_mm_s_reference", "speed, reference", "mm/s"),
+    Column("speed_mm_s_other", "other", "mm/s"),
+    Column("force_n_reference", "force, reference", "N"),
+    Column("force_n_other", "other", "N"),
+    Column("contact_s_reference", "in contact per trial, reference", "s"),
+    Column("contact_s_other", "other", "s"),
+    Column("presentations_reference", "presentations per trial, reference"),
+    Column("presentations_other", "other"),
+)
+
 
 def hand_means(hand: pd.DataFrame, *, models: tuple[str, str]) -> pd.DataFrame:
     """Each participant's hand with either model, over the textures judged with both.
@@ -64,6 +77,24 @@ def hand_means(hand: pd.DataFrame, *, models: tuple[str, str]) -> pd.DataFrame:
     everybody = hand[["task", "participant_id"]].drop_duplicates()
     rows = everybody.merge(pd.DataFrame({"measure": MEASURES}), how="cross")
     return rows.merge(means, how="left")[[*_CELL, "reference", "other"]]
+
+
+def hand_by_participant(means: pd.DataFrame) -> pd.DataFrame:
+    """The same with a row per task and participant.
+
+    Parameters
+    ----------
+    means : DataFrame
+        From `hand_means`.
+
+    Returns
+    -------
+    DataFrame
+        `PARTICIPANT_COLUMNS`.
+    """
+    wide = means.pivot(index=["task", "participant_id"], columns="measure")
+    wide = wide.set_axis(wide.columns.map(lambda pair: f"{pair[1]}_{pair[0]}"), axis=1)
+    return wide.reset_index()[names(PARTICIPANT_COLUMNS)]
 
 
 def hand_tests(

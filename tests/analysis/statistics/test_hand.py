@@ -9,7 +9,13 @@ from scipy import stats
 
 from analysis.answers.hand import MEASURES
 from analysis.columns import names
-from analysis.statistics.hand import HAND_TEST_COLUMNS, hand_means, hand_tests
+from analysis.statistics.hand import (
+    HAND_TEST_COLUMNS,
+    PARTICIPANT_COLUMNS,
+    hand_by_participant,
+    hand_means,
+    hand_tests,
+)
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "other")
@@ -79,6 +85,17 @@ def test_a_texture_counts_only_where_it_has_both_models(rng):
     found = means.loc[("speed_mm_s", "sub-01")]
     assert found["reference"] == pytest.approx(expected["full"])
     assert found["other"] == pytest.approx(expected["other"])
+
+
+def test_each_participant_has_a_row_with_every_measure(rng):
+    means = hand_means(hand_of(rng), models=PAIR)
+    wide = hand_by_participant(means)
+    assert list(wide) == names(PARTICIPANT_COLUMNS)
+    assert len(wide) == 12
+    for measure in MEASURES:
+        own = means[means["measure"] == measure].sort_values("participant_id")
+        for which in ("reference", "other"):
+            assert wide[f"{measure}_{which}"].tolist() == own[which].tolist()
 
 
 def test_who_has_no_pair_is_named(rng):
