@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,9 +12,12 @@ import typer
 
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
-from tactileq.telling import share_of, usable_recordings
+from tactileq.telling import progress, share_of, usable_recordings
+from tactileq.workers import working
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from analysis.answers.loading import Responses
     from analysis.textures.results import TextureResult
     from modeling import Simplification, TextureModel
@@ -27,6 +31,21 @@ def analyze(
     ] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
     simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
+    validate: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Append what the procedures do on planted truth, by N simulations of each.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes of --validate; one per core without it."),
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, whose workers --validate.")
+    ] = None,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
@@ -38,6 +57,7 @@ def analyze(
     """
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
+    from analysis.report.section_validation import validation_section
     from experiments.sessions.bids import export_all
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
@@ -63,13 +83,17 @@ def analyze(
             "give all three or none."
         )
     inputs = [path for path in (data, *folders) if path is not None]
+    appendix = []
+    if validate is not None:
+        appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
-        settings = settings_of(responses, results)
+        settings = {**settings_of(responses, results), "validate": validate}
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",
             responses=responses,
             textures=results,
+            benches=appendix,
             provenance=provenance,
             seed=seed,
             progress=tell,
@@ -78,6 +102,37 @@ def analyze(
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     print((out / "report.html").resolve())
+
+
+def validated(
+    simulations: int, *, seed: int, jobs: int | None = None, dask: str | None = None
+) -> pd.DataFrame:
+    """The procedures on planted truth: the same table on any number of workers.
+
+    Parameters
+    ----------
+    simulations : int
+        Of each row, ≥ 1.
+    seed : int
+        ≥ 0.
+    jobs : int, optional
+        Processes; as many as cores without it.
+    dask : str, optional
+        Address of a scheduler.
+    """
+    from analysis.statistics.validation import cells, simulate_cell, validation_table
+
+    rows = cells()
+    work = partial(simulate_cell, simulations=simulations, seed=seed)
+    found: dict[int, dict[str, object]] = {}
+    with (
+        progress("Validating", len(rows)) as advance,
+        working(work, rows, jobs=jobs, dask=dask) as done,
+    ):
+        for number, row in done:
+            found[number] = row
+            advance(f"{row['procedure']}, {row['situation']}")
+    return validation_table(found[number] for number in sorted(found))
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:
