@@ -100,14 +100,14 @@ def verdicts(
     own = (wide[texture].dropna().to_numpy(float) for texture in wide)
     each = np.array([_p_values(differences, claim.bounds, rng=rng) for differences in own])
     adjusted = np.column_stack([holm(each[:, 0]), holm(each[:, 1])])
-    rows = {ALL_TEXTURES: overall, **dict(zip(wide, adjusted, strict=True))}
+    rows = {ALL_TEXTURES: overall, **dict(zip(map(str, wide), adjusted, strict=True))}
     doubted = {
         texture: bool(standing.insensitive)
         or values.share_at_ends.get(texture, 0.0) > standing.highest_share_at_ends
         for texture in rows
     }
     found = [
-        Verdict(claim.name, str(texture), n, _verdict(*p, doubted=doubted[texture]))
+        Verdict(claim.name, texture, n, _verdict(*p, doubted=doubted[texture]))
         for texture, p in rows.items()
     ]
     withheld = any(one.verdict == WITHHELD for one in found if one.texture != ALL_TEXTURES)

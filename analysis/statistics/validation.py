@@ -93,7 +93,8 @@ def _ceiling(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> 
     noise_sd = DIFFERENCE_SD / sqrt(2)
     middle = 100 + float(stats.norm.ppf(AT_END)) * float(np.hypot(PERSON_SD, noise_sd))
     latent = rng.normal(middle, PERSON_SD, shape)[..., None] + rng.normal(0, noise_sd, (*shape, 2))
-    return np.clip(latent + [0.0, truth], 0.0, 100.0)
+    ended: Floats = np.clip(latent + np.array([0.0, truth]), 0.0, 100.0)
+    return ended
 
 
 def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
@@ -191,7 +192,8 @@ def _family_rejects(ratings: Floats, truth: float, rng: np.random.Generator) -> 
 def _equivalent(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
     def told(differences: Floats) -> Hits:
         _, p_low, _, p_high = one_sided_tests(differences, BOUNDS)
-        return np.maximum(p_low, p_high) < ALPHA
+        equal: Hits = np.maximum(p_low, p_high) < ALPHA
+        return equal
 
     return _told(_differences(ratings), told)
 
@@ -201,7 +203,8 @@ def _equivalent_by_guard(ratings: Floats, truth: float, rng: np.random.Generator
     at_end = (ratings <= 0) | (ratings >= 100)
     answered = np.isfinite(ratings).sum(axis=(1, 2))
     few = at_end.sum(axis=(1, 2)) <= HIGHEST_SHARE_AT_ENDS * answered
-    return _equivalent(ratings, truth, rng) & few
+    told: Hits = _equivalent(ratings, truth, rng) & few
+    return told
 
 
 def _d_z_covers(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
@@ -507,6 +510,6 @@ def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
     return float(interval.low), float(interval.high)
 
 
-def validation_table(rows: Iterable[Mapping[str, Any]]) -> pd.DataFrame:
+def validation_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """The rows of `simulate_cell` as a table of `VALIDATION_COLUMNS`."""
-    return pd.DataFrame(rows, columns=names(VALIDATION_COLUMNS))
+    return pd.DataFrame(list(rows), columns=names(VALIDATION_COLUMNS))

@@ -87,7 +87,8 @@ def analyze(
     if validate is not None:
         appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
-        settings = {**settings_of(responses, results), "validate": validate}
+        settings = settings_of(responses, results)
+        settings |= {"validate": validate} if validate is not None else {}
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",

@@ -27,7 +27,6 @@ from tactileq.workers import working
 
 if TYPE_CHECKING:
     import pandas as pd
-
     from matplotlib.figure import Figure
 
     from analysis.answers.loading import PlannedTask, Responses

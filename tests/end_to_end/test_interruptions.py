@@ -39,11 +39,21 @@ LONG = {
     "stimuli": ("stimuli", "models/canvas.json", *SPEEDS, "--seed", "{}"),
     "record": ("record", "out", "--texture", "canvas", "--rate", "5000", "--seed", "{}"),
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
+    "power": ("power", "claims.toml", "--subjects", "[2,4]", "--jobs", "2", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
     "demo": ("demo", "--seed", "{}"),
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
     "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
+CLAIM = """
+[[plan.claims]]
+name = "magnitude feels the same"
+task = "absolute"
+measure = "magnitude_similarity"
+models = ["full", "simplified"]
+bounds = [-7.5, 7.5]
+test = "equivalence"
+"""
 QUICK = ("import", "record")
 NEW_PLACES = ("record", "simulate")  # these refuse what is there
 
@@ -73,6 +83,7 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Pat
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
     (tmp_path / "study.toml").write_text(small_study)
+    (tmp_path / "claims.toml").write_text(small_study + CLAIM)
     for name, force_n in (("light", 1), ("strong", 3)):
         hand = f"speed_mm_s = [100, 300], force_n = [1, {force_n}]"
         scene = f'version = 1\nscene.name = "{name}"\nhand = {{{hand}}}\n'
