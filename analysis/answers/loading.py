@@ -334,9 +334,9 @@ def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[s
             "else; restore the file."
         )
     names = {tuple(kinds) for kinds in textures if isinstance(kinds, Mapping)}
-    if len({frozenset(some) for some in names}) > 1:
+    if len({frozenset(some) for some in names}) > 1 or any(len(some) < 2 for some in names):
         raise InputError(
-            f"expected models of the same sets for every texture in {place}, got "
+            f"expected models of the same sets, two at least, for every texture in {place}, got "
             f"{shown('; '.join(', '.join(some) for some in sorted(names)))}; restore the file."
         )
     assert isinstance(stated, Mapping)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from textwrap import fill
 
 import numpy as np
 import pandas as pd
@@ -39,6 +40,7 @@ MARKS = {
 NO_VERDICT = "no test"
 PANEL_WIDTH, ROW_HEIGHT = 4.4, 0.36
 MOST_IN_A_ROW = 3
+TITLE_WIDTH = 34  # characters, beside the stamp of what is simulated
 
 
 def figure_forest(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:
@@ -82,14 +84,16 @@ def plot_forest(found: ClaimFound, *, simulated: bool, ax: Axes) -> Axes:
                 ax.plot(
                     [factor * row[low], factor * row[high]], [place] * 2, color=colour, lw=width
                 )
-        ax.plot(factor * row["mean_difference"], place, mark, color=colour, mec="white", ms=8)
+        edge = colour if mark == "x" else "white"
+        ax.plot(factor * row["mean_difference"], place, mark, color=colour, mec=edge, ms=8)
     ax.set_yticks(range(len(tests)), [_label(row) for row in tests.to_dict("records")])
     ax.get_yticklabels()[0].set_fontweight("bold")
     ax.set_ylim(len(tests) - 0.5, -0.5)
     reference, other = ("chance", "share") if claim.task == "oddity" else claim.models
     unit = "percentage points" if claim.measure == "correct" else "points of the scale"
     ax.set_xlabel(f"{other} − {reference} ({unit})")
-    ax.set_title(claim.name if claim.planned else f"{claim.name} (exploratory)", fontsize=10)
+    name = claim.name if claim.planned else f"{claim.name} (exploratory)"
+    ax.set_title(fill(name, TITLE_WIDTH), loc="left", fontsize=10)
     ax.spines[["top", "right"]].set_visible(False)
     stamp_if_simulated(ax, simulated)
     return ax
@@ -103,9 +107,7 @@ def _legend(found: Sequence[ClaimFound]) -> list[Line2D | Patch]:
     """Every verdict that occurs, the two intervals, and the bounds where there are some."""
     occurring = pd.concat([one.tests["verdict"] for one in found]).unique()
     handles: list[Line2D | Patch] = [
-        Line2D(
-            [], [], marker=mark, color=colour, ls="", mec="white", ms=8, label=name or NO_VERDICT
-        )
+        Line2D([], [], marker=mark, color=colour, ls="", ms=8, label=name or NO_VERDICT)
         for name, (mark, colour) in MARKS.items()
         if name in occurring
     ]

@@ -54,6 +54,8 @@ def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
     unit, factor = ("percentage points", 100.0) if rate else ("points of 100", 1.0)
     ends = ("ci90_low", "ci90_high") if confidence == "90%" else ("ci_low", "ci_high")
     middle, low, high = (factor * row[name] for name in ("mean_difference", *ends))
+    if np.isnan(middle):
+        return "(nobody answered completely)"
     interval = f"{confidence} CI {signed(low, 1)} to {signed(high, 1)}"
     if np.isnan(low):
         interval = "no interval"
@@ -90,7 +92,7 @@ def _overall(found: ClaimFound, row: Row) -> str:
         told += f", since {why_withheld(found, row)}"
     told += f"; {difference(found, row, confidence='90%')}"
     if np.isfinite(row["t"]):
-        told += f", t({row['df']}) = {signed(row['t'], 2)}"
+        told += f", t({row['df']:.0f}) = {signed(row['t'], 2)}"
     if np.isfinite(row["p"]):
         told += f", {_p(row['p'])}"
     if np.isfinite(row["p_equivalence"]):

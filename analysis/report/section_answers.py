@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.columns import chosen, without
+from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_confusion, figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS
@@ -16,7 +16,7 @@ from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import confusion_outcomes, rate_outcomes
-from analysis.statistics.claims import CLAIM_COLUMNS
+from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import (
     CONFUSION_COLUMNS,
     ConfusionMatrix,
@@ -27,11 +27,6 @@ from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
 from analysis.statistics.verdicts import ClaimFound, chance_of, pairs_of
 from modeling.files.writing import file_stem
 
-VERDICTS_SHOWN = chosen(
-    CLAIM_COLUMNS,
-    *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
-    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends"),
-)
 TESTS_SHOWN = chosen(
     CLAIM_COLUMNS,
     *("claim", "texture", "mean_reference", "mean_other", "mean_difference", "ci_low", "ci_high"),
@@ -63,9 +58,9 @@ def verdict_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section:
         "who answered completely; then each texture, a family of its own with Holm's correction "
         "for tests of a difference and of equivalence (TOST) separately; identical models are "
         "controls. Differences and bounds in points of the scale, or shares of right answers. "
-        "Columns that are not shown are in the file.",
-        tests,
-        VERDICTS_SHOWN,
+        "The tests themselves are below.",
+        tests[names(VERDICT_COLUMNS)],
+        VERDICT_COLUMNS,
         simulated,
     )
     detail = Table(

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.plan import Claim
-from analysis.columns import TEXTURE, Column, P, names
+from analysis.columns import TEXTURE, Column, P, chosen, names
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.statistics.equivalence import (
     ALPHA,
@@ -58,7 +58,7 @@ CLAIM_COLUMNS = (
     Column("bound_low", "bounds from"),
     Column("bound_high", "to"),
     Column("t"),
-    Column("df"),
+    Column("df", format=".0f"),
     P,
     Column("p_holm", "p (Holm)", is_p_value=True),
     Column("p_equivalence", "p of TOST", is_p_value=True),
@@ -75,6 +75,12 @@ CLAIM_COLUMNS = (
     Column("share_at_ends", "share at ends"),
     Column("excluded"),
     Column("note"),
+)
+
+VERDICT_COLUMNS = chosen(
+    CLAIM_COLUMNS,
+    *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
+    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends"),
 )
 
 
@@ -253,7 +259,7 @@ def _controls(
             found = _row(of_texture, claim.bounds, rng=rng)
             kept = {name: found[name] for name in described}
             rows.append({"texture": texture, "verdict": CONTROL, "note": IDENTICAL, **kept})
-    table = pd.DataFrame(rows, columns=names(CLAIM_COLUMNS))
+    table = pd.DataFrame(rows).reindex(columns=names(CLAIM_COLUMNS))
     return table.sort_values("texture", key=ignoring_case) if rows else table
 
 

@@ -92,11 +92,12 @@ def one_sided_tests(differences: Floats, bounds: Bounds) -> tuple[Floats, Floats
 
 
 def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) -> str:
-    """What a test of a difference and one of equivalence say together; empty where one is NaN.
+    """What a test of a difference and one of equivalence say together.
 
+    Empty where the former could not be made; the latter is NaN where there are no bounds.
     docs/method/statistics.md#verdicts
     """
-    if not np.isfinite(p_difference + p_equivalence):
+    if np.isnan(p_difference):
         return ""
     differs, equals = p_difference < alpha, p_equivalence < alpha
     if differs:
