@@ -15,7 +15,8 @@ def test_what_does_not_hold_stands_on_top_and_everything_below():
     table = validation_table(rows)
     section = validation_section(table)
     apart, fold = section.items
-    assert isinstance(apart, Table) and isinstance(fold, Fold)
+    assert isinstance(apart, Table)
+    assert isinstance(fold, Fold)
     assert apart.frame.to_dict("records") == [
         {
             "procedure": "TOST, no guard on ends",
@@ -30,7 +31,8 @@ def test_what_does_not_hold_stands_on_top_and_everything_below():
     ]
     (whole,) = fold.items
     assert whole.frame is table
-    assert apart.simulated and whole.simulated
+    assert apart.simulated
+    assert whole.simulated
     assert "2 of 4 rows hold" in section.done[0]
     assert "200 simulations" in section.done[0]
 

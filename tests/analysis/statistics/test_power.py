@@ -85,7 +85,9 @@ def test_what_says_nothing_is_counted_as_no_verdict():
 
 
 def test_a_doubted_texture_is_no_equivalent_one():
-    values = Values(table=table_of(np.tile([-0.5, 0.5, 0.0, 0.1], (2, 3))), share_at_ends={"t1": 0.3})
+    values = Values(
+        table=table_of(np.tile([-0.5, 0.5, 0.0, 0.1], (2, 3))), share_at_ends={"t1": 0.3}
+    )
     found = told(values, Standing(highest_share_at_ends=0.2), n=12)
     assert found == {ALL_TEXTURES: EQUIVALENT, "t0": EQUIVALENT, "t1": WITHHELD} | {
         EVERY_TEXTURE: INCONCLUSIVE

@@ -36,7 +36,7 @@ def within_limits(row: dict, probability: float) -> bool:
 
 
 def test_power_of_equivalence_is_that_of_the_published_design():
-    """METHOD 12: at n = 20, 80 % need a bound of 0.68 SD; all seven are equivalent in 0.21."""
+    """At n = 20, 80 % need bounds of 0.68 SD of differences; all of seven then have 0.21."""
     one = equivalence_power(20, 0.0, bounds=(-0.68, 0.68), sd=1.0)
     assert one == pytest.approx(0.80, abs=0.005)
     assert one**7 == pytest.approx(0.21, abs=0.005)

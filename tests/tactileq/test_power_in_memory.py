@@ -116,9 +116,7 @@ def test_a_planted_difference_is_found_and_none_is_called_equivalent(
     known = {"texture": ALL_TEXTURES, "n": 12, "claim": RATED.name}
     assert chance(tables[0.0], **known, verdict="equivalent") > 0.7
     assert chance(tables[-25.0], **known, verdict="different") > 0.7
-    of_four = chance(
-        tables[0.0], RATED.name, ALL_TEXTURES, n=4, verdict="inconclusive"
-    )
+    of_four = chance(tables[0.0], RATED.name, ALL_TEXTURES, n=4, verdict="inconclusive")
     assert of_four > chance(tables[0.0], **known, verdict="inconclusive")
 
 
