@@ -39,7 +39,7 @@ LONG = {
     "stimuli": ("stimuli", "models/canvas.json", *SPEEDS, "--seed", "{}"),
     "record": ("record", "out", "--texture", "canvas", "--rate", "5000", "--seed", "{}"),
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
-    "power": ("power", "claims.toml", "--subjects", "[2,4]", "--jobs", "2", "--seed", "{}"),
+    "power": ("power", "claims.toml", "--subjects", "[8,16]", "--jobs", "2", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
     "demo": ("demo", "--seed", "{}"),
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),

@@ -32,13 +32,13 @@ def power(main, *more: object, study: str = "study.toml"):
 
 
 def test_power_writes_its_table_and_chart(main, place: Path) -> None:
-    words = ("--subjects", "4,12,4", "--effect", "magnitude_similarity=0")
+    words = ("--subjects", "4,8,4", "--effect", "magnitude_similarity=0")
     told = power(main, *words)
     assert told.returncode == 0, told.stderr
     line = "magnitude feels the same: simulated: "
     assert [text for text in told.stdout.splitlines() if text.startswith(line)]
     table = pd.read_csv(place / "power/power.tsv", sep="\t")
-    assert set(table["n"]) == {4, 8, 12}
+    assert set(table["n"]) == {4, 8}
     assert set(table["simulations"]) == {10}
     assert table["simulated"].all()
     note = json.loads((place / "power/provenance.json").read_text())
@@ -48,8 +48,6 @@ def test_power_writes_its_table_and_chart(main, place: Path) -> None:
     assert first["power.svg"].startswith(b"<?xml")
     assert power(main, *words).returncode == 0
     assert {name: (place / "power" / name).read_bytes() for name in files} == first
-    assert power(main, *words, "--seed", 1).returncode == 0
-    assert (place / "power/power.tsv").read_bytes() != first["power.tsv"]
 
 
 def test_dask_workers_give_the_same_table(main, place: Path) -> None:
