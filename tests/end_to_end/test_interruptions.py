@@ -45,15 +45,6 @@ LONG = {
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
     "stability": ("stability", "--reduced", "--only", "{blending|vibrators}", "--jobs", "2"),
 }
-CLAIM = """
-[[plan.claims]]
-name = "magnitude feels the same"
-task = "absolute"
-measure = "magnitude_similarity"
-models = ["full", "simplified"]
-bounds = [-7.5, 7.5]
-test = "equivalence"
-"""
 QUICK = ("import", "record")
 NEW_PLACES = ("record", "simulate")  # these refuse what is there
 
@@ -69,7 +60,9 @@ def words_of(name: str, which: int) -> list[str]:
 
 
 @pytest.fixture
-def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Path:
+def place(
+    tmp_path: Path, hatt_xml: Callable[..., str], small_study: str, claimed_study: str
+) -> Path:
     """Small inputs of every command."""
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     for name in ("canvas", "MDF"):
@@ -83,7 +76,7 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Pat
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
     (tmp_path / "study.toml").write_text(small_study)
-    (tmp_path / "claims.toml").write_text(small_study + CLAIM)
+    (tmp_path / "claims.toml").write_text(claimed_study)
     for name, force_n in (("light", 1), ("strong", 3)):
         hand = f"speed_mm_s = [100, 300], force_n = [1, {force_n}]"
         scene = f'version = 1\nscene.name = "{name}"\nhand = {{{hand}}}\n'

@@ -11,18 +11,17 @@ from distributed import LocalCluster
 
 from modeling import Threshold, simplify
 from stimuli.planted.textures import planted_texture
-from tests.end_to_end.test_interruptions import CLAIM
 
 
 @pytest.fixture
-def place(tmp_path: Path, small_study: str) -> Path:
+def place(tmp_path: Path, small_study: str, claimed_study: str) -> Path:
     """A study with a claim, and its models."""
     codec = Threshold.named("codec")
     for name in ("canvas", "MDF"):
         truth = planted_texture(name)
         truth.save(tmp_path / f"models/{name}.json")
         simplify(truth, codec).model.save(tmp_path / f"simplified/{name}.json")
-    (tmp_path / "study.toml").write_text(small_study + CLAIM)
+    (tmp_path / "study.toml").write_text(claimed_study)
     (tmp_path / "none.toml").write_text(small_study)
     return tmp_path
 
