@@ -25,6 +25,7 @@ COMMANDS = {
     "vibrator": "vibrator",
     "feel": "feel",
     "study": "study",
+    "power": "power",
     "session": "session",
     "threshold": "threshold",
     "simulate": "simulate",

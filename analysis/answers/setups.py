@@ -67,6 +67,18 @@ def named_after(setup: str, table: pd.DataFrame) -> pd.DataFrame:
     return table.assign(participant_id=setup + BETWEEN + table["participant_id"].astype(str))
 
 
+def answers_at(setup: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.DataFrame]:
+    """The rows of one set-up with its own names of participants; all without a set-up's name."""
+    if not setup:
+        return dict(tables)
+    before = setup + BETWEEN
+    own = {t: table[table["participant_id"].str.startswith(before)] for t, table in tables.items()}
+    return {
+        task: table.assign(participant_id=table["participant_id"].str.removeprefix(before))
+        for task, table in own.items()
+    }
+
+
 def setup_of(participants: pd.Series) -> pd.Series:
     """The set-up before each participant's name; empty where there is only one."""
     parts = participants.str.split(BETWEEN, n=1)

@@ -211,6 +211,7 @@ def _answer_sections(
     if hand is not None:
         # Of several pairs of models the first.
         pair = shown[0].claim.models
+        hand = hand[~hand["texture"].isin(list(responses.identical(pair)))]
         sections.append(hand_section(hand, models=pair, simulated=simulated, rng=rng))
     return [section for section in sections if section is not None]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,10 +13,11 @@ import typer
 
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
-from tactileq.telling import share_of, usable_recordings
+from tactileq.telling import progress, share_of, usable_recordings
+from tactileq.workers import working
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    import pandas as pd
 
     from analysis.answers.loading import Responses
     from analysis.answers.plan import AnalysisPlan
@@ -43,6 +45,21 @@ def analyze(
     complete: Annotated[
         bool, typer.Option("--complete", help="Compare complete pairs, where some are not.")
     ] = False,
+    validate: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Append what the procedures do on planted truth, by N simulations of each.",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes of --validate; one per core without it."),
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, whose workers --validate.")
+    ] = None,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
@@ -53,11 +70,9 @@ def analyze(
 
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
-    from analysis.answers.loading import leave_out, load_responses
-    from analysis.answers.setups import pool_setups
     from analysis.report.report import write_report
+    from analysis.report.section_validation import validation_section
     from analysis.statistics.verdicts import check_complete
-    from experiments.sessions.bids import export_all
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.models.loading import load_models
@@ -65,11 +80,7 @@ def analyze(
 
     check_own_results(out, "analyze")
     places = _places(data)
-    for place in places.values():
-        export_all(place)  # of sessions that were killed
-    setups = {name: load_responses(place) for name, place in places.items()}
-    responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
-    responses = leave_out(responses, dict(map(_with_reason, exclude or ())))
+    responses = _answers(places, exclude or ())
     if plan is not None:
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
     if not complete:
@@ -90,14 +101,19 @@ def analyze(
             "give all three or none."
         )
     inputs = [path for path in (*places.values(), *folders) if path is not None]
+    appendix = []
+    if validate is not None:
+        appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         settings = settings_of(responses, results)
+        settings |= {"validate": validate} if validate is not None else {}
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",
             responses=responses,
             textures=results,
-            hand=_hand(places, setups),
+            hand=_hand(places, responses),
+            benches=appendix,
             provenance=provenance,
             seed=seed,
             progress=tell,
@@ -122,15 +138,31 @@ def _places(data: Sequence[str]) -> dict[str, Path]:
     return places
 
 
-def _hand(places: Mapping[str, Path], setups: Mapping[str, Responses]) -> DataFrame:
+def _answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Responses:
+    """The answers at all set-ups, without those who are left out."""
+    from analysis.answers.loading import leave_out, load_responses
+    from analysis.answers.setups import pool_setups
+    from experiments.sessions.bids import export_all
+
+    for place in places.values():
+        export_all(place)  # of sessions that were killed
+    setups = {name: load_responses(place) for name, place in places.items()}
+    responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
+    return leave_out(responses, dict(map(_with_reason, exclude)))
+
+
+def _hand(places: Mapping[str, Path], responses: Responses) -> pd.DataFrame:
     """How the hand moved at all set-ups, participants named as in the answers."""
     import pandas as pd
 
     from analysis.answers.hand import load_hand
-    from analysis.answers.setups import named_after
+    from analysis.answers.setups import answers_at, named_after
 
-    tables = [(name, load_hand(place, setups[name].answers)) for name, place in places.items()]
-    return pd.concat([named_after(name, table) for name, table in tables], ignore_index=True)
+    tables = [
+        named_after(name, load_hand(place, answers_at(name, responses.answers)))
+        for name, place in places.items()
+    ]
+    return pd.concat(tables, ignore_index=True)
 
 
 def _with_reason(text: str) -> tuple[str, str]:
@@ -146,6 +178,37 @@ def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
     later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
     claims = (replace(claim, planned=claim in registered.claims) for claim in later.claims)
     return replace(later, claims=tuple(claims))
+
+
+def validated(
+    simulations: int, *, seed: int, jobs: int | None = None, dask: str | None = None
+) -> pd.DataFrame:
+    """The procedures on planted truth: the same table on any number of workers.
+
+    Parameters
+    ----------
+    simulations : int
+        Of each row, ≥ 1.
+    seed : int
+        ≥ 0.
+    jobs : int, optional
+        Processes; as many as cores without it.
+    dask : str, optional
+        Address of a scheduler.
+    """
+    from analysis.statistics.validation import cells, simulate_cell, validation_table
+
+    rows = cells()
+    work = partial(simulate_cell, simulations=simulations, seed=seed)
+    found: dict[int, dict[str, object]] = {}
+    with (
+        progress("Validating", len(rows)) as advance,
+        working(work, rows, jobs=jobs, dask=dask) as done,
+    ):
+        for number, row in done:
+            found[number] = row
+            advance(f"{row['procedure']}, {row['situation']}")
+    return validation_table(found[number] for number in sorted(found))
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:

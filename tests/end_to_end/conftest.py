@@ -25,6 +25,15 @@ schedule = "by-day"
 canvas = "A"
 MDF = "B"
 """
+CLAIM = """
+[[plan.claims]]
+name = "magnitude feels the same"
+task = "absolute"
+measure = "magnitude_similarity"
+models = ["full", "simplified"]
+bounds = [-7.5, 7.5]
+test = "equivalence"
+"""
 Run = Callable[..., subprocess.CompletedProcess[str]]
 
 
@@ -32,6 +41,12 @@ Run = Callable[..., subprocess.CompletedProcess[str]]
 def small_study() -> str:
     """A study file of two textures and two participants of either task."""
     return SMALL_STUDY
+
+
+@pytest.fixture
+def claimed_study() -> str:
+    """The small study with a claim about its ratings."""
+    return SMALL_STUDY + CLAIM
 
 
 @pytest.fixture

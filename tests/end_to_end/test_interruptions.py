@@ -39,6 +39,7 @@ LONG = {
     "stimuli": ("stimuli", "models/canvas.json", *SPEEDS, "--seed", "{}"),
     "record": ("record", "out", "--texture", "canvas", "--rate", "5000", "--seed", "{}"),
     "simulate": ("simulate", "--study", "study.toml", "--data", "out", "--seed", "{}"),
+    "power": ("power", "claims.toml", "--subjects", "[8,16]", "--jobs", "2", "--seed", "{}"),
     "analyze": ("analyze", "data", *FOLDERS, "--seed", "{}"),
     "demo": ("demo", "--seed", "{}"),
     "chart": ("bench", "chart", "--toolkit", "{}.xml", "--method", "AR(6)", "--jobs", "2"),
@@ -59,7 +60,9 @@ def words_of(name: str, which: int) -> list[str]:
 
 
 @pytest.fixture
-def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Path:
+def place(
+    tmp_path: Path, hatt_xml: Callable[..., str], small_study: str, claimed_study: str
+) -> Path:
     """Small inputs of every command."""
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     for name in ("canvas", "MDF"):
@@ -73,6 +76,7 @@ def place(tmp_path: Path, hatt_xml: Callable[..., str], small_study: str) -> Pat
     for name in ("1", "2"):
         (tmp_path / f"{name}.xml").write_text(hatt_xml(material=name), encoding="utf-8")
     (tmp_path / "study.toml").write_text(small_study)
+    (tmp_path / "claims.toml").write_text(claimed_study)
     for name, force_n in (("light", 1), ("strong", 3)):
         hand = f"speed_mm_s = [100, 300], force_n = [1, {force_n}]"
         scene = f'version = 1\nscene.name = "{name}"\nhand = {{{hand}}}\n'

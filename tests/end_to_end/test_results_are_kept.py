@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -149,7 +150,10 @@ FOREIGN = {
 
 @pytest.mark.parametrize(
     "command",
-    ["analyze data", "demo", "bench render", "bench chart", "stability", "scene light.toml"],
+    [
+        *("analyze data", "demo", "bench render", "bench chart", "stability", "scene light.toml"),
+        "power study.toml",
+    ],
 )
 @pytest.mark.parametrize("foreign", FOREIGN.values(), ids=FOREIGN)
 def test_folders_with_one_foreign_file_are_not_replaced(
@@ -158,7 +162,8 @@ def test_folders_with_one_foreign_file_are_not_replaced(
     made = tmp_path / "made"
     (made / "figures").mkdir(parents=True)
     (made / "figures/a.png").write_bytes(b"ours")
-    seal_folder(made, provenance_of(command.removesuffix(" data").removesuffix(" light.toml"), {}))
+    whose = re.sub(" (data|[a-z]+.toml)$", "", command)
+    seal_folder(made, provenance_of(whose, {}))
     path = made / foreign
     if foreign.endswith("/"):
         path.mkdir()

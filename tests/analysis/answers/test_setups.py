@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.answers.loading import PlannedTask, Responses
-from analysis.answers.setups import pool_setups, setup_of
+from analysis.answers.setups import answers_at, pool_setups, setup_of
 from analysis.statistics.verdicts import claims_found, differences_by_setup
 from modeling import InputError
 
@@ -46,6 +46,8 @@ def test_people_of_one_number_at_two_set_ups_are_two(leipzig, nara):
     assert both.unfinished == ()
     assert both.warnings == ("leipzig: sub-02 was a pilot.", "nara: sub-02 was a pilot.")
     assert both.plan.sha256 == ("0a" * 32, "0b")
+    for task, table in answers_at("nara", both.answers).items():
+        assert table.reset_index(drop=True).equals(nara.answers[task])
     alone = claims_found(leipzig, rng=np.random.default_rng(0))
     found = claims_found(both, rng=np.random.default_rng(0))
     assert found[0].tests["n"].iloc[0] == 32

@@ -1,0 +1,423 @@
+"""tactileq power: how many participants a study needs for its claims."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from modeling.errors import shown
+from tactileq.commands.session import models_of_study
+from tactileq.keeping import check_own_results
+from tactileq.options import (
+    Models,
+    Out,
+    SceneModels,
+    Seed,
+    Simplified,
+    StudyArgument,
+    ThresholdName,
+)
+from tactileq.telling import progress, tell_models
+from tactileq.workers import working
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from analysis.answers.loading import PlannedTask, Responses
+    from analysis.statistics.power import Verdict
+    from experiments.observers.in_memory import Row
+    from experiments.observers.percepts import Perception
+    from experiments.observers.psychometrics import Psychometrics
+    from experiments.study.models import ModelSets
+    from experiments.study.study import Study
+
+PICTURE_DPI = 150
+
+
+def power(
+    study: StudyArgument,
+    models: Models = None,
+    simplified: Simplified = None,
+    scene: SceneModels = None,
+    subjects: Annotated[
+        str,
+        typer.Option(
+            "--subjects",
+            help="Participants: from,to,step (8,48,8), or a list in brackets ([8,20]).",
+        ),
+    ] = "8,48,8",
+    simulations: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies.")] = 200,
+    effect: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[TEXTURE:]WHAT=POINTS",
+            help="Plant a difference between the models instead of what percepts do, in all "
+            "textures or in one; WHAT is magnitude_similarity, frequency_similarity or choice; "
+            "repeatable.",
+        ),
+    ] = None,
+    threshold: ThresholdName = "codec",
+    seed: Seed = 0,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Processes at once; one per core without it.")
+    ] = None,
+    dask: Annotated[
+        str | None, typer.Option(help="Address of a Dask scheduler, whose workers simulate.")
+    ] = None,
+    out: Out = Path("power"),
+) -> None:
+    """Simulate a study with n participants many times: the chance of each verdict on its claims.
+
+    What stands for the real surfaces are the planted textures of the same names. Writes power.tsv,
+    power.png and power.svg.
+
+    Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
+    """
+    from experiments.study.study import Study
+
+    check_own_results(out, "power")
+    plan = Study.load(study)
+    sizes = sizes_of(subjects)
+    largest = planned_for(plan, sizes)
+    planted = planted_effects(effect or (), plan.textures)
+    people = people_of(
+        largest,
+        models_of_study(plan, study, models=models, simplified=simplified, scene=scene)[0],
+        threshold=threshold,
+        planted=planted,
+    )
+    tell_models(people.models, plan.textures)
+    with progress("Simulated studies", simulations) as advance:
+        table = chances(
+            people,
+            sizes,
+            simulations=simulations,
+            seed=seed,
+            jobs=jobs,
+            dask=dask,
+            advance=advance,
+        )
+    settings = {
+        "study_sha256": plan.sha256,
+        "models_sha256": people.models.sha256(plan.textures),
+        "threshold": threshold,
+        "subjects": list(sizes),
+        "simulations": simulations,
+        "planted": planted,
+    }
+    _write(table, plan, out, seed=seed, settings=settings, inputs=[study])
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class People:
+    """A study with the simulated people who take part in it.
+
+    Parameters
+    ----------
+    study : Study
+        With as many participants as the largest n.
+    models : ModelSets
+    perception : Perception
+    psychometrics : Psychometrics
+    """
+
+    study: Study
+    models: ModelSets
+    perception: Perception
+    psychometrics: Psychometrics
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Those that claims are about."""
+        return tuple(dict.fromkeys(claim.task for claim in self.study.plan.claims))
+
+
+def sizes_of(text: str) -> tuple[int, ...]:
+    """Numbers of participants from `from,to,step`, or from a list in brackets.
+
+    Raises
+    ------
+    ValueError
+        For anything else.
+    """
+    listed = text.startswith("[") and text.endswith("]")
+    try:
+        numbers = [int(word) for word in text.strip("[]").split(",")]
+    except ValueError:
+        numbers = []
+    if not listed and len(numbers) == 3 and numbers[2] > 0:
+        numbers = list(range(numbers[0], numbers[1] + 1, numbers[2]))
+    elif not listed and len(numbers) != 1:
+        numbers = []
+    if not numbers or min(numbers) < 2 or max(numbers) > 9999:
+        raise ValueError(
+            "expected participants from 2 to 9999 as from,to,step (8,48,8), one number, or a list "
+            f"in brackets ([8,20,36]), got {shown(text)}; correct --subjects."
+        )
+    return tuple(sorted(set(numbers)))
+
+
+def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
+    """The study with the largest number of participants in each task that a claim is about.
+
+    Raises
+    ------
+    ValueError
+        Where there is no claim, a claim is about a task that compares no models, or a number of
+        participants leaves the order of models unbalanced.
+    """
+    from analysis.statistics.verdicts import measures_of
+
+    if not plan.plan.claims:
+        raise ValueError(
+            "expected claims under [[plan.claims]] in the study, whose verdicts are simulated, got "
+            "none; write down what is claimed (tactileq study init shows how)."
+        )
+    for claim in plan.plan.claims:
+        if not measures_of(claim.task):
+            raise ValueError(
+                f"expected claims about tasks that compare models, got {claim.name} about "
+                f"{claim.task}; leave it out."
+            )
+    tasks = {claim.task for claim in plan.plan.claims}
+    for n in sizes:  # each has to be a study that can be run
+        with_n = {task: replace(plan.plan_of(task), participants=n) for task in tasks}
+        study = replace(plan, tasks={**plan.tasks, **with_n})
+    return study
+
+
+def planted_effects(effects: Sequence[str], textures: Sequence[str]) -> dict[str, dict[str, float]]:
+    """Points by texture and by what they are planted in, from `[TEXTURE:]WHAT=POINTS`.
+
+    Raises
+    ------
+    ValueError
+        For another form, or a texture that is not in the study.
+    """
+    from experiments.observers.psychometrics import EFFECTS
+
+    planted: dict[str, dict[str, float]] = {}
+    for text in effects:
+        place, _, points = text.rpartition("=")
+        texture, _, what = place.rpartition(":")
+        if what not in EFFECTS or not _is_number(points) or texture not in ("", *textures):
+            raise ValueError(
+                f"expected [TEXTURE:]WHAT=POINTS for --effect, with a texture of the study "
+                f"({', '.join(textures)}) and one of {', '.join(EFFECTS)}, got {shown(text)}; "
+                "correct it."
+            )
+        for one in [texture] if texture else textures:
+            planted.setdefault(one, {})[what] = float(points)
+    return planted
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def people_of(
+    study: Study,
+    sets: ModelSets,
+    *,
+    threshold: str,
+    planted: dict[str, dict[str, float]],
+) -> People:
+    """Who takes part, with the planted textures as real surfaces.
+
+    Raises
+    ------
+    ValueError
+        For a texture that is not among them, and for models that are missing.
+    """
+    from experiments.observers.percepts import Perception
+    from experiments.observers.psychometrics import Psychometrics
+    from experiments.observers.simulated import require_plantable
+    from modeling import Threshold
+    from stimuli.planted.textures import TEXTURES, planted_texture
+
+    if unknown := [name for name in study.textures if name not in TEXTURES]:
+        raise ValueError(
+            f"expected a study of the planted textures {', '.join(TEXTURES)}, which stand for the "
+            f"real surfaces here, got {', '.join(unknown)}; plan with textures of these names."
+        )
+    sets.require(study)
+    psychometrics = Psychometrics(planted=planted)
+    perception = Perception(
+        study,
+        real={name: planted_texture(name) for name in study.textures},
+        models=sets,
+        threshold=Threshold.named(threshold),
+    )
+    require_plantable(perception, psychometrics)
+    return People(study=study, models=sets, perception=perception, psychometrics=psychometrics)
+
+
+def chances(
+    people: People,
+    sizes: Sequence[int],
+    *,
+    simulations: int,
+    seed: int,
+    jobs: int | None = None,
+    dask: str | None = None,
+    advance: Callable[[str], None] = lambda item: None,
+) -> pd.DataFrame:
+    """The chance of each verdict on each claim, by n.
+
+    docs/method/power.md#first-n
+
+    Parameters
+    ----------
+    people : People
+    sizes : sequence of int
+        Numbers of participants, none above those of the study.
+    simulations : int
+    seed : int
+        ≥ 0.
+    jobs : int, optional
+        Processes; as many as cores without it. No number of them changes the table.
+    dask : str, optional
+        Address of a scheduler.
+    advance : callable, optional
+        Called after each simulation.
+
+    Returns
+    -------
+    DataFrame
+        `analysis.statistics.power.POWER_COLUMNS`.
+    """
+    from analysis.statistics.power import power_table
+
+    work = partial(simulated_verdicts, people, sizes, seed=seed)
+    found: dict[int, list[Verdict]] = {}
+    with working(work, range(simulations), jobs=jobs, dask=dask) as done:
+        for number, one in done:
+            found[number] = one
+            advance("")
+    in_order = (one for number in sorted(found) for one in found[number])
+    return power_table(in_order, simulations=simulations)
+
+
+def simulated_verdicts(
+    people: People, sizes: Sequence[int], number: int, *, seed: int
+) -> list[Verdict]:
+    """All verdicts of one simulation: the largest study, and its first n participants."""
+    from analysis.statistics.power import verdicts
+    from analysis.statistics.verdicts import claim_standing, claim_values
+    from experiments.observers.in_memory import simulate_sessions
+    from modeling.seeds import generator
+
+    rng = generator(seed, number)
+    rows = simulate_sessions(
+        people.study,
+        models=people.models,
+        perception=people.perception,
+        psychometrics=people.psychometrics,
+        seed=int(rng.integers(2**63)),
+        subjects=range(1, max(sizes) + 1),
+        tasks=people.tasks,
+    )
+    found = []
+    for n in sizes:
+        responses = responses_of(people, rows, n=n)
+        for claim in responses.plan.claims:
+            found += verdicts(
+                claim,
+                claim_values(responses, claim),
+                n=n,
+                standing=claim_standing(responses, claim, rng=rng),
+                rng=rng,
+            )
+    return found
+
+
+def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Responses:
+    """The answers of the first n participants as if they had been loaded."""
+    import pandas as pd
+
+    from analysis.answers.loading import Responses
+    from analysis.answers.plan import plan_from
+
+    answers, anchors = {}, {}
+    for task, of_task in rows.items():
+        table = pd.DataFrame(of_task)
+        table = table[(table["participant"] <= n) & (table["phase"] == "main")]
+        table = table.assign(participant_id=table["participant"].map("sub-{:04d}".format))
+        answers[task] = table
+        if "virtual_texture" in table:
+            other = table["virtual_texture"] != table["texture"]
+            answers[task], anchors[task] = table[~other], table[other]
+    return Responses(
+        answers=answers,
+        simulated_participants=True,
+        simulated_rig=True,
+        anchors=anchors,
+        equal=people.models.equal_models(people.study.textures),
+        plan=plan_from(people.study.plan.to_dict(), path=Path("study")),
+        planned=_planned(people, n=n),
+    )
+
+
+def _planned(people: People, *, n: int) -> dict[str, PlannedTask]:
+    from analysis.answers.loading import PlannedTask
+
+    study = people.study
+    return {
+        task: PlannedTask(
+            n, n * study.sessions(task), study.plan_of(task).models, study.plan_of(task).repeats
+        )
+        for task in people.tasks
+    }
+
+
+def _write(
+    table: pd.DataFrame,
+    plan: Study,
+    out: Path,
+    *,
+    seed: int,
+    settings: dict[str, object],
+    inputs: Sequence[Path],
+) -> None:
+    from analysis.answers.plan import plan_from
+    from analysis.figures.power import figure_power
+    from analysis.figures.saving import save_figure
+    from analysis.statistics.power import power_sentences
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import provenance_of, seal_folder
+    from modeling.files.writing import write_text
+
+    provenance = provenance_of("power", settings, seed=seed, inputs=inputs)
+    marked = table.assign(simulated="true")
+    figure = figure_power(table)
+    with replace_folder(out) as fresh:
+        text = marked.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n")
+        write_text(fresh / "power.tsv", text)
+        save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)
+        (fresh / "power.svg").write_bytes(_svg_of(figure))
+        seal_folder(fresh, provenance)
+    for line in power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims):
+        print(line)
+    print(f"simulated: {out / 'power.png'}")
+
+
+def _svg_of(figure: Figure) -> bytes:
+    """The same bytes for the same figure: without the date, and with names that are not drawn."""
+    import io
+
+    from matplotlib import rc_context
+
+    svg = io.BytesIO()
+    with rc_context({"svg.hashsalt": "tactileq"}):
+        figure.savefig(svg, format="svg", metadata={"Date": None})
+    return svg.getvalue()

@@ -1,0 +1,89 @@
+"""tactileq power and tactileq analyze --validate, as a user meets them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from distributed import LocalCluster
+
+from modeling import Threshold, simplify
+from stimuli.planted.textures import planted_texture
+
+
+@pytest.fixture
+def place(tmp_path: Path, small_study: str, claimed_study: str) -> Path:
+    """A study with a claim, and its models."""
+    codec = Threshold.named("codec")
+    for name in ("canvas", "MDF"):
+        truth = planted_texture(name)
+        truth.save(tmp_path / f"models/{name}.json")
+        simplify(truth, codec).model.save(tmp_path / f"simplified/{name}.json")
+    (tmp_path / "study.toml").write_text(claimed_study)
+    (tmp_path / "none.toml").write_text(small_study)
+    return tmp_path
+
+
+def power(main, *more: object, study: str = "study.toml"):
+    return main("power", study, "--simulations", 10, "--jobs", 1, *more)
+
+
+def test_power_writes_its_table_and_chart(main, place: Path) -> None:
+    words = ("--subjects", "4,8,4", "--effect", "magnitude_similarity=0")
+    told = power(main, *words)
+    assert told.returncode == 0, told.stderr
+    line = "magnitude feels the same: simulated: "
+    assert [text for text in told.stdout.splitlines() if text.startswith(line)]
+    table = pd.read_csv(place / "power/power.tsv", sep="\t")
+    assert set(table["n"]) == {4, 8}
+    assert set(table["simulations"]) == {10}
+    assert table["simulated"].all()
+    note = json.loads((place / "power/provenance.json").read_text())
+    assert note["settings"]["planted"]["MDF"] == {"magnitude_similarity": 0.0}
+    files = ("power.tsv", "power.png", "power.svg")
+    first = {name: (place / "power" / name).read_bytes() for name in files}
+    assert first["power.svg"].startswith(b"<?xml")
+    assert power(main, *words).returncode == 0
+    assert {name: (place / "power" / name).read_bytes() for name in files} == first
+
+
+def test_dask_workers_give_the_same_table(main, place: Path) -> None:
+    words = ("power", "study.toml", "--simulations", 10, "--subjects", "[2,4]")
+    many = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    with LocalCluster(processes=False, **many) as cluster:
+        there = main(*words, "--dask", cluster.scheduler_address, "--out", "there")
+    assert there.returncode == 0, there.stderr
+    assert main(*words, "--jobs", 1, "--out", "here").returncode == 0
+    assert (place / "here/power.tsv").read_bytes() == (place / "there/power.tsv").read_bytes()
+
+
+def test_power_refuses_in_one_sentence_and_replaces_nothing(main, place: Path) -> None:
+    refused = power(main, study="none.toml")
+    assert refused.returncode == 1
+    (line,) = refused.stderr.splitlines()
+    assert "expected claims under [[plan.claims]] in the study" in line
+    assert not (place / "power").exists()
+    (place / "power").mkdir()
+    (place / "power/mine.txt").write_text("mine")
+    refused = power(main)
+    assert "expected a new folder or earlier results of tactileq power" in refused.stderr
+    assert (place / "power/mine.txt").read_text() == "mine"
+
+
+def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from analysis.statistics import validation
+
+    few = validation.cells(["TOST, guard on ends"], sizes=[8])
+    monkeypatch.setattr(validation, "cells", lambda: few)
+    assert main("simulate", "--study", "study.toml", "--data", "data").returncode == 0
+    told = main("analyze", "data", "--validate", 40, "--jobs", 1)
+    assert told.returncode == 0, told.stderr
+    table = pd.read_csv(place / "analysis-results/tables/validation.tsv", sep="\t")
+    assert len(table) == len(few)
+    assert set(table["simulations"]) == {40}
+    page = (place / "analysis-results/report.html").read_text()
+    assert "Appendix: the procedures on planted truth" in page
+    assert main("analyze", "data").returncode == 0
+    assert "Appendix" not in (place / "analysis-results/report.html").read_text()

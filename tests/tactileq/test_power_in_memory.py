@@ -1,0 +1,195 @@
+"""Observers to verdicts in memory: sizes, effects, and the same table whoever works on it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import pandas as pd
+import pytest
+
+from analysis.answers.loading import load_responses
+from analysis.labels import ALL_TEXTURES
+from analysis.statistics.power import EVERY_TEXTURE, POWER_COLUMNS
+from analysis.statistics.validation import cells, simulate_cell
+from analysis.statistics.verdicts import claim_values
+from experiments.observers.in_memory import simulate_sessions
+from experiments.observers.whole_study import simulate_study
+from experiments.study.models import ModelSets
+from experiments.study.plan import Claim, Plan
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
+from modeling import InputError, Threshold, simplify
+from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
+from tactileq.commands.power import (
+    People,
+    chances,
+    people_of,
+    planned_for,
+    planted_effects,
+    responses_of,
+    simulated_verdicts,
+    sizes_of,
+)
+from tactileq.workers import working
+
+TEXTURES = ("canvas", "PVC")
+RATED = Claim(
+    name="rated the same",
+    task="absolute",
+    measure="magnitude_similarity",
+    models=("full", "simplified"),
+    bounds=(-7.5, 7.5),
+    test="equivalence",
+)
+ODD = replace(RATED, name="no odd one", task="oddity", measure="correct", bounds=(-0.2, 0.2))
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return Study(
+        name="Two textures",
+        seed=5,
+        textures=TEXTURES,
+        trays={"canvas": "A", "PVC": "B"},
+        tasks={
+            "absolute": TaskPlan(
+                participants=4, schedule="interleaved", anchors={"canvas": "PVC"}, repeats=2
+            ),
+            "oddity": TaskPlan(participants=4, schedule="interleaved", repeats=6),
+        },
+        plan=Plan(claims=(RATED, ODD)),
+    )
+
+
+@pytest.fixture(scope="module")
+def models() -> ModelSets:
+    truths = {texture: planted_texture(texture) for texture in TEXTURES}
+    codec = Threshold.named("codec")
+    fewer = {texture: simplify(model, codec).model for texture, model in truths.items()}
+    return ModelSets(sets={"full": truths, "simplified": fewer})
+
+
+def people(study: Study, models: ModelSets, *, most: int, points: float = 0.0) -> People:
+    planted = planted_effects([f"magnitude_similarity={points:g}"], TEXTURES)
+    return people_of(planned_for(study, [most]), models, threshold="codec", planted=planted)
+
+
+def chance(table: pd.DataFrame, claim: str, texture: str, *, n: int, verdict: str) -> float:
+    rows = table[(table["claim"] == claim) & (table["texture"] == texture)]
+    (row,) = rows[(rows["n"] == n) & (rows["verdict"] == verdict)]["chance"]
+    return float(row)
+
+
+def test_any_number_of_workers_gives_the_same_tables(study: Study, models: ModelSets):
+    who = people(study, models, most=8)
+    tables = [chances(who, (4, 8), simulations=4, seed=3, jobs=jobs) for jobs in (1, 2)]
+    assert tables[0].equals(tables[1])
+    assert list(tables[0]) == [column.name for column in POWER_COLUMNS]
+    work = partial(simulate_cell, simulations=120, seed=7)
+    rows = cells(["TOST, no guard on ends"], sizes=[8])
+    found = []
+    for jobs in (1, 2):
+        with working(work, rows, jobs=jobs) as done:
+            found.append(dict(done))
+    assert found[0] == found[1]
+
+
+def test_the_first_n_are_a_study_planned_for_n(study: Study, models: ModelSets):
+    larger = simulated_verdicts(people(study, models, most=8), (4, 8), 0, seed=2)
+    smaller = simulated_verdicts(people(study, models, most=4), (4,), 0, seed=2)
+    assert [one for one in larger if one.n == 4] == smaller
+    assert {one.texture for one in smaller} == {ALL_TEXTURES, *TEXTURES, EVERY_TEXTURE}
+    assert {one.claim for one in smaller} == {RATED.name, ODD.name}
+
+
+def test_a_planted_difference_is_found_and_none_is_called_equivalent(
+    study: Study, models: ModelSets
+):
+    tables = {
+        points: chances(
+            people(study, models, most=12, points=points), (4, 12), simulations=8, seed=1, jobs=1
+        )
+        for points in (0.0, -25.0)
+    }
+    known = {"texture": ALL_TEXTURES, "n": 12, "claim": RATED.name}
+    assert chance(tables[0.0], **known, verdict="equivalent") > 0.7
+    assert chance(tables[-25.0], **known, verdict="different") > 0.7
+    of_four = chance(tables[0.0], RATED.name, ALL_TEXTURES, n=4, verdict="inconclusive")
+    assert of_four > chance(tables[0.0], **known, verdict="inconclusive")
+
+
+def test_answers_in_memory_are_those_of_the_disk(tmp_path, study: Study, models: ModelSets):
+    who = people(study, models, most=4)
+    parts = {"models": models, "psychometrics": who.psychometrics, "seed": 9}
+    rows = simulate_sessions(who.study, perception=who.perception, **parts)
+    real = {texture: planted_texture(texture) for texture in TEXTURES}
+    simulate_study(
+        who.study,
+        real=real,
+        rig=SimulatedRig(real, seed=9),
+        data_folder=tmp_path / "data",
+        threshold=Threshold.named("codec"),
+        **parts,
+    )
+    stored = load_responses(tmp_path / "data")
+    kept = responses_of(who, {task: rows[task] for task in who.tasks}, n=4)
+    assert kept.plan.claims == stored.plan.claims
+    assert kept.unfinished == stored.unfinished == ()
+    assert {task: kept.planned[task] for task in who.tasks} == {
+        task: stored.planned[task] for task in who.tasks
+    }
+    assert len(kept.anchors["absolute"]) == len(stored.anchors["absolute"]) == 4
+    for claim in kept.plan.claims:
+        tables = []
+        for responses in (kept, stored):
+            values = claim_values(responses, claim)
+            numbers = values.table[["reference", "other"]].reset_index(drop=True)
+            tables.append((numbers, values.share_at_ends))
+        pd.testing.assert_frame_equal(tables[0][0], tables[1][0], atol=1e-9)
+        assert tables[0][1] == tables[1][1]
+
+
+@pytest.mark.parametrize(
+    ("text", "sizes"),
+    [("8,24,8", (8, 16, 24)), ("8,23,8", (8, 16)), ("[36,8]", (8, 36)), ("20", (20,))],
+)
+def test_sizes_are_a_range_or_a_list(text: str, sizes: tuple[int, ...]):
+    assert sizes_of(text) == sizes
+
+
+@pytest.mark.parametrize("text", ["", "8,24", "8;24;8", "1,9,2", "8,24,0", "24,8,4", "[]", "[8,a]"])
+def test_other_sizes_are_refused(text: str):
+    with pytest.raises(ValueError, match="correct --subjects"):
+        sizes_of(text)
+
+
+def test_effects_are_planted_in_one_texture_or_in_all():
+    assert planted_effects(["choice=-2", "PVC:magnitude_similarity=3.5"], TEXTURES) == {
+        "canvas": {"choice": -2.0},
+        "PVC": {"choice": -2.0, "magnitude_similarity": 3.5},
+    }
+    assert planted_effects([], TEXTURES) == {}
+
+
+@pytest.mark.parametrize(
+    "text", ["choice", "choice=", "choice=far", "loudness=3", "silk:choice=3", "=3", "PVC=3"]
+)
+def test_other_effects_are_refused(text: str):
+    with pytest.raises(ValueError, match="for --effect, with a texture of the study"):
+        planted_effects([text], TEXTURES)
+
+
+def test_what_cannot_be_planned_is_refused(study: Study, models: ModelSets):
+    with pytest.raises(ValueError, match="expected claims under"):
+        planned_for(replace(study, plan=Plan()), [4])
+    by_day = {**study.tasks, "absolute": TaskPlan(participants=4, schedule="by-day")}
+    with pytest.raises(InputError, match="even number of participants"):
+        planned_for(replace(study, tasks=by_day), [4, 7])
+    with pytest.raises(InputError, match="planted for canvas"):
+        people(study, models, most=4, points=200.0)
+    trays = {"silk": "A", "PVC": "B"}
+    silk = replace(study, textures=tuple(trays), trays=trays, tasks={}, plan=Plan())
+    with pytest.raises(ValueError, match="expected a study of the planted textures"):
+        people_of(silk, models, threshold="codec", planted={})
