@@ -20,7 +20,18 @@ if TYPE_CHECKING:
 
 
 def analyze(
-    data: Annotated[Path, typer.Argument(help="Folder of the study's answers.")],
+    data: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Folder of the study's answers; with --table: further tables."),
+    ] = None,
+    table: Annotated[
+        list[Path] | None,
+        typer.Option(help="Instead of the folder: tables of any experiment, CSV or TSV."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option("--map", help="What columns mean: correct=TYPE_ANS,factor=TYPE,…"),
+    ] = None,
     out: Out = Path("analysis-results"),
     recordings: Annotated[
         Path | None, typer.Option(help="Folder of recording sets, one folder per texture.")
@@ -34,6 +45,13 @@ def analyze(
     With --recordings, --models and --simplified the report also tells how good and how small the
     models are; why layers went stands in the folder that tactileq simplify wrote.
 
+    With --table answers come from tables of any experiment. The map names columns: participant
+    (else the file's name), factor (any number), count, and one of correct (0 or 1), share (0 to
+    1), value, or presented with answered. Without these each file is a confusion matrix called
+    PARTICIPANT_LEVEL, with a level for each factor.
+
+    Example: tactileq analyze --table P*.csv --map correct=RIGHT,factor=SIZE
+
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
     from analysis.answers.loading import load_responses
@@ -44,10 +62,23 @@ def analyze(
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
-    check_own_results(out, "analyze")
-    export_all(data)  # of sessions that were killed
-    responses = load_responses(data)
     folders = (recordings, models, simplified)
+    if table is not None or columns is not None:
+        if folders != (None, None, None):
+            raise ValueError(
+                "expected --table without --recordings, --models and --simplified, got both; "
+                "leave those out."
+            )
+        return analyze_tables([*(table or []), *(data or [])], columns, out=out, seed=seed)
+    if data is None or len(data) != 1:
+        raise ValueError(
+            f"expected one folder of answers or --table with files, got {len(data or [])} "
+            "folders; give one of the two."
+        )
+    answers = data[0]
+    check_own_results(out, "analyze")
+    export_all(answers)  # of sessions that were killed
+    responses = load_responses(answers)
     results = []
     if recordings is not None and models is not None and simplified is not None:
         results = results_of_study(
@@ -62,7 +93,7 @@ def analyze(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    inputs = [path for path in (data, *folders) if path is not None]
+    inputs = [path for path in (answers, *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         settings = settings_of(responses, results)
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
@@ -77,6 +108,37 @@ def analyze(
         seal_folder(fresh, provenance)
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
+    print((out / "report.html").resolve())
+
+
+def analyze_tables(files: Sequence[Path], columns: str | None, *, out: Path, seed: int) -> None:
+    """Write the report on tables of any experiment."""
+    import numpy as np
+
+    from analysis.answers.imported import load_imported, parse_map
+    from analysis.report.report import write_report
+    from analysis.report.section_table import table_sections
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import provenance_of, seal_folder
+
+    folders = [path for path in files if path.is_dir()]
+    if not files or folders:
+        got = f"the folder {folders[0]}" if folders else "none"
+        raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
+    check_own_results(out, "analyze")
+    imported = load_imported(files, parse_map(columns or ""))
+    sections = table_sections(imported, rng=np.random.default_rng(seed))
+    with replace_folder(out) as fresh, share_of("Reporting") as tell:
+        provenance = provenance_of("analyze", {"map": columns or ""}, seed=seed, inputs=files)
+        write_report(
+            fresh / "report.html",
+            benches=sections,
+            provenance=provenance,
+            title="What the tables show",
+            seed=seed,
+            progress=tell,
+        )
+        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 
