@@ -14,6 +14,11 @@ SCALES = {
     "magnitude_similarity": "vibration magnitude",
     "frequency_similarity": "frequency pattern",
 }
+# What claims can be about: columns of tables of answers, in words.
+MEASURES = {
+    **{column: f"rated similarity of {scale}" for column, scale in SCALES.items()},
+    "correct": "correct rate",
+}
 
 ALL_TEXTURES = "all textures"
 

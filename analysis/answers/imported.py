@@ -169,7 +169,9 @@ def load_imported(files: Sequence[str | Path], mapping: TableMap) -> Imported:
         Naming file and line, where a table does not hold what the map says.
     """
     labels = _Labels()
-    tables, classes, missed = [], (), 0
+    tables: list[pd.DataFrame] = []
+    classes: tuple[str, ...] = ()
+    missed = 0
     for path in files:
         file = _read(Path(path))
         if mapping.is_matrix:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +32,8 @@ _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
 # What a session may differ in where its manifest records why, and under which word.
 _MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
+# Times to the millisecond: nobody has as many of them in common with somebody else by chance.
+FEWEST_TIMES = 3
 _DERIVE = "delete it, and tactileq study status makes it again from the session's log"
 
 
@@ -74,6 +76,8 @@ class Responses:
     anchors : mapping of task to DataFrame
         Of tasks that have them the main trials whose virtual surface modelled another texture than
         the real one's, same columns; no statistic of the models uses them.
+    left_out : mapping of task to DataFrame
+        The main trials of participants who were left out by hand (`leave_out`).
     name : str
         The study's name.
     models : mapping of texture to mapping of set to SHA-256
@@ -95,6 +99,7 @@ class Responses:
     simulated_rig: bool
     training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
     name: str = ""
     models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     equal: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
@@ -135,16 +140,18 @@ class Responses:
 
     def done(self, task: str) -> PlannedTask:
         """How many participants and sessions have answered main trials of a task so far."""
-        answers = self.answers[task]
-        sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
-        return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+        return _done(self.answers[task])
 
     @property
     def unfinished(self) -> tuple[str, ...]:
-        """Tasks that were begun, with fewer participants or sessions than planned."""
+        """Tasks that were begun, with fewer participants or sessions than planned.
+
+        Those who were left out by hand have taken part.
+        """
         short = []
         for task, planned in self.planned.items():
-            done = self.done(task)
+            here = self.answers[task]
+            done = _done(pd.concat([here, self.left_out.get(task, here[:0])]))
             fewer = done.participants < planned.participants or done.sessions < planned.sessions
             if done.participants and fewer:
                 short.append(task)
@@ -187,14 +194,11 @@ def load_responses(data_folder: str | Path) -> Responses:
     models = _models(description, folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
     origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
-    warnings: list[str] = []
-    equal: dict[str, list[Sequence[str]]] = {}
-    sets = tuple(next(iter(models.values()), {}))
+    gathered = _Gathered(models)
     participants = simulated["SimulatedParticipant"]
     _check_participants(folder / "participants.tsv", participants)
     tables = {
-        task: _load_task(folder, task, origin=origin, sets=sets, equal=equal, warnings=warnings)
-        for task in ANSWER_TABLES
+        task: _load_task(folder, task, origin=origin, gathered=gathered) for task in ANSWER_TABLES
     }
     if all(table is None for table in tables.values()):
         raise InputError(
@@ -210,11 +214,57 @@ def load_responses(data_folder: str | Path) -> Responses:
         anchors={task: anchors for task, (*_, anchors) in parts.items() if anchors is not None},
         name=str(description.get("Name", "")),
         models=models,
-        equal=equal,
-        plan=_plan(description, folder / "dataset_description.json"),
+        equal=gathered.equal,
+        plan=_plan(description, gathered.plans, path=folder / "dataset_description.json"),
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
-        warnings=tuple(warnings),
+        warnings=tuple(gathered.warnings),
+    )
+
+
+def _done(answers: pd.DataFrame) -> PlannedTask:
+    sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
+    return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+
+
+def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
+    """The answers without those of some participants, which `warnings` tell with the reasons.
+
+    Parameters
+    ----------
+    responses : Responses
+    reasons : mapping of participant to reason
+        Participants as in the data, such as sub-05.
+
+    Raises
+    ------
+    InputError
+        For a participant who gave no answers, or an empty reason.
+    """
+    tables = (responses.answers, responses.training, responses.anchors)
+    known = {who for kind in tables for t in kind.values() for who in t["participant_id"]}
+    for who, why in reasons.items():
+        if who not in known or not why.strip():
+            raise InputError(
+                f"expected a participant with answers and a reason to leave them out, got "
+                f"{shown(who)} with {shown(why)}; name one as the data do, such as "
+                f"{min(known, default='sub-01')}."
+            )
+    answers, training, anchors = (
+        {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
+        for kind in tables
+    )
+    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
+    return replace(
+        responses,
+        answers={task: table.reset_index(drop=True) for task, table in answers.items()},
+        training=training,
+        anchors=anchors,
+        left_out={
+            task: table[table["participant_id"].isin(list(reasons))]
+            for task, table in responses.answers.items()
+        },
+        warnings=(*responses.warnings, *told),
     )
 
 
@@ -251,21 +301,44 @@ def _description(folder: Path) -> Mapping[str, object]:
     return description
 
 
-def _plan(description: Mapping[str, object], path: Path) -> AnalysisPlan:
-    """The claims of the study that was run; none where the data do not tell the study."""
+class _Gathered:
+    """What is gathered while one session after the other is read."""
+
+    def __init__(self, models: Mapping[str, Mapping[str, str]]) -> None:
+        self.textures = frozenset(models)
+        self.sets = tuple(next(iter(models.values()), {}))
+        self.equal: dict[str, list[Sequence[str]]] = {}
+        self.plans: dict[str, None] = {}  # in the order of the sessions
+        self.warnings: list[str] = []
+        self._whose: dict[str, str] = {}
+
+    def add(self, sidecar: Mapping[str, object]) -> None:
+        """The plan of a session, and the groups of equal models that it names."""
+        if isinstance(plan := sidecar.get("PlanSHA256"), str):
+            self.plans[plan] = None
+        stated = sidecar.get("Identical")
+        for texture, groups in stated.items() if isinstance(stated, Mapping) else ():
+            known = self.equal.setdefault(str(texture), [])
+            known += [tuple(group) for group in groups if tuple(group) not in known]
+
+    def check_once(self, table: pd.DataFrame, what: str, *, path: Path) -> None:
+        """Refuse answers that are those of another session to the last digit of every time."""
+        if "response_time_s" not in table or table["response_time_s"].nunique() < FEWEST_TIMES:
+            return
+        text = table.to_csv(index=False)
+        if text in self._whose:
+            raise InputError(
+                f"expected answers of its own in {path}, found those of {self._whose[text]}, with "
+                "the same response times; leave one of the two sessions out."
+            )
+        self._whose[text] = what
+
+
+def _plan(description: Mapping[str, object], hashes: Iterable[str], *, path: Path) -> AnalysisPlan:
+    """The claims of the study as it was first run; none where the data do not tell the study."""
     design = description.get("StudyDesign")
     stated = design.get("plan", {}) if isinstance(design, dict) else {}
-    return plan_from(stated, sha256=str(description.get("PlanSHA256", "")), path=path)
-
-
-def _gather_equal(sidecar: Mapping[str, object], equal: dict[str, list[Sequence[str]]]) -> None:
-    """Add the groups of equal models that a session names."""
-    stated = sidecar.get("Identical")
-    if not isinstance(stated, Mapping):
-        return
-    for texture, groups in stated.items():
-        known = equal.setdefault(str(texture), [])
-        known += [tuple(group) for group in groups if tuple(group) not in known]
+    return plan_from(stated, sha256=tuple(hashes), path=path)
 
 
 def _planned(description: Mapping[str, object], path: Path) -> dict[str, PlannedTask]:
@@ -312,9 +385,9 @@ def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[s
             "else; restore the file."
         )
     names = {tuple(kinds) for kinds in textures if isinstance(kinds, Mapping)}
-    if len({frozenset(some) for some in names}) > 1:
+    if len({frozenset(some) for some in names}) > 1 or any(len(some) < 2 for some in names):
         raise InputError(
-            f"expected models of the same sets for every texture in {place}, got "
+            f"expected models of the same sets, two at least, for every texture in {place}, got "
             f"{shown('; '.join(', '.join(some) for some in sorted(names)))}; restore the file."
         )
     assert isinstance(stated, Mapping)
@@ -326,12 +399,10 @@ def _load_task(
     task: str,
     *,
     origin: Mapping[str, object],
-    sets: Sequence[str],
-    equal: dict[str, list[Sequence[str]]],
-    warnings: list[str],
+    gathered: _Gathered,
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
-    sessions, unordered = [], []
+    sessions, unordered, warnings = [], [], gathered.warnings
     for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
         participant, session = path.parts[-4], path.parts[-3]
         if path.name != f"{participant}_{session}_task-{task}_beh.tsv":
@@ -342,8 +413,10 @@ def _load_task(
         what = f"{participant} {task} {session}"
         sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
         table = _read_lines(path)
-        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]), sets=sets)
-        _gather_equal(sidecar, equal)
+        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+        _check_known(table, gathered, path=path)
+        gathered.check_once(table, what, path=path)
+        gathered.add(sidecar)
         planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
         if planned is None:
             unordered.append(what)
@@ -439,9 +512,7 @@ def _unanswered(folder: Path, task: str) -> list[str]:
     return told
 
 
-def _check_session(
-    table: pd.DataFrame, task: str, *, path: Path, simulated: bool, sets: Sequence[str]
-) -> None:
+def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
     columns = ANSWER_TABLES[task]
     _require_columns(table, tuple(column.name for column in columns), path=path)
@@ -459,13 +530,22 @@ def _check_session(
     _check_simulated(table, simulated, path=path)
     neither = ~table["valid"].isin([0.0, 1.0])
     _refuse(neither, table["valid"], expected="1 or 0 in column valid", path=path)
-    if sets:
-        other = ~table["model"].isin(list(sets)) & table["model"].notna()
-        expected = f"{' or '.join(sets)}, the study's sets of models, in column model"
-        _refuse(other, table["model"], expected=expected, path=path)
     twice = table.duplicated("trial")
     _refuse(twice, table["trial"], expected="every trial once", path=path)
     _check_choices(table, {column.name: column for column in columns}, path=path)
+
+
+def _check_known(table: pd.DataFrame, gathered: _Gathered, *, path: Path) -> None:
+    """Refuse textures and sets of models that the study does not have, where it is known."""
+    if not gathered.sets:
+        return
+    sets, textures = gathered.sets, sorted(gathered.textures)
+    named = (("model", sets, "sets of models"), ("texture", textures, "textures"))
+    for column, known, what in (*named, ("virtual_texture", textures, "textures")):
+        if column in table:
+            other = ~table[column].isin(list(known)) & table[column].notna()
+            expected = f"{' or '.join(known)}, the study's {what}, in column {column}"
+            _refuse(other, table[column], expected=expected, path=path)
 
 
 def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:

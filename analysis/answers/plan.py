@@ -24,17 +24,21 @@ class Claim:
     models : (str, str)
         The reference, and the one whose difference from it is claimed about; of the oddity task
         the difference is that of the share of right answers from chance.
-    bounds : (float, float)
-        In points of the scale, or shares of right answers; below and above 0.
+    bounds : (float, float), optional
+        In points of the scale, or shares of right answers; below and above 0. Without them
+        nothing is called equivalent.
     test : {"equivalence", "difference"}
+    planned : bool
+        Whether it was fixed before the first answer; else it is exploratory.
     """
 
     name: str
     task: str
     measure: str
     models: tuple[str, str]
-    bounds: tuple[float, float]
+    bounds: tuple[float, float] | None
     test: str
+    planned: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,34 +52,29 @@ class AnalysisPlan:
         One sentence for each reason to leave somebody or something out.
     highest_share_at_ends : float
         Share of ratings at either end of a scale (0 … 1) above which no equality is concluded.
-    sha256 : str
-        Of the plan; empty where none was registered.
-    exploratory : bool
-        Whether the claims were made or changed after the first answer.
+    sha256 : tuple of str
+        Of the pages to preregister that sessions ran under; several where the study was changed.
     """
 
     claims: tuple[Claim, ...]
     exclusions: tuple[str, ...] = ()
     highest_share_at_ends: float = 0.2
-    sha256: str = ""
-    exploratory: bool = False
-
-    def claims_about(self, task: str) -> tuple[Claim, ...]:
-        """The claims about one task."""
-        return tuple(claim for claim in self.claims if claim.task == task)
+    sha256: tuple[str, ...] = ()
 
 
-def plan_from(values: Mapping[str, Any], *, sha256: str, path: Path) -> AnalysisPlan:
+def plan_from(
+    values: Mapping[str, Any], *, path: Path, sha256: tuple[str, ...] = ()
+) -> AnalysisPlan:
     """The plan of a study's values, as a manifest holds them.
 
     Parameters
     ----------
     values : mapping
         The table `plan` of the study.
-    sha256 : str
-        That names the plan.
     path : Path
         The file, for what is said of it.
+    sha256 : tuple of str
+        Of the pages to preregister.
 
     Raises
     ------

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from scipy import stats
 
 from analysis.figures.drawing import (
     BLACK,
@@ -21,12 +21,15 @@ from analysis.figures.drawing import (
 )
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MODELS, SCALES, significance_mark
 from analysis.statistics.confusion import ConfusionMatrix
+from analysis.statistics.paired import CONFIDENCE, ignoring_case
+from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Floats
 
-MODEL_COLOURS = {"full": BLUE, "simplified": ORANGE}
-MODEL_HATCHES = {"full": "", "simplified": "///"}
+ROLES = ("reference", "other")
+ROLE_COLOURS = {"reference": BLUE, "other": ORANGE}
+ROLE_HATCHES = {"reference": "", "other": "///"}
 LEGEND_OF_BARS = (
-    "bars: mean ± standard error; points: means of the participants, a line joins one person's\n"
+    "bars: mean with 95 % confidence interval; points: participants, a line joins one person's\n"
     "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
 )
 BAR_WIDTH = 0.42
@@ -36,22 +39,21 @@ SIDES = (-0.5, 0.5)
 GOLDEN_RATIO = (5**0.5 - 1) / 2
 
 
-def figure_ratings(tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool) -> Figure:
-    """Rated similarity, both scales, before and after simplification (PAPER fig. 9).
+def figure_ratings(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:
+    """Rated similarity on each scale with either model (PAPER fig. 9).
 
     Parameters
     ----------
-    tests : DataFrame
-        From `paired.rating_tests`.
-    means : DataFrame
-        From `paired.rating_means`.
+    found : sequence of ClaimFound
+        About the same two models, a panel each.
     simulated : bool
         Written into the figure.
     """
-    figure = Figure(figsize=(12.5, 5), layout="constrained")
-    for panel, ax, scale in zip("ab", figure.subplots(1, 2), SCALES.values(), strict=True):
-        chosen, points = tests[tests["scale"] == scale], means[means["scale"] == scale]
-        plot_paired_bars(chosen, points, simulated=simulated, ax=ax)
+    figure = Figure(figsize=(6.25 * len(found), 5), layout="constrained")
+    axes = np.atleast_1d(figure.subplots(1, len(found)))
+    for panel, ax, one in zip("abcdef", axes, found, strict=False):
+        scale = SCALES[one.claim.measure]
+        plot_paired_bars(one, simulated=simulated, ax=ax)
         ax.set_title(f"({panel}) {scale}", loc="left")
         ax.set_ylabel(f"rated similarity of {scale} (0–100)")
         ax.set_ylim(0, 115)
@@ -61,25 +63,20 @@ def figure_ratings(tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool)
     return figure
 
 
-def figure_correct_rates(
-    tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool, chance: float = 1 / 7
-) -> Figure:
-    """Correct rates before and after simplification against chance (PAPER fig. 11).
+def figure_correct_rates(found: ClaimFound, *, chance: float, simulated: bool) -> Figure:
+    """Correct rates with either model against chance (PAPER fig. 11).
 
     Parameters
     ----------
-    tests : DataFrame
-        From `rates.rate_tests`; the row over all textures is left out.
-    means : DataFrame
-        From `paired.participant_means` of the correct answers.
-    simulated : bool
-        Written into the figure.
+    found : ClaimFound
     chance : float
         Rate of a guessing participant, drawn as a line.
+    simulated : bool
+        Written into the figure.
     """
     figure = Figure(figsize=(9.5, 5), layout="constrained")
     ax = figure.subplots()
-    plot_paired_bars(tests[tests["texture"] != ALL_TEXTURES], means, simulated=simulated, ax=ax)
+    plot_paired_bars(found, simulated=simulated, ax=ax)
     ax.axhline(chance, color=BLACK, ls="--", lw=1)
     ax.text(1.0, chance, f" chance\n {chance:.1%}", transform=ax.get_yaxis_transform(), va="center")
     ax.set_ylabel("correct rate (share of trials, 0–1)")
@@ -90,43 +87,43 @@ def figure_correct_rates(
     return figure
 
 
-def plot_paired_bars(
-    tests: pd.DataFrame, means: pd.DataFrame, *, simulated: bool, ax: Axes | None = None
-) -> Axes:
-    """Bars of mean ± standard error per texture, full beside simplified, over their participants.
+def plot_paired_bars(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """Bars of means with their 95 % intervals per texture, either model, over their participants.
 
     Parameters
     ----------
-    tests : DataFrame
-        A row per texture, as from `paired.paired_family`.
-    means : DataFrame
-        texture, participant_id, full, simplified: a point each, one person's two joined by a line.
+    found : ClaimFound
+        A participant's two means are joined by a line.
     simulated : bool
         Written into the figure.
     ax : Axes, optional
     """
     ax = axes_or_new(ax)
+    tests = found.tests[found.tests["texture"] != ALL_TEXTURES]
+    tests = tests.sort_values("texture", key=ignoring_case)
     place = np.arange(len(tests))
-    for side, model in zip(SIDES, MODELS, strict=True):
+    for side, role, model in zip(SIDES, ROLES, found.claim.models, strict=True):
         ax.bar(
             place + side * BAR_WIDTH,
-            tests[f"mean_{model}"],
+            tests[f"mean_{role}"],
             BAR_WIDTH,
-            color=(MODEL_COLOURS[model], BAR_OPACITY),
-            hatch=MODEL_HATCHES[model],
-            edgecolor=MODEL_COLOURS[model],
+            color=(ROLE_COLOURS[role], BAR_OPACITY),
+            hatch=ROLE_HATCHES[role],
+            edgecolor=ROLE_COLOURS[role],
             label=f"{model} model",
         )
     for x, test in zip(place, tests.to_dict("records"), strict=True):
-        own = means.loc[means["texture"] == test["texture"], list(MODELS)].to_numpy(dtype=float)
+        rows = found.values["texture"] == test["texture"]
+        own = found.values.loc[rows, list(ROLES)].to_numpy(dtype=float)
         _participants(ax, float(x), own)
-        top = max(np.nanmax(own, initial=0.0), *(test[f"mean_{model}"] for model in MODELS))
+        top = np.nanmax([0.0, *own.ravel(), *(test[f"mean_{role}"] for role in ROLES)])
         _significance_bracket(ax, float(x), top=float(top), p=float(test["p_holm"]))
-    for side, model in zip(SIDES, MODELS, strict=True):
+    wide = stats.t.isf((1 - CONFIDENCE) / 2, np.maximum(tests["n"].to_numpy(float) - 1, 1))
+    for side, role in zip(SIDES, ROLES, strict=True):
         ax.errorbar(
             place + side * BAR_WIDTH,
-            tests[f"mean_{model}"],
-            tests[f"se_{model}"].fillna(0.0),
+            tests[f"mean_{role}"],
+            wide * tests[f"se_{role}"].fillna(0.0),
             ls="",
             color=BLACK,
             lw=1.8,

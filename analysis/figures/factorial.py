@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -92,7 +93,14 @@ def plot_levels(
         ax.plot(place, values, color=GREY, lw=0.7, marker="o", ms=2.5, alpha=0.6, label=label)
     mean = means.set_index(factor).reindex(levels)
     half = np.nan_to_num([mean["mean"] - mean["ci_low"], mean["ci_high"] - mean["mean"]])
-    style = {"color": BLUE, "lw": 2.4, "marker": "s", "ms": 6, "capsize": 5, "capthick": 2}
+    style: dict[str, Any] = {
+        "color": BLUE,
+        "lw": 2.4,
+        "marker": "s",
+        "ms": 6,
+        "capsize": 5,
+        "capthick": 2,
+    }
     ax.errorbar(place, mean["mean"], half, **style, label="mean and 95% CI", zorder=4, mec=BLACK)
     long = any(len(str(level)) > LONGEST_UPRIGHT for level in levels)
     ax.set_xticks(place, list(levels), rotation=30 if long else 0, ha="right" if long else "center")

@@ -1,16 +1,17 @@
-"""Figures become files: as PNG, in fonts that have the characters of their names."""
+"""Figures become files: as PNG and SVG, in fonts that have the characters of their names."""
 
 from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 from matplotlib import rc_context
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, findfont, findSystemFonts, fontManager
 from matplotlib.ft2font import FT2Font
@@ -18,6 +19,8 @@ from matplotlib.text import Text
 
 DEFAULT_FAMILY = "DejaVu Sans"  # comes with Matplotlib
 REGULAR_WEIGHTS = (400, "normal", "regular", "book")
+
+Drawing = Callable[[io.BytesIO], None]
 
 
 def png_of(figure: Figure, *, dpi: float) -> tuple[bytes, str]:
@@ -31,18 +34,34 @@ def png_of(figure: Figure, *, dpi: float) -> tuple[bytes, str]:
     (bytes, str)
         The picture, and the characters that no font here has, in order; often none.
     """
-    picture = _drawn(figure, dpi=dpi, families=(DEFAULT_FAMILY,))
-    # Tick labels have their text only once they are drawn.
-    texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
-    foreign = _without_default({character for text in texts for character in text.get_text()})
-    if not foreign:
-        return picture, ""
-    families, lacking = _families_for(foreign)
-    if len(families) > 1:
-        for text in texts:
-            text.set_fontfamily(families)
-        picture = _drawn(figure, dpi=dpi, families=families)
-    return picture, lacking
+
+    def draw(buffer: io.BytesIO) -> None:
+        figure.set_dpi(dpi)
+        # Laid out and drawn in one go; `savefig` goes through everything twice.
+        FigureCanvasAgg(figure).print_png(buffer)  # type: ignore[no-untyped-call]
+
+    return _in_its_fonts(figure, draw)
+
+
+def svg_of(figure: Figure) -> tuple[bytes, str]:
+    """The figure as SVG, text as outlines; the same bytes in every run.
+
+    Returns
+    -------
+    (bytes, str)
+        As `png_of`.
+    """
+
+    def draw(buffer: io.BytesIO) -> None:
+        figure.set_dpi(72)
+        # Text as outlines: it looks the same wherever the picture ends up, and no machine needs a
+        # font with the characters of a name; it can be searched in the page and in the tables. The
+        # salt gives what is drawn once and used again the same names in every run.
+        with rc_context({"svg.fonttype": "path", "svg.hashsalt": "figure"}):
+            canvas = FigureCanvasSVG(figure)
+            canvas.print_svg(buffer, metadata={"Date": None})  # type: ignore[no-untyped-call]
+
+    return _in_its_fonts(figure, draw)
 
 
 def save_figure(figure: Figure, path: str | Path, *, dpi: float) -> None:
@@ -68,14 +87,28 @@ def warn_of_missing_fonts(lacking: str) -> None:
         warnings.warn(missing_fonts(lacking), stacklevel=3)
 
 
-def _drawn(figure: Figure, *, dpi: float, families: tuple[str, ...]) -> bytes:
+def _in_its_fonts(figure: Figure, draw: Drawing) -> tuple[bytes, str]:
+    """What is drawn, once more in other fonts if names ask for them; and what no font has."""
+    picture = _drawn(draw, families=(DEFAULT_FAMILY,))
+    # Tick labels have their text only once they are drawn.
+    texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
+    foreign = _without_default({character for text in texts for character in text.get_text()})
+    if not foreign:
+        return picture, ""
+    families, lacking = _families_for(foreign)
+    if len(families) > 1:
+        for text in texts:
+            text.set_fontfamily(families)
+        picture = _drawn(draw, families=families)
+    return picture, lacking
+
+
+def _drawn(draw: Drawing, *, families: tuple[str, ...]) -> bytes:
     buffer = io.BytesIO()
     with rc_context({"font.family": list(families)}), warnings.catch_warnings():
         # Said once for all characters by `missing_fonts`, and by Matplotlib for each.
         warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
-        figure.set_dpi(dpi)
-        # Laid out and drawn in one go; `savefig` goes through everything twice.
-        FigureCanvasAgg(figure).print_png(buffer)  # type: ignore[no-untyped-call]
+        draw(buffer)
     return buffer.getvalue()
 
 

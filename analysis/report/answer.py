@@ -1,56 +1,55 @@
-"""The answer to the report's question: one sentence, and the sentences behind it."""
+"""The answer to the report's question: one sentence, computed from the verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
-from typing import Any
-
-import numpy as np
-import pandas as pd
+from collections.abc import Sequence
 
 from analysis.answers.loading import Responses
-from analysis.columns import p_value
-from analysis.labels import ALL_TEXTURES, TASKS
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.sentences import ALPHA, signed
-from analysis.statistics.overall import CORRECT_RATE
+from analysis.labels import MEASURES, TASKS
+from analysis.report.claim_sentences import (
+    NO_TEST,
+    by_verdict,
+    difference,
+    overall_row,
+    why_withheld,
+)
+from analysis.statistics.claims import INTERIM, WITHHELD
+from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from analysis.statistics.verdicts import ClaimFound
 
-Row = Mapping[Hashable, Any]
 NOBODY_ASKED = "Nobody was asked: this report holds models and no answers."
+WORDS = {
+    EQUIVALENT: "equivalent in",
+    WITHIN_BOUNDS: "different, but within the bounds, in",
+    DIFFERENT: "different in",
+    INCONCLUSIVE: "inconclusive in",
+    WITHHELD: "not called equivalent in",
+    INTERIM: "no verdict before the study is complete on",
+    NO_TEST: "it cannot be told yet, for want of complete answers, in",
+}
+NO_BOUNDS = "no difference was shown, and without bounds no equality can be, in"
 
 
-def answer(
-    overall: pd.DataFrame, families: Sequence[pd.DataFrame], *, responses: Responses | None
-) -> str:
-    """Can anybody feel the difference? One sentence with intervals, computed from the answers.
+def answer(found: Sequence[ClaimFound], responses: Responses | None) -> str:
+    """Can anybody feel the difference? One sentence with intervals.
+
+    Planned claims alone, where there are some.
 
     Parameters
     ----------
-    overall : DataFrame
-        From `overall.overall_tests`.
-    families : sequence of DataFrame
-        The paired tests texture by texture.
+    found : sequence of ClaimFound
     responses : Responses, optional
         Who answered, and where.
     """
     if responses is None or not responses.textures:
         return NOBODY_ASKED
-    if overall.empty:
-        return "Nothing to compare: the full and simplified models of all textures are identical."
-    told = f"{_circumstances(responses)}{_verdict(overall, families)}{_changes(overall)}"
-    shown = overall["p_holm"] < ALPHA
-    if overall["ci_low"].notna().any() and not shown.any():
-        told += "; whatever lies within these intervals is not ruled out"
-    return f"{told[0].upper()}{told[1:]}."
-
-
-def overall_outcomes(overall: pd.DataFrame) -> list[Outcome]:
-    """One sentence per measure, from `overall.overall_tests`."""
-    return [
-        Outcome(Weight.OVERALL, _overall_outcome(row))
-        for row in overall.to_dict("records")
-        if pd.notna(row["p_holm"])
-    ]
+    asked = [one for one in found if one.claim.planned] or list(found)
+    parts = _parts(asked)
+    if not parts:
+        return "Nothing to compare: the models of all textures are identical."
+    differing = _differing_textures(asked)
+    told = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
+    return f"{told[0].upper()}{told[1:]}"
 
 
 def unfinished_tasks(responses: Responses) -> list[str]:
@@ -65,15 +64,6 @@ def unfinished_tasks(responses: Responses) -> list[str]:
     return told
 
 
-def _overall_outcome(row: Row) -> str:
-    p = p_value(row["p_holm"])
-    return (
-        f"{row['measure'].capitalize()}, simplified − full: {_change(row)}, t({row['df']}) = "
-        f"{signed(row['t'], 2)}, Holm p {p if p.startswith('<') else f'= {p}'}, "
-        f"d_z = {signed(row['d_z'], 2)} (textures: {row['textures']}; participants: {row['n']})."
-    )
-
-
 def _circumstances(responses: Responses) -> str:
     """Nobody may take a simulated or an unfinished study for a finished one with people."""
     if responses.simulated_participants:
@@ -85,40 +75,52 @@ def _circumstances(responses: Responses) -> str:
     return where + ("so far, " if responses.unfinished else "")
 
 
-def _verdict(overall: pd.DataFrame, families: Iterable[pd.DataFrame]) -> str:
-    if overall["p_holm"].isna().all():
-        return "it cannot be told yet, for want of answers that vary between participants"
-    if (overall["p_holm"] < ALPHA).any():
-        return f"yes, over {_textures(overall)} together"
-    single = [
-        tests[(tests["p_holm"] < ALPHA) & (tests["texture"] != ALL_TEXTURES)] for tests in families
-    ]
-    differing = sorted({texture for tests in single for texture in tests["texture"]})
-    if differing:
-        return (
-            f"in single textures ({', '.join(differing)}), but no difference was shown over "
-            f"{_textures(overall)} together"
-        )
-    return "no difference was shown, which is not to say that there is none"
+def _subject(found: Sequence[ClaimFound]) -> str:
+    pairs = list(dict.fromkeys(one.claim.models for one in found))
+    names = " and ".join(f"{other} models against {reference} ones" for reference, other in pairs)
+    kind = "" if any(one.claim.planned for one in found) else " (exploratory: nothing was planned)"
+    return f"{names}, over all textures{kind}"
 
 
-def _textures(overall: pd.DataFrame) -> str:
-    count = int(overall["textures"].max())
-    return f"{count} texture{'s' * (count != 1)}"
+def _parts(found: Sequence[ClaimFound]) -> list[str]:
+    """What is said of the claims, those of one verdict together."""
+    groups: dict[str, list[str]] = {}
+    for one in found:
+        row = overall_row(one)
+        if row is None:
+            continue
+        verdict = row["verdict"] or NO_TEST
+        words = WORDS[verdict]
+        if verdict == INCONCLUSIVE and one.claim.bounds is None:
+            words = NO_BOUNDS
+        shown = "90%" if one.claim.bounds is not None else "95%"
+        told = f"{_what(one, found)} {difference(one, row, confidence=shown)}"
+        if verdict == WITHHELD:
+            told += f", since {why_withheld(one, row)}"
+        groups.setdefault(words, []).append(told)
+    return [f"{words} {' and '.join(told)}" for words, told in groups.items()]
 
 
-def _changes(overall: pd.DataFrame) -> str:
-    measured = overall[overall["mean_difference"].notna()].to_dict("records")
-    listed = ", ".join(f"{row['measure']} {_change(row)}" for row in measured)
-    return f": mean difference, simplified − full, of the {listed}" if listed else ""
+def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
+    """The measure; with the task, or the pair, where another claim is about the same."""
+    claim, what = one.claim, MEASURES[one.claim.measure]
+    others = [each.claim for each in found if each.claim.measure == claim.measure]
+    if len({each.task for each in others}) > 1:
+        what += f" of the {TASKS[claim.task]}"
+    if len({each.models for each in others}) > 1:
+        what += f" ({claim.models[1]})"
+    return f"the {what}" if claim.measure == "correct" else what
 
 
-def _change(row: Row) -> str:
-    rate = row["measure"] == CORRECT_RATE
-    unit, factor = ("percentage points", 100.0) if rate else ("points of 100", 1.0)
-    difference, low, high = (
-        factor * row[name] for name in ("mean_difference", "ci_low", "ci_high")
-    )
-    undefined = np.isnan(low)
-    interval = "no interval" if undefined else f"95% CI {signed(low, 1)} to {signed(high, 1)}"
-    return f"{signed(difference, 1)} {unit} ({interval})"
+def _differing_textures(found: Sequence[ClaimFound]) -> str:
+    """Single textures whose models differ, whatever their mean says."""
+    named = {}
+    for one in found:
+        groups = by_verdict(one)
+        rows = groups.get(DIFFERENT, []) + groups.get(WITHIN_BOUNDS, [])
+        if rows:
+            named[_what(one, found)] = ", ".join(sorted(str(row["texture"]) for row in rows))
+    if not named:
+        return ""
+    shown = "; ".join(f"{textures} ({what})" for what, textures in named.items())
+    return f"; single textures that differ: {shown}"

@@ -16,6 +16,7 @@ PICTURE_DPI = 150
 PIXELS_PER_INCH = 92
 MOST_COLUMNS_AT_FULL_SIZE = 11
 MOST_ROWS_KEPT_TOGETHER = 15
+LONGEST_WORD_KEPT_WHOLE = 20  # letters, on paper
 
 STYLE = """
 :root { --ink: #1b1f24; --soft: #59636e; --line: #d8dee4; --paper: #fff; --tint: #f4f7fa;
@@ -71,15 +72,18 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   .banner { padding: 6px 10px; print-color-adjust: exact; -webkit-print-color-adjust: exact; }
   section { border: 0; border-radius: 0; padding: 0; margin: 16px 0; }
   h2, h3, h4, summary, caption { break-after: avoid; }
-  figure, .tile, .short, tr { break-inside: avoid; }
+  figure, .tile, .short, caption, tr { break-inside: avoid; }
   figure img { max-height: 155mm; width: auto; }
   .scroll { overflow: visible; }
   table { width: 100%; font-size: 8pt; }
   .wide table { font-size: 7pt; }
   thead { display: table-header-group; }
-  th, td { padding: 2px 6px 2px 0; overflow-wrap: anywhere; }
-  th, td.number, td.name { overflow-wrap: normal; }
+  /* Neither the beginning of a table stands alone on a page nor its end. */
+  tbody tr:nth-child(-n + 3), tbody tr:nth-last-child(-n + 2) { break-before: avoid; }
+  th, td { padding: 2px 6px 2px 0; }
   td.name { white-space: normal; }
+  /* Only what no line can hold is broken within a word, lest a column be cut. */
+  td.long { overflow-wrap: anywhere; }
   caption, figcaption, p, ul, .answer { max-width: none; }
   caption, figcaption { font-size: 9pt; }
   /* What is folded on the screen is unfolded on paper, where browsers can without a script. */
@@ -134,6 +138,11 @@ class Fold:
 
 
 Item = Table | Picture | Fold
+
+
+def paragraph(heading: str, text: str) -> str:
+    """Plain text below a heading."""
+    return f"<h3>{escape(heading)}</h3><p>{escape(text)}</p>"
 
 
 def bullets(sentences: Sequence[str]) -> str:
@@ -214,7 +223,10 @@ def _with_content(table: Table) -> Columns:
 def _css(column: Column, values: pd.Series) -> str:
     if pd.api.types.is_numeric_dtype(values):
         return 'class="number"'
-    return 'class="name"' if column.is_name else ""
+    words = (word for value in values for word in column.text(value).split())
+    long = any(len(word) > LONGEST_WORD_KEPT_WHOLE for word in words)
+    classes = ["name"] * column.is_name + ["long"] * long
+    return f'class="{" ".join(classes)}"' if classes else ""
 
 
 def _row_html(columns: Columns, values: Sequence[object], *, css: Sequence[str]) -> str:

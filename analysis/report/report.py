@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.columns import without
-from analysis.figures.saving import missing_fonts, png_of
-from analysis.report.answer import answer, overall_outcomes, unfinished_tasks
+from analysis.figures.saving import missing_fonts, png_of, svg_of
+from analysis.labels import MODELS
+from analysis.report.answer import answer, unfinished_tasks
 from analysis.report.outcomes import by_weight
 from analysis.report.page import (
     PICTURE_DPI,
@@ -24,25 +25,29 @@ from analysis.report.page import (
     folded,
     grouped,
     page,
+    paragraph,
     picture_html,
     table_html,
     tiles,
 )
-from analysis.report.section_answers import choice_section, rating_section
+from analysis.report.plan_sentences import deviations, methods_paragraph
+from analysis.report.section_answers import choice_section, rating_section, verdict_section
+from analysis.report.section_hand import hand_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
+from analysis.report.section_reliability import reliability_section
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
-from analysis.statistics.overall import OVERALL_COLUMNS, overall_tests
-from analysis.textures.compared import Mapped, comparisons
+from analysis.statistics.equivalence import INCONCLUSIVE
+from analysis.statistics.verdicts import ODDITY_CHANCE, ClaimFound, chance_of, claims_found
+from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
 from modeling.files.writing import write_text
 
-OVERALL_SHOWN = without(OVERALL_COLUMNS, "se_full", "se_simplified", "shapiro_p", "wilcoxon_w")
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -55,11 +60,13 @@ def write_report(
     benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
+    hand: pd.DataFrame | None = None,
+    planted: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
     progress: Progress | None = None,
     mapped: Mapped = map,
 ) -> Path:
-    """Write report.html, and tables/*.tsv and figures/*.png beside it.
+    """Write report.html, and tables/*.tsv, figures/*.png and figures/*.svg beside it.
 
     Parameters
     ----------
@@ -74,6 +81,10 @@ def write_report(
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
+    hand : DataFrame, optional
+        How the hand moved with either model (`analysis.answers.hand.load_hand`).
+    planted : mapping of texture to mapping of measure to points, optional
+        Differences that simulated participants were given (`verdicts.planted_verdicts`).
     seed : int
         Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
     progress : callable, optional
@@ -95,42 +106,43 @@ def write_report(
     target = Path(path)
     tell = progress or (lambda share, what: None)
     rng = np.random.default_rng(seed)
-    same = frozenset(r.texture for r in textures if r.simplification.identical)
-    identical = same if responses is None else same | responses.identical
-    sections = _sections(
-        responses, textures, identical=identical, rng=rng, tell=tell, mapped=mapped
-    )
-    sections += benches
+    if responses is not None:
+        responses = _with_identical(responses, textures)
+    # Begun first: other processes compare models while this one analyses answers.
+    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
+    tell(0.0, "analysing answers")
+    found = [] if responses is None else claims_found(responses, rng=rng)
+    answered = []
+    if responses is not None:
+        answered = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
+    sections = [*_model_sections(textures, compared, answered=answered, tell=tell), *benches]
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
     pictures = _pictures([item for section in sections for item in section.items])
     drawn = mapped(_drawn, pictures)
-    overall = pd.DataFrame()
-    if responses is not None:
-        overall = overall_tests(responses, identical=identical)
-    families = [section.tests for section in sections if section.tests is not None]
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
-    for number, (picture, (png, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
+    for number, (picture, (formats, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
         tell(1 - PICTURES_SHARE * (1 - number / len(pictures)), f"drawing {picture.title}")
-        files.add_picture(picture, png, lacking=lacking)
-    compared = files.html(_overall_items(overall, responses))
+        files.add_picture(picture, formats, lacking=lacking)
     shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
-    overview = _overview(
-        sections, responses, overall=overall, models=bool(textures), undrawn=undrawn
-    )
+    overview = _overview(sections, responses, found=found, models=bool(textures), undrawn=undrawn)
+    methods = ""
+    if responses is not None and found:
+        text = methods_paragraph(responses, found)
+        methods = paragraph("Statistical methods, for a paper", text)
     html = page(
         title=title,
-        answer=answer(overall, families, responses=responses),
+        answer=answer(found, responses),
         lead="Surfaces recorded, modelled, simplified by what can be felt, and judged.",
         banner=_banner(responses, textures),
         sections=[
-            ("overview", "At a glance", overview + compared),
+            ("overview", "At a glance", overview),
             *shown,
-            ("origin", "Provenance", files.html([provenance_table(facts)])),
+            ("origin", "Methods and provenance", methods + files.html([provenance_table(facts)])),
         ],
     )
     write_text(target, html)
@@ -140,23 +152,16 @@ def write_report(
     return target
 
 
-def _sections(
-    responses: Responses | None,
+def _model_sections(
     textures: Sequence[TextureResult],
+    compared: Iterable[Comparison],
     *,
-    identical: frozenset[str],
-    rng: np.random.Generator,
+    answered: Sequence[Section],
     tell: Progress,
-    mapped: Mapped,
 ) -> list[Section]:
-    # Begun first: other processes compare models while this one analyses answers.
-    compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
-    tell(0.0, "analysing answers")
-    answered = _answer_sections(responses, identical=identical, rng=rng)
-    planted = [result for result in textures if result.truth is not None]
-    known = [planted_section(planted)] if planted else []
+    """The sections on models, where there are some, around those on the answers."""
     if not textures:
-        return answered
+        return list(answered)
     gfc, driven = [], []
     before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
@@ -166,66 +171,90 @@ def _sections(
         driven.append(comparison.driven)
     tell(1 - PICTURES_SHARE, "regressing parameters on speed and force")
     models = model_section(textures, pd.concat(gfc, ignore_index=True))
-    return [models, parameter_section(textures, driving_table(driven)), *answered, *known]
+    parameters = parameter_section(textures, driving_table(driven))
+    truths = [result for result in textures if result.truth is not None]
+    return [models, parameters, *answered, *([planted_section(truths)] if truths else [])]
+
+
+def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> Responses:
+    """The answers, with what the models themselves say of being identical."""
+    equal = {texture: list(groups) for texture, groups in responses.equal.items()}
+    for result in textures:
+        if result.simplification.identical:
+            equal.setdefault(result.texture, []).append(MODELS)
+    return replace(responses, equal=equal)
 
 
 def _answer_sections(
-    responses: Responses | None, *, identical: frozenset[str], rng: np.random.Generator
+    responses: Responses,
+    found: Sequence[ClaimFound],
+    *,
+    hand: pd.DataFrame | None,
+    planted: Mapping[str, Mapping[str, float]] | None,
+    rng: np.random.Generator,
 ) -> list[Section]:
-    sections = []
-    if responses is not None and not responses.absolute.empty:
-        sections.append(rating_section(responses, identical=identical))
-    if responses is not None and not responses.relative.empty:
-        sections.append(choice_section(responses, identical=identical, rng=rng))
-    return sections
+    """What people answered, and how far that can be relied on."""
+    shown = [one for one in found if len(one.tests)]
+    if not shown:
+        return []
+    simulated = responses.simulated
+    by_task = {task: [one for one in shown if one.claim.task == task] for task in responses.answers}
+    sections: list[Section | None] = [verdict_section(shown, simulated=simulated, planted=planted)]
+    if by_task.get("absolute"):
+        sections.append(rating_section(responses, by_task["absolute"]))
+    if by_task.get("relative"):
+        sections.append(choice_section(responses, by_task["relative"], rng=rng))
+    tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
+    sections.append(
+        reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
+    )
+    if hand is not None:
+        # Of several pairs of models the first.
+        pair = shown[0].claim.models
+        sections.append(hand_section(hand, models=pair, simulated=simulated, rng=rng))
+    return [section for section in sections if section is not None]
+
+
+def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
+    """Rates of guessing participants in the tasks with right answers."""
+    chances = {"oddity": ODDITY_CHANCE}
+    if "relative" in tasks:
+        chances["relative"] = chance_of(tasks["relative"])
+    return chances
 
 
 def _overview(
     sections: Sequence[Section],
     responses: Responses | None,
     *,
-    overall: pd.DataFrame,
+    found: Sequence[ClaimFound],
     models: bool,
     undrawn: str,
 ) -> str:
+    verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
     warned = cautions(
-        [section.tests for section in sections if section.tests is not None],
         simulated_participants=responses is not None and responses.simulated_participants,
         simulated_rig=responses is not None and responses.simulated_rig,
         models=models,
+        inconclusive=bool((verdicts == INCONCLUSIVE).any()),
         unfinished=[] if responses is None else unfinished_tasks(responses),
     )
-    outcomes = overall_outcomes(overall)
-    outcomes += [outcome for section in sections for outcome in section.outcomes]
-    noticed = responses.warnings if responses is not None else ()
+    outcomes = [outcome for section in sections for outcome in section.outcomes]
     done = [sentence for section in sections for sentence in section.done]
-    done += [f"On reading the answers: {warning}" for warning in noticed]
     done += [f"On drawing the pictures: {undrawn}"] * bool(undrawn)
+    otherwise = [] if responses is None else deviations(responses, found)
+    planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
     return (
         tiles([tile for section in sections for tile in section.tiles])
         + "<h3>What came out</h3>"
         + grouped(by_weight(outcomes))
         + '<div class="caution"><h3>What may not be concluded</h3>'
         + bullets(warned)
-        + "</div><h3>What was done</h3>"
+        + "</div>"
+        + planned * bool(otherwise)
+        + "<h3>What was done</h3>"
         + bullets(done)
     )
-
-
-def _overall_items(overall: pd.DataFrame, responses: Responses | None) -> tuple[Item, ...]:
-    if overall.empty or responses is None:
-        return ()
-    table = Table(
-        "overall_tests",
-        "Full against simplified models over all textures",
-        "The comparison behind the sentence on top. A participant's value is the mean over the "
-        "textures that they judged with both models; the correct rate is a share. Differences are "
-        "simplified − full. Holm over the measures. Intervals: 95% each, not corrected.",
-        overall,
-        OVERALL_SHOWN,
-        responses.simulated,
-    )
-    return (table,)
 
 
 def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> str:
@@ -252,9 +281,10 @@ def _pictures(items: Sequence[Item]) -> list[Picture]:
     return found
 
 
-def _drawn(picture: Picture) -> tuple[bytes, str]:
-    """The picture as PNG, and the characters that no font here has."""
-    return png_of(picture.figure, dpi=PICTURE_DPI)
+def _drawn(picture: Picture) -> tuple[dict[str, bytes], str]:
+    """The picture by the endings of its files, and the characters that no font here has."""
+    png, lacking = png_of(picture.figure, dpi=PICTURE_DPI)
+    return {"png": png, "svg": svg_of(picture.figure)[0]}, lacking
 
 
 class _Files:
@@ -265,12 +295,13 @@ class _Files:
         self.lacking: set[str] = set()
         self.pictures: dict[str, bytes] = {}
 
-    def add_picture(self, picture: Picture, png: bytes, *, lacking: str) -> None:
-        """Write a picture's file; `html` will show it."""
-        target = self.folder / "figures" / f"{picture.name}.png"
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes(png)
-        self.pictures[picture.name] = png
+    def add_picture(self, picture: Picture, formats: Mapping[str, bytes], *, lacking: str) -> None:
+        """Write a picture's files; `html` will show the PNG."""
+        folder = self.folder / "figures"
+        folder.mkdir(parents=True, exist_ok=True)
+        for ending, data in formats.items():
+            (folder / f"{picture.name}.{ending}").write_bytes(data)
+        self.pictures[picture.name] = formats["png"]
         self.lacking.update(lacking)
 
     def html(self, items: Sequence[Item]) -> str:

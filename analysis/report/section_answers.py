@@ -1,100 +1,177 @@
-"""The sections on people's answers: ratings and choices."""
+"""The sections on people's answers: verdicts, ratings and choices."""
 
 from __future__ import annotations
 
-from collections.abc import Set
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
 
 from analysis.answers.loading import Responses
-from analysis.columns import chosen, without
+from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_confusion, figure_correct_rates, figure_ratings
+from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS
+from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
-from analysis.report.sentences import rate_outcomes, rating_outcomes
+from analysis.report.sentences import confusion_outcomes, rate_outcomes
+from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import (
     CONFUSION_COLUMNS,
     ConfusionMatrix,
     confusion_matrices,
     confusion_table,
 )
-from analysis.statistics.paired import (
-    RATING_TEST_COLUMNS,
-    participant_means,
-    rating_means,
-    rating_tests,
+from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
+from analysis.statistics.verdicts import (
+    PLANTED_COLUMNS,
+    SETUP_COLUMNS,
+    ClaimFound,
+    chance_of,
+    differences_by_setup,
+    pairs_of,
+    planted_verdicts,
 )
-from analysis.statistics.rates import (
-    CORRECT_RATE_COLUMNS,
-    RATE_TEST_COLUMNS,
-    correct_rates,
-    rate_tests,
-)
+from modeling.files.writing import file_stem
 
-PAIRED_SHOWN = (
-    *("texture", "n", "mean_full", "mean_simplified", "mean_difference", "ci_low", "ci_high", "t"),
-    *("df", "p", "p_holm", "d_z", "d_z_low", "d_z_high", "wilcoxon_p", "note", "excluded"),
+TESTS_SHOWN = chosen(
+    CLAIM_COLUMNS,
+    *("claim", "texture", "mean_reference", "mean_other", "mean_difference", "ci_low", "ci_high"),
+    *("t", "df", "p", "p_equivalence", "d_z", "d_z_low", "d_z_high", "bf01", "shapiro_p"),
+    *("wilcoxon_p", "sign_flips_p", "note", "excluded"),
 )
-RATING_TESTS_SHOWN = chosen(RATING_TEST_COLUMNS, "scale", *PAIRED_SHOWN)
-RATE_TESTS_SHOWN = chosen(RATE_TEST_COLUMNS, *PAIRED_SHOWN)
 CORRECT_RATES_SHOWN = (
     *without(CORRECT_RATE_COLUMNS, "note"),
     *chosen(CORRECT_RATE_COLUMNS, "note"),
 )
 
 
-def rating_section(responses: Responses, *, identical: Set[str] = frozenset()) -> Section:
-    """Absolute evaluation (PAPER VIII-A); `identical`: textures with nothing to compare."""
-    tests = rating_tests(responses.absolute, identical=identical)
-    done, tile = _participants(responses, "absolute")
+def verdict_section(
+    found: Sequence[ClaimFound],
+    *,
+    simulated: bool,
+    planted: Mapping[str, Mapping[str, float]] | None = None,
+) -> Section:
+    """Every claim with its tests; at least one. `planted` as in `verdicts.planted_verdicts`."""
     picture = Picture(
-        "ratings",
-        "Rated similarity of virtual and real surface",
-        "Bars: means over participants ± standard error; points: participants. Cf. the paper's "
-        "figure 9.",
-        figure_ratings(tests, rating_means(responses.absolute), simulated=responses.simulated),
-        responses.simulated,
+        "forest",
+        "Differences and their bounds",
+        "Mean differences over participants with 90% and 95% confidence intervals. Where the 90% "
+        "interval lies within the bounds (grey), a test of equivalence is significant, Holm's "
+        "correction left aside; where the 95% interval does not hold 0, a test of a difference is.",
+        figure_forest(found, simulated=simulated),
+        simulated,
     )
-    table = Table(
-        "rating_tests",
-        "Paired tests of the ratings",
-        "Differences are simplified − full, in points of the scale. Holm over the textures of one "
-        "scale. d_z: mean difference over the standard deviation of the differences. Intervals: "
-        "95%.",
+    tests = pd.concat([one.tests for one in found], ignore_index=True)
+    verdicts = Table(
+        "claims",
+        "Verdicts",
+        "First the mean over the textures whose models differ, each counting once, of participants "
+        "who answered completely; then each texture, a family of its own with Holm's correction "
+        "for tests of a difference and of equivalence (TOST) separately; identical models are "
+        "controls. Differences and bounds in points of the scale, or shares of right answers. "
+        "The tests themselves are below.",
+        tests[names(VERDICT_COLUMNS)],
+        VERDICT_COLUMNS,
+        simulated,
+    )
+    detail = Table(
+        "claim_tests",
+        "Tests behind the verdicts",
+        "Paired t-tests over participants, intervals 95%. d_z: mean difference over the standard "
+        "deviation of the differences. BF₀₁: Bayes factor for no difference (JZS, r = 0.707). "
+        "Beside them Shapiro and Wilk's test of the differences, Wilcoxon's signed-rank test, and "
+        "a permutation test that flips signs; where nobody varies, p is that of the sign flips.",
         tests,
-        RATING_TESTS_SHOWN,
-        responses.simulated,
+        TESTS_SHOWN,
+        simulated,
     )
+    return Section(
+        "verdicts",
+        "Verdicts",
+        (
+            picture,
+            verdicts,
+            *_setups_table(found, simulated=simulated),
+            *(_planted_table(found, planted),) * bool(planted),
+            Fold("Tests behind the verdicts", (detail,)),
+        ),
+        outcomes=tuple(claim_outcomes(found)),
+    )
+
+
+def _setups_table(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Table, ...]:
+    """The differences at each set-up, where there are several."""
+    by_setup = differences_by_setup(found)
+    if by_setup.empty:
+        return ()
+    table = Table(
+        "setups",
+        "Differences at each set-up",
+        "Means over the textures whose models differ, of complete participants; described, not "
+        "tested: verdicts are those of all set-ups together.",
+        by_setup,
+        SETUP_COLUMNS,
+        simulated,
+    )
+    return (table,)
+
+
+def _planted_table(
+    found: Sequence[ClaimFound], planted: Mapping[str, Mapping[str, float]] | None
+) -> Table:
+    return Table(
+        "planted_effects",
+        "Verdicts beside what was planted",
+        "Points that simulated participants rate the other model higher, and what the tests made "
+        "of their answers. Undecided: inconclusive, or a verdict that was withheld.",
+        planted_verdicts(found, planted or {}),
+        PLANTED_COLUMNS,
+        simulated=True,
+    )
+
+
+def rating_section(responses: Responses, found: Sequence[ClaimFound]) -> Section:
+    """Absolute evaluation (PAPER VIII-A); `found` are its claims, one at least."""
+    done, tile = _participants(responses, "absolute")
+    pairs = list(dict.fromkeys(one.claim.models for one in found))
+    pictures = [
+        Picture(
+            _name("ratings", pair),
+            f"Rated similarity of virtual and real surface, {pair[0]} and {pair[1]} models",
+            "Bars: means over participants with 95% confidence intervals; points: participants. "
+            "Cf. the paper's figure 9, whose bars are standard errors.",
+            figure_ratings(
+                [one for one in found if one.claim.models == pair], simulated=responses.simulated
+            ),
+            responses.simulated,
+        )
+        for pair in pairs
+    ]
     return Section(
         "ratings",
         "Absolute evaluation: ratings",
-        (picture, table),
-        outcomes=tuple(rating_outcomes(tests)),
+        tuple(pictures),
         done=(done,),
         tiles=(tile,),
-        tests=tests,
     )
 
 
 def choice_section(
-    responses: Responses, *, identical: Set[str] = frozenset(), rng: np.random.Generator
+    responses: Responses, found: Sequence[ClaimFound], *, rng: np.random.Generator
 ) -> Section:
-    """Relative evaluation (PAPER VIII-B); `rng` draws the bootstrap.
-
-    `identical`: textures with nothing to compare.
-    """
+    """Relative evaluation (PAPER VIII-B); `found` are its claims, `rng` draws the bootstrap."""
     relative, simulated = responses.relative, responses.simulated
+    pairs = pairs_of(responses, "relative")
+    models = tuple(dict.fromkeys(name for pair in pairs for name in pair))
     matrices = confusion_matrices(relative)
-    chance = 1 / len(matrices["full"].textures)
-    rates = correct_rates(relative, rng=rng, chance=chance)
-    tests = rate_tests(relative, identical=identical)
-    means = participant_means(relative, "correct")
+    chance = chance_of(relative)
+    rates = correct_rates(relative, models, rng=rng, chance=chance)
     done, tile = _participants(responses, "relative")
     overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
-    shown = " → ".join(f"{overall[model]:.0%}" for model in MODELS if model in overall)
-    rate_tile = (shown, f"right answers, full → simplified (chance {chance:.0%})")
+    shown = " → ".join(f"{overall[model]:.0%}" for model in models if model in overall)
+    rate_tile = (shown, f"right answers, {' → '.join(models)} (chance {chance:.0%})")
     counts = Fold(
         "Confusion matrices as tables",
         tuple(_confusion_table(matrix, simulated=simulated) for matrix in matrices.values()),
@@ -103,34 +180,38 @@ def choice_section(
         "choices",
         "Relative evaluation: forced choice",
         (
-            *_choice_pictures(tests, means, matrices=matrices, simulated=simulated),
-            *_rate_tables(rates, tests, simulated=simulated),
+            *(_rates_picture(one, chance=chance, simulated=simulated) for one in found),
+            _confusion_picture(matrices, chance=chance, simulated=simulated),
+            _rates_table(rates, simulated=simulated),
             counts,
         ),
-        outcomes=tuple(rate_outcomes(rates, tests, matrices=matrices)),
+        outcomes=(*rate_outcomes(rates, chance=chance), *confusion_outcomes(matrices)),
         done=(done,),
         tiles=(tile, rate_tile),
-        tests=tests,
     )
 
 
-def _choice_pictures(
-    tests: pd.DataFrame,
-    means: pd.DataFrame,
-    *,
-    matrices: dict[str, ConfusionMatrix],
-    simulated: bool,
-) -> tuple[Picture, Picture]:
-    chance = 1 / len(matrices["full"].textures)
-    rates_picture = Picture(
-        "correct_rates",
-        "Correct rates of the forced choice",
-        "Bars: means over participants ± standard error; points: participants; dashed: chance. "
-        "Cf. the paper's figure 11.",
-        figure_correct_rates(tests, means, simulated=simulated, chance=chance),
+def _name(what: str, pair: tuple[str, str]) -> str:
+    """The stem of a picture's file."""
+    return what if pair == MODELS else f"{what}_{file_stem('_'.join(pair))}"
+
+
+def _rates_picture(found: ClaimFound, *, chance: float, simulated: bool) -> Picture:
+    reference, other = found.claim.models
+    return Picture(
+        _name("correct_rates", found.claim.models),
+        f"Correct rates of the forced choice, {reference} and {other} models",
+        "Bars: means over participants with 95% confidence intervals; points: participants; "
+        "dashed: chance. Cf. the paper's figure 11, whose bars are standard errors.",
+        figure_correct_rates(found, chance=chance, simulated=simulated),
         simulated,
     )
-    confusion_picture = Picture(
+
+
+def _confusion_picture(
+    matrices: dict[str, ConfusionMatrix], *, chance: float, simulated: bool
+) -> Picture:
+    return Picture(
         "confusion",
         "Who was taken for whom",
         "Rows: real surface presented; columns: virtual surface answered. Per cent of the row, in "
@@ -138,32 +219,20 @@ def _choice_pictures(
         figure_confusion(matrices, simulated=simulated),
         simulated,
     )
-    return rates_picture, confusion_picture
 
 
-def _rate_tables(
-    rates: pd.DataFrame, tests: pd.DataFrame, *, simulated: bool
-) -> tuple[Table, Table]:
-    against_chance = Table(
+def _rates_table(rates: pd.DataFrame, *, simulated: bool) -> Table:
+    return Table(
         "correct_rates",
         "Correct rates against chance",
         "Participants are the units: mean of their rates with a 95% interval (bias-corrected and "
-        "accelerated bootstrap over participants), and a one-sample t-test against chance with "
-        "Holm over the textures of one model.",
+        "accelerated bootstrap over participants), and a one-sample t-test against chance (sign "
+        "flips where all have one rate) with Holm over the textures of one model. The rows over "
+        "all textures weigh textures equally, and have complete participants only.",
         rates,
         CORRECT_RATES_SHOWN,
         simulated,
     )
-    paired = Table(
-        "rate_tests",
-        "Paired tests of the correct rates",
-        "Differences are simplified − full, as shares. Holm over the textures; the row over all "
-        "textures stands outside the family. Intervals: 95%.",
-        tests,
-        RATE_TESTS_SHOWN,
-        simulated,
-    )
-    return against_chance, paired
 
 
 def _participants(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:

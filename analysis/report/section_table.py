@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -57,9 +58,7 @@ def table_sections(imported: Imported, *, rng: np.random.Generator) -> list[Sect
 
 def answer_of_table(imported: Imported) -> str:
     """The sentence on top of the report: the mean over participants with its interval."""
-    cells = participant_cells(
-        imported.answers, imported.measure, factors=list(imported.factors)
-    )
+    cells = participant_cells(imported.answers, imported.measure, factors=list(imported.factors))
     mean, low, high = overall_mean(cells)
     people = cells["participant_id"].nunique()
     who = "1 participant" if people == 1 else f"{people} participants"
@@ -112,9 +111,7 @@ def _condition_section(imported: Imported, cells: pd.DataFrame) -> Section:
     )
 
 
-def _pictures(
-    imported: Imported, cells: pd.DataFrame, means: pd.DataFrame
-) -> tuple[Picture, ...]:
+def _pictures(imported: Imported, cells: pd.DataFrame, means: pd.DataFrame) -> tuple[Picture, ...]:
     if not imported.factors:
         return ()
     figure = figure_factorial(
@@ -125,13 +122,11 @@ def _pictures(
     return (Picture("by_condition", title, note, figure, False),)
 
 
-def _anova_section(
-    complete: CompleteCells, measure: str, *, rng: np.random.Generator
-) -> Section:
+def _anova_section(complete: CompleteCells, measure: str, *, rng: np.random.Generator) -> Section:
     anova, pairs = repeated_measures_anova(complete), pairwise_tests(complete, rng=rng)
     left_out = ""
     if complete.excluded:
-        left_out = f" Left out, without answers in every condition: {_listed(complete.excluded)}."
+        left_out = f" Left out, without answers in every condition: {', '.join(complete.excluded)}."
     tables = (
         Table(
             "anova",
@@ -162,8 +157,8 @@ def _anova_section(
     )
 
 
-def _effect(row: dict[str, object], measure: str) -> Outcome:
-    p = float(str(row["p_corrected"]))
+def _effect(row: Mapping[Hashable, Any], measure: str) -> Outcome:
+    p = float(row["p_corrected"])
     verb = "changes" if p < ALPHA else "was not shown to change"
     probability = p_value(p) if p < 0.001 else f"= {p_value(p)}"
     return Outcome(
@@ -172,10 +167,6 @@ def _effect(row: dict[str, object], measure: str) -> Outcome:
         f"{row['F']:.3f}, p {probability} (Greenhouse–Geisser), generalized η² = "
         f"{row['generalized_eta_squared']:.3f}.",
     )
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)
 
 
 def _confusion_section(imported: Imported) -> Section:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import pandas as pd
-
 from analysis.report.outcomes import Outcome
 from analysis.report.page import Item
 
@@ -28,8 +26,6 @@ class Section:
         What was done.
     tiles : tuple of (str, str)
         Key figures: value, and what it is.
-    tests : DataFrame, optional
-        The paired tests shown here.
     """
 
     anchor: str
@@ -38,4 +34,3 @@ class Section:
     outcomes: tuple[Outcome, ...] = ()
     done: tuple[str, ...] = ()
     tiles: tuple[tuple[str, str], ...] = ()
-    tests: pd.DataFrame | None = None

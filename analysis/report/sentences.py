@@ -7,51 +7,33 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.columns import p_value
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, MODELS, SCALES
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL
 from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 
 ALPHA = 0.05
 
 
-def rating_outcomes(tests: pd.DataFrame) -> list[Outcome]:
-    """One sentence per rating scale, from `paired.rating_tests`."""
-    families = {scale: tests[tests["scale"] == scale] for scale in SCALES.values()}
+def rate_outcomes(rates: pd.DataFrame, *, chance: float) -> list[Outcome]:
+    """A sentence on each model's correct rates against chance, from `rates.correct_rates`."""
     return [
-        Outcome(
-            _weight_of_family(family),
-            f"Rated similarity of {scale}: " + _differences(family, unit="points", factor=1.0),
-        )
-        for scale, family in families.items()
+        Outcome(Weight.SECONDARY, _against_chance(of_model, model=str(model), chance=chance))
+        for model, of_model in rates.groupby("model", sort=False)
     ]
 
 
-def rate_outcomes(
-    rates: pd.DataFrame, tests: pd.DataFrame, *, matrices: Mapping[str, ConfusionMatrix]
-) -> list[Outcome]:
-    """Sentences on the forced choice, from the three results of `statistics`."""
-    family = tests[tests["texture"] != ALL_TEXTURES]
-    differ = "Correct rates: " + _differences(family, unit="percentage points", factor=100.0)
-    outcomes = [Outcome(_weight_of_family(family), differ)]
-    for model in MODELS:
-        chosen = rates[rates["model"] == model]
-        if not chosen.empty:
-            chance = 1 / len(matrices[model].textures)
-            told = _against_chance(chosen, model=model, chance=chance)
-            outcomes.append(Outcome(Weight.SECONDARY, told))
-            outcomes += described(_strongest_confusion(matrices[model]))
-    return outcomes
+def confusion_outcomes(matrices: Mapping[str, ConfusionMatrix]) -> list[Outcome]:
+    """The most frequent confusion with each model, where there is one."""
+    return [
+        outcome
+        for matrix in matrices.values()
+        for outcome in described(_strongest_confusion(matrix))
+    ]
 
 
 def described(sentences: Iterable[str]) -> list[Outcome]:
     """These sentences as findings that describe and test nothing."""
     return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences]
-
-
-def _weight_of_family(tests: pd.DataFrame) -> Weight:
-    """Tests that show a difference in some texture weigh more than those that show none."""
-    return Weight.TEXTURES if (tests["p_holm"] < ALPHA).any() else Weight.SECONDARY
 
 
 def simplification_outcomes(gfc: pd.DataFrame) -> list[Outcome]:
@@ -163,23 +145,23 @@ def _worst_of(rows: pd.DataFrame, name: str, *, digits: int, unit: str = "") -> 
 
 
 def cautions(
-    families: Sequence[pd.DataFrame],
     *,
     simulated_participants: bool,
     simulated_rig: bool,
     models: bool,
+    inconclusive: bool,
     unfinished: Sequence[str] = (),
 ) -> list[str]:
     """What may not be concluded.
 
     Parameters
     ----------
-    families : sequence of DataFrame
-        Paired tests that the report shows, from `statistics`.
     simulated_participants, simulated_rig : bool
-        Whether the answers are simulated, and whether the rig was.
+        Whether there are answers that are simulated, and whether the rig was.
     models : bool
         Whether the report shows likeness of spectra.
+    inconclusive : bool
+        Whether some test shows neither a difference nor equality.
     unfinished : sequence of str
         For each task with less than was planned: how much of it there is.
     """
@@ -187,31 +169,23 @@ def cautions(
     if unfinished:
         sentences.append(
             f"The study is not complete ({'; '.join(unfinished)}): these results are preliminary, "
-            "and p values do not hold where they decide whether to go on."
+            "there is no verdict, and p values do not hold where they decide whether to go on."
         )
-    if families and simulated_participants:
+    if simulated_participants:
         sentences.append(
             "Simulated participants follow a model that was written down beforehand: their "
             "answers test the procedure and say nothing about what people feel."
         )
-    elif families and simulated_rig:
+    elif simulated_rig:
         sentences.append(
             "The participants are people, but the rig was simulated and nobody felt a real "
             "surface: their answers test the procedure and say nothing about what people feel."
         )
-    if families:
-        unshown = sum(int((tests["p_holm"] >= ALPHA).sum()) for tests in families)
+    if inconclusive:
         sentences.append(
-            f"A t-test that is not significant ({unshown} here) does not show that full and "
-            "simplified models are equal; showing that takes an equivalence test with a bound "
-            "fixed before the data, which is not part of this version."
-        )
-    named = {name for tests in families for cell in tests["excluded"] for name in cell.split(", ")}
-    missing = sorted(named - {""})
-    if missing:
-        sentences.append(
-            "Some pairs are incomplete; these participants are left out of at least one "
-            f"comparison: {', '.join(missing)}."
+            "Inconclusive means neither: a test of a difference that is not significant does not "
+            "show that two models are equal; only a test of equivalence with bounds that were "
+            "fixed before the data does."
         )
     if models:
         sentences.append(
@@ -219,36 +193,6 @@ def cautions(
             "read it beside its floor, its expected value and the distances in dB."
         )
     return sentences
-
-
-def _differences(tests: pd.DataFrame, *, unit: str, factor: float) -> str:
-    """Which textures differ between the models, after Holm."""
-    same = tests[tests["note"] == IDENTICAL]
-    tests = tests.drop(same.index)
-    count = len(tests)
-    different = tests[tests["p_holm"] < ALPHA]
-    undefined = tests[tests["p_holm"].isna()]
-    rest = count - len(different) - len(undefined)
-    if not count:
-        text = "nothing was compared"
-    elif different.empty:
-        text = f"no difference between the models was shown in any of {count} textures"
-    else:
-        shown = "; ".join(
-            f"{row['texture']} {signed(factor * row['mean_difference'], 1)} {unit} (95% CI "
-            f"{signed(factor * row['ci_low'], 1)} to {signed(factor * row['ci_high'], 1)}, "
-            f"t({row['df']}) = {signed(row['t'], 2)}, Holm p {_p(row['p_holm'])}, "
-            f"d_z = {signed(row['d_z'], 2)})"
-            for row in different.to_dict("records")
-        )
-        text = f"simplified and full models differ in {len(different)} of {count} textures: {shown}"
-        if rest:
-            text += f"; no difference was shown in the other {rest}"
-    if not undefined.empty:
-        text += f"; the test is undefined for {_names(undefined['texture'])} (see the notes)"
-    if not same.empty:
-        text += f"; {IDENTICAL}: {_names(same['texture'])}"
-    return text + "."
 
 
 def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
@@ -297,8 +241,3 @@ def _names(textures: Sequence[str] | pd.Series) -> str:
 def signed(value: float, digits: int) -> str:
     """A number with its sign, as people write it."""
     return f"{value:+.{digits}f}".replace("-", "−")
-
-
-def _p(p: float) -> str:
-    shown = p_value(p)
-    return shown if shown.startswith("<") else f"= {shown}"

@@ -5,15 +5,16 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Hashable, Mapping
 from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from analysis.answers.plan import Claim
-from analysis.columns import TEXTURE, Column, P, names
-from analysis.labels import ALL_TEXTURES, IDENTICAL
+from analysis.columns import TEXTURE, Column, P, chosen, names
+from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.statistics.equivalence import (
     ALPHA,
     EQUIVALENT,
@@ -27,9 +28,10 @@ from analysis.statistics.paired import (
     ignoring_case,
     paired_test,
     participant_means,
+    t_tests,
+    why_undefined,
     without_rounding_noise,
 )
-from modeling import InputError
 
 WITHHELD = "equivalence withheld"
 INTERIM = "interim, no verdict"
@@ -37,6 +39,8 @@ CONTROL = "control"
 
 CLAIM_COLUMNS = (
     Column("claim", is_name=True),
+    Column("measure", is_name=True),
+    Column("planned"),
     TEXTURE,
     Column("verdict", is_name=True),
     Column("reference", is_name=True),
@@ -54,7 +58,7 @@ CLAIM_COLUMNS = (
     Column("bound_low", "bounds from"),
     Column("bound_high", "to"),
     Column("t"),
-    Column("df"),
+    Column("df", format=".0f"),
     P,
     Column("p_holm", "p (Holm)", is_p_value=True),
     Column("p_equivalence", "p of TOST", is_p_value=True),
@@ -71,6 +75,12 @@ CLAIM_COLUMNS = (
     Column("share_at_ends", "share at ends"),
     Column("excluded"),
     Column("note"),
+)
+
+VERDICT_COLUMNS = chosen(
+    CLAIM_COLUMNS,
+    *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
+    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends"),
 )
 
 
@@ -133,19 +143,34 @@ def claim_tests(
         `CLAIM_COLUMNS`. The first row, of all textures, has complete participants only, each
         texture counting once, and is a family of its own. The textures are another, Holm for tests
         of difference and of equivalence separately; their verdicts rest on these. Identical
-        textures come last, without tests.
-
-    Raises
-    ------
-    InputError
-        Where no texture is left to compare, or nobody has both models.
+        textures come last, without tests; where all are, there is nothing else.
     """
     compared = values.table[~values.table["texture"].isin(list(standing.identical))]
-    if compared.empty or compared[["reference", "other"]].dropna().empty:
-        raise InputError(
-            f"expected participants with complete answers on both models for the claim "
-            f"{claim.name}, got none; run more sessions, or leave the claim out."
-        )
+    controls = _controls(values, claim, standing, rng=rng)
+    tests = _tests(compared, values, claim, standing, rng=rng) if len(compared) else controls[:0]
+    table = pd.concat([each for each in (tests, controls) if len(each)] or [controls])
+    reference, other = claim.models
+    low, high = claim.bounds or (np.nan, np.nan)
+    return table.reset_index(drop=True).assign(
+        claim=claim.name,
+        measure=MEASURES[claim.measure],
+        planned="yes" if claim.planned else "no",
+        reference=reference,
+        other=other,
+        bound_low=low,
+        bound_high=high,
+    )[names(CLAIM_COLUMNS)]
+
+
+def _tests(
+    compared: pd.DataFrame,
+    values: Values,
+    claim: Claim,
+    standing: Standing,
+    *,
+    rng: np.random.Generator,
+) -> pd.DataFrame:
+    """The row over all textures, and a row for each."""
     overall = _row(_over_textures(compared), claim.bounds, rng=rng)
     overall |= {"texture": ALL_TEXTURES, "p_holm": overall["p"]}
     overall["p_equivalence_holm"] = overall["p_equivalence"]
@@ -162,15 +187,7 @@ def claim_tests(
         _verdict(row, share, standing)
         for row, share in zip(table.to_dict("records"), shares, strict=True)
     ]
-    table = pd.concat([table, _controls(values, claim, standing, rng=rng)], ignore_index=True)
-    reference, other = claim.models
-    return table.assign(
-        claim=claim.name,
-        reference=reference,
-        other=other,
-        bound_low=claim.bounds[0],
-        bound_high=claim.bounds[1],
-    )[names(CLAIM_COLUMNS)]
+    return table
 
 
 def all_equivalent(tests: pd.DataFrame) -> bool:
@@ -186,38 +203,44 @@ def all_equivalent(tests: pd.DataFrame) -> bool:
     """
     textures = tests[(tests["texture"] != ALL_TEXTURES) & (tests["verdict"] != CONTROL)]
     held_back = textures["verdict"].isin([WITHHELD, INTERIM])
-    return bool((textures["p_equivalence"] < ALPHA).all() and not held_back.any())
+    equal = textures["p_equivalence"] < ALPHA
+    return bool(len(textures) and equal.all() and not held_back.any())
 
 
 def _over_textures(compared: pd.DataFrame) -> pd.DataFrame:
     """Means over the textures of each participant; NaN of who is not complete in all of them."""
-    means = compared.groupby("participant_id")[["reference", "other"]].agg(
-        lambda column: column.mean(skipna=False)
-    )
+    lacking = compared[["reference", "other"]].isna().any(axis=1)
+    means = compared.groupby("participant_id")[["reference", "other"]].mean()
+    means[means.index.isin(compared["participant_id"][lacking])] = np.nan
     return means.reset_index()
 
 
-def _row(rows: pd.DataFrame, bounds: Bounds, *, rng: np.random.Generator) -> dict[str, object]:
+def _row(
+    rows: pd.DataFrame, bounds: Bounds | None, *, rng: np.random.Generator
+) -> dict[str, object]:
     """Both tests over the participants of one texture, or of the means over all."""
     both = rows.dropna(subset=["reference", "other"])
     result = paired_test(both["reference"], both["other"], rng=rng)
     differences = without_rounding_noise((both["other"] - both["reference"]).to_numpy(float))
-    equal = equivalence_test(differences, bounds, rng=rng)
+    low, high = float("nan"), float("nan")
+    if not why_undefined(differences):
+        *_, (low,), (high,) = t_tests(differences[None, :], confidence=1 - 2 * ALPHA)
+    equal = equivalence_test(differences, bounds, rng=rng).p if bounds else float("nan")
     return {
         **asdict(result),
-        "ci90_low": equal.ci_low,
-        "ci90_high": equal.ci_high,
-        "p_equivalence": equal.p,
+        "ci90_low": low,
+        "ci90_high": high,
+        "p_equivalence": equal,
         "bf01": bayes_factor_null(result.t, result.n),
         "bf01_highest": bayes_factor_null(0.0, result.n) if result.n > 1 else float("nan"),
         "excluded": ", ".join(sorted(set(rows["participant_id"]) - set(both["participant_id"]))),
     }
 
 
-def _verdict(row: dict[str, object], share_at_ends: float, standing: Standing) -> str:
+def _verdict(row: Mapping[Hashable, Any], share_at_ends: float, standing: Standing) -> str:
     if standing.unfinished:
         return INTERIM
-    found = verdict(float(str(row["p_holm"])), float(str(row["p_equivalence_holm"])))
+    found = verdict(row["p_holm"], row["p_equivalence_holm"])
     doubted = bool(standing.insensitive) or share_at_ends > standing.highest_share_at_ends
     return WITHHELD if found == EQUIVALENT and doubted else found
 
@@ -226,15 +249,17 @@ def _controls(
     values: Values, claim: Claim, standing: Standing, *, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Textures whose models are the same: described, without tests and verdict."""
-    described = ("n", "excluded", "mean_reference", "se_reference", "mean_other", "se_other")
-    described += ("mean_difference", "ci_low", "ci_high")
+    described = (
+        *("n", "excluded", "mean_reference", "se_reference", "mean_other", "se_other"),
+        *("mean_difference", "ci_low", "ci_high"),
+    )
     rows = []
     for texture, of_texture in values.table.groupby("texture", sort=False):
         if texture in standing.identical:
             found = _row(of_texture, claim.bounds, rng=rng)
             kept = {name: found[name] for name in described}
             rows.append({"texture": texture, "verdict": CONTROL, "note": IDENTICAL, **kept})
-    table = pd.DataFrame(rows, columns=names(CLAIM_COLUMNS))
+    table = pd.DataFrame(rows).reindex(columns=names(CLAIM_COLUMNS))
     return table.sort_values("texture", key=ignoring_case) if rows else table
 
 
@@ -290,6 +315,7 @@ def share_at_ends(
     """
     answered = table[table[column].notna()]
     at_end = answered[column].isin(ends)
-    shares = at_end.groupby(answered["texture"]).mean().to_dict()
+    by_texture = at_end.groupby(answered["texture"]).mean()
     compared = ~answered["texture"].isin(list(identical))
+    shares = {str(texture): float(share) for texture, share in by_texture.items()}
     return {**shares, ALL_TEXTURES: float(at_end[compared].mean())}

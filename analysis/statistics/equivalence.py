@@ -1,4 +1,4 @@
-"""No difference as a claim: two one-sided tests against bounds, and what both tests together say."""
+"""No difference as a claim: two one-sided tests against bounds, and what both tests say."""
 
 from __future__ import annotations
 
@@ -85,15 +85,19 @@ def one_sided_tests(differences: Floats, bounds: Bounds) -> tuple[Floats, Floats
     """t and p against the lower, then against the upper bound, (k,) each, of (k, n) differences."""
     above = stats.ttest_1samp(differences, bounds[0], axis=1, alternative="greater")
     below = stats.ttest_1samp(differences, bounds[1], axis=1, alternative="less")
-    return above.statistic, above.pvalue, below.statistic, below.pvalue
+    t_low, p_low, t_high, p_high = np.array(
+        [above.statistic, above.pvalue, below.statistic, below.pvalue]
+    )
+    return t_low, p_low, t_high, p_high
 
 
 def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) -> str:
-    """What a test of a difference and one of equivalence say together; empty where one is NaN.
+    """What a test of a difference and one of equivalence say together.
 
+    Empty where the former could not be made; the latter is NaN where there are no bounds.
     docs/method/statistics.md#verdicts
     """
-    if not np.isfinite(p_difference + p_equivalence):
+    if np.isnan(p_difference):
         return ""
     differs, equals = p_difference < alpha, p_equivalence < alpha
     if differs:

@@ -5,6 +5,7 @@ docs/method/tables.md#analysis-of-variance
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -110,7 +111,7 @@ def participant_cells(
         else:
             values = np.repeat(cell[measure].to_numpy(dtype=float), cell["count"])
             low, high = _t_interval(values)
-        row = {"participant_id": who, **dict(zip(factors, levels, strict=True))}
+        row: dict[str, object] = {"participant_id": who, **dict(zip(factors, levels, strict=True))}
         row |= {"condition": _condition(levels), "trials": trials}
         rows.append(row | {"mean": mean, "ci_low": low, "ci_high": high})
     return pd.DataFrame(rows)
@@ -134,7 +135,7 @@ def cell_means(cells: pd.DataFrame, factors: Sequence[str]) -> pd.DataFrame:
     for condition, cell in cells.groupby("condition", sort=False):
         values = cell["mean"].to_numpy(dtype=float)
         low, high = _t_interval(values)
-        row = {factor: cell[factor].iloc[0] for factor in factors}
+        row: dict[str, object] = {factor: cell[factor].iloc[0] for factor in factors}
         row |= {"condition": condition, "n": values.size, "mean": float(values.mean())}
         rows.append(row | {"ci_low": low, "ci_high": high})
     table = pd.DataFrame(rows)
@@ -191,7 +192,7 @@ def repeated_measures_anova(complete: CompleteCells) -> pd.DataFrame:
     -------
     DataFrame
         `ANOVA_COLUMNS`, a row per effect; `p_corrected` equals p where the effect has one degree of
-        freedom. F and p are NaN where nobody varies.
+        freedom. F and p are NaN where an effect is the same in all participants.
 
     Raises
     ------
@@ -210,9 +211,10 @@ def repeated_measures_anova(complete: CompleteCells) -> pd.DataFrame:
     table.loc[single, "epsilon"] = 1.0
     table.loc[single, "p_corrected"] = table.loc[single, "p"]
     table["n"] = n
-    constant = np.ptp(complete.means) < 1e-12  # else rounding over rounding gives an F
-    if constant:
-        table[["F", "p", "epsilon", "p_corrected", "generalized_eta_squared"]] = np.nan
+    # Where all participants show one effect alike, F would be rounding over rounding.
+    alike = [float(np.ptp(score, axis=0).max()) < 1e-12 for score in _effects(complete).values()]
+    undefined = ["F", "p", "epsilon", "p_corrected", "generalized_eta_squared"]
+    table.loc[alike, undefined] = np.nan
     return table
 
 
@@ -220,7 +222,8 @@ def _few_factors(long: pd.DataFrame, factors: list[str]) -> pd.DataFrame:
     from pingouin import rm_anova  # late: it takes a second to import
 
     within = factors[0] if len(factors) == 1 else factors
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore"), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "The inplace keyword", module="pingouin")
         found = rm_anova(
             data=long,
             dv="mean",
@@ -229,6 +232,9 @@ def _few_factors(long: pd.DataFrame, factors: list[str]) -> pd.DataFrame:
             correction=True,
             effsize="ng2",
         )
+    # It drops columns without any number.
+    numbers = ["ddof1", "ddof2", "F", "p_unc", "eps", "p_GG_corr", "ng2"]
+    found = found.reindex(columns=["Source", *numbers])
     return pd.DataFrame(
         {
             "effect": [str(source).replace(" * ", " × ") for source in found["Source"]],
@@ -252,11 +258,7 @@ def _many_factors(complete: CompleteCells) -> pd.DataFrame:
     plain = {factor: f"f{number}" for number, factor in enumerate(factors)}
     long = complete.long.rename(columns=plain)
     found = AnovaRM(long, "mean", "participant_id", within=list(plain.values())).fit().anova_table
-    scores = {
-        which: _scores(complete.means, which)
-        for size in range(1, len(factors) + 1)
-        for which in combinations(range(len(factors)), size)
-    }
+    scores = _effects(complete)
     unexplained = complete.means.size * np.var(complete.means) - sum(
         len(score) * np.sum(score.mean(axis=0) ** 2) for score in scores.values()
     )
@@ -279,6 +281,15 @@ def _many_factors(complete: CompleteCells) -> pd.DataFrame:
             }
         )
     return pd.DataFrame(rows)
+
+
+def _effects(complete: CompleteCells) -> dict[tuple[int, ...], Floats]:
+    """Scores of each effect, by its factors' numbers: main effects, then interactions."""
+    return {
+        which: _scores(complete.means, which)
+        for size in range(1, len(complete.levels) + 1)
+        for which in combinations(range(len(complete.levels)), size)
+    }
 
 
 def _scores(means: Floats, which: tuple[int, ...]) -> Floats:
@@ -316,10 +327,13 @@ def pairwise_tests(complete: CompleteCells, *, rng: np.random.Generator) -> pd.D
     for axis, (factor, levels) in enumerate(complete.levels.items()):
         others = tuple(i + 1 for i in range(len(complete.levels)) if i != axis)
         means = complete.means.mean(axis=others)
-        rows = []
+        rows: list[dict[str, object]] = []
         for first, second in combinations(range(len(levels)), 2):
             test = paired_test(means[:, first], means[:, second], rng=rng)
-            row = {"factor": factor, "pair": f"{levels[second]} − {levels[first]}"}
+            row: dict[str, object] = {
+                "factor": factor,
+                "pair": f"{levels[second]} − {levels[first]}",
+            }
             shown = ("n", "mean_difference", "ci_low", "ci_high", "t", "df", "p", "d_z", "note")
             rows.append(row | {name: getattr(test, name) for name in shown})
         tables.append(pd.DataFrame(rows).assign(p_holm=lambda table: holm(table["p"])))

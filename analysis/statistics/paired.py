@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,9 @@ from modeling.arrays import Floats
 
 CONFIDENCE = 0.95
 RESAMPLES = 9999  # of sign flips; all of them where there are fewer, that is up to 13 participants
+
+
+Alternative = Literal["two-sided", "greater", "less"]
 
 
 @dataclass(frozen=True)
@@ -187,23 +191,25 @@ def t_tests(
 def wilcoxon(differences: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
     """W and two-sided p of the signed-rank test; NaN where there is no difference.
 
-    Differences of 0 are left out. Where some are tied, by sign flips; else exact up to 50.
+    Differences of 0 are left out. Exact up to 50 people; where some are tied, by sign flips of the
+    ranks, as SciPy's `PermutationMethod` does, but for all draws at once.
     """
     moved = differences[differences != 0]
     if not moved.size:
         return float("nan"), float("nan")
-    tied = np.unique(np.abs(moved)).size < moved.size
-    method = stats.PermutationMethod(n_resamples=RESAMPLES, rng=rng) if tied else "auto"
-    result = stats.wilcoxon(moved, method=method)
-    return float(result.statistic), float(result.pvalue)
+    result = stats.wilcoxon(moved)
+    ranks = stats.rankdata(np.abs(moved))
+    if np.unique(ranks).size == ranks.size:
+        return float(result.statistic), float(result.pvalue)
+    return float(result.statistic), sign_flips_p(np.sign(moved) * ranks, rng=rng)
 
 
 def sign_flips_p(
-    differences: Floats, *, rng: np.random.Generator, alternative: str = "two-sided"
+    differences: Floats, *, rng: np.random.Generator, alternative: Alternative = "two-sided"
 ) -> float:
     """p of the mean when each participant's difference could as well have the other sign.
 
-    Exact up to 13 participants, else from 9999 draws; NaN of no participant.
+    Exact up to 13 participants, else from 9999 draws; of one participant 1, of none NaN.
     docs/method/statistics.md#sign-flips
 
     Parameters
@@ -212,8 +218,8 @@ def sign_flips_p(
     rng : Generator
     alternative : {"two-sided", "greater", "less"}
     """
-    if not differences.size:
-        return float("nan")
+    if differences.size < 2:
+        return 1.0 if differences.size else float("nan")
     result = stats.permutation_test(
         (differences, np.zeros_like(differences)),
         lambda one, other, axis: (one - other).mean(axis=axis),

@@ -1,8 +1,8 @@
-"""Correct rates of the relative task, against chance and between models."""
+"""Correct rates of the forced choice against chance."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,20 +10,13 @@ import pandas as pd
 from scipy import stats
 
 from analysis.columns import MODEL, TEXTURE, Column, P, names
-from analysis.labels import ALL_TEXTURES, MODELS
+from analysis.labels import ALL_TEXTURES
 from analysis.statistics.paired import (
-    CI_HIGH,
-    CI_LOW,
     CONFIDENCE,
-    DF,
-    NOTE,
-    P_HOLM,
-    PAIRED_COLUMNS,
-    T,
     holm,
     ignoring_case,
     mean,
-    paired_family,
+    sign_flips_p,
     standard_error,
     t_test,
     why_undefined,
@@ -33,32 +26,6 @@ from modeling import InputError
 from modeling.arrays import Floats
 
 BOOTSTRAP_RESAMPLES = 5000
-RATE_TEST_COLUMNS = PAIRED_COLUMNS
-
-
-def rate_tests(relative: pd.DataFrame, *, identical: Collection[str] = frozenset()) -> pd.DataFrame:
-    """Paired tests of the correct rates (PAPER VIII-B), Holm over the textures.
-
-    Parameters
-    ----------
-    relative : DataFrame
-        `Responses.relative`; rates are shares 0–1 per participant.
-    identical : collection of str
-        As in `rating_tests`. They stay in the row over all textures, where the choice was among
-        all models of one kind.
-
-    Returns
-    -------
-    DataFrame
-        One row per texture as in `rating_tests`, then one over all textures, which is not part
-        of the family (its p_holm is NaN).
-    """
-    family = paired_family(relative, "correct", identical=identical)
-    overall = paired_family(relative.assign(texture=ALL_TEXTURES), "correct")
-    tests = pd.concat([family, overall.assign(p_holm=np.nan)], ignore_index=True)
-    return tests[names(RATE_TEST_COLUMNS)]
-
-
 CORRECT_RATE_COLUMNS = (
     TEXTURE,
     MODEL,
@@ -66,12 +33,22 @@ CORRECT_RATE_COLUMNS = (
     Column("trials"),
     Column("mean"),
     Column("se", "SE"),
-    *(CI_LOW, CI_HIGH, T, DF, P, NOTE, P_HOLM),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+    Column("t"),
+    Column("df"),
+    P,
+    Column("note"),
+    Column("p_holm", "p (Holm)", is_p_value=True),
 )
 
 
 def correct_rates(
-    relative: pd.DataFrame, *, rng: np.random.Generator, chance: float = 1 / 7
+    relative: pd.DataFrame,
+    models: Sequence[str],
+    *,
+    rng: np.random.Generator,
+    chance: float = 1 / 7,
 ) -> pd.DataFrame:
     """Correct rates per texture and model against chance, participants as units.
 
@@ -81,8 +58,10 @@ def correct_rates(
     ----------
     relative : DataFrame
         Columns participant_id, texture, model, correct (0, 1 or NaN).
+    models : sequence of str
+        The sets of models, in the order of the rows.
     rng : Generator
-        Draws the participants of the bootstrap.
+        Draws the participants of the bootstrap, and sign flips.
     chance : float
         Rate of a guessing participant, 0 … 1.
 
@@ -91,36 +70,54 @@ def correct_rates(
     DataFrame
         texture, model, participants, trials, mean, se, ci_low, ci_high (95 %, bias-corrected and
         accelerated bootstrap over participants), t, df, p (one-sample t of the participants'
-        rates against chance, two-sided), note, p_holm (over the textures of one model). The rows
-        `all textures` pool a participant's trials and stand outside the family.
+        rates against chance, two-sided; of sign flips where all have one rate), note, p_holm (over
+        the textures of one model). The rows `all textures` stand outside the family: means over
+        the textures, each counting once, of participants who answered on all of them.
+
+    Raises
+    ------
+    InputError
+        Where nobody answered.
     """
-    pooled = relative.assign(texture=ALL_TEXTURES)
-    rows = []
-    for model in MODELS:
-        for table in (relative, pooled):
-            chosen = table[table["model"] == model]
-            family = pd.DataFrame(
-                _rate_row(cell, rng=rng, chance=chance) | {"texture": texture, "model": model}
-                for texture, cell in chosen.groupby("texture", sort=False)
-            )
-            if family.empty:
-                continue
-            family["p_holm"] = holm(family["p"]) if table is relative else np.nan
-            rows.append(family.sort_values("texture", key=ignoring_case))
+    rates = relative.groupby(["model", "texture", "participant_id"])["correct"].mean().dropna()
+    trials = relative[relative["correct"].notna()].groupby(["model", "texture"]).size()
+    rows: list[pd.DataFrame] = []
+    for model in models:
+        if model not in rates.index.get_level_values("model"):
+            continue
+        wide = rates.loc[model].unstack("texture")
+        family = pd.DataFrame(
+            {
+                "texture": texture,
+                "trials": int(trials[model, texture]),
+                **_rate_row(of_texture.dropna().to_numpy(float), rng=rng, chance=chance),
+            }
+            for texture, of_texture in wide.items()
+        ).sort_values("texture", key=ignoring_case)
+        complete = wide.dropna()
+        overall = _rate_row(complete.mean(axis=1).to_numpy(float), rng=rng, chance=chance)
+        of_complete = relative["participant_id"].isin(complete.index) & (relative["model"] == model)
+        overall |= {
+            "texture": ALL_TEXTURES,
+            "trials": int(relative[of_complete]["correct"].notna().sum()),
+        }
+        both = [family.assign(p_holm=holm(family["p"])), pd.DataFrame([overall])]
+        rows += [table.assign(model=model) for table in both]
     if not rows:
         raise InputError("expected answers of the forced choice, got none; run a session first.")
     return pd.concat(rows, ignore_index=True)[names(CORRECT_RATE_COLUMNS)]
 
 
-def _rate_row(cell: pd.DataFrame, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:
-    rates = cell.groupby("participant_id")["correct"].mean().dropna().to_numpy(dtype=float)
+def _rate_row(rates: Floats, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:
+    """Of one rate per participant."""
     against_chance = without_rounding_noise(rates - chance)
     undefined = why_undefined(against_chance)
-    t, p = (np.nan, np.nan) if undefined else t_test(against_chance)[:2]
+    t, p = (
+        (np.nan, sign_flips_p(against_chance, rng=rng)) if undefined else t_test(against_chance)[:2]
+    )
     low, high = (np.nan, np.nan) if undefined else bootstrap_interval(rates, rng)
     return {
         "participants": rates.size,
-        "trials": int(cell["correct"].notna().sum()),
         "mean": mean(rates),
         "se": standard_error(rates),
         "ci_low": low,

@@ -15,8 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from experiments.console.screens import open_window
+from experiments.sessions.surfaces import present
 from modeling import InputError
-from rig.interface import Presentable, Stimulus, TextureRig
+from rig.interface import Presentable, TextureRig
 
 FLIPS = 240
 PRESSES = 20
@@ -91,12 +92,8 @@ def time_presentations(rig: TextureRig, models: Sequence[Presentable]) -> Timing
     try:
         taken = []
         for number in range(PRESSES):
-            shown, pressed_s = models[number % len(models)], rig.now_s()
-            if isinstance(shown, Stimulus):
-                left_s = rig.present_signal(shown)
-            else:
-                left_s = rig.present_model(shown)
-            taken.append(1e3 * (left_s - pressed_s))
+            pressed_s = rig.now_s()
+            taken.append(1e3 * (present(rig, models[number % len(models)]) - pressed_s))
         faults = rig.take_faults()
     finally:
         rig.close()

@@ -68,6 +68,13 @@ class Choice:
     response_time_s: float
 
 
+def present(rig: TextureRig, shown: Presentable | ToneBurst) -> float:
+    """Present a virtual surface, a stimulus from its beginning; when its first sample left."""
+    if isinstance(shown, ToneBurst | Stimulus):
+        return rig.present_signal(shown)
+    return rig.present_model(shown)
+
+
 class Surfaces:
     """What a participant can switch between in one trial; made by the trial loop.
 
@@ -182,7 +189,7 @@ class Surfaces:
         shown = self._models[index]
         if isinstance(shown, ToneBurst) and index in self.felt:
             return
-        left_s = self._present(shown)
+        left_s = present(self._rig, shown)
         self.presses += 1
         self.felt.add(index)
         self._presented("virtual", left_s, index=index)
@@ -208,18 +215,12 @@ class Surfaces:
         elif self._selected is not None:
             shown = self._models[self._selected]
             if not isinstance(shown, ToneBurst):
-                self._again("virtual", self._present(shown), index=self._selected)
+                self._again("virtual", present(self._rig, shown), index=self._selected)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""
         if self._rig.read().button:
             self.toggle()
-
-    def _present(self, shown: Presentable | ToneBurst) -> float:
-        """Present a virtual surface, a stimulus from its beginning; when its first sample left."""
-        if isinstance(shown, ToneBurst | Stimulus):
-            return self._rig.present_signal(shown)
-        return self._rig.present_model(shown)
 
     def _again(self, shown: str, left_s: float, **which: int) -> None:
         self._note("presented", surface=shown, start_s=left_s, **which)

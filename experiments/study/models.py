@@ -73,12 +73,9 @@ class ModelSets:
         self, textures: Sequence[str], names: Sequence[str] | None = None
     ) -> tuple[str, ...]:
         """The textures whose models are equal in all (or these) sets: nothing to compare."""
-        first, *others = names or self.names
-        return tuple(
-            texture
-            for texture in textures
-            if all(self.of(texture, first) == self.of(texture, name) for name in others)
-        )
+        every = tuple(names or self.names)
+        equal = self.equal_models(textures, every)
+        return tuple(texture for texture, groups in equal.items() if groups == (every,))
 
     def equal_models(
         self, textures: Sequence[str], names: Sequence[str] | None = None

@@ -250,7 +250,7 @@ class DeskRig:
 
     def _present_stimulus(self, stimulus: Stimulus) -> float:
         self.silence()
-        check_made_for(self._file, stimulus)
+        check_made_for(self._file, stimulus, f"the stimulus of {stimulus.texture}")
         sound, compensated = self.parts.sound, stimulus.vibrator_sha256 is not None
         start_s = self._started(
             lambda: sound.play_signal(stimulus.samples_g, compensated=compensated)

@@ -7,6 +7,7 @@ module, is the one that ships.
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -18,7 +19,7 @@ from modeling import InputError
 from modeling.checks import check_keys
 from modeling.files.documents import check_version, read_toml, toml_section
 from modeling.files.hashes import sha256_of_values
-from modeling.files.reading import read_text
+from modeling.files.reading import read_bytes, read_text
 from modeling.files.writing import write_text
 from modeling.rendering.limits import Limits
 from modeling.vibrators.vibrator import Vibrator
@@ -121,6 +122,14 @@ class RigFile:
         _rig_from(tomllib.loads(text), file)
         write_text(file, text)
         return RigFile.load(file)
+
+    @cached_property
+    def vibrator_sha256(self) -> str | None:
+        """SHA-256 of the file that [vibrator] names, None where it names none."""
+        file = self.vibrator.file
+        if file is None:
+            return None
+        return hashlib.sha256(read_bytes(self.path.parent / file, "the vibrator")).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that JSON takes too, defaults written out."""

@@ -6,7 +6,7 @@ docs/method/live.md#signals
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +15,11 @@ from modeling.errors import InputError, shown
 from modeling.files.reading import read_bytes
 from modeling.files.tables import number, read_table
 from modeling.files.wav import read_wav
-from modeling.models.loading import AnyModel, load_model, made_from
+from modeling.models.loading import load_model, made_from
 from rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
 MANIFEST = "manifest.tsv"
-_SOURCES = "sources"
 _COLUMNS = ("file", "unit", "format", "full_scale_g", "sha256", "vibrator_sha256", "simulated")
 _WHERE = ("trajectory", "speed_mm_s", "force_n", "gain_db")
 _CONDITION = (*_WHERE, "vibrator_sha256")
@@ -122,6 +121,7 @@ def stimuli_of_surfaces(
             f"{', '.join(labels)}; name the study's set of models after one of them."
         )
     wanted = label if len(labels) != 1 else labels[0]
+    sources = _sources(folder)
     found: dict[str, Stimulus] = {}
     for texture in textures:
         fitting = [row for row in rows if (row["texture"], row["model"]) == (texture, wanted)]
@@ -132,13 +132,14 @@ def stimuli_of_surfaces(
                 "trajectory, one seed and one rate."
             )
         if fitting:
-            found[texture] = _stimulus(folder, fitting[0])
+            found[texture] = _stimulus(folder, fitting[0], sources)
     return found
 
 
-def _stimulus(folder: Path, row: dict[str, str]) -> Stimulus:
+def _stimulus(folder: Path, row: dict[str, str], sources: Mapping[str, Path]) -> Stimulus:
     prepared = _prepared(folder, row)
-    model = _source(folder / _SOURCES, row["model_sha256"])
+    source = sources.get(row["model_sha256"])
+    model = None if source is None else load_model(source)
     return Stimulus(
         **vars(prepared),
         texture=row["texture"],
@@ -149,12 +150,10 @@ def _stimulus(folder: Path, row: dict[str, str]) -> Stimulus:
     )
 
 
-def _source(sources: Path, sha256: str) -> AnyModel | None:
-    """The copy of a model whose file has this hash, None where it is gone."""
-    for path in sorted(sources.glob("*.json")):
-        if hashlib.sha256(read_bytes(path, "a model")).hexdigest() == sha256:
-            return load_model(path)
-    return None
+def _sources(folder: Path) -> dict[str, Path]:
+    """The copies of models that a set keeps, by the SHA-256 of their file."""
+    copies = (folder / "sources").glob("*.json")
+    return {hashlib.sha256(read_bytes(path, "a model")).hexdigest(): path for path in copies}
 
 
 def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,15 +15,21 @@ from tactileq.options import Out, Seed
 from tactileq.telling import share_of, usable_recordings
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from analysis.answers.loading import Responses
+    from analysis.answers.plan import AnalysisPlan
     from analysis.textures.results import TextureResult
     from modeling import Simplification, TextureModel
 
 
 def analyze(
     data: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Folder of the study's answers; with --table: further tables."),
+        list[str] | None,
+        typer.Argument(
+            help="Folder of the study's answers; of several set-ups NAME=FOLDER each. With "
+            "--table: further tables."
+        ),
     ] = None,
     table: Annotated[
         list[Path] | None,
@@ -38,12 +45,22 @@ def analyze(
     ] = None,
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
     simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
+    plan: Annotated[
+        Path | None, typer.Option(help="Study file whose claims are tested though it came later.")
+    ] = None,
+    exclude: Annotated[
+        list[str] | None, typer.Option(help="Participant and why: sub-05='fell asleep'.")
+    ] = None,
+    complete: Annotated[
+        bool, typer.Option("--complete", help="Compare complete pairs, where some are not.")
+    ] = False,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
-    With --recordings, --models and --simplified the report also tells how good and how small the
-    models are; why layers went stands in the folder that tactileq simplify wrote.
+    Claims are those of the study that was run; those of --plan are exploratory. With --recordings,
+    --models and --simplified the report also tells how good and how small the models are; why
+    layers went stands in the folder that tactileq simplify wrote.
 
     With --table answers come from tables of any experiment. The map names columns: participant
     (else the file's name), factor (any number), count, and one of correct (0 or 1), share (0 to
@@ -54,31 +71,41 @@ def analyze(
 
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
-    from analysis.answers.loading import load_responses
+    folders = (recordings, models, simplified)
+    if table is not None or columns is not None:
+        if (*folders, plan, exclude) != (None,) * 5 or complete:
+            raise ValueError(
+                "expected --table with no option but --map, --out and --seed, got more; "
+                "leave the others out."
+            )
+        files = [*(table or []), *map(Path, data or [])]
+        analyze_tables(files, columns or "", out=out, seed=seed)
+        return
+    if not data:
+        raise ValueError(
+            "expected a folder of answers, or --table with files, got neither; give one of the two."
+        )
+    from analysis.answers.loading import leave_out, load_responses
+    from analysis.answers.setups import pool_setups
     from analysis.report.report import write_report
+    from analysis.statistics.verdicts import check_complete
     from experiments.sessions.bids import export_all
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
-    folders = (recordings, models, simplified)
-    if table is not None or columns is not None:
-        if folders != (None, None, None):
-            raise ValueError(
-                "expected --table without --recordings, --models and --simplified, got both; "
-                "leave those out."
-            )
-        return analyze_tables([*(table or []), *(data or [])], columns, out=out, seed=seed)
-    if data is None or len(data) != 1:
-        raise ValueError(
-            f"expected one folder of answers or --table with files, got {len(data or [])} "
-            "folders; give one of the two."
-        )
-    answers = data[0]
     check_own_results(out, "analyze")
-    export_all(answers)  # of sessions that were killed
-    responses = load_responses(answers)
+    places = _places(data)
+    for place in places.values():
+        export_all(place)  # of sessions that were killed
+    setups = {name: load_responses(place) for name, place in places.items()}
+    responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
+    responses = leave_out(responses, dict(map(_with_reason, exclude or ())))
+    if plan is not None:
+        responses = replace(responses, plan=_later_plan(plan, responses.plan))
+    if not complete:
+        check_complete(responses)
     results = []
     if recordings is not None and models is not None and simplified is not None:
         results = results_of_study(
@@ -93,7 +120,7 @@ def analyze(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    inputs = [path for path in (answers, *folders) if path is not None]
+    inputs = [path for path in (*places.values(), *folders) if path is not None]
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
         settings = settings_of(responses, results)
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
@@ -101,6 +128,7 @@ def analyze(
             fresh / "report.html",
             responses=responses,
             textures=results,
+            hand=_hand(places, setups),
             provenance=provenance,
             seed=seed,
             progress=tell,
@@ -111,7 +139,7 @@ def analyze(
     print((out / "report.html").resolve())
 
 
-def analyze_tables(files: Sequence[Path], columns: str | None, *, out: Path, seed: int) -> None:
+def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int) -> None:
     """Write the report on tables of any experiment."""
     import numpy as np
 
@@ -126,10 +154,10 @@ def analyze_tables(files: Sequence[Path], columns: str | None, *, out: Path, see
         got = f"the folder {folders[0]}" if folders else "none"
         raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
     check_own_results(out, "analyze")
-    imported = load_imported(files, parse_map(columns or ""))
+    imported = load_imported(files, parse_map(columns))
     sections = table_sections(imported, rng=np.random.default_rng(seed))
     with replace_folder(out) as fresh, share_of("Reporting") as tell:
-        provenance = provenance_of("analyze", {"map": columns or ""}, seed=seed, inputs=files)
+        provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=files)
         write_report(
             fresh / "report.html",
             benches=sections,
@@ -140,6 +168,46 @@ def analyze_tables(files: Sequence[Path], columns: str | None, *, out: Path, see
         )
         seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
+
+
+def _places(data: Sequence[str]) -> dict[str, Path]:
+    """The folder of each set-up, by its name; one alone needs none."""
+    if len(data) == 1:
+        return {"": Path(data[0])}
+    named = [text.partition("=") for text in data]
+    places = {name: Path(folder) for name, _, folder in named if name and folder}
+    if len(places) < len(data):
+        raise ValueError(
+            f"expected a name of its own for each of several set-ups, got {', '.join(data)}; name "
+            "them, as in leipzig=data nara=other/data."
+        )
+    return places
+
+
+def _hand(places: Mapping[str, Path], setups: Mapping[str, Responses]) -> DataFrame:
+    """How the hand moved at all set-ups, participants named as in the answers."""
+    import pandas as pd
+
+    from analysis.answers.hand import load_hand
+    from analysis.answers.setups import named_after
+
+    tables = [(name, load_hand(place, setups[name].answers)) for name, place in places.items()]
+    return pd.concat([named_after(name, table) for name, table in tables], ignore_index=True)
+
+
+def _with_reason(text: str) -> tuple[str, str]:
+    who, _, why = text.partition("=")
+    return who, why
+
+
+def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
+    """The claims of a study file; those that were not registered are exploratory."""
+    from analysis.answers.plan import plan_from
+    from experiments.study.study import Study
+
+    later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
+    claims = (replace(claim, planned=claim in registered.claims) for claim in later.claims)
+    return replace(later, claims=tuple(claims))
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:

@@ -92,6 +92,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             results,
             benches=benches.sections(rivals),
             provenance=provenance,
+            planted=population.planted,
             seed=seed,
             mapped=mapped,
         )
@@ -220,20 +221,25 @@ def write_demo_report(
     *,
     benches: Sequence[Section],
     provenance: Mapping[str, object],
+    planted: Mapping[str, Mapping[str, float]],
     seed: int,
     mapped: Mapped,
 ) -> None:
     """The report of everything in the demo's folder, with a progress bar."""
+    from analysis.answers.hand import load_hand
     from analysis.answers.loading import load_responses
     from analysis.report.report import write_report
 
+    responses = load_responses(folder / "data")
     with share_of("Analyzing") as tell:
         write_report(
             folder / "report.html",
-            responses=load_responses(folder / "data"),
+            responses=responses,
             textures=results,
+            hand=load_hand(folder / "data", responses.answers),
             benches=benches,
             provenance=provenance,
+            planted=planted,
             seed=seed,
             progress=tell,
             mapped=mapped,

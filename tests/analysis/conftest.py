@@ -11,6 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.answers.loading import Responses
+from analysis.answers.plan import AnalysisPlan, Claim
+from analysis.statistics.verdicts import ClaimFound, claims_found
 from analysis.textures.results import TextureResult
 from modeling import TextureModel, Threshold, fit_texture, simplify
 from stimuli.planted.textures import planted_texture, record_texture
@@ -168,6 +171,50 @@ def rating_table(
                     }
                 )
     return pd.DataFrame(rows)
+
+
+def claim(
+    measure: str, *, bounds: tuple[float, float] | None = (-7.5, 7.5), planned: bool = True
+) -> Claim:
+    """A claim about full and simplified models."""
+    return Claim(
+        name=f"{measure} is the same",
+        task="relative" if measure == "correct" else "absolute",
+        measure=measure,
+        models=("full", "simplified"),
+        bounds=bounds,
+        test="equivalence",
+        planned=planned,
+    )
+
+
+PLAN = AnalysisPlan(
+    claims=(
+        claim("magnitude_similarity"),
+        claim("frequency_similarity"),
+        claim("correct", bounds=(-0.1, 0.1)),
+    ),
+    exclusions=("Trials in which the rig failed are repeated.",),
+    sha256=("0a" * 32,),
+)
+
+
+@pytest.fixture(scope="session")
+def plan() -> AnalysisPlan:
+    """Three claims of equivalence with bounds."""
+    return PLAN
+
+
+@pytest.fixture(scope="session")
+def found(ratings: pd.DataFrame, choices: pd.DataFrame) -> list[ClaimFound]:
+    """The claims of the plan about the answers of sixteen people."""
+    responses = Responses(
+        {"absolute": ratings, "relative": choices},
+        simulated_participants=True,
+        simulated_rig=True,
+        plan=PLAN,
+    )
+    return claims_found(responses, rng=np.random.default_rng(5))
 
 
 @pytest.fixture(scope="session")

@@ -51,12 +51,12 @@ def test_matrices_are_drawn_for_each_condition(main, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ((), "expected one folder of answers or --table with files, got 0 folders"),
-        (("one", "two"), "got 2 folders"),
+        ((), "expected a folder of answers, or --table with files, got neither"),
+        (("--table", HAPTICOMM[0], "--complete"), "expected --table with no option but"),
         (("--map", "correct=A"), "expected files of answers with --table, got none"),
         (("--table", ".", "--map", "correct=A"), "got the folder ."),
         (("--table", HAPTICOMM[0], "--map", "correct=NO"), "there are ID, TYPE, SIZE, TYPE_ANS"),
-        (("--table", HAPTICOMM[0], "--models", "m"), "expected --table without --recordings"),
+        (("--table", HAPTICOMM[0], "--models", "m"), "expected --table with no option but"),
     ],
 )
 def test_what_cannot_be_analysed_is_refused(main, tmp_path: Path, words, told: str) -> None:

@@ -65,7 +65,7 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
         assert ((found.mean() - pd.Series(points)).abs() < 4 * errors).all()
     assert json.loads((demo / "provenance.json").read_text())["seed"] == 1
 
-    names = ["gfc", "rating_tests", "rate_tests", "correct_rates", "planted_truth"]
+    names = ["gfc", "claims", "claim_tests", "correct_rates", "planted_truth"]
     names += ["regressions", "regression_support", "regression_coefficients", "centroid", "driving"]
     for name in names:
         table = pd.read_csv(demo / "tables" / f"{name}.tsv", sep="\t")
@@ -78,6 +78,13 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     numbers = driving[driving.texture == "all textures"].set_index("driven_by").numbers
     assert numbers["grid"] > 10 * numbers["conditions"] > 10 * numbers["centroid"]
     assert (demo / "figures/centroid.png").read_bytes().startswith(b"\x89PNG")
+
+    # What the report says is what was planted, or nothing; MDF's difference it finds.
+    said = pd.read_csv(demo / "tables/planted_effects.tsv", sep="\t")
+    assert set(said.agreement) <= {"agrees", "undecided"}
+    magnitude = said[said.claim == "magnitude feels the same"].set_index("texture")
+    assert magnitude.loc["MDF", ["planted", "verdict"]].tolist() == [-12.0, "different"]
+    assert (said.agreement == "agrees").sum() >= 4
 
 
 def answers_of(data: Path, task: str) -> pd.DataFrame:

@@ -14,33 +14,16 @@ from typing import Any
 import pytest
 
 from experiments.sessions.log import read_log
-from stimuli.planted.textures import planted_texture
 from tests.rig.waiting import wait_until
+from tests.two_surfaces import save_two_surfaces
 
-STUDY = """
-name = "Two surfaces"
-seed = 3
-textures = ["MDF", "PVC"]
-[trays]
-MDF = "A"
-PVC = "B"
-[absolute]
-participants = 2
-schedule = "interleaved"
-training_trials = 1
-"""
 WORDS = ("session", "--task", "absolute", "--study", "study.toml", "--data", "data")
 SECONDS = 120.0  # for a hang, not for speed
 
 
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
-    for name in ("MDF", "PVC"):
-        model = planted_texture(name)
-        for folder, kept in (("models", model), ("simplified", model.with_layers([0]))):
-            (tmp_path / folder).mkdir(exist_ok=True)
-            kept.save(tmp_path / folder / f"{name}.json")
-    (tmp_path / "study.toml").write_text(STUDY)
+    save_two_surfaces(tmp_path)
     return tmp_path
 
 

@@ -15,23 +15,9 @@ from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.surfaces import SessionAborted, Surfaces
 from experiments.study.study import Study
 from modeling import InputError
-from stimuli.planted.textures import planted_texture
 from tactileq.commands.session import session
 from tests.experiments.scripted import Ready, Scripted
-
-STUDY = """
-name = "Two surfaces"
-seed = 3
-textures = ["MDF", "PVC"]
-languages = ["en", "ja"]
-[trays]
-MDF = "A"
-PVC = "B"
-[absolute]
-participants = 2
-schedule = "interleaved"
-training_trials = 1
-"""
+from tests.two_surfaces import save_two_surfaces
 
 
 class Leaves(Scripted):
@@ -41,12 +27,7 @@ class Leaves(Scripted):
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    for name in ("MDF", "PVC"):
-        model = planted_texture(name)
-        for folder, kept in (("models", model), ("simplified", model.with_layers([0]))):
-            (tmp_path / folder).mkdir(exist_ok=True)
-            kept.save(tmp_path / folder / f"{name}.json")
-    (tmp_path / "study.toml").write_text(STUDY)
+    save_two_surfaces(tmp_path, 'languages = ["en", "ja"]')
     monkeypatch.setattr("tactileq.experimenter.Terminal", Ready)
     return tmp_path
 

@@ -11,6 +11,7 @@ import pytest
 
 from analysis.answers.loading import PlannedTask, load_responses
 from modeling import InputError
+from tests.analysis.conftest import TEXTURES
 
 
 def test_main_trials_and_training_are_kept_apart(study_folder, write_task, absolute_rows):
@@ -105,7 +106,6 @@ def test_windows_line_ends_and_byte_order_mark_are_read(study_folder, write_task
         (7, "high", "from 0 to 100"),
         (7, "nan", "from 0 to 100"),
         (9, "inf", "at least 0"),
-        (3, "half", "full or simplified"),
         (1, "warm-up", "training or main"),
         (5, "left", "real or virtual"),
         (2, "n/a", "a value in column texture"),
@@ -328,15 +328,88 @@ def _describe(folder, **values):
     return path
 
 
+def _models_of_all() -> dict[str, dict[str, str]]:
+    return {texture: {"full": "0a", "simplified": "1b"} for texture in TEXTURES}
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        (2, "linen", "aluminum or canvas or .* wall paper, the study's textures, in column"),
+        (3, "half", "full or simplified, the study's sets of models, in column model"),
+    ],
+)
+def test_textures_and_models_that_the_study_does_not_have_are_refused(
+    study_folder, write_task, absolute_rows, column, value, expected
+):
+    absolute_rows[4][column] = value
+    path = write_task("absolute", absolute_rows)
+    path.with_suffix(".json").write_text("{}")
+    _describe(study_folder, ModelsSHA256=_models_of_all())
+    with pytest.raises(InputError, match=expected) as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, path)
+
+
+def test_one_session_under_two_names_is_refused(study_folder, write_task, relative_rows):
+    for number, row in enumerate(relative_rows):
+        row[-2] = f"{20 + number / 7:.3f}"
+    write_task("relative", relative_rows)
+    twice = write_task("relative", relative_rows, participant="sub-02")
+    with pytest.raises(InputError, match="found those of sub-01 relative ses-01") as caught:
+        load_responses(study_folder)
+    _one_sentence(caught.value, twice)
+    relative_rows[3][-2] = "21.999"
+    write_task("relative", relative_rows, participant="sub-02")
+    assert len(load_responses(study_folder).relative) == 14
+
+
+def test_claims_come_from_the_study_that_was_run(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    stated = {
+        "name": "as strong",
+        "task": "absolute",
+        "measure": "magnitude_similarity",
+        "models": ["full", "simplified"],
+        "bounds": [-7.5, 5],
+        "test": "equivalence",
+    }
+    plan = {"claims": [stated], "exclusions": ["who slept"], "highest_share_at_ends": 0.3}
+    description = _describe(study_folder, StudyDesign={"plan": plan})
+    path.with_suffix(".json").write_text(json.dumps({"PlanSHA256": "ab"}))
+    found = load_responses(study_folder).plan
+    assert found.claims[0].bounds == (-7.5, 5.0)
+    assert found.claims[0].planned
+    assert (found.exclusions, found.highest_share_at_ends) == (("who slept",), 0.3)
+    assert found.sha256 == ("ab",)
+    for wrong in ({"bounds": [1, 2]}, {"measure": "toggle"}, {"models": ["full"]}, {"task": "?"}):
+        _describe(study_folder, StudyDesign={"plan": {"claims": [stated | wrong]}})
+        with pytest.raises(
+            InputError, match=r"expected the claims of a study's \[plan\]"
+        ) as caught:
+            load_responses(study_folder)
+        _one_sentence(caught.value, description)
+
+
+def test_equal_models_are_those_that_sessions_name(study_folder, write_task, absolute_rows):
+    path = write_task("absolute", absolute_rows)
+    groups = {"canvas": [["full", "simplified"]], "PVC": [["simplified", "AR"]]}
+    path.with_suffix(".json").write_text(json.dumps({"Identical": groups}))
+    responses = load_responses(study_folder)
+    assert responses.identical() == {"canvas"}
+    assert responses.identical(("simplified", "AR")) == {"PVC"}
+    assert responses.identical(("full", "AR")) == frozenset()
+
+
 def test_identical_models_are_known_by_their_hashes(study_folder, write_task, absolute_rows):
     path = write_task("absolute", absolute_rows)
-    assert load_responses(study_folder).identical == frozenset()
+    assert load_responses(study_folder).identical() == frozenset()
     path.with_suffix(".json").write_text("{}")
-    models = {"canvas": {"full": "0a", "simplified": "0a"}, "PVC": {"full": "1", "simplified": "2"}}
+    models = _models_of_all() | {"canvas": {"full": "0a", "simplified": "0a"}}
     _describe(study_folder, ModelsSHA256=models)
     responses = load_responses(study_folder)
     assert responses.models == models
-    assert responses.identical == {"canvas"}
+    assert responses.identical() == {"canvas"}
 
 
 def test_sessions_without_sidecar_or_answers_are_noticed(
@@ -381,13 +454,13 @@ def test_a_changed_manifest_or_design_is_refused(
     "models",
     [
         *(7, {"canvas": "0a"}, {"canvas": {"full": "0a"}}),
-        {"canvas": {"full": "0a", "simplified": "1", "paper": "2"}},
+        {"canvas": {"full": "0a", "AR": "1"}, "PVC": {"full": "0a", "simplified": "1"}},
     ],
 )
 def test_a_damaged_list_of_models_is_refused(study_folder, write_task, absolute_rows, models):
     write_task("absolute", absolute_rows)
     path = _describe(study_folder, ModelsSHA256=models)
-    with pytest.raises(InputError, match="models of each texture|full and simplified") as caught:
+    with pytest.raises(InputError, match="models of each texture|of the same sets") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)
 
@@ -399,7 +472,7 @@ def test_sessions_with_other_models_or_another_study_are_refused(
     study_folder, write_task, absolute_rows, key, value
 ):
     path = write_task("absolute", absolute_rows)
-    models = {"canvas": {"full": "0a", "simplified": "1b"}}
+    models = _models_of_all()
     _describe(study_folder, ModelsSHA256=models, StudySHA256="00")
     sidecar = path.with_suffix(".json")
     sidecar.write_text(json.dumps({key: value}))
@@ -420,7 +493,7 @@ def test_a_session_that_went_on_against_a_rule_is_told(
     study_folder, write_task, absolute_rows, key, value, what
 ):
     path = write_task("absolute", absolute_rows)
-    models = {"canvas": {"full": "0a", "simplified": "1b"}}
+    models = _models_of_all()
     _describe(study_folder, ModelsSHA256=models, StudySHA256="00", Pilot=False)
     sidecar = path.with_suffix(".json")
     record = {"what": what, "reason": "the disk was lost"}
@@ -590,7 +663,7 @@ def _relative_columns() -> tuple[str, ...]:
         ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20)),
         (
             {"participants": 3, "schedule": "by-day", "models": ["full", "paper", "AR"]},
-            PlannedTask(3, 9),
+            PlannedTask(3, 9, ("full", "paper", "AR")),
         ),
     ],
 )

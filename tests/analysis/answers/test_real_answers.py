@@ -12,8 +12,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import stats
 
+from analysis.answers.plan import Claim
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.rates import correct_rates, rate_tests
+from analysis.statistics.claims import Standing, Values, claim_tests, complete_means
+from analysis.statistics.rates import correct_rates
 
 FOLDER = Path(__file__).parents[2] / "data" / "hapticomm_3x3"
 TYPES = {"1": "slide", "2": "tap", "3": "tap and hold"}
@@ -50,7 +52,8 @@ def _counted() -> dict[tuple[str, str, str], list[int]]:
 
 def test_rates_against_chance(answers):
     counted = _counted()
-    rates = correct_rates(answers, rng=np.random.default_rng(0), chance=1 / 3)
+    models = ("full", "simplified")
+    rates = correct_rates(answers, models, rng=np.random.default_rng(0), chance=1 / 3)
     overall = rates[(rates["texture"] == ALL_TEXTURES) & (rates["model"] == "full")].iloc[0]
     by_person: dict[str, list[int]] = defaultdict(list)
     for (person, _, size), right in counted.items():
@@ -65,7 +68,20 @@ def test_rates_against_chance(answers):
 
 
 def test_paired_comparison_of_rates(answers):
-    tests = rate_tests(answers).set_index("texture")
+    models = ("full", "simplified")
+    claim = Claim(
+        name="size",
+        task="relative",
+        measure="correct",
+        models=models,
+        bounds=None,
+        test="difference",
+    )
+    means = complete_means(answers, "correct", models=models, repeats=6)
+    found = claim_tests(
+        claim, Values(table=means), standing=Standing(), rng=np.random.default_rng(1)
+    )
+    tests = found.set_index("texture")
     counted = _counted()
     for touch in TYPES.values():
         differences = np.array(

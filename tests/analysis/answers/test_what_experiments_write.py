@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from analysis.answers.loading import PlannedTask, Responses, load_responses
 from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.paired import rating_tests
-from analysis.statistics.rates import rate_tests
+from analysis.statistics.verdicts import claims_found, incomplete
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
@@ -90,16 +90,26 @@ def test_every_answer_arrives(responses):
 
 def test_the_study_and_its_models_are_known(responses):
     assert responses.name == "Three surfaces"
-    assert responses.planned["relative"] == PlannedTask(4, 8)
+    assert responses.planned["relative"] == PlannedTask(4, 8, ("full", "simplified"), 2)
     assert responses.unfinished == ()
     assert set(responses.models) == set(TEXTURES)
-    assert responses.identical == frozenset()
+    assert responses.identical() == frozenset()
     assert len(responses.study_sha256) == 64
 
 
 def test_no_pair_is_missing(responses):
-    assert (rating_tests(responses.absolute)["excluded"] == "").all()
-    assert (rate_tests(responses.relative)["n"] == 4).all()
+    found = claims_found(responses, rng=np.random.default_rng(0))
+    assert [(one.claim.task, one.claim.measure) for one in found] == [
+        ("absolute", "magnitude_similarity"),
+        ("absolute", "frequency_similarity"),
+        ("relative", "correct"),
+        ("oddity", "correct"),
+    ]
+    people = [3, 3, 4, 1]
+    for one, count in zip(found, people, strict=True):
+        assert list(incomplete(one)) == []
+        assert (one.tests["n"] == count).all()
+        assert one.claim.planned is False  # the study states no claims
     for matrix in confusion_matrices(responses.relative).values():
         assert matrix.counts.sum(axis=1).tolist() == [4 * 2] * 3
 

@@ -11,14 +11,16 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from analysis.answers.loading import Responses
 from analysis.figures.answers import (
     BAR_WIDTH,
-    MODEL_COLOURS,
+    ROLE_COLOURS,
     figure_confusion,
     figure_correct_rates,
     figure_ratings,
 )
 from analysis.figures.drawing import LAYER_COLOURS, VERMILLION
+from analysis.figures.forest import figure_forest
 from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import (
     figure_spectra,
@@ -28,8 +30,7 @@ from analysis.figures.spectra import (
 from analysis.spectra.comparison import compare_spectra, spectrum_panels
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.paired import participant_means, rating_means, rating_tests
-from analysis.statistics.rates import rate_tests
+from analysis.statistics.verdicts import ClaimFound, claims_found
 from modeling import InputError, RecordingSet
 from modeling.fitting.conditions import recording_spectra
 
@@ -91,8 +92,8 @@ def test_a_condition_off_the_grid_is_refused(results):
         layers_over_speed(results[0].model, force_n=2.0)
 
 
-def test_ratings(ratings):
-    figure = figure_ratings(rating_tests(ratings), rating_means(ratings), simulated=True)
+def test_ratings(found):
+    figure = figure_ratings(found[:2], simulated=True)
     axes = drawn(figure)
     assert [ax.get_ylabel() for ax in axes] == [
         "rated similarity of vibration magnitude (0–100)",
@@ -103,14 +104,12 @@ def test_ratings(ratings):
         assert "***" in texts(ax)  # the planted effect on PVC
         assert len(ax.patches) >= 14
         assert "wall paper" in [label.get_text() for label in ax.get_xticklabels()]
-    for words in ("full model", "simplified model", "standard error", "Holm"):
+    for words in ("full model", "simplified model", "95 % confidence interval", "Holm"):
         assert words in texts(figure)
 
 
-def test_correct_rates(choices):
-    figure = figure_correct_rates(
-        rate_tests(choices), participant_means(choices, "correct"), simulated=True
-    )
+def test_correct_rates(found):
+    figure = figure_correct_rates(found[2], chance=1 / 7, simulated=True)
     (ax,) = drawn(figure)
     assert "SIMULATED" in texts(ax)
     assert "14.3%" in texts(ax)
@@ -119,19 +118,19 @@ def test_correct_rates(choices):
     assert "all textures" not in texts(ax)
 
 
-def test_every_participant_is_a_point_at_their_mean(choices):
-    means = participant_means(choices, "correct")
-    ax = drawn(figure_correct_rates(rate_tests(choices), means, simulated=True))[0]
+def test_every_participant_is_a_point_at_their_mean(found):
+    means = found[2].values
+    ax = drawn(figure_correct_rates(found[2], chance=1 / 7, simulated=True))[0]
     people = [line for line in ax.lines if len(line.get_xdata()) == 2 and line.get_marker() == "o"]
     assert len(people) == 7 * 16
     aluminum = means[means["texture"] == "aluminum"]
     pairs = [tuple(line.get_ydata()) for line in people[:16]]  # textures in alphabetic order
-    assert pairs == list(zip(aluminum["full"], aluminum["simplified"], strict=True))
+    assert pairs == list(zip(aluminum["reference"], aluminum["other"], strict=True))
     for line in people[:16]:
         left, right = line.get_xdata()
         assert -BAR_WIDTH < left < 0 < right < BAR_WIDTH  # each within its own bar
     assert len({line.get_xdata()[0] for line in people[:16]}) == 16
-    again = drawn(figure_correct_rates(rate_tests(choices), means, simulated=True))[0]
+    again = drawn(figure_correct_rates(found[2], chance=1 / 7, simulated=True))[0]
     places = [[list(line.get_xdata()) for line in each.lines] for each in (ax, again)]
     assert places[0] == places[1]
     assert "one participant" in texts(ax.figure)
@@ -153,11 +152,39 @@ def test_lines_of_thresholds_are_told_apart_by_colour_and_by_dashes(results):
     assert set(names) <= set(texts(axes[0].figure).split("\n"))
 
 
+def test_differences_stand_beside_their_bounds(found: list[ClaimFound]):
+    axes = drawn(figure_forest(found, simulated=True))
+    assert len(axes) == 3
+    for ax, one in zip(axes, found, strict=True):
+        factor = 100 if one.claim.measure == "correct" else 1
+        (band,) = ax.patches
+        assert (band.get_x(), band.get_width()) == (
+            pytest.approx(factor * one.claim.bounds[0]),
+            pytest.approx(factor * (one.claim.bounds[1] - one.claim.bounds[0])),
+        )
+        labels = [label.get_text() for label in ax.get_yticklabels()]
+        assert labels[0] == "all textures (n = 16)"
+        assert labels[1:] == [f"{texture} (n = 16)" for texture in one.tests["texture"][1:]]
+        points = [line for line in ax.lines if line.get_marker() != "None"]
+        means = [point.get_xdata()[0] for point in points]
+        assert means == pytest.approx((factor * one.tests["mean_difference"]).tolist())
+        wide, narrow = ax.lines[1].get_xdata(), ax.lines[2].get_xdata()  # 95 % and 90 %
+        assert wide[0] < narrow[0] < narrow[1] < wide[1]
+        unit = "percentage points" if factor == 100 else "points of the scale"
+        assert ax.get_xlabel() == f"simplified − full ({unit})"
+        assert "SIMULATED" in texts(ax)
+    shown = texts(axes[0].figure)
+    for verdict in set(found[0].tests["verdict"]) | {"90 % CI", "95 % CI", "within the bounds"}:
+        assert verdict in shown
+
+
 def test_undefined_and_missing_values_do_not_break_the_bars(choices):
     always_right = choices.assign(correct=1.0)
-    figure = figure_correct_rates(
-        rate_tests(always_right), participant_means(always_right, "correct"), simulated=False
+    answers = Responses(
+        {"relative": always_right}, simulated_participants=False, simulated_rig=False
     )
+    (one,) = claims_found(answers, rng=np.random.default_rng(1))
+    figure = figure_correct_rates(one, chance=1 / 7, simulated=False)
     figure.draw_without_rendering()
     heights = {bar.get_height() for bar in figure.axes[0].patches}
     assert heights == {1.0}
@@ -211,12 +238,11 @@ def test_small_multiples_of_spectra_need_no_grid(results, count):
     assert axes[-1].get_xlabel() == "frequency (Hz)"
 
 
-def test_real_results_are_not_called_simulated(ratings, choices, results):
+def test_real_results_are_not_called_simulated(found, choices):
     for figure in (
-        figure_ratings(rating_tests(ratings), rating_means(ratings), simulated=False),
-        figure_correct_rates(
-            rate_tests(choices), participant_means(choices, "correct"), simulated=False
-        ),
+        figure_forest(found, simulated=False),
+        figure_ratings(found[:2], simulated=False),
+        figure_correct_rates(found[2], chance=1 / 7, simulated=False),
         figure_confusion(confusion_matrices(choices), simulated=False),
     ):
         figure.draw_without_rendering()
@@ -224,5 +250,5 @@ def test_real_results_are_not_called_simulated(ratings, choices, results):
 
 
 def test_colours_are_okabe_and_itos():
-    for colour in (*LAYER_COLOURS, *MODEL_COLOURS.values(), VERMILLION):
+    for colour in (*LAYER_COLOURS, *ROLE_COLOURS.values(), VERMILLION):
         assert to_hex(colour) in OKABE_ITO

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from xml.etree import ElementTree
 
 import matplotlib as mpl
 import numpy as np
@@ -13,7 +14,7 @@ from matplotlib.image import imread
 from matplotlib.text import Text
 
 from analysis.figures import saving
-from analysis.figures.saving import DEFAULT_FAMILY, missing_fonts, png_of, save_figure
+from analysis.figures.saving import DEFAULT_FAMILY, missing_fonts, png_of, save_figure, svg_of
 
 pytestmark = pytest.mark.filterwarnings("error")
 NAMES = ("木材", "나무", "ひのき")
@@ -71,3 +72,45 @@ def test_what_no_font_has_is_told_once_in_one_sentence(tmp_path: Path):
     assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
     assert "for 木 材, drawn as boxes; install one" in missing_fonts("木材")
     assert missing_fonts("") == ""
+
+
+def course_of(name: str) -> Figure:
+    """What names of clips, markers and images depend on, with a name."""
+    figure = Figure(figsize=(4, 3), layout="constrained")
+    ax = figure.subplots()
+    ax.plot([0, 1, 2], [0, 1, 0], marker="o", clip_on=True)
+    ax.imshow(np.eye(3), extent=(0, 2, 0, 1))
+    ax.set_title(name)
+    return figure
+
+
+def test_svg_is_the_same_in_every_run():
+    first, lacking = svg_of(course_of("wall paper"))
+    assert lacking == ""
+    assert svg_of(course_of("wall paper"))[0] == first
+    assert svg_of(course_of("wallpaper"))[0] != first
+    # A PNG that was drawn before may move the layout by a hair, always by the same.
+    after_png = []
+    for _ in range(2):
+        figure = course_of("wall paper")
+        png_of(figure, dpi=150)
+        after_png.append(svg_of(figure)[0])
+    assert after_png[0] == after_png[1]
+
+
+def test_svg_needs_no_font_and_tells_no_date():
+    root = ElementTree.fromstring(svg_of(course_of("µ − wall paper"))[0])
+    kinds = {element.tag.rpartition("}")[2] for element in root.iter()}
+    assert "path" in kinds
+    assert not kinds & {"text", "date"}
+    assert root.get("width") == "288pt"  # 4 inches
+
+
+def test_svg_draws_other_scripts_as_a_png_does(only_matplotlibs_font):
+    assert svg_of(figure_of("oak", "木木")) == (svg_of(figure_of("oak", "木木"))[0], "木")
+
+
+def test_drawing_svg_leaves_the_settings_of_matplotlib():
+    before = dict(mpl.rcParams)
+    svg_of(figure_of("oak"))
+    assert dict(mpl.rcParams) == before

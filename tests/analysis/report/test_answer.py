@@ -1,102 +1,193 @@
-"""The sentence on top: it answers, with intervals, and claims neither equality nor people."""
+"""The sentence on top: it answers by the plan, with intervals, and claims no more."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-import pandas as pd
+import numpy as np
 import pytest
 
 from analysis.answers.loading import PlannedTask, Responses
-from analysis.columns import names
-from analysis.report.answer import NOBODY_ASKED, answer, overall_outcomes, unfinished_tasks
+from analysis.answers.plan import AnalysisPlan
+from analysis.labels import ALL_TEXTURES
+from analysis.report.answer import NOBODY_ASKED, answer, unfinished_tasks
+from analysis.report.claim_sentences import claim_outcomes, difference, overall_row
 from analysis.report.outcomes import HEADINGS, Outcome, Weight, by_weight
-from analysis.statistics.overall import CORRECT_RATE, OVERALL_COLUMNS, overall_tests
-from analysis.statistics.paired import rating_tests
-from analysis.statistics.rates import rate_tests
-
-NAN = float("nan")
-
-
-def measured(difference: float, low: float, high: float, *, p: float) -> pd.DataFrame:
-    """The comparison of the correct rates as `overall_tests` gives it."""
-    row = dict.fromkeys(names(OVERALL_COLUMNS), 0.0)
-    row |= {"measure": CORRECT_RATE, "textures": 7, "n": 24, "df": 23, "t": -3.46, "d_z": -0.71}
-    row |= {"mean_difference": difference, "ci_low": low, "ci_high": high, "p": p, "p_holm": p}
-    return pd.DataFrame([row])
-
-
-SHOWN = measured(-0.0931, -0.149, -0.037, p=0.006)
-NOT_SHOWN = measured(0.01, -0.03, 0.05, p=0.6)
+from analysis.report.plan_sentences import deviations, methods_paragraph
+from analysis.statistics.claims import CONTROL
+from analysis.statistics.verdicts import ClaimFound, claims_found
 
 
 @pytest.fixture
-def people(ratings, choices) -> Responses:
+def people(ratings, choices, plan) -> Responses:
     return Responses(
         {"absolute": ratings, "relative": choices},
         simulated_participants=False,
         simulated_rig=False,
+        plan=plan,
     )
 
 
-def test_a_difference_is_told_with_its_interval(people):
-    assert answer(SHOWN, [], responses=people) == (
-        "Yes, over 7 textures together: mean difference, simplified − full, of the correct rate "
-        "−9.3 percentage points (95% CI −14.9 to −3.7)."
+def analysed(responses: Responses) -> list[ClaimFound]:
+    return claims_found(responses, rng=np.random.default_rng(5))
+
+
+def told(responses: Responses | None) -> str:
+    return answer([] if responses is None else analysed(responses), responses)
+
+
+def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
+    """The same tests with this verdict on all textures together."""
+    changed = []
+    for one in found:
+        tests = one.tests.copy()
+        tests.loc[tests["texture"] == ALL_TEXTURES, "verdict"] = verdict
+        changed.append(replace(one, tests=tests))
+    return changed
+
+
+def test_the_answer_is_the_verdicts_with_their_intervals(people, found):
+    sentence = told(people)
+    assert sentence.startswith("Simplified models against full ones, over all textures: ")
+    assert sentence.count(".") == sentence.replace(". ", "").count(".")  # one sentence
+    for one in found:
+        row = overall_row(one)
+        assert row is not None
+        assert difference(one, row, confidence="90%") in sentence
+    low, high = (f"{found[0].tests.iloc[0][name]:+.1f}" for name in ("ci90_low", "ci90_high"))
+    shown = f"(90% CI {low} to {high}, bounds -7.5 to +7.5)".replace("-", "−")
+    assert shown in sentence
+    assert "bounds −10.0 to +10.0)" in sentence
+    assert (
+        "; single textures that differ: PVC (rated similarity of vibration magnitude)" in sentence
     )
 
 
-def test_no_difference_shown_is_not_called_equality(people):
-    told = answer(NOT_SHOWN, [], responses=people)
-    assert told.startswith("No difference was shown, which is not to say that there is none: ")
-    assert "+1.0 percentage points (95% CI −3.0 to +5.0)" in told
-    assert told.endswith("; whatever lies within these intervals is not ruled out.")
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        ("equivalent", "equivalent in rated similarity of vibration magnitude"),
+        ("different", "different in rated similarity"),
+        ("different but within bounds", "different, but within the bounds, in rated"),
+        ("inconclusive", "inconclusive in rated similarity"),
+        ("interim, no verdict", "no verdict before the study is complete on rated"),
+        ("", "it cannot be told yet, for want of complete answers, in rated"),
+    ],
+)
+def test_each_verdict_has_its_words(people, found, verdict, words):
+    sentence = answer(with_verdict(found, verdict), people)
+    assert words in sentence
+    # Those of one verdict stand together.
+    assert " and the correct rate " in sentence
 
 
-def test_single_textures_that_differ_are_named(people):
-    family = pd.DataFrame({"texture": ["PVC", "canvas"], "p_holm": [0.04, 0.7]})
-    told = answer(NOT_SHOWN, [family], responses=people)
-    assert told.startswith(
-        "In single textures (PVC), but no difference was shown over 7 textures together: "
+def test_why_equality_is_withheld_is_said(people, found):
+    withheld = with_verdict(found, "equivalence withheld")
+    crowded = withheld[0].tests.copy()
+    crowded["share_at_ends"] = 0.65
+    crowded_one = replace(
+        withheld[0],
+        tests=crowded,
+        standing=replace(withheld[0].standing, highest_share_at_ends=0.2),
     )
+    sentence = answer([crowded_one], people)
+    assert "since 65% of the ratings lie at an end of the scale (at most 20% were planned)" in (
+        sentence
+    )
+    alike = replace(withheld[1], standing=replace(withheld[1].standing, insensitive="all alike"))
+    assert "since all alike" in answer([alike], people)
+    assert "withheld, since all alike" in claim_outcomes([alike])[0].sentence
+
+
+def test_without_a_plan_nothing_is_called_equal(people):
+    bare = replace(people, plan=AnalysisPlan(claims=()))
+    sentence = told(bare)
+    assert "(exploratory: nothing was planned)" in sentence
+    assert "equivalent" not in sentence
+    assert "95% CI" in sentence
+    assert "bounds" not in sentence.replace("without bounds no equality can be", "")
+    [first, *_] = deviations(bare, analysed(bare))
+    assert first.startswith("No claim was registered before the first answer")
 
 
 def test_who_did_not_feel_a_surface_is_said_first(people):
-    nobody = replace(people, simulated_participants=True)
-    assert answer(SHOWN, [], responses=nobody).startswith("In a simulation without people, yes")
-    twin = replace(people, simulated_rig=True)
-    told = answer(SHOWN, [], responses=twin)
-    assert told.startswith("At a simulated rig, where nobody felt a real surface, yes")
+    assert told(replace(people, simulated_participants=True)).startswith(
+        "In a simulation without people, simplified models"
+    )
+    assert told(replace(people, simulated_rig=True)).startswith(
+        "At a simulated rig, where nobody felt a real surface, simplified"
+    )
 
 
 def test_an_unfinished_study_answers_so_far(people):
-    begun = replace(people, planned={"relative": PlannedTask(24, 48)})
-    assert answer(SHOWN, [], responses=begun).startswith("So far, yes, over 7 textures")
+    begun = replace(people, planned={"relative": PlannedTask(24, 48, repeats=3)})
+    sentence = told(begun)
+    assert sentence.startswith("So far, simplified models")
+    assert "no verdict before the study is complete on the correct rate" in sentence
     assert unfinished_tasks(begun) == [
         "forced choice: 16 of 24 planned participants, 16 of 48 planned sessions"
     ]
-    done = replace(people, planned={"relative": PlannedTask(16, 16)})
-    assert answer(SHOWN, [], responses=done).startswith("Yes")
+    done = replace(people, planned={"relative": PlannedTask(16, 16, repeats=3)})
+    assert told(done).startswith("Simplified")
     assert unfinished_tasks(done) == []
 
 
-def test_nothing_is_answered_where_nothing_can_be(people):
-    assert answer(pd.DataFrame(), [], responses=None) == NOBODY_ASKED
-    undefined = measured(NAN, NAN, NAN, p=NAN)
-    told = answer(undefined, [], responses=people)
-    assert told == "It cannot be told yet, for want of answers that vary between participants."
-    assert overall_outcomes(undefined) == []
-    assert "are identical" in answer(SHOWN.iloc[:0], [], responses=people)
+def test_nothing_is_answered_where_nothing_can_be(people, choices):
+    assert told(None) == NOBODY_ASKED
+    same = {texture: [("full", "simplified")] for texture in people.textures}
+    assert "are identical" in told(replace(people, equal=same))
+    one_model = replace(people, answers={"relative": choices[choices["model"] == "full"]})
+    assert "for want of complete answers" in told(one_model)
 
 
-def test_the_answer_comes_from_the_answers(people, ratings, choices):
-    overall = overall_tests(people)
-    told = answer(overall, [rating_tests(ratings), rate_tests(choices)], responses=people)
-    for row in overall.to_dict("records"):
-        factor = 100 if row["measure"] == CORRECT_RATE else 1
-        difference = f"{factor * row['mean_difference']:+.1f}".replace("-", "−")
-        assert f"{row['measure']} {difference} " in told
-    assert told.startswith("Yes, over 7 textures together")  # PVC's 30 points
+def test_every_texture_is_told_with_its_verdict(people):
+    same = replace(people, equal={"canvas": [("full", "simplified")]})
+    found = analysed(same)
+    outcomes = claim_outcomes(found)
+    assert [outcome.weight for outcome in outcomes[::2]] == [Weight.OVERALL] * 3
+    assert [outcome.weight for outcome in outcomes[1::2]] == [
+        *(Weight.TEXTURES, Weight.TEXTURES, Weight.SECONDARY)
+    ]
+    for one, outcome in zip(found, outcomes[1::2], strict=True):
+        for row in one.tests.iloc[1:].to_dict("records"):
+            assert row["texture"] in outcome.sentence
+            assert row["verdict"] in (CONTROL, *outcome.sentence.replace(":", ";").split("; "))
+        assert "identical models, nothing to compare: canvas" in outcome.sentence
+
+
+def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan):
+    gone = (people.absolute["participant_id"] == "sub-05") & (people.absolute["texture"] == "MDF")
+    cut = replace(
+        people,
+        answers={**people.answers, "absolute": people.absolute[~gone]},
+        plan=replace(plan, claims=plan.claims[:1], sha256=("0a" * 32, "0b" * 32)),
+        warnings=("sub-09 relative ses-01 was a pilot.",),
+    )
+    sentences = deviations(cut, analysed(cut))
+    assert sentences[0] == (
+        "Claims fixed before the first answer: 1 (page to preregister: 0a0a0a0a0a0a…)."
+    )
+    assert sentences[1] == "Planned exclusion: Trials in which the rig failed are repeated."
+    assert "others ran under 0b0b0b0b0b0b…" in sentences[2]
+    assert sentences[3] == (
+        "Exploratory, since not in the plan: rated similarity of frequency pattern; correct rate."
+    )
+    assert "answers: sub-05 (MDF)." in sentences[4]
+    assert sentences[-1] == "On reading the answers: sub-09 relative ses-01 was a pilot."
+
+
+def test_the_methods_are_told_as_a_paper_tells_them(people, plan):
+    text = methods_paragraph(people, analysed(people))
+    assert text.startswith(
+        "16 participants took part in the absolute evaluation of 7 textures; 16 participants took "
+        "part in the forced choice of 7 textures."
+    )
+    assert "rated similarity of vibration magnitude −7.5 to +7.5" in text
+    assert "bounds fixed before the first answer" in text
+    bare = replace(people, plan=AnalysisPlan(claims=()), simulated_participants=True)
+    other = methods_paragraph(bare, analysed(bare))
+    assert other.startswith("16 simulated participants")
+    assert "TOST" not in other
 
 
 def test_the_weightiest_findings_come_first():

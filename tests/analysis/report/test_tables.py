@@ -27,7 +27,7 @@ from analysis.columns import TEXTURE, Column, Columns, chosen, names, without
 from analysis.labels import ALL_TEXTURES
 from analysis.report.chart_page import chart_section
 from analysis.report.page import Fold, Item, Table, table_html
-from analysis.report.section_answers import choice_section, rating_section
+from analysis.report.section_answers import choice_section, rating_section, verdict_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
@@ -38,10 +38,10 @@ from analysis.report.section_scenes import (
     scene_section,
 )
 from analysis.report.section_stability import stability_section
+from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
-from analysis.statistics.overall import OVERALL_COLUMNS
-from analysis.statistics.paired import RATING_TEST_COLUMNS
-from analysis.statistics.rates import CORRECT_RATE_COLUMNS, RATE_TEST_COLUMNS
+from analysis.statistics.rates import CORRECT_RATE_COLUMNS
+from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
 from analysis.textures.likeness import GFC_COLUMNS
@@ -55,7 +55,7 @@ from analysis.textures.regressions import (
     SUPPORT_COLUMNS,
     driving_table,
 )
-from analysis.textures.results import VERDICT_COLUMNS
+from analysis.textures.results import VERDICT_COLUMNS as LAYER_VERDICT_COLUMNS
 from modeling import Scene, compile_scene, fit_ar
 from modeling.scenes.scene import HandRange
 from modeling.scenes.strokes import windows_kept
@@ -63,13 +63,15 @@ from stimuli.planted.textures import PlantedSurface, planted_texture, record_tex
 
 PAGE = Path(analysis.report.page.__file__)
 DECLARED = {
-    "rating_tests": RATING_TEST_COLUMNS,
-    "rate_tests": RATE_TEST_COLUMNS,
+    "claims": VERDICT_COLUMNS,
+    "claim_tests": CLAIM_COLUMNS,
+    "planted_effects": PLANTED_COLUMNS,
+    "setups": SETUP_COLUMNS,
     "correct_rates": CORRECT_RATE_COLUMNS,
     "confusion": CONFUSION_COLUMNS,
     "gfc": GFC_COLUMNS,
     "left_out": LEFT_OUT_COLUMNS,
-    "verdicts": VERDICT_COLUMNS,
+    "verdicts": LAYER_VERDICT_COLUMNS,
     "regressions": REGRESSION_COLUMNS,
     "regression_support": SUPPORT_COLUMNS,
     "regression_coefficients": COEFFICIENT_COLUMNS,
@@ -81,7 +83,6 @@ DECLARED = {
     "planted_layers": PLANTED_LAYER_COLUMNS,
     "planted_between": PLANTED_BETWEEN_COLUMNS,
     "provenance": PROVENANCE_COLUMNS,
-    "overall_tests": OVERALL_COLUMNS,
     "chart_comparisons": COMPARISON_COLUMNS,
     "chart_methods": METHOD_COLUMNS,
     "scene_comparison": SCENE_COMPARISON_COLUMNS,
@@ -90,7 +91,7 @@ DECLARED = {
     "stability_margins": MARGIN_COLUMNS,
     "stability_edges": EDGE_COLUMNS,
 }
-OF_THE_REPORT = {"provenance", "overall_tests"}  # stand in no section
+ELSEWHERE = {"provenance", "setups"}  # in no section, or of several set-ups only
 EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
 
 
@@ -121,7 +122,7 @@ def compiled_example() -> tuple[CompiledExample, dict[str, Surface]]:
 
 
 @pytest.fixture(scope="module")
-def tables(results, ratings, choices) -> list[Table]:
+def tables(results, ratings, choices, found) -> list[Table]:
     """All tables of a report but its provenance."""
     responses = Responses(
         {"absolute": ratings, "relative": choices},
@@ -139,8 +140,9 @@ def tables(results, ratings, choices) -> list[Table]:
     sections = (
         model_section(textures, pd.concat([each.gfc for each in compared])),
         parameter_section(textures, driving_table([each.driven for each in compared])),
-        rating_section(responses),
-        choice_section(responses, rng=np.random.default_rng(1)),
+        verdict_section(found, simulated=True, planted={"PVC": {"magnitude_similarity": -30.0}}),
+        rating_section(responses, found[:2]),
+        choice_section(responses, found[2:], rng=np.random.default_rng(1)),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
         scene_section([compiled_example()]),
@@ -150,7 +152,7 @@ def tables(results, ratings, choices) -> list[Table]:
 
 
 def test_no_table_is_without_a_declaration(tables: list[Table]) -> None:
-    assert {kind(table) for table in tables} | OF_THE_REPORT == set(DECLARED)
+    assert {kind(table) for table in tables} | ELSEWHERE == set(DECLARED)
 
 
 def test_tables_have_the_columns_that_are_declared(tables: list[Table]) -> None:

@@ -9,7 +9,10 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.statistics.paired import holm, paired_test, rating_tests
+from analysis.answers.plan import Claim
+from analysis.labels import ALL_TEXTURES
+from analysis.statistics.claims import Standing, Values, claim_tests, complete_means
+from analysis.statistics.paired import holm, paired_test
 from analysis.statistics.rates import correct_rates
 
 
@@ -26,8 +29,8 @@ def test_the_paired_test_errs_in_five_per_cent_and_its_interval_covers_the_truth
     for _ in range(repeats):
         person = rng.normal(60, 15, people)
         full = person + rng.normal(0, 8, people)
-        wrong += paired_test(full, person + rng.normal(0, 8, people)).p < 0.05
-        result = paired_test(full, person + shift + rng.normal(0, 8, people))
+        wrong += paired_test(full, person + rng.normal(0, 8, people), rng=rng).p < 0.05
+        result = paired_test(full, person + shift + rng.normal(0, 8, people), rng=rng)
         covered += result.ci_low <= shift <= result.ci_high
         effect_covered += result.d_z_low <= shift / (8 * np.sqrt(2)) <= result.d_z_high
     low, high = binomial_limits(0.05, repeats)
@@ -63,7 +66,7 @@ def test_the_bootstrap_interval_of_a_correct_rate_covers_the_truth(monkeypatch):
                 "correct": right.ravel().astype(float),
             }
         )
-        row = correct_rates(table, rng=rng).iloc[0]
+        row = correct_rates(table, ["full"], rng=rng).iloc[0]
         covered += row["ci_low"] <= truth <= row["ci_high"]
     # A bootstrap over 24 people is a little short of its nominal 0.95; 0.93 is what it promises.
     assert (
@@ -90,9 +93,25 @@ def test_a_planted_effect_is_found_where_it_is_and_nowhere_else():
             for texture in ("canvas", "MDF", "PVC")
             for model in ("full", "simplified")
         ]
-        tests = rating_tests(pd.DataFrame(rows))
-        hit = (tests["scale"] == "vibration magnitude") & (tests["texture"] == "PVC")
-        found += int((tests[hit]["p_holm"] < 0.05).sum())
-        elsewhere += int((tests[~hit]["p_holm"] < 0.05).sum())
+        table = pd.DataFrame(rows)
+        for scale in ("magnitude_similarity", "frequency_similarity"):
+            tests = _of_textures(table, scale, rng=rng)
+            hit = (tests["texture"] == "PVC") & (scale == "magnitude_similarity")
+            found += int((tests[hit]["p_holm"] < 0.05).sum())
+            elsewhere += int((tests[~hit]["p_holm"] < 0.05).sum())
     assert found >= 18
     assert elsewhere / (5 * repeats) <= binomial_limits(0.05, 5 * repeats)[1]
+
+
+def _of_textures(table: pd.DataFrame, scale: str, *, rng: np.random.Generator) -> pd.DataFrame:
+    claim = Claim(
+        name=scale,
+        task="absolute",
+        measure=scale,
+        models=("full", "simplified"),
+        bounds=(-7.5, 7.5),
+        test="equivalence",
+    )
+    means = complete_means(table, scale, models=claim.models, repeats=1)
+    tests = claim_tests(claim, Values(table=means), standing=Standing(), rng=rng)
+    return tests[tests["texture"] != ALL_TEXTURES]

@@ -11,26 +11,32 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.labels import ALL_TEXTURES, IDENTICAL
+from analysis.labels import ALL_TEXTURES
 from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.paired import (
     d_z_interval,
     holm,
     paired_test,
-    rating_tests,
+    sign_flips_p,
     standard_error,
+    wilcoxon,
 )
-from analysis.statistics.rates import correct_rates, rate_tests
+from analysis.statistics.rates import correct_rates
 from modeling import InputError
 
 # Student (1908): extra hours of sleep with two drugs, ten patients. The expected values are those
 # that R prints for t.test(paired = TRUE) on its data set `sleep`.
+MODELS = ("full", "simplified")
 DRUG_1 = [0.7, -1.6, -0.2, -1.2, -0.1, 3.4, 3.7, 0.8, 0.0, 2.0]
 DRUG_2 = [1.9, 0.8, 1.1, 0.1, -0.1, 4.4, 5.5, 1.6, 4.6, 3.4]
 
 
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
 def test_paired_t_agrees_with_students_published_example():
-    result = paired_test(DRUG_2, DRUG_1)
+    result = paired_test(DRUG_2, DRUG_1, rng=rng())
     assert (result.n, result.df) == (10, 9)
     assert_allclose(result.t, -4.0621, atol=5e-5)
     assert_allclose(result.p, 0.002833, atol=5e-7)
@@ -45,18 +51,19 @@ def test_paired_t_agrees_with_students_published_example():
 
 def test_paired_t_by_hand():
     # Differences 1…5: mean 3, variance 5/2, so t = 3/√(5/2/5) = 3√2 and d_z = 3/√(5/2).
-    result = paired_test([10, 20, 30, 40, 50], [11, 22, 33, 44, 55])
+    result = paired_test([10, 20, 30, 40, 50], [11, 22, 33, 44, 55], rng=rng())
     assert_allclose(result.t, 3 * np.sqrt(2))
     assert_allclose(result.d_z, 3 / np.sqrt(2.5))
-    assert_allclose(result.se_full, np.sqrt(250 / 5))
-    assert_allclose([result.mean_full, result.mean_simplified], [30, 33])
+    assert_allclose(result.se_reference, np.sqrt(250 / 5))
+    assert_allclose([result.mean_reference, result.mean_other], [30, 33])
 
 
 @settings(deadline=None)  # with ties the signed-rank test counts permutations
 @given(st.lists(st.tuples(st.integers(0, 1000), st.integers(0, 1000)), min_size=2, max_size=8))
 def test_d_z_is_t_over_root_n_and_signs_turn_with_the_order(pairs):
     full, simplified = np.array(pairs, dtype=float).T
-    result, turned = paired_test(full, simplified), paired_test(simplified, full)
+    result = paired_test(full, simplified, rng=rng())
+    turned = paired_test(simplified, full, rng=rng())
     assert_allclose(result.mean_difference, -turned.mean_difference)
     if np.ptp(simplified - full) == 0:
         assert np.isnan(result.t)
@@ -73,7 +80,7 @@ def test_d_z_is_t_over_root_n_and_signs_turn_with_the_order(pairs):
 def test_the_packages_cohen_d_is_not_d_z():
     packaged = pingouin.ttest(DRUG_2, DRUG_1, paired=True)["cohen_d"].iloc[0]
     assert abs(packaged) < 0.9
-    assert abs(paired_test(DRUG_2, DRUG_1).d_z) > 1.28
+    assert abs(paired_test(DRUG_2, DRUG_1, rng=rng()).d_z) > 1.28
 
 
 @pytest.mark.parametrize("n", [2, 8, 20, 40])
@@ -117,8 +124,8 @@ def test_holm_is_between_p_and_bonferroni_and_keeps_the_order(p):
     ],
 )
 def test_an_undefined_t_is_nan_with_a_reason(full, simplified):
-    result = paired_test(full, simplified)
-    for value in (result.t, result.p, result.ci_low, result.d_z, result.d_z_low):
+    result = paired_test(full, simplified, rng=rng())
+    for value in (result.t, result.ci_low, result.d_z, result.d_z_low):
         assert np.isnan(value)
     assert result.note.startswith("t undefined")
     assert result.n == len(full)
@@ -126,86 +133,41 @@ def test_an_undefined_t_is_nan_with_a_reason(full, simplified):
 
 def test_unequal_lengths_and_missing_values_are_refused():
     with pytest.raises(InputError, match="one length"):
-        paired_test([1, 2], [1, 2, 3])
+        paired_test([1, 2], [1, 2, 3], rng=rng())
     with pytest.raises(InputError, match="finite"):
-        paired_test([1, np.nan], [1, 2])
+        paired_test([1, np.nan], [1, 2], rng=rng())
 
 
-def test_rating_tests_cover_every_scale_and_texture(ratings):
-    tests = rating_tests(ratings)
-    assert len(tests) == 14
-    assert tests.groupby("scale").size().to_dict() == {
-        "vibration magnitude": 7,
-        "frequency pattern": 7,
-    }
-    for _, family in tests.groupby("scale"):
-        assert_allclose(family["p_holm"], holm(family["p"]))
-    wide = ratings.pivot_table(
-        index="participant_id", columns=["texture", "model"], values="frequency_similarity"
+def test_who_does_not_vary_is_tested_by_flipping_signs():
+    # Ten people, each 3 points lower: of 2¹⁰ flips only the two without exceptions are as far.
+    same = paired_test([10.0] * 10, [7.0] * 10, rng=rng())
+    assert np.isnan(same.t)
+    assert_allclose([same.p, same.sign_flips_p], 2 / 2**10)
+    assert_allclose(sign_flips_p(np.full(10, 3.0), rng=rng(), alternative="greater"), 1 / 2**10)
+    assert sign_flips_p(np.full(10, 3.0), rng=rng(), alternative="less") == 1
+    assert paired_test([5.0] * 4, [5.0] * 4, rng=rng()).p == 1
+    assert np.isnan(paired_test([], [], rng=rng()).p)
+
+
+@given(st.lists(st.integers(-6, 6), min_size=2, max_size=9))
+def test_tied_ranks_are_permuted_as_scipy_does(differences):
+    values = np.array(differences, dtype=float)
+    moved = values[values != 0]
+    if moved.size < 2:
+        assert np.isnan(wilcoxon(values, rng=rng())[0]) == (not moved.size)
+        return
+    every = stats.PermutationMethod(n_resamples=np.inf)
+    expected = stats.wilcoxon(moved, method=every)
+    found = wilcoxon(values, rng=rng())
+    assert_allclose(found, (expected.statistic, expected.pvalue))
+
+
+def test_nobody_is_compared_with_chance():
+    nobody = pd.DataFrame(columns=["participant_id", "texture", "model", "correct"]).astype(
+        {"correct": float}
     )
-    expected = stats.ttest_rel(wide["PVC"]["simplified"], wide["PVC"]["full"])
-    row = tests[(tests["scale"] == "frequency pattern") & (tests["texture"] == "PVC")].iloc[0]
-    assert_allclose([row["t"], row["p"]], [expected.statistic, expected.pvalue])
-    assert row["p_holm"] < 0.001
-
-
-def test_identical_models_are_described_but_not_tested(ratings, choices):
-    plain = rating_tests(ratings)
-    marked = rating_tests(ratings, identical={"canvas", "MDF"})
-    same = marked["texture"].isin(["canvas", "MDF"])
-    assert (marked[same]["note"] == IDENTICAL).all()
-    assert marked[same][["t", "p", "p_holm", "d_z", "wilcoxon_p"]].isna().all(axis=None)
-    for name in ("n", "mean_full", "mean_simplified", "mean_difference", "ci_low"):
-        assert_allclose(marked[name], plain[name])
-    for _, family in marked[~same].groupby("scale"):
-        assert len(family) == 5
-        assert_allclose(family["p_holm"], holm(family["p"]))
-    rates = rate_tests(choices, identical={"canvas"}).set_index("texture")
-    assert rates.loc["canvas", "note"] == IDENTICAL
-    assert np.isnan(rates.loc["canvas", "p"])
-    others = rate_tests(choices).set_index("texture").drop("canvas")
-    assert_allclose(rates.drop("canvas")["p"], others["p"])
-
-
-def test_a_participant_without_one_rating_is_named_and_left_out_of_that_pair_only(ratings):
-    gap = (ratings["participant_id"] == "sub-03") & (ratings["texture"] == "canvas")
-    gap &= ratings["model"] == "simplified"
-    tests = rating_tests(
-        ratings.assign(magnitude_similarity=ratings["magnitude_similarity"].where(~gap))
-    )
-    hit = (tests["scale"] == "vibration magnitude") & (tests["texture"] == "canvas")
-    assert tests[hit]["excluded"].tolist() == ["sub-03"]
-    assert tests[hit]["n"].tolist() == [15]
-    assert (tests[~hit]["excluded"] == "").all()
-    assert (tests[~hit]["n"] == 16).all()
-
-
-def test_a_participant_without_a_day_is_named_everywhere(choices):
-    gone = (choices["participant_id"] == "sub-05") & (choices["model"] == "full")
-    tests = rate_tests(choices[~gone])
-    assert (tests["excluded"] == "sub-05").all()
-    assert (tests["n"] == 15).all()
-
-
-def test_no_answers_are_refused(choices, ratings):
-    for analyse, table in ((rating_tests, ratings), (rate_tests, choices)):
-        with pytest.raises(InputError, match="got none"):
-            analyse(table.iloc[:0])
     with pytest.raises(InputError, match="got none"):
-        correct_rates(choices.iloc[:0], rng=np.random.default_rng(0))
-
-
-def test_rate_tests_keep_the_overall_row_out_of_the_family(choices):
-    tests = rate_tests(choices)
-    assert tests["texture"].tolist()[-1] == ALL_TEXTURES
-    assert np.isnan(tests["p_holm"].iloc[-1])
-    assert_allclose(tests["p_holm"].iloc[:-1], holm(tests["p"].iloc[:-1]))
-    by = ["participant_id", "texture", "model"]
-    means = choices.groupby(by)["correct"].mean().groupby(["texture", "model"]).mean()
-    assert_allclose(
-        tests.set_index("texture")["mean_full"].drop(ALL_TEXTURES),
-        [means[texture, "full"] for texture in tests["texture"][:-1]],
-    )
+        correct_rates(nobody, ["full"], rng=rng())
 
 
 @pytest.mark.filterwarnings("error")
@@ -213,7 +175,7 @@ def test_correct_rates_against_simple_counts(choices):
     choices = choices.assign(
         correct=choices["correct"].where(choices["texture"] != "wall paper", 1.0)
     )
-    rates = correct_rates(choices, rng=np.random.default_rng(0))
+    rates = correct_rates(choices, MODELS, rng=rng())
     assert len(rates) == 16
     for row in rates.to_dict("records"):
         cell = choices[choices["model"] == row["model"]]
@@ -224,7 +186,9 @@ def test_correct_rates_against_simple_counts(choices):
         assert_allclose(row["mean"], cell["correct"].mean())
         assert_allclose(row["se"], standard_error(per_person))
         if row["texture"] == "wall paper":
-            assert np.isnan(row["p"])
+            # Everybody is right: no t, but all signs are alike (16 people, 9999 draws).
+            assert np.isnan(row["t"])
+            assert row["p"] <= 1e-3
             assert row["note"].startswith("t undefined")
         else:
             expected = stats.ttest_1samp(per_person, 1 / 7)
@@ -236,8 +200,20 @@ def test_correct_rates_against_simple_counts(choices):
 
 
 def test_the_same_seed_gives_the_same_intervals(choices):
-    first, second = (correct_rates(choices, rng=np.random.default_rng(9)) for _ in range(2))
+    first, second = (correct_rates(choices, MODELS, rng=np.random.default_rng(9)) for _ in range(2))
     pd.testing.assert_frame_equal(first, second)
+
+
+def test_rows_over_textures_weigh_textures_equally_and_need_all_of_them(choices):
+    many = choices[choices["texture"] == "canvas"].assign(correct=0.0)
+    gone = (choices["participant_id"] == "sub-03") & (choices["texture"] == "PVC")
+    table = pd.concat([choices[~gone], many, many], ignore_index=True)
+    row = correct_rates(table, ["full"], rng=rng()).set_index("texture").loc[ALL_TEXTURES]
+    assert row["participants"] == 15
+    of_full = table[(table["model"] == "full") & (table["participant_id"] != "sub-03")]
+    by_texture = of_full.groupby(["texture", "participant_id"])["correct"].mean()
+    assert_allclose(row["mean"], by_texture.groupby("texture").mean().mean())
+    assert row["trials"] == len(of_full)
 
 
 NAMES = ("a", "b", "c", "d")

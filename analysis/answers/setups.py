@@ -1,0 +1,107 @@
+"""Answers of one study from several set-ups, put together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pandas as pd
+
+from analysis.answers.loading import Responses
+from modeling import InputError
+from modeling.errors import shown
+
+BETWEEN = "/"  # a set-up's name and a participant's: leipzig/sub-01
+
+
+def pool_setups(setups: Mapping[str, Responses]) -> Responses:
+    """The answers of all set-ups, participants named after theirs.
+
+    Parameters
+    ----------
+    setups : mapping of name to Responses
+        One at least; each set-up runs the whole study with people of its own.
+
+    Returns
+    -------
+    Responses
+        Of as many participants as are planned for all set-ups together.
+
+    Raises
+    ------
+    InputError
+        For a name that cannot stand before a participant's, or set-ups that differ in their
+        study, their models or in what was simulated.
+    """
+    first = next(iter(setups.values()))
+    for name, one in setups.items():
+        if not name or BETWEEN in name:
+            raise InputError(f"expected a name without {BETWEEN} for a set-up, got {shown(name)}.")
+        _check_alike(first, one, name)
+    groups = {t: tuple(known) for one in setups.values() for t, known in one.equal.items()}
+    planned = {
+        task: replace(
+            plan,
+            participants=plan.participants * len(setups),
+            sessions=plan.sessions * len(setups),
+        )
+        for task, plan in first.planned.items()
+    }
+    hashes = dict.fromkeys(sha256 for one in setups.values() for sha256 in one.plan.sha256)
+    return replace(
+        first,
+        answers=_joined({name: one.answers for name, one in setups.items()}),
+        training=_joined({name: one.training for name, one in setups.items()}),
+        anchors=_joined({name: one.anchors for name, one in setups.items()}),
+        equal=groups,
+        planned=planned,
+        plan=replace(first.plan, sha256=tuple(hashes)),
+        warnings=tuple(f"{name}: {told}" for name, one in setups.items() for told in one.warnings),
+    )
+
+
+def named_after(setup: str, table: pd.DataFrame) -> pd.DataFrame:
+    """The table with its participants named after their set-up; as it is without a name."""
+    if not setup:
+        return table
+    return table.assign(participant_id=setup + BETWEEN + table["participant_id"].astype(str))
+
+
+def setup_of(participants: pd.Series) -> pd.Series:
+    """The set-up before each participant's name; empty where there is only one."""
+    parts = participants.str.split(BETWEEN, n=1)
+    return parts.map(lambda found: found[0] if len(found) > 1 else "")
+
+
+def _check_alike(first: Responses, other: Responses, name: str) -> None:
+    same = (
+        ("study", first.study_sha256, other.study_sha256),
+        ("models", first.models, other.models),
+        ("simulated participants", first.simulated_participants, other.simulated_participants),
+        ("simulated rig", first.simulated_rig, other.simulated_rig),
+    )
+    for what, wanted, found in same:
+        if wanted != found:
+            raise InputError(
+                f"expected set-ups that ran one study alike, got another {what} at {shown(name)}; "
+                "analyse it by itself."
+            )
+    if other is not first and any(
+        len(table) and table.equals(other.answers[task]) for task, table in first.answers.items()
+    ):
+        raise InputError(
+            f"expected answers of its own at the set-up {shown(name)}, got those of another one; "
+            "name each folder once."
+        )
+
+
+def _joined(tables: Mapping[str, Mapping[str, pd.DataFrame]]) -> dict[str, pd.DataFrame]:
+    """The tables of each task beneath each other, participants named after their set-ups."""
+    tasks = dict.fromkeys(task for of_setup in tables.values() for task in of_setup)
+    joined = {}
+    for task in tasks:
+        here = {name: of_setup[task] for name, of_setup in tables.items() if task in of_setup}
+        named = [named_after(name, table) for name, table in here.items() if len(table)]
+        empty = next(iter(here.values()))
+        joined[task] = pd.concat(named, ignore_index=True) if named else empty
+    return joined

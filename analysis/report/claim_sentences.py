@@ -1,0 +1,133 @@
+"""What the tests of claims say, in sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from analysis.columns import p_value
+from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
+from analysis.report.outcomes import Outcome, Weight
+from analysis.report.sentences import signed
+from analysis.statistics.claims import CONTROL, WITHHELD, all_equivalent
+from analysis.statistics.equivalence import DIFFERENT, WITHIN_BOUNDS
+from analysis.statistics.verdicts import ClaimFound
+
+Row = Mapping[Hashable, Any]
+NO_TEST = "no test"
+
+
+def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
+    """For each claim a sentence on all textures together, and one on each of them."""
+    outcomes = []
+    for one in found:
+        row = overall_row(one)
+        if row is not None:
+            outcomes.append(Outcome(Weight.OVERALL, _overall(one, row)))
+        textures = by_verdict(one)
+        differ = {DIFFERENT, WITHIN_BOUNDS} & textures.keys()
+        weight = Weight.TEXTURES if differ else Weight.SECONDARY
+        outcomes.append(Outcome(weight, _textures(one, textures)))
+    return outcomes
+
+
+def overall_row(found: ClaimFound) -> Row | None:
+    """The row over all textures; None where all are identical."""
+    rows = found.tests[found.tests["texture"] == ALL_TEXTURES].to_dict("records")
+    return rows[0] if rows else None
+
+
+def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
+    """The rows of single textures, controls left out, by their verdicts."""
+    groups: dict[str, list[Row]] = {}
+    for row in found.tests.to_dict("records"):
+        if row["texture"] != ALL_TEXTURES and row["verdict"] != CONTROL:
+            groups.setdefault(row["verdict"] or NO_TEST, []).append(row)
+    return groups
+
+
+def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
+    """The mean difference with its interval: `−1.7 points of 100 (95% CI −2.9 to −0.5)`."""
+    rate = found.claim.measure == "correct"
+    unit, factor = ("percentage points", 100.0) if rate else ("points of 100", 1.0)
+    ends = ("ci90_low", "ci90_high") if confidence == "90%" else ("ci_low", "ci_high")
+    middle, low, high = (factor * row[name] for name in ("mean_difference", *ends))
+    if np.isnan(middle):
+        return "(nobody answered completely)"
+    interval = f"{confidence} CI {signed(low, 1)} to {signed(high, 1)}"
+    if np.isnan(low):
+        interval = "no interval"
+    bounds = found.claim.bounds
+    if bounds is not None and confidence == "90%":
+        low, high = (signed(factor * bound, 1) for bound in bounds)
+        interval += f", bounds {low} to {high}"
+    return f"{signed(middle, 1)} {unit} ({interval})"
+
+
+def why_withheld(found: ClaimFound, row: Row) -> str:
+    """Why no equality is concluded from a row, though the test would."""
+    standing = found.standing
+    if standing.insensitive:
+        return standing.insensitive
+    return (
+        f"{row['share_at_ends']:.0%} of the ratings lie at an end of the scale (at most "
+        f"{standing.highest_share_at_ends:.0%} were planned)"
+    )
+
+
+def comparison(found: ClaimFound) -> str:
+    """What is subtracted from what."""
+    reference, other = found.claim.models
+    if found.claim.task == "oddity":
+        return f"right answers on {other} among {reference} and vice versa, from chance"
+    return f"{other} − {reference}"
+
+
+def _overall(found: ClaimFound, row: Row) -> str:
+    verdict = row["verdict"] or NO_TEST
+    told = f"{found.claim.name} ({MEASURES[found.claim.measure]}, {comparison(found)}): {verdict}"
+    if verdict == WITHHELD:
+        told += f", since {why_withheld(found, row)}"
+    told += f"; {difference(found, row, confidence='90%')}"
+    if np.isfinite(row["t"]):
+        told += f", t({row['df']:.0f}) = {signed(row['t'], 2)}"
+    if np.isfinite(row["p"]):
+        told += f", {_p(row['p'])}"
+    if np.isfinite(row["p_equivalence"]):
+        told += f", TOST {_p(row['p_equivalence'])}"
+    if np.isfinite(row["d_z"]):
+        told += (
+            f", d_z = {signed(row['d_z'], 2)}, BF₀₁ = {row['bf01']:.2g} (at most "
+            f"{row['bf01_highest']:.2g} with so many)"
+        )
+    return f"{told[0].upper()}{told[1:]} (participants: {row['n']})."
+
+
+def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
+    parts = []
+    for verdict, rows in groups.items():
+        if verdict in (DIFFERENT, WITHIN_BOUNDS):
+            shown = "; ".join(
+                f"{row['texture']} {difference(found, row)}, Holm {_p(row['p_holm'])}"
+                for row in rows
+            )
+            parts.append(f"{verdict}: {shown}")
+        elif verdict == WITHHELD:
+            shown = "; ".join(f"{row['texture']} ({why_withheld(found, row)})" for row in rows)
+            parts.append(f"{verdict}: {shown}")
+        else:
+            parts.append(f"{verdict}: {', '.join(str(row['texture']) for row in rows)}")
+    if found.claim.bounds is not None and all_equivalent(found.tests):
+        parts.append("every texture is equivalent at once (largest p of TOST below .05)")
+    same = found.tests[found.tests["note"] == IDENTICAL]["texture"]
+    if len(same):
+        parts.append(f"{IDENTICAL}: {', '.join(same)}")
+    told = f"{found.claim.name}, texture by texture: {'; '.join(parts) or 'nothing to compare'}."
+    return f"{told[0].upper()}{told[1:]}"
+
+
+def _p(p: float) -> str:
+    shown = p_value(p)
+    return f"p {shown}" if shown.startswith("<") else f"p = {shown}"

@@ -1,0 +1,147 @@
+"""The section on the hand: speed, force and contact by model.
+
+docs/method/reliability.md#hand
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.answers.hand import HAND_COLUMNS
+from analysis.columns import without
+from analysis.figures.hand import figure_hand
+from analysis.labels import TASKS
+from analysis.report.outcomes import Outcome, Weight
+from analysis.report.page import Fold, Picture, Table
+from analysis.report.sections import Section
+from analysis.report.sentences import signed
+from analysis.statistics.hand import HAND_TEST_COLUMNS, hand_means, hand_tests
+
+ALPHA = 0.05
+TESTS_SHOWN = without(HAND_TEST_COLUMNS, "se_reference", "se_other")
+MEASURES = {
+    "speed_mm_s": ("speed while touching", "mm/s"),
+    "force_n": ("force while touching", "N"),
+    "contact_s": ("time in contact per trial", "s"),
+    "presentations": ("presentations per trial", ""),
+}
+
+
+def hand_section(
+    hand: pd.DataFrame, *, models: tuple[str, str], simulated: bool, rng: np.random.Generator
+) -> Section | None:
+    """How the hand moved with either model; None where it was measured with both in no task.
+
+    Parameters
+    ----------
+    hand : DataFrame
+        From `analysis.answers.hand.load_hand`.
+    models : (str, str)
+        The reference, and the other one.
+    simulated : bool
+    rng : Generator
+        Draws sign flips.
+    """
+    if hand.empty:
+        return None
+    tests = hand_tests(hand, models=models, rng=rng)
+    measured = tests[tests["measure"].isin(["speed_mm_s", "force_n"]) & (tests["n"] > 0)]
+    if measured.empty:
+        return None
+    means = hand_means(hand, models=models)
+    tasks = list(dict.fromkeys(measured["task"]))
+    pictures = [
+        _picture(means[means["task"] == task], task, models=models, simulated=simulated)
+        for task in tasks
+    ]
+    return Section(
+        "hand",
+        "How the hand moved",
+        (*pictures, *_tables(tests, hand, models=models, simulated=simulated)),
+        outcomes=(Outcome(Weight.SECONDARY, hand_caveat(tests, models=models)),),
+    )
+
+
+def hand_caveat(tests: pd.DataFrame, *, models: tuple[str, str]) -> str:
+    """One sentence on what the hand did otherwise with the other model.
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `hand_tests`.
+    models : (str, str)
+        The reference, and the other one.
+    """
+    reference, other = models
+    compared = tests[tests["n"] > 0]
+    apart = compared[compared["p"] < ALPHA]
+    if apart.empty:
+        main = compared[compared["measure"].isin(["speed_mm_s", "force_n"])]
+        return (
+            f"No difference of the hand's movement between {reference} and {other} models was "
+            f"shown ({other} − {reference}: {_told(main)})."
+        )
+    return (
+        f"Caveat: the hand did otherwise with {other} than with {reference} models ({other} − "
+        f"{reference}: {_told(apart)}), so that a difference of the answers, or its absence, may "
+        "come from the hand and not from the models."
+    )
+
+
+def _told(tests: pd.DataFrame) -> str:
+    return "; ".join(_difference(row) for row in tests.to_dict("records"))
+
+
+def _difference(row: Mapping[Hashable, Any]) -> str:
+    words, unit = MEASURES[row["measure"]]
+    digits = 1 if row["measure"] == "speed_mm_s" else 2
+    mean, low, high = (
+        signed(row[name], digits) for name in ("mean_difference", "ci_low", "ci_high")
+    )
+    interval = f" (95% CI {low} to {high})" if np.isfinite(row["ci_low"]) else ""
+    return f"{words} in the {TASKS[row['task']]} {mean} {unit}".rstrip() + interval
+
+
+def _picture(
+    means: pd.DataFrame, task: str, *, models: tuple[str, str], simulated: bool
+) -> Picture:
+    return Picture(
+        f"hand_{task}",
+        f"Speed and force of the hand by model, {TASKS[task]}",
+        "Points: participants, a line joins one person's; beside them the mean with its 95% "
+        "confidence interval. Means over the textures that a participant judged with both models.",
+        figure_hand(means, models=models, simulated=simulated),
+        simulated,
+    )
+
+
+def _tables(
+    tests: pd.DataFrame, hand: pd.DataFrame, *, models: tuple[str, str], simulated: bool
+) -> tuple[Table, Fold]:
+    reference, other = models
+    labels = {
+        name: f"{words} ({unit})".replace(" ()", "") for name, (words, unit) in MEASURES.items()
+    }
+    paired = Table(
+        "hand_tests",
+        "The hand with either model",
+        f"Paired t-tests, {other} − {reference}. A participant's value is the mean over the "
+        "textures judged with both. Only virtual surfaces, and only trials that were answered. "
+        "Not corrected for the number of tests.",
+        tests.assign(measure=tests["measure"].map(labels), task=tests["task"].map(TASKS)),
+        TESTS_SHOWN,
+        simulated,
+    )
+    cells = Table(
+        "hand",
+        "The hand by participant, texture and model",
+        "Means over trials. n/a: nothing measured it, or the session stored none of it.",
+        hand.assign(task=hand["task"].map(TASKS)),
+        HAND_COLUMNS,
+        simulated,
+    )
+    return paired, Fold("The hand by participant, texture and model", (cells,))

@@ -1,0 +1,190 @@
+"""The section on reliability: agreement, repeatability, ends of the scale, careless answers.
+
+docs/method/reliability.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.columns import Column, names
+from analysis.labels import SCALES, TASKS
+from analysis.report.outcomes import Outcome, Weight
+from analysis.report.page import Item, Table
+from analysis.report.sections import Section
+from analysis.statistics.reliability import (
+    AGREEMENT_COLUMNS,
+    RATER_COLUMNS,
+    SIGN_COLUMNS,
+    agreement,
+    answers_at_chance,
+    fast_answers,
+    rater_table,
+    same_ratings,
+    within_participant_sd,
+)
+
+# Nobody moves over two surfaces, or over several, in less.
+FASTEST_S = 2.0
+CARELESS_COLUMNS = (Column("task", is_name=True), *SIGN_COLUMNS)
+
+
+def reliability_section(
+    answers: Mapping[str, pd.DataFrame],
+    *,
+    chances: Mapping[str, float],
+    simulated: bool,
+    rng: np.random.Generator,
+) -> Section | None:
+    """How far the answers can be relied on; None where there are none.
+
+    Parameters
+    ----------
+    answers : mapping of task to DataFrame
+        `Responses.answers`.
+    chances : mapping of task to float
+        Rate of a guessing participant in tasks with right answers, 0 … 1; others are not judged
+        by it.
+    simulated : bool
+    rng : Generator
+        Draws sign flips.
+    """
+    given = {task: table for task, table in answers.items() if not table.empty}
+    if not given:
+        return None
+    rated = [
+        (table, scale)
+        for table in given.values()
+        for scale in SCALES
+        if scale in table and table[scale].notna().any()
+    ]
+    agreed, raters = _of_ratings(rated)
+    careless = careless_signs(given, chances=chances, rng=rng)
+    items: list[Item] = _rating_tables(agreed, raters, simulated=simulated) if rated else []
+    items.append(_careless_table(careless, simulated=simulated))
+    return Section(
+        "reliability",
+        "Reliability of the answers",
+        tuple(items),
+        outcomes=tuple(_outcomes(agreed, raters, careless)),
+    )
+
+
+def careless_signs(
+    answers: Mapping[str, pd.DataFrame], *, chances: Mapping[str, float], rng: np.random.Generator
+) -> pd.DataFrame:
+    """Whose answers look careless, and by what, in every task.
+
+    docs/method/reliability.md#careless-answers
+
+    Returns
+    -------
+    DataFrame
+        `CARELESS_COLUMNS`, a row for each participant and sign; often none.
+    """
+    found = []
+    for task, table in answers.items():
+        for scale in (scale for scale in SCALES if scale in table):
+            same = same_ratings(table, scale)
+            detail = same["detail"] + f" of {SCALES[scale]}"
+            found.append(same.assign(task=task, detail=detail))
+        if "response_time_s" in table:
+            found.append(fast_answers(table, limit_s=FASTEST_S).assign(task=task))
+        if task in chances:
+            found.append(answers_at_chance(table, chance=chances[task], rng=rng).assign(task=task))
+    every = pd.concat(found, ignore_index=True) if found else pd.DataFrame()
+    return every.reindex(columns=names(CARELESS_COLUMNS))
+
+
+def _of_ratings(rated: list[tuple[pd.DataFrame, str]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    agreed = [agreement(table, scale) for table, scale in rated]
+    raters = [rater_table(table, scale) for table, scale in rated]
+    return (
+        pd.concat(agreed, ignore_index=True) if agreed else pd.DataFrame(),
+        pd.concat(raters, ignore_index=True) if raters else pd.DataFrame(),
+    )
+
+
+def _rating_tables(agreed: pd.DataFrame, raters: pd.DataFrame, *, simulated: bool) -> list[Item]:
+    correlations = Table(
+        "agreement",
+        "Agreement of the participants' ratings",
+        "Intraclass correlations, two-way: what is rated are textures × models, raters are the "
+        "participants. Agreement: the ratings themselves; consistency: but for each participant's "
+        "own mean, which paired comparisons leave out too. One rating, or the mean of all "
+        "participants'. Where all surfaces are rated alike they are low, however well people "
+        "agree. Intervals: 95%.",
+        agreed.replace({"scale": SCALES}),
+        AGREEMENT_COLUMNS,
+        simulated,
+    )
+    each = Table(
+        "raters",
+        "How each participant used the scales",
+        "Share at ends: of ratings that are 0 or 100. SD between repeats: of ratings of the same "
+        "texture with the same model; n/a without repeats.",
+        raters.replace({"scale": SCALES}),
+        RATER_COLUMNS,
+        simulated,
+    )
+    return [correlations, each]
+
+
+def _careless_table(careless: pd.DataFrame, *, simulated: bool) -> Table:
+    return Table(
+        "careless",
+        "Answers that look careless" if len(careless) else "No answers look careless",
+        f"Described, never excluded: all ratings of a scale the same; every answer within "
+        f"{FASTEST_S:g} s; right answers not above chance and below the others' rate, while the "
+        "group is above chance. Of participants with at least five answers.",
+        careless.replace({"task": TASKS}),
+        CARELESS_COLUMNS,
+        simulated,
+    )
+
+
+def _outcomes(agreed: pd.DataFrame, raters: pd.DataFrame, careless: pd.DataFrame) -> list[Outcome]:
+    told = [_agreement_told(own, scale) for scale, own in _by_scale(agreed)]
+    told += [_repeats_told(own, scale) for scale, own in _by_scale(raters)]
+    people = sorted(set(careless["participant_id"]))
+    if people:
+        told.append(
+            f"Answers of {len(people)} participant{'s' * (len(people) > 1)} look careless "
+            f"({', '.join(people)}); they are not left out."
+        )
+    return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in told if sentence]
+
+
+def _by_scale(table: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    return [(str(s), own) for s, own in table.groupby("scale", sort=False)] if len(table) else []
+
+
+def _agreement_told(own: pd.DataFrame, scale: str) -> str:
+    by_kind = {row["kind"]: row for row in own.to_dict("records")}
+    one, all_ = by_kind["consistency, one rating"], by_kind["consistency, mean of all"]
+    if np.isnan(one["icc"]):
+        return ""
+    return (
+        f"Agreement on {SCALES[scale]}: one participant's ratings have an intraclass correlation "
+        f"(consistency) of {_with_interval(one)}, the mean of {one['participants']} participants' "
+        f"{_with_interval(all_)}."
+    )
+
+
+def _with_interval(row: Mapping[Hashable, Any]) -> str:
+    value, low, high = (f"{row[n]:.2f}".replace("-", "−") for n in ("icc", "ci_low", "ci_high"))
+    return f"{value} (95% CI {low} to {high})"
+
+
+def _repeats_told(own: pd.DataFrame, scale: str) -> str:
+    spread = within_participant_sd(own)
+    if np.isnan(spread):
+        return ""
+    return (
+        f"Ratings of {SCALES[scale]} that a participant repeated have a standard deviation of "
+        f"{spread:.1f} points."
+    )

@@ -1,0 +1,326 @@
+"""From answers to verdicts: what each claim is about, and what stands against its verdict.
+
+docs/method/statistics.md#verdicts
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from analysis.answers.loading import Responses
+from analysis.answers.plan import DIFFERENCE, Claim
+from analysis.answers.setups import setup_of
+from analysis.columns import TEXTURE, Column, names
+from analysis.labels import MEASURES, MODELS, SCALES, TASKS
+from analysis.statistics.claims import (
+    CONTROL,
+    Standing,
+    Values,
+    claim_tests,
+    complete_means,
+    share_at_ends,
+)
+from analysis.statistics.equivalence import ALPHA, DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
+from analysis.statistics.paired import (
+    sign_flips_p,
+    t_test,
+    why_undefined,
+    without_rounding_noise,
+)
+from modeling import InputError
+from modeling.arrays import Floats
+
+ENDS = (0.0, 100.0)  # of the rating scales
+ODDITY_CHANCE = 1 / 3
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ClaimFound:
+    """One claim with its tests and what they rest on.
+
+    Parameters
+    ----------
+    claim : Claim
+    tests : DataFrame
+        `analysis.statistics.claims.claim_tests`; without rows where nobody answered.
+    values : DataFrame
+        texture, participant_id, reference, other.
+    standing : Standing
+    """
+
+    claim: Claim
+    tests: pd.DataFrame
+    values: pd.DataFrame
+    standing: Standing
+
+
+def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[ClaimFound]:
+    """Every claim of the plan, then an exploratory one of each measure that no claim is about.
+
+    Parameters
+    ----------
+    responses : Responses
+    rng : Generator
+        Draws sign flips.
+
+    Returns
+    -------
+    list of ClaimFound
+        Without those about tasks that nobody has begun.
+    """
+    found = []
+    for claim in all_claims(responses):
+        values = claim_values(responses, claim)
+        standing = claim_standing(responses, claim, rng=rng)
+        tests = claim_tests(claim, values, standing=standing, rng=rng)
+        found.append(ClaimFound(claim=claim, tests=tests, values=values.table, standing=standing))
+    return found
+
+
+def all_claims(responses: Responses) -> tuple[Claim, ...]:
+    """The claims of the plan about tasks with answers, and exploratory ones beside them."""
+    begun = [task for task, answers in responses.answers.items() if not answers.empty]
+    planned = [claim for claim in responses.plan.claims if claim.task in begun]
+    known = {(claim.task, claim.measure, claim.models) for claim in planned}
+    others = [
+        Claim(
+            name=" ".join([MEASURES[measure], *pair[1:] * (pair != MODELS)]),
+            task=task,
+            measure=measure,
+            models=pair,
+            bounds=None,
+            test=DIFFERENCE,
+            planned=False,
+        )
+        for task in begun
+        for measure in measures_of(task)
+        for pair in pairs_of(responses, task)
+        if (task, measure, pair) not in known
+    ]
+    return (*planned, *others)
+
+
+def measures_of(task: str) -> tuple[str, ...]:
+    """Columns that claims about a task can be about; none of one that compares no models."""
+    if task == "absolute":
+        return tuple(SCALES)
+    return () if task == "threshold" else ("correct",)
+
+
+def pairs_of(responses: Responses, task: str) -> list[tuple[str, str]]:
+    """The reference with each other set of models that a task compares."""
+    planned = responses.planned.get(task)
+    asked = set(responses.answers[task]["model"].dropna())
+    sets = planned.models if planned else MODELS if asked <= set(MODELS) else tuple(sorted(asked))
+    return [(sets[0], other) for other in sets[1:]]
+
+
+def claim_values(responses: Responses, claim: Claim) -> Values:
+    """What every participant gave for each texture, with either model; complete cells only.
+
+    In the oddity task, whose trials hold both models, the reference is chance.
+    """
+    answers = answers_about(responses, claim)
+    repeats = repeats_of(responses, claim.task)
+    if claim.task == "oddity":
+        both = answers.assign(model=claim.models[1])
+        table = complete_means(both, claim.measure, models=claim.models, repeats=repeats)
+        return Values(table=table.assign(reference=ODDITY_CHANCE))
+    table = complete_means(answers, claim.measure, models=claim.models, repeats=repeats)
+    if claim.task != "absolute":
+        return Values(table=table)
+    same = responses.identical(claim.models)
+    return Values(
+        table=table,
+        share_at_ends=share_at_ends(answers, claim.measure, identical=same, ends=ENDS),
+    )
+
+
+def answers_about(responses: Responses, claim: Claim) -> pd.DataFrame:
+    """The main trials in which one of the claim's models was presented; in the oddity task both."""
+    answers = responses.answers[claim.task]
+    if claim.task == "oddity":
+        return answers[[set(held.split("|")) == set(claim.models) for held in answers["layout"]]]
+    return answers[answers["model"].isin(claim.models)]
+
+
+def repeats_of(responses: Responses, task: str) -> int:
+    """Answers that make a cell of a texture and a model complete: as planned, else the usual."""
+    if task in responses.planned:
+        return responses.planned[task].repeats
+    answers = responses.answers[task]
+    cells = ["participant_id", "texture"] + ["model"] * (task != "oddity")
+    return int(answers.groupby(cells).size().mode().max())
+
+
+def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> Standing:
+    """What stands against a verdict on a claim.
+
+    docs/method/statistics.md#withheld
+    """
+    return Standing(
+        identical=responses.identical(claim.models),
+        highest_share_at_ends=responses.plan.highest_share_at_ends,
+        insensitive=_insensitive(responses, claim, rng=rng),
+        unfinished=claim.task in responses.unfinished,
+    )
+
+
+def _insensitive(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
+    """Why people may not have felt a difference had there been one; empty where they would have."""
+    if claim.task == "absolute" and claim.task in responses.anchors:
+        anchors = responses.anchors[claim.task]
+        own = answers_about(responses, claim)
+        own = own[own["texture"].isin(anchors["texture"])]
+        means = [table.groupby("participant_id")[claim.measure].mean() for table in (own, anchors)]
+        if len(anchors) and _one_sided_p((means[0] - means[1]).dropna(), rng=rng) >= ALPHA:
+            return "anchors were not rated lower than the textures' own models"
+    if claim.task == "relative":
+        values = claim_values(responses, claim).table.groupby("participant_id")["reference"].mean()
+        chance = chance_of(responses.relative)
+        if _one_sided_p((values - chance).dropna(), rng=rng) >= ALPHA:
+            return f"answers on {claim.models[0]} models were not above chance"
+    return ""
+
+
+def chance_of(relative: pd.DataFrame) -> float:
+    """Share of right answers of who guesses: one of all that lay on the buttons."""
+    return 1 / max(len(layout.split("|")) for layout in relative["layout"].dropna())
+
+
+def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:
+    """p of the claim that a mean is above 0; 1 where nobody has a value."""
+    numbers: Floats = without_rounding_noise(values.to_numpy(dtype=float))
+    if not numbers.size:
+        return 1.0
+    if why_undefined(numbers):
+        return sign_flips_p(numbers, rng=rng, alternative="greater")
+    return float(stats.ttest_1samp(numbers, 0.0, alternative="greater").pvalue)
+
+
+SETUP_COLUMNS = (
+    Column("claim", is_name=True),
+    Column("setup", "set-up", is_name=True),
+    Column("n"),
+    Column("mean_difference", "difference"),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+)
+
+
+def differences_by_setup(found: Sequence[ClaimFound]) -> pd.DataFrame:
+    """The mean difference over all textures at each set-up; no row where there is only one.
+
+    Returns
+    -------
+    DataFrame
+        `SETUP_COLUMNS`; of participants who are complete in all textures that are compared.
+    """
+    rows = []
+    for one in found:
+        compared = one.values[~one.values["texture"].isin(list(one.standing.identical))]
+        lacking = compared["other"].isna() | compared["reference"].isna()
+        incomplete_ones = compared["participant_id"][lacking]
+        whole = compared[~compared["participant_id"].isin(incomplete_ones)]
+        differences = (whole["other"] - whole["reference"]).groupby(whole["participant_id"]).mean()
+        names_of = setup_of(pd.Series(differences.index, index=differences.index, dtype=object))
+        for name, each in differences.groupby(names_of) if names_of.nunique() > 1 else ():
+            values = without_rounding_noise(each.to_numpy(dtype=float))
+            low, high = (np.nan, np.nan) if why_undefined(values) else t_test(values)[2:]
+            row = {"claim": one.claim.name, "setup": name, "n": len(each)}
+            rows.append({**row, "mean_difference": each.mean(), "ci_low": low, "ci_high": high})
+    return pd.DataFrame(rows, columns=names(SETUP_COLUMNS))
+
+
+PLANTED_COLUMNS = (
+    Column("claim", is_name=True),
+    TEXTURE,
+    Column("planted"),
+    Column("mean_difference", "difference"),
+    Column("ci_low", "95 % CI from"),
+    Column("ci_high", "to"),
+    Column("verdict", is_name=True),
+    Column("agreement"),
+)
+
+
+def planted_verdicts(
+    found: Sequence[ClaimFound], planted: Mapping[str, Mapping[str, float]]
+) -> pd.DataFrame:
+    """Verdicts beside the differences that simulated participants were given.
+
+    Parameters
+    ----------
+    found : sequence of ClaimFound
+    planted : mapping of texture to mapping of measure to points
+        Other − reference. Measures without planted differences are left out.
+
+    Returns
+    -------
+    DataFrame
+        `PLANTED_COLUMNS`. A verdict agrees where it says what was planted, contradicts where it
+        says the opposite (a difference where none was planted, equality where the planted one
+        reaches a bound), and is undecided else.
+    """
+    rows = []
+    for one in found:
+        points = {t: of[one.claim.measure] for t, of in planted.items() if one.claim.measure in of}
+        tests = one.tests[one.tests["verdict"] != CONTROL]
+        compared = [texture for texture in tests["texture"] if texture in points]
+        for row in tests.to_dict("records") if compared else ():
+            mean = float(np.mean([points[texture] for texture in compared]))
+            truth = points.get(row["texture"], mean)
+            agreement = _agreement(row["verdict"], truth, bounds=one.claim.bounds)
+            rows.append({**row, "planted": truth, "agreement": agreement})
+    return pd.DataFrame(rows, columns=names(PLANTED_COLUMNS))
+
+
+def _agreement(verdict: str, truth: float, *, bounds: tuple[float, float] | None) -> str:
+    within = bounds is not None and bounds[0] < truth < bounds[1]
+    wrong_equality = not within and verdict in (EQUIVALENT, WITHIN_BOUNDS)
+    wrong_difference = truth == 0 and verdict in (DIFFERENT, WITHIN_BOUNDS)
+    if wrong_equality or wrong_difference:
+        return "contradicts"
+    return "agrees" if verdict in (EQUIVALENT, DIFFERENT, WITHIN_BOUNDS) else "undecided"
+
+
+def check_complete(responses: Responses) -> None:
+    """Refuse participants who lack answers to a texture with one of two models.
+
+    Raises
+    ------
+    InputError
+        Names them, and the textures.
+    """
+    lacking: dict[str, dict[str, None]] = {}
+    for claim in all_claims(responses):
+        standing = Standing(identical=responses.identical(claim.models))
+        values = claim_values(responses, claim).table
+        one = ClaimFound(claim=claim, tests=pd.DataFrame(), values=values, standing=standing)
+        for participant, texture in incomplete(one):
+            lacking.setdefault(participant, {})[f"{TASKS[claim.task]} of {texture}"] = None
+    if not lacking:
+        return
+    (who, what), *others = lacking.items()
+    more = f", and of {len(others)} more ({', '.join(w for w, _ in others[:5])}" if others else ""
+    more += ", …)" if len(others) > 5 else ")" * bool(others)
+    shown = ", ".join(list(what)[:3]) + (", …" if len(what) > 3 else "")
+    raise InputError(
+        f"expected all planned answers on both models of every texture, got too few of {who} "
+        f"({shown}){more}; let them finish, leave them out with a reason (--exclude), or compare "
+        "complete pairs alone (--complete)."
+    )
+
+
+def incomplete(found: ClaimFound) -> Iterator[tuple[str, str]]:
+    """Participant and texture of each pair that lacks an answer, identical ones left out."""
+    values = found.values
+    lacking = values[["reference", "other"]].isna().any(axis=1)
+    lacking &= ~values["texture"].isin(list(found.standing.identical))
+    for row in values[lacking].to_dict("records"):
+        yield str(row["participant_id"]), str(row["texture"])

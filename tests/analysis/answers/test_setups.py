@@ -1,0 +1,74 @@
+"""Answers of several set-ups: one study, participants of their own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.answers.loading import PlannedTask, Responses
+from analysis.answers.setups import pool_setups, setup_of
+from analysis.statistics.verdicts import claims_found, differences_by_setup
+from modeling import InputError
+
+
+@pytest.fixture
+def leipzig(ratings, choices, plan) -> Responses:
+    return Responses(
+        {"absolute": ratings, "relative": choices},
+        simulated_participants=False,
+        simulated_rig=False,
+        plan=plan,
+        study_sha256="0a",
+        planned={"absolute": PlannedTask(16, 16)},
+        warnings=("sub-02 was a pilot.",),
+    )
+
+
+@pytest.fixture
+def nara(leipzig) -> Responses:
+    """Others, who rate simplified models 20 points lower throughout, and answer all right."""
+    lower = 20.0 * (leipzig.absolute["model"] == "simplified")
+    rated = leipzig.absolute.assign(
+        magnitude_similarity=leipzig.absolute["magnitude_similarity"] - lower
+    )
+    plan = replace(leipzig.plan, sha256=("0b",))
+    chosen = leipzig.relative.assign(correct=1.0)
+    return replace(leipzig, answers={"absolute": rated, "relative": chosen}, plan=plan)
+
+
+def test_people_of_one_number_at_two_set_ups_are_two(leipzig, nara):
+    both = pool_setups({"leipzig": leipzig, "nara": nara})
+    assert both.absolute["participant_id"].nunique() == 32
+    assert set(setup_of(both.absolute["participant_id"])) == {"leipzig", "nara"}
+    assert both.planned["absolute"] == PlannedTask(32, 32)
+    assert both.unfinished == ()
+    assert both.warnings == ("leipzig: sub-02 was a pilot.", "nara: sub-02 was a pilot.")
+    assert both.plan.sha256 == ("0a" * 32, "0b")
+    alone = claims_found(leipzig, rng=np.random.default_rng(0))
+    found = claims_found(both, rng=np.random.default_rng(0))
+    assert found[0].tests["n"].iloc[0] == 32
+    table = differences_by_setup(found)
+    assert differences_by_setup(alone).empty
+    first, second = (table.iloc[n] for n in (0, 1))
+    assert (first["setup"], second["setup"]) == ("leipzig", "nara")
+    whole = alone[0].tests.iloc[0]
+    for name in ("n", "mean_difference", "ci_low", "ci_high"):
+        assert first[name] == pytest.approx(whole[name])
+    assert second["mean_difference"] == pytest.approx(first["mean_difference"] - 20)
+
+
+def test_set_ups_that_are_not_alike_are_refused(leipzig, nara):
+    for other, what in (
+        (replace(nara, study_sha256="0b"), "study"),
+        (replace(nara, models={"canvas": {"full": "1"}}), "models"),
+        (replace(nara, simulated_participants=True), "simulated participants"),
+        (replace(nara, simulated_rig=True), "simulated rig"),
+    ):
+        with pytest.raises(InputError, match=f"got another {what} at 'nara'"):
+            pool_setups({"leipzig": leipzig, "nara": other})
+    with pytest.raises(InputError, match="expected answers of its own at the set-up 'nara'"):
+        pool_setups({"leipzig": leipzig, "nara": replace(leipzig)})
+    with pytest.raises(InputError, match="expected a name without"):
+        pool_setups({"leipzig/2": leipzig, "nara": nara})

@@ -1,0 +1,210 @@
+"""Verdicts by the plan: families, controls, what withholds equality, who is complete."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from scipy import stats
+
+from analysis.answers.plan import Claim
+from analysis.columns import names
+from analysis.labels import ALL_TEXTURES, IDENTICAL
+from analysis.statistics.claims import (
+    CLAIM_COLUMNS,
+    CONTROL,
+    INTERIM,
+    WITHHELD,
+    Standing,
+    Values,
+    all_equivalent,
+    claim_tests,
+    complete_means,
+    share_at_ends,
+)
+from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from analysis.statistics.paired import holm
+
+CLAIM = Claim(
+    name="as strong",
+    task="absolute",
+    measure="magnitude_similarity",
+    models=("full", "simplified"),
+    bounds=(-7.5, 7.5),
+    test="equivalence",
+)
+PEOPLE = 24
+
+
+def values(effects: dict[str, float], *, sd: float = 4.0, seed: int = 0) -> Values:
+    """Ratings of each texture whose differences have exactly these means and this deviation."""
+    rng = np.random.default_rng(seed)
+    rows = []
+    for texture, effect in effects.items():
+        reference = rng.normal(60, 8, PEOPLE)
+        noise = rng.normal(0, 1, PEOPLE)
+        noise = (noise - noise.mean()) / noise.std(ddof=1)
+        other = reference + effect + sd * noise
+        people = [f"sub-{n:02d}" for n in range(PEOPLE)]
+        rows.append(
+            pd.DataFrame(
+                {
+                    "texture": texture,
+                    "participant_id": people,
+                    "reference": reference,
+                    "other": other,
+                }
+            )
+        )
+    return Values(table=pd.concat(rows, ignore_index=True))
+
+
+def verdicts_on(
+    what: Values, *, standing: Standing | None = None, claim: Claim = CLAIM
+) -> pd.DataFrame:
+    return claim_tests(claim, what, standing=standing or Standing(), rng=np.random.default_rng(1))
+
+
+EFFECTS = {"canvas": 0.0, "PVC": -12.0, "MDF": 3.5, "leather": -7.0}
+
+
+def test_each_texture_gets_the_verdict_that_was_planted():
+    table = verdicts_on(values(EFFECTS))
+    assert list(table) == names(CLAIM_COLUMNS)
+    assert table["texture"].tolist() == [ALL_TEXTURES, "canvas", "leather", "MDF", "PVC"]
+    found = table.set_index("texture")["verdict"].to_dict()
+    assert found == {
+        ALL_TEXTURES: WITHIN_BOUNDS,  # −3.9 on average
+        "canvas": EQUIVALENT,
+        "PVC": DIFFERENT,
+        "MDF": WITHIN_BOUNDS,
+        "leather": DIFFERENT,  # not significantly within
+    }
+    noisy = verdicts_on(values(EFFECTS, sd=25.0)).set_index("texture")["verdict"]
+    assert noisy["canvas"] == noisy["MDF"] == noisy["leather"] == INCONCLUSIVE
+
+
+def test_all_textures_are_a_family_of_their_own_and_textures_another():
+    table = verdicts_on(values(EFFECTS))
+    overall, textures = table.iloc[0], table.iloc[1:]
+    assert overall["p_holm"] == overall["p"]
+    assert overall["p_equivalence_holm"] == overall["p_equivalence"]
+    assert_allclose(textures["p_holm"], holm(textures["p"]))
+    assert_allclose(textures["p_equivalence_holm"], holm(textures["p_equivalence"]))
+    assert (textures["p_equivalence_holm"] > textures["p_equivalence"]).any()
+
+
+def test_the_row_over_all_textures_weighs_textures_equally_and_has_complete_people_only():
+    what = values(EFFECTS)
+    gone = (what.table["participant_id"] == "sub-03") & (what.table["texture"] == "PVC")
+    cut = Values(table=what.table.assign(other=what.table["other"].where(~gone)))
+    table = verdicts_on(cut).set_index("texture")
+    assert (table["n"].drop([ALL_TEXTURES, "PVC"]) == PEOPLE).all()
+    for texture in (ALL_TEXTURES, "PVC"):
+        assert table.loc[texture, ["n", "excluded"]].tolist() == [PEOPLE - 1, "sub-03"]
+    wide = cut.table.assign(d=cut.table["other"] - cut.table["reference"])
+    wide = wide.pivot(index="participant_id", columns="texture", values="d").dropna()
+    expected = stats.ttest_1samp(wide.mean(axis=1), 0)
+    overall = table.loc[ALL_TEXTURES]
+    assert_allclose([overall["t"], overall["p"]], [expected.statistic, expected.pvalue])
+    ninety = expected.confidence_interval(0.9)
+    assert_allclose([overall["ci90_low"], overall["ci90_high"]], [ninety.low, ninety.high])
+
+
+def test_identical_models_are_controls_outside_the_family():
+    what = values(EFFECTS)
+    alone = verdicts_on(what, standing=Standing(identical={"canvas", "MDF"}))
+    assert alone["texture"].tolist() == [ALL_TEXTURES, "leather", "PVC", "canvas", "MDF"]
+    controls = alone[alone["verdict"] == CONTROL]
+    assert (controls["note"] == IDENTICAL).all()
+    assert controls[["t", "p", "p_holm", "p_equivalence", "d_z", "bf01"]].isna().all(axis=None)
+    assert controls[["mean_difference", "ci_low", "mean_reference"]].notna().all(axis=None)
+    fewer = Values(table=what.table[what.table["texture"].isin(["leather", "PVC"])])
+    same = verdicts_on(fewer)
+    pd.testing.assert_frame_equal(alone.iloc[:3], same, check_dtype=False)
+    nothing = verdicts_on(what, standing=Standing(identical=set(EFFECTS)))
+    assert (nothing["verdict"] == CONTROL).all()
+    assert not all_equivalent(nothing)
+
+
+@pytest.mark.parametrize(
+    ("standing", "share", "expected"),
+    [
+        (Standing(highest_share_at_ends=0.2), 0.1, EQUIVALENT),
+        (Standing(highest_share_at_ends=0.2), 0.2, EQUIVALENT),  # not more than planned
+        (Standing(highest_share_at_ends=0.2), 0.65, WITHHELD),
+        (Standing(insensitive="anchors alike"), 0.0, WITHHELD),
+        (Standing(unfinished=True), 0.0, INTERIM),
+    ],
+)
+def test_what_withholds_equality(standing, share, expected):
+    what = values({"canvas": 0.0, "PVC": -12.0})
+    shares = {"canvas": share, "PVC": share, ALL_TEXTURES: share}
+    table = verdicts_on(replace(what, share_at_ends=shares), standing=standing).set_index("texture")
+    assert table.loc["canvas", "verdict"] == expected
+    # A difference is a difference, whatever the ends of the scale hide.
+    assert table.loc["PVC", "verdict"] == (INTERIM if standing.unfinished else DIFFERENT)
+    assert all_equivalent(verdicts_on(replace(values({"a": 0.0}), share_at_ends={}))) is True
+
+
+def test_all_equivalent_takes_the_largest_unadjusted_p():
+    close = {"a": 0.0, "b": 6.0, "c": -6.0}
+    table = verdicts_on(values(close))
+    textures = table.iloc[1:]
+    assert (textures["p_equivalence"] < 0.05).all()
+    assert (textures["p_equivalence_holm"] >= 0.05).any()  # Holm alone would not allow it
+    assert all_equivalent(table)
+    assert not all_equivalent(verdicts_on(values({**close, "d": 7.0})))
+    assert not all_equivalent(verdicts_on(values(close), standing=Standing(unfinished=True)))
+
+
+def test_a_claim_without_bounds_finds_no_equality():
+    table = verdicts_on(values(EFFECTS), claim=replace(CLAIM, bounds=None)).set_index("texture")
+    assert table["p_equivalence"].isna().all()
+    assert table["bound_low"].isna().all()
+    assert table.loc["canvas", "verdict"] == INCONCLUSIVE
+    assert table.loc["PVC", "verdict"] == DIFFERENT
+    assert not all_equivalent(table.reset_index())
+
+
+@pytest.mark.filterwarnings("error")
+def test_nobody_complete_is_told_and_not_tested():
+    what = values({"canvas": 0.0})
+    one_model = Values(table=what.table.assign(other=np.nan))
+    table = verdicts_on(one_model)
+    assert (table["n"] == 0).all()
+    assert (table["verdict"] == "").all()
+    assert table["note"].str.startswith("t undefined").all()
+
+
+def test_means_count_where_every_repeat_was_answered():
+    rows = [
+        ("sub-01", "canvas", "full", 10.0),
+        ("sub-01", "canvas", "full", 20.0),
+        ("sub-01", "canvas", "simplified", 30.0),
+        ("sub-01", "canvas", "simplified", np.nan),
+        ("sub-02", "canvas", "full", 50.0),
+        ("sub-02", "canvas", "full", 60.0),
+        ("sub-02", "canvas", "simplified", 70.0),
+        ("sub-02", "canvas", "simplified", 90.0),
+        ("sub-02", "PVC", "full", 1.0),
+        ("sub-02", "canvas", "AR", 5.0),
+    ]
+    table = pd.DataFrame(rows, columns=["participant_id", "texture", "model", "rating"])
+    means = complete_means(table, "rating", models=("full", "simplified"), repeats=2)
+    by = means.set_index(["participant_id", "texture"])
+    assert by.loc[("sub-01", "canvas"), "reference"] == 15.0
+    assert np.isnan(by.loc[("sub-01", "canvas"), "other"])
+    assert by.loc[("sub-02", "canvas")].tolist() == [55.0, 80.0]
+    assert by.loc[[("sub-01", "PVC"), ("sub-02", "PVC")]].isna().all(axis=None)
+
+
+def test_the_share_at_the_ends_leaves_identical_textures_out_of_the_whole():
+    table = pd.DataFrame(
+        {"texture": ["a", "a", "b", "b", "b"], "rating": [100.0, 50.0, 0.0, 100.0, np.nan]}
+    )
+    shares = share_at_ends(table, "rating", identical={"b"}, ends=(0.0, 100.0))
+    assert shares == {"a": 0.5, "b": 1.0, ALL_TEXTURES: 0.5}

@@ -1,0 +1,214 @@
+"""From answers to claims: what is tested, of whom, and what stands against a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.answers.loading import PlannedTask, Responses, leave_out
+from analysis.answers.plan import AnalysisPlan
+from analysis.labels import ALL_TEXTURES
+from analysis.statistics.claims import INTERIM, WITHHELD
+from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT
+from analysis.statistics.verdicts import (
+    all_claims,
+    chance_of,
+    check_complete,
+    claim_standing,
+    claim_values,
+    claims_found,
+    incomplete,
+    pairs_of,
+    planted_verdicts,
+)
+from modeling import InputError
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(2)
+
+
+@pytest.fixture
+def answers(ratings, choices, plan) -> Responses:
+    return Responses(
+        {"absolute": ratings, "relative": choices},
+        simulated_participants=False,
+        simulated_rig=False,
+        plan=plan,
+    )
+
+
+def test_planned_claims_come_first_and_what_nobody_planned_is_exploratory(answers, plan):
+    assert all_claims(answers) == plan.claims
+    fewer = replace(answers, plan=replace(plan, claims=plan.claims[1:2]))
+    claims = all_claims(fewer)
+    assert [claim.measure for claim in claims] == [
+        *("frequency_similarity", "magnitude_similarity", "correct")
+    ]
+    assert [claim.planned for claim in claims] == [True, False, False]
+    assert [claim.bounds for claim in claims[1:]] == [None, None]
+    nobody = replace(answers, answers={"absolute": answers.absolute.iloc[:0]})
+    assert all_claims(nobody) == ()
+
+
+def test_the_planted_difference_is_found_where_it_is(found):
+    for one in found[:2]:
+        tests = one.tests.set_index("texture")
+        assert tests.loc["PVC", "verdict"] == DIFFERENT
+        assert tests.loc["PVC", "mean_difference"] == pytest.approx(
+            -30, abs=4 * 8 * (2 / 16) ** 0.5
+        )  # errors
+        others = tests["verdict"].drop(["PVC", ALL_TEXTURES])
+        assert DIFFERENT not in set(others)
+
+
+def test_any_sets_of_models_are_compared_with_the_first_that_was_planned(answers):
+    third = answers.relative[answers.relative["model"] == "full"].assign(model="AR")
+    three = replace(
+        answers,
+        answers={"relative": pd.concat([answers.relative, third])},
+        planned={"relative": PlannedTask(16, 48, ("simplified", "AR", "full"), 3)},
+        plan=AnalysisPlan(claims=()),
+    )
+    assert pairs_of(three, "relative") == [("simplified", "AR"), ("simplified", "full")]
+    found = claims_found(three, rng=rng())
+    assert [one.claim.models for one in found] == pairs_of(three, "relative")
+    first, second = (one.tests["mean_difference"].to_numpy() for one in found)
+    assert first == pytest.approx(second)  # AR's answers are those of full
+
+
+def test_who_lacks_one_repeat_is_named(answers):
+    gone = answers.relative[
+        (answers.relative["participant_id"] == "sub-07") & (answers.relative["texture"] == "MDF")
+    ].index[0]
+    cut = replace(answers, answers={"relative": answers.relative.drop(gone)})
+    (one,) = claims_found(cut, rng=rng())
+    assert list(incomplete(one)) == [("sub-07", "MDF")]
+    tests = one.tests.set_index("texture")
+    assert tests.loc[[ALL_TEXTURES, "MDF"], "n"].tolist() == [15, 15]
+    same = replace(cut, equal={"MDF": [("full", "simplified")]})
+    (one,) = claims_found(same, rng=rng())
+    assert list(incomplete(one)) == []  # a control lacks nothing
+
+
+def test_an_unfinished_task_has_no_verdict(answers):
+    begun = replace(answers, planned={"relative": PlannedTask(24, 48, repeats=3)})
+    found = claims_found(begun, rng=rng())
+    assert set(found[2].tests["verdict"]) == {INTERIM}
+    assert INTERIM not in set(found[0].tests["verdict"])
+
+
+@pytest.mark.parametrize(("lower", "told_apart"), [(30.0, True), (0.0, False)])
+def test_equality_needs_anchors_that_are_told_apart(answers, lower, told_apart):
+    own = answers.absolute[answers.absolute["texture"] == "canvas"]
+    noise = rng().normal(0, 6, len(own))
+    anchors = own.assign(
+        magnitude_similarity=own["magnitude_similarity"] - lower + noise - noise.mean()
+    )
+    claim = answers.plan.claims[0]
+    with_anchors = replace(answers, anchors={"absolute": anchors})
+    standing = claim_standing(with_anchors, claim, rng=rng())
+    assert (standing.insensitive == "") is told_apart
+    verdicts = set(claims_found(with_anchors, rng=rng())[0].tests["verdict"])
+    assert (WITHHELD in verdicts) is not told_apart
+    assert (EQUIVALENT in verdicts) is told_apart
+    assert claim_standing(answers, claim, rng=rng()).insensitive == ""  # none were planned
+
+
+def test_equality_of_guesses_is_none(answers):
+    """Two models that nobody recognises are equally often right: that says nothing."""
+    draws = np.random.default_rng(8)
+    guessed = answers.relative.assign(
+        correct=(draws.random(len(answers.relative)) < 1 / 7).astype(float)
+    )
+    blind = replace(answers, answers={"relative": guessed})
+    standing = claim_standing(blind, answers.plan.claims[2], rng=rng())
+    assert standing.insensitive == "answers on full models were not above chance"
+    assert chance_of(guessed) == 1 / 7
+    wide = replace(answers.plan.claims[2], bounds=(-0.3, 0.3))
+    (one,) = claims_found(replace(blind, plan=AnalysisPlan(claims=(wide,))), rng=rng())
+    assert one.tests["verdict"].iloc[0] == WITHHELD
+
+
+def test_everybody_right_is_above_chance_and_equal(answers):
+    always = replace(answers, answers={"relative": answers.relative.assign(correct=1.0)})
+    (one,) = claims_found(always, rng=rng())
+    assert one.standing.insensitive == ""
+    assert set(one.tests["verdict"]) == {EQUIVALENT}
+    assert (one.tests["p"] == 1).all()
+    assert (one.tests["p_equivalence"] <= 1e-3).all()
+
+
+def test_the_odd_one_out_is_compared_with_chance(answers, plan):
+    draws = np.random.default_rng(5)
+    rows = [
+        {
+            "participant_id": f"sub-{person:02d}",
+            "texture": texture,
+            "model": odd,
+            "layout": "|".join(layout),
+            "correct": float(draws.random() < (0.9 if texture == "PVC" else 1 / 3)),
+        }
+        for person in range(24)
+        for texture in ("canvas", "PVC")
+        for odd, layout in (
+            ("full", ("simplified", "full", "simplified")),
+            ("simplified", ("simplified", "full", "full")),
+        )
+        for _ in range(6)
+    ]
+    claim = replace(plan.claims[2], task="oddity", bounds=(-0.15, 0.15))
+    odd = replace(
+        answers,
+        answers={"oddity": pd.DataFrame(rows)},
+        plan=AnalysisPlan(claims=(claim,)),
+        planned={"oddity": PlannedTask(24, 24, repeats=12)},
+    )
+    values = claim_values(odd, claim).table
+    assert values["reference"].unique() == pytest.approx([1 / 3])
+    (one,) = claims_found(odd, rng=rng())
+    verdicts = one.tests.set_index("texture")["verdict"]
+    assert verdicts[["canvas", "PVC"]].tolist() == [EQUIVALENT, DIFFERENT]
+    assert (one.tests["n"] == 24).all()
+
+
+def test_verdicts_stand_beside_what_was_planted(found):
+    points = {texture: {"magnitude_similarity": 0.0} for texture in found[0].values["texture"]}
+    points["PVC"] = {"magnitude_similarity": -30.0}
+    table = planted_verdicts(found, points)
+    assert set(table["claim"]) == {found[0].claim.name}
+    by = table.set_index("texture")
+    assert by.loc[ALL_TEXTURES, "planted"] == pytest.approx(-30 / 7)
+    assert by.loc["PVC", ["planted", "agreement"]].tolist() == [-30.0, "agrees"]
+    assert "contradicts" not in set(table["agreement"])
+    turned = planted_verdicts(found, points | {"PVC": {"magnitude_similarity": 0.0}})
+    assert turned.set_index("texture").loc["PVC", "agreement"] == "contradicts"
+
+
+def test_incomplete_pairs_are_refused_and_named(answers):
+    check_complete(answers)
+    gone = answers.relative["participant_id"].isin(["sub-03", "sub-09"])
+    gone &= answers.relative["model"] == "full"
+    cut = replace(answers, answers={**answers.answers, "relative": answers.relative[~gone]})
+    with pytest.raises(
+        InputError, match=r"too few of sub-03 \(forced choice of .*1 more \(sub-09\)"
+    ):
+        check_complete(cut)
+    check_complete(leave_out(cut, {"sub-03": "left", "sub-09": "left"}))
+
+
+def test_who_is_left_out_by_hand_is_gone_and_told(answers):
+    fewer = leave_out(answers, {"sub-03": "fell asleep"})
+    for table in fewer.answers.values():
+        assert "sub-03" not in set(table["participant_id"])
+        assert table["participant_id"].nunique() == 15
+    planned = {"relative": PlannedTask(16, 16, repeats=3)}
+    assert replace(fewer, planned=planned).unfinished == ()
+    assert replace(fewer, planned=planned).done("relative").participants == 15
+    assert fewer.warnings == ("sub-03 was left out by hand: fell asleep.",)
+    for who, why in (("sub-99", "?"), ("sub-03", " ")):
+        with pytest.raises(InputError, match="expected a participant with answers and a reason"):
+            leave_out(answers, {who: why})

@@ -1,0 +1,145 @@
+"""tactileq analyze: claims of the study, later ones, incomplete pairs, who is left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from experiments.observers.whole_study import simulate_study
+from experiments.study.models import ModelSets
+from experiments.study.plan import Claim, Plan
+from experiments.study.study import Study
+from experiments.study.task_plan import TaskPlan
+from modeling import Threshold, simplify
+from rig.twin import SimulatedRig
+from stimuli.planted.textures import planted_texture
+
+TEXTURES = ("leather", "MDF", "PVC")
+LATER = """
+name = "Three surfaces"
+seed = 3
+textures = ["leather", "MDF", "PVC"]
+trays = {leather = "A", MDF = "B", PVC = "C"}
+[absolute]
+participants = 4
+schedule = "interleaved"
+[[plan.claims]]
+name = "as strong"
+task = "absolute"
+measure = "magnitude_similarity"
+models = ["full", "simplified"]
+bounds = [-9, 9]
+test = "equivalence"
+"""
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A simulated study with one claim."""
+    truths = {texture: planted_texture(texture) for texture in TEXTURES}
+    threshold = Threshold.shipped("codec")
+    fewer = {name: simplify(truth, threshold).model for name, truth in truths.items()}
+    claim = Claim(
+        name="as strong",
+        task="absolute",
+        measure="magnitude_similarity",
+        models=("full", "simplified"),
+        bounds=(-7.5, 7.5),
+        test="equivalence",
+    )
+    study = Study(
+        name="Three surfaces",
+        seed=3,
+        textures=TEXTURES,
+        trays={"leather": "A", "MDF": "B", "PVC": "C"},
+        tasks={
+            "absolute": TaskPlan(participants=4, schedule="interleaved", training_trials=1),
+            "relative": TaskPlan(participants=2, schedule="by-day", repeats=1, training_trials=1),
+        },
+        plan=Plan(claims=(claim,), exclusions=("Whoever presses nothing.",)),
+    )
+    folder = tmp_path / "data"
+    simulate_study(
+        study,
+        real=truths,
+        models=ModelSets(sets={"full": truths, "simplified": fewer}),
+        rig=SimulatedRig(seed=1),
+        data_folder=folder,
+        seed=7,
+        threshold=threshold,
+    )
+    return folder
+
+
+def claims(folder: Path) -> pd.DataFrame:
+    return pd.read_csv(folder / "tables/claim_tests.tsv", sep="\t", na_values="n/a")
+
+
+def test_claims_are_those_of_the_study_and_others_exploratory(main, data: Path) -> None:
+    assert main("analyze", "data", "--out", "first").returncode == 0
+    tests = claims(data.parent / "first")
+    planned = tests.groupby("claim")["planned"].first().to_dict()
+    assert planned == {
+        "as strong": "yes",
+        "rated similarity of frequency pattern": "no",
+        "correct rate": "no",
+    }
+    of_plan = tests[tests["planned"] == "yes"]
+    assert set(of_plan["bound_low"]) == {-7.5}
+    assert tests[tests["planned"] == "no"]["bound_low"].isna().all()
+    page = (data.parent / "first/report.html").read_text(encoding="utf-8")
+    assert "Planned exclusion: Whoever presses nothing." in page
+    manifests = list(data.rglob("*_manifest.json"))
+    plan_sha256 = json.loads(manifests[0].read_text())["plan_sha256"]
+    assert f"page to preregister: {plan_sha256[:12]}" in page
+
+    later = data.parent / "later.toml"
+    later.write_text(LATER)
+    assert main("analyze", "data", "--plan", "later.toml", "--out", "second").returncode == 0
+    tests = claims(data.parent / "second")
+    assert set(tests["planned"]) == {"no"}  # other bounds than were registered
+    assert set(tests[tests["claim"] == "as strong"]["bound_high"]) == {9.0}
+    later.write_text(LATER.replace("[-9, 9]", "[-7.5, 7.5]"))
+    assert main("analyze", "data", "--plan", "later.toml", "--out", "third").returncode == 0
+    tests = claims(data.parent / "third")
+    assert set(tests[tests["claim"] == "as strong"]["planned"]) == {"yes"}
+
+
+def test_several_set_ups_have_names_and_answers_of_their_own(main, data: Path) -> None:
+    for words, told in (
+        (("data", "data"), "expected a name of its own for each of several set-ups"),
+        (("here=data", "there=data"), "expected answers of its own at the set-up 'there'"),
+    ):
+        refused = main("analyze", *words)
+        assert refused.returncode == 1
+        assert told in refused.stderr
+        assert refused.stderr.count("\n") == 1
+
+
+def test_incomplete_pairs_are_refused_and_complete_ones_offered(main, data: Path) -> None:
+    (path,) = data.glob("sub-03/ses-01/beh/*_task-absolute_beh.tsv")
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:-1]))
+    (log,) = data.glob("sourcedata/sub-03/ses-01/*_task-absolute_log.jsonl")
+    log.unlink()  # else the whole table is made from it again
+    refused = main("analyze", "data")
+    assert refused.returncode == 1
+    assert refused.stderr.count("\n") == 1
+    assert "too few of sub-03 (absolute evaluation of " in refused.stderr
+    assert "--complete" in refused.stderr
+    assert not (data.parent / "analysis-results").exists()
+    assert main("analyze", "data", "--complete", "--out", "complete").returncode == 0
+    tests = claims(data.parent / "complete").set_index(["claim", "texture"])
+    row = tests.loc[("as strong", "all textures")]
+    assert (row["n"], row["excluded"]) == (3, "sub-03")
+    assert main("analyze", "data", "--exclude", "sub-03=left", "--out", "without").returncode == 0
+    page = (data.parent / "without/report.html").read_text(encoding="utf-8")
+    assert "sub-03 was left out by hand: left." in page
+    # Who was left out took part: nobody is missing.
+    assert "interim, no verdict" not in set(claims(data.parent / "without")["verdict"])
+    unknown = main("analyze", "data", "--exclude", "sub-77=left")
+    assert unknown.returncode == 1
+    assert "such as sub-01" in unknown.stderr
