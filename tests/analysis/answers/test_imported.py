@@ -19,7 +19,8 @@ def load(folder: Path, text: str | bytes, mapping: str, name: str = "P01.csv") -
 
 
 def test_a_table_of_a_spreadsheet(tmp_path: Path) -> None:
-    text = "\ufeffVP ; Size;Rating\r\n1;klein;3,5\r\nP02; Klein ;\r\n1.0;GROSS;NaN\r\n1;gross;4\r\n;;\r\n\r\n"
+    lines = ("\ufeffVP ; Size;Rating", "1;klein;3,5", "P02; Klein ;", "1.0;GROSS;NaN")
+    text = "\r\n".join((*lines, "1;gross;4", ";;", "", ""))
     found = load(tmp_path, text, "participant=vp,value=rating,factor=Size")
     assert list(found.answers["participant_id"]) == ["1", "1"]
     assert list(found.answers["Size"]) == ["klein", "gross"]
