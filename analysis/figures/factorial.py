@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -88,10 +88,10 @@ def plot_levels(
     ax = axes_or_new(ax)
     place = np.arange(len(levels))
     for number, (_, own) in enumerate(cells.groupby("participant_id", sort=False)):
-        values = own.set_index(factor)["mean"].reindex(levels)
+        values = own.set_index(factor)["mean"].reindex(list(levels))
         label = "" if number else "one participant"
         ax.plot(place, values, color=GREY, lw=0.7, marker="o", ms=2.5, alpha=0.6, label=label)
-    mean = means.set_index(factor).reindex(levels)
+    mean = means.set_index(factor).reindex(list(levels))
     half = np.nan_to_num([mean["mean"] - mean["ci_low"], mean["ci_high"] - mean["mean"]])
     style: dict[str, Any] = {
         "color": BLUE,
@@ -111,7 +111,7 @@ def plot_levels(
     return ax
 
 
-def _of_panel(table: pd.DataFrame, panel: dict[str, str]) -> pd.DataFrame:
+def _of_panel(table: pd.DataFrame, panel: Mapping[Hashable, str]) -> pd.DataFrame:
     for name, level in panel.items():
         table = table[table[name] == level]
     return table
