@@ -48,6 +48,7 @@ from analysis.textures.results import TextureResult
 from modeling import InputError
 from modeling.files.writing import write_text
 
+LEAD = "Surfaces recorded, modelled, simplified by what can be felt, and judged."
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -60,6 +61,7 @@ def write_report(
     benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
+    answered: str = "",
     hand: pd.DataFrame | None = None,
     planted: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
@@ -81,6 +83,8 @@ def write_report(
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; what is nested is unfolded.
     title : str
+    answered : str
+        The sentence on top, where `benches` hold the answers; computed from `responses` else.
     hand : DataFrame, optional
         How the hand moved with either model (`analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
@@ -112,10 +116,10 @@ def write_report(
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
     tell(0.0, "analysing answers")
     found = [] if responses is None else claims_found(responses, rng=rng)
-    answered = []
+    people = []
     if responses is not None:
-        answered = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
-    sections = [*_model_sections(textures, compared, answered=answered, tell=tell), *benches]
+        people = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
+    sections = [*_model_sections(textures, compared, people=people, tell=tell), *benches]
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
@@ -136,8 +140,8 @@ def write_report(
         methods = paragraph("Statistical methods, for a paper", text)
     html = page(
         title=title,
-        answer=answer(found, responses),
-        lead="Surfaces recorded, modelled, simplified by what can be felt, and judged.",
+        answer=answered or answer(found, responses),
+        lead="" if answered else LEAD,
         banner=_banner(responses, textures),
         sections=[
             ("overview", "At a glance", overview),
@@ -156,12 +160,12 @@ def _model_sections(
     textures: Sequence[TextureResult],
     compared: Iterable[Comparison],
     *,
-    answered: Sequence[Section],
+    people: Sequence[Section],
     tell: Progress,
 ) -> list[Section]:
     """The sections on models, where there are some, around those on the answers."""
     if not textures:
-        return list(answered)
+        return list(people)
     gfc, driven = [], []
     before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
@@ -173,7 +177,7 @@ def _model_sections(
     models = model_section(textures, pd.concat(gfc, ignore_index=True))
     parameters = parameter_section(textures, driving_table(driven))
     truths = [result for result in textures if result.truth is not None]
-    return [models, parameters, *answered, *([planted_section(truths)] if truths else [])]
+    return [models, parameters, *people, *([planted_section(truths)] if truths else [])]
 
 
 def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> Responses:

@@ -27,9 +27,20 @@ if TYPE_CHECKING:
 
 def analyze(
     data: Annotated[
-        list[str],
-        typer.Argument(help="Folder of the study's answers; of several set-ups NAME=FOLDER each."),
-    ],
+        list[str] | None,
+        typer.Argument(
+            help="Folder of the study's answers; of several set-ups NAME=FOLDER each. With "
+            "--table: further tables."
+        ),
+    ] = None,
+    table: Annotated[
+        list[Path] | None,
+        typer.Option(help="Instead of the folder: tables of any experiment, CSV or TSV."),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option("--map", help="What columns mean: correct=TYPE_ANS,factor=TYPE,…"),
+    ] = None,
     out: Out = Path("analysis-results"),
     recordings: Annotated[
         Path | None, typer.Option(help="Folder of recording sets, one folder per texture.")
@@ -68,8 +79,29 @@ def analyze(
     --models and --simplified the report also tells how good and how small the models are; why
     layers went stands in the folder that tactileq simplify wrote.
 
+    With --table answers come from tables of any experiment. The map names columns: participant
+    (else the file's name), factor (any number), count, and one of correct (0 or 1), share (0 to
+    1), value, or presented with answered. Without these each file is a confusion matrix called
+    PARTICIPANT_LEVEL, with a level for each factor.
+
+    Example: tactileq analyze --table P*.csv --map correct=RIGHT,factor=SIZE
+
     Example: tactileq analyze data --recordings recordings --models models --simplified simplified
     """
+    folders = (recordings, models, simplified)
+    if table is not None or columns is not None:
+        if (*folders, plan, exclude, validate) != (None,) * 6 or complete:
+            raise ValueError(
+                "expected --table with no option but --map, --out and --seed, got more; "
+                "leave the others out."
+            )
+        files = [*(table or []), *map(Path, data or [])]
+        analyze_tables(files, columns or "", out=out, seed=seed)
+        return
+    if not data:
+        raise ValueError(
+            "expected a folder of answers, or --table with files, got neither; give one of the two."
+        )
     from analysis.report.report import write_report
     from analysis.report.section_validation import validation_section
     from analysis.statistics.verdicts import check_complete
@@ -85,7 +117,6 @@ def analyze(
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
     if not complete:
         check_complete(responses)
-    folders = (recordings, models, simplified)
     results = []
     if recordings is not None and models is not None and simplified is not None:
         results = results_of_study(
@@ -121,6 +152,38 @@ def analyze(
         seal_folder(fresh, provenance)
     for warning in responses.warnings:
         print(f"warning: {warning}", file=sys.stderr)
+    print((out / "report.html").resolve())
+
+
+def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int) -> None:
+    """Write the report on tables of any experiment."""
+    import numpy as np
+
+    from analysis.answers.imported import load_imported, parse_map
+    from analysis.report.report import write_report
+    from analysis.report.section_table import answer_of_table, table_sections
+    from modeling.files.folders import replace_folder
+    from modeling.files.provenance import provenance_of, seal_folder
+
+    folders = [path for path in files if path.is_dir()]
+    if not files or folders:
+        got = f"the folder {folders[0]}" if folders else "none"
+        raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
+    check_own_results(out, "analyze")
+    imported = load_imported(files, parse_map(columns))
+    sections = table_sections(imported, rng=np.random.default_rng(seed))
+    with replace_folder(out) as fresh, share_of("Reporting") as tell:
+        provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=files)
+        write_report(
+            fresh / "report.html",
+            benches=sections,
+            answered=answer_of_table(imported),
+            provenance=provenance,
+            title="What the tables show",
+            seed=seed,
+            progress=tell,
+        )
+        seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
 
 
@@ -285,7 +348,7 @@ def _require_models(
         )
     given = {"full": full[texture].sha256, "simplified": shown[texture].sha256}
     for kind, presented in responses.models.get(texture, {}).items():
-        if given[kind] != presented:
+        if given.get(kind, presented) != presented:
             raise ValueError(
                 f"expected the {kind} model of {texture} that was presented (SHA-256 "
                 f"{presented[:12]}…), got another one ({given[kind][:12]}…); give the folders of "

@@ -1,0 +1,134 @@
+"""Tables of any experiment: what people bring is read, what cannot be meant is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from analysis.answers.imported import Imported, load_imported, parse_map
+from modeling import InputError
+
+
+def load(folder: Path, text: str | bytes, mapping: str, name: str = "P01.csv") -> Imported:
+    data = text.encode() if isinstance(text, str) else text
+    (folder / name).write_bytes(data)
+    return load_imported([folder / name], parse_map(mapping))
+
+
+def test_a_table_of_a_spreadsheet(tmp_path: Path) -> None:
+    lines = ("\ufeffVP ; Size;Rating", "1;klein;3,5", "P02; Klein ;", "1.0;GROSS;NaN")
+    text = "\r\n".join((*lines, "1;gross;4", ";;", "", ""))
+    found = load(tmp_path, text, "participant=vp,value=rating,factor=Size")
+    assert list(found.answers["participant_id"]) == ["1", "1"]
+    assert list(found.answers["Size"]) == ["klein", "gross"]
+    assert list(found.answers["value"]) == [3.5, 4.0]
+    assert (found.missed, found.measure) == (2, "value")
+
+
+def test_the_file_names_the_participant(tmp_path: Path) -> None:
+    found = load(tmp_path, "hit\tx\n1\ta\n0\tb\n", "correct=hit")
+    assert list(found.answers["participant_id"]) == ["P01", "P01"]
+    assert list(found.answers["correct"]) == [1.0, 0.0]
+
+
+def test_a_class_never_answered_stays(tmp_path: Path) -> None:
+    found = load(
+        tmp_path,
+        "p,a,n\nfelt,felt,3\nmdf,Felt,2\ncork,mdf,0\nCork,mdf,1\n",
+        "presented=p,answered=a,count=n",
+    )
+    assert found.classes == ("cork", "felt", "mdf")
+    assert list(found.answers["count"]) == [3, 2, 1]
+    assert list(found.answers["correct"]) == [1.0, 0.0, 0.0]
+
+
+def test_a_matrix_has_its_condition_in_its_name(tmp_path: Path) -> None:
+    text = "x,a,b,c\na,2,1,\nb,0,3,0\nc,1,0,0\n"
+    found = load(tmp_path, text, "factor=model,factor=day", name="VP_3_full_1.csv")
+    assert found.answers.iloc[0][["participant_id", "model", "day"]].tolist() == [
+        "VP_3",
+        "full",
+        "1",
+    ]
+    assert found.answers["count"].sum() == 7
+    assert (found.answers["count"] * found.answers["correct"]).sum() == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "mapping", "told"),
+    [
+        ("A,B\n1,1\n", "correct=C", "line 1, got no such column; there are A, B"),
+        ("A,A\n1,1\n", "correct=A", "got 2 columns of that name"),
+        ("A\n1\n0.5\n", "correct=A", "line 3, got '0.5'"),
+        ("A\n1.1\n", "share=A", "a share from 0 to 1 in"),
+        ("A\n-0.1\n", "share=A", "a share from 0 to 1 in"),
+        ("A\nmany\n", "value=A", "expected a number in"),
+        ("A\ninf\n", "value=A", "expected a number in"),
+        ("A,N\n1,-1\n", "correct=A,count=N", "expected a whole count from 0 in"),
+        ("A,N\n1,1.5\n", "correct=A,count=N", "expected a whole count from 0 in"),
+        ("A,F\n1,\n", "correct=A,factor=F", "expected a value of F in"),
+        ("A,F\n0.5,x\n0.5,X\n", "share=A,factor=F", "got P01 again in"),
+        ("A,B\n1,2\n2,1\n", "presented=A,answered=B", "3 to 16 classes in P01.csv, got 2"),
+        ("A,B\n" + "".join(f"{i},{i}\n" for i in range(17)), "presented=A,answered=B", "got 17"),
+        ("A,B\n1,1,1\n", "correct=A", "expected 2 columns in"),
+        ("A\nNaN\n", "correct=A", "expected answers in the tables, got none"),
+        ("A\n", "correct=A", "got 1 lines"),
+        (b"A\n\xff\n", "correct=A", "save it as UTF-8"),
+        ("x,a,b,c\na,1,1,1\nb,1,1,1\nd,1,1,1\n", "", "make the matrix square"),
+        ("x,a,b\na,1,1\nb,1,1\n", "", "3 to 16 classes"),
+        ("x,a,b,c\na,1,1,1\nb,1,1,1\nc,1,1,1\n", "factor=model", "PARTICIPANT_model"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(
+    tmp_path: Path, text: str | bytes, mapping: str, told: str
+) -> None:
+    with pytest.raises(InputError) as refused:
+        load(tmp_path, text, mapping)
+    assert told in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_participant_in_two_files_and_other_classes(tmp_path: Path) -> None:
+    for name, classes in (("P01", "abc"), ("p01", "abc"), ("P02", "abd")):
+        lines = [f"{c},1,1,1" for c in classes]
+        (tmp_path / f"{name}.csv").write_text("\n".join([",".join("x" + classes), *lines]))
+    one, again, other = (tmp_path / f"{name}.csv" for name in ("P01", "p01", "P02"))
+    with pytest.raises(InputError, match="got P01 again"):
+        load_imported([one, again], parse_map(""))
+    with pytest.raises(InputError, match="expected the classes of the files before"):
+        load_imported([one, other], parse_map(""))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "right=A",
+        "correct",
+        "correct=",
+        "correct=A,correct=B",
+        "factor=A,factor=A",
+        "presented=A",
+        "correct=A,share=B",
+        "participant=A",
+        "correct=A,factor=mean",
+    ],
+)
+def test_a_map_that_cannot_be_meant_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="^expected .*, got "):
+        parse_map(text)
+
+
+@settings(
+    max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None
+)
+@given(text=st.text(alphabet='A,;\t\n"01.x -', max_size=40))
+def test_any_text_is_read_or_refused(tmp_path: Path, text: str) -> None:
+    try:
+        found = load(tmp_path, "A,B\n" + text, "correct=A")
+    except InputError:
+        return
+    assert found.answers["correct"].isin([0.0, 1.0]).all()
+    assert len(found.answers) > 0
