@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pandas as pd
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from analysis.benches.atlas.cases import TO_COME
 from analysis.benches.atlas.edges import Examined
@@ -23,7 +20,7 @@ from analysis.benches.atlas.tables import (
 )
 from analysis.columns import chosen, names, without
 from analysis.figures.atlas import figure_atlas
-from analysis.figures.saving import png_of, warn_of_missing_fonts
+from analysis.figures.saving import png_of, svg_of, warn_of_missing_fonts
 from analysis.report.findings import table_bytes
 from analysis.report.outcomes import Outcome
 from analysis.report.page import (
@@ -135,17 +132,9 @@ def atlas_files(examined: Sequence[Examined], provenance: Mapping[str, object]) 
     html = _page(section, png, cells=tables["cells.tsv"], provenance=provenance)
     return {name: table_bytes(table) for name, table in tables.items()} | {
         "atlas.png": png,
-        "atlas.svg": _svg_of(picture.figure),
+        "atlas.svg": svg_of(picture.figure)[0],
         "atlas.html": html.encode(),
     }
-
-
-def _svg_of(figure: Figure) -> bytes:
-    """The same bytes for the same figure: without the date, and with names that are not drawn."""
-    svg = io.BytesIO()
-    with rc_context({"svg.hashsalt": "tactileq"}):
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-    return svg.getvalue()
 
 
 def _page(

@@ -27,7 +27,6 @@ from tactileq.workers import working
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from analysis.answers.loading import PlannedTask, Responses
     from analysis.statistics.power import Verdict
@@ -391,7 +390,7 @@ def _write(
 ) -> None:
     from analysis.answers.plan import plan_from
     from analysis.figures.power import figure_power
-    from analysis.figures.saving import save_figure
+    from analysis.figures.saving import save_figure, svg_of
     from analysis.statistics.power import power_sentences
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
@@ -404,20 +403,8 @@ def _write(
         text = marked.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n")
         write_text(fresh / "power.tsv", text)
         save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)
-        (fresh / "power.svg").write_bytes(_svg_of(figure))
+        (fresh / "power.svg").write_bytes(svg_of(figure)[0])
         seal_folder(fresh, provenance)
     for line in power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims):
         print(line)
     print(f"simulated: {out / 'power.png'}")
-
-
-def _svg_of(figure: Figure) -> bytes:
-    """The same bytes for the same figure: without the date, and with names that are not drawn."""
-    import io
-
-    from matplotlib import rc_context
-
-    svg = io.BytesIO()
-    with rc_context({"svg.hashsalt": "tactileq"}):
-        figure.savefig(svg, format="svg", metadata={"Date": None})
-    return svg.getvalue()
