@@ -70,8 +70,8 @@ def oddity_d_prime(share: float) -> float:
 
     Less than chance carries no sign here: who confuses the odd one with others feels no less.
     """
-    if share <= 1 / 3:
-        return 0.0 if share >= 0 else float("nan")
+    if 0 <= share <= 1 / 3:
+        return 0.0
     return inf if share == 1 else _inverse(oddity_share, share, lowest=0.0)
 
 
