@@ -31,7 +31,7 @@ def confusion_change_p(
         For no participant, different shapes or negative counts.
     """
     one, two = np.asarray(reference, dtype=float), np.asarray(other, dtype=float)
-    if one.shape != two.shape or one.ndim != 3 or not one.size or not (one + two >= 0).all():
+    if one.shape != two.shape or one.ndim != 3 or not one.size or not (np.minimum(one, two) >= 0).all():
         raise InputError(
             "expected counts of the same participants and classes with both models, got arrays of "
             f"shapes {one.shape} and {two.shape}; leave out people who lack one of the models."
@@ -39,7 +39,7 @@ def confusion_change_p(
     if len(one) == 1:
         return 1.0  # the swap of one participant has the same sum of squares
     totals = np.stack([one.sum(axis=2), two.sum(axis=2)])
-    both = (totals > 0).all(axis=0)[..., None]
+    both = (totals.min(axis=0) > 0)[..., None]
     divisor = np.maximum(totals, 1)[..., None]
     change = np.where(both, two / divisor[1] - one / divisor[0], 0.0).reshape(len(one), -1)
     # A swap of the models turns a participant's whole change round.
