@@ -31,7 +31,12 @@ def confusion_change_p(
         For no participant, different shapes or negative counts.
     """
     one, two = np.asarray(reference, dtype=float), np.asarray(other, dtype=float)
-    if one.shape != two.shape or one.ndim != 3 or not one.size or not (np.minimum(one, two) >= 0).all():
+    if (
+        one.shape != two.shape
+        or one.ndim != 3
+        or not one.size
+        or not (np.minimum(one, two) >= 0).all()
+    ):
         raise InputError(
             "expected counts of the same participants and classes with both models, got arrays of "
             f"shapes {one.shape} and {two.shape}; leave out people who lack one of the models."
