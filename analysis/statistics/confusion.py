@@ -20,7 +20,7 @@ class ConfusionMatrix:
     Parameters
     ----------
     model : str
-        full or simplified.
+        Name of the set of models.
     textures : (k,) tuple of str
         Names of rows and columns.
     counts : (k, k) ndarray of int
@@ -40,24 +40,28 @@ class ConfusionMatrix:
         return shares
 
 
-def confusion_matrices(relative: pd.DataFrame) -> dict[str, ConfusionMatrix]:
-    """Count who was taken for whom, for the full and the simplified model (PAPER fig. 10).
+def confusion_matrices(
+    relative: pd.DataFrame, models: tuple[str, ...] = MODELS
+) -> dict[str, ConfusionMatrix]:
+    """Count who was taken for whom, with each set of models (PAPER fig. 10).
 
     Parameters
     ----------
     relative : DataFrame
         `Responses.relative`; trials without an answer are left out.
+    models : tuple of str
+        Sets of models to count, in this order.
 
     Returns
     -------
     dict
-        By model, both over the same textures: all that were presented or on offer.
+        By model, all over the same textures: all that were presented or on offer.
     """
     answered = relative[relative["answer"].notna()]
     offered = {name for layout in answered["layout"] for name in str(layout).split("|")}
     textures = tuple(sorted(offered | set(answered["texture"]), key=str.casefold))
     matrices = {}
-    for model in MODELS:
+    for model in models:
         chosen = answered[answered["model"] == model]
         counts = pd.crosstab(chosen["texture"], chosen["answer"])
         square = counts.reindex(index=list(textures), columns=list(textures), fill_value=0)

@@ -1,0 +1,58 @@
+"""Transferred information where it is known."""
+
+import numpy as np
+import pytest
+
+from analysis.statistics.information import (
+    corrected_bits,
+    information_bits,
+    transferred_information,
+)
+from modeling import InputError
+
+
+@pytest.mark.parametrize("k", [3, 7, 16])
+def test_all_right_is_log2_of_the_classes(k):
+    found = transferred_information([5 * np.eye(k)] * 4, rng=np.random.default_rng(1))
+    assert found.uncorrected == pytest.approx(np.log2(k))
+    assert found.bits == pytest.approx(np.log2(k))
+    assert np.isnan(found.ci_low)
+
+
+def test_binary_channel_has_its_capacity():
+    noise = 0.1 * np.log2(0.1) + 0.9 * np.log2(0.9)
+    assert information_bits(np.array([[90.0, 10], [10, 90]])) == pytest.approx(1 + noise)
+
+
+def test_correction_takes_chance_to_nothing():
+    rng = np.random.default_rng(2)
+    tables = rng.multinomial(60, np.full(7, 1 / 7), size=(400, 7)).astype(float)
+    corrected = [corrected_bits(table) for table in tables]
+    assert abs(np.mean(corrected)) < 0.005
+    assert np.mean([information_bits(table) for table in tables]) > 0.05
+
+
+def test_interval_encloses_the_value_and_repeats():
+    draws = np.random.default_rng(3).multinomial(6, [0.7, 0.2, 0.1], size=(12, 3))
+    one, again = (transferred_information(draws, rng=np.random.default_rng(4)) for _ in "ab")
+    assert one == again
+    assert one.ci_low < one.bits < one.ci_high
+
+
+def test_a_class_never_answered_or_presented_changes_nothing():
+    small = np.array([[8.0, 2], [3, 9]])
+    assert corrected_bits(np.pad(small, (0, 1))) == pytest.approx(corrected_bits(small))
+
+
+@pytest.mark.parametrize(
+    "counts",
+    [np.eye(3), [np.eye(3)], np.zeros((0, 3, 3)), [np.eye(3), np.zeros((3, 3))]],
+)
+def test_single_people_and_empty_matrices_are_refused(counts):
+    with pytest.raises(InputError, match="expected"):
+        transferred_information(counts, rng=np.random.default_rng(5))
+
+
+def test_nan_is_refused():
+    with pytest.raises(InputError, match="counts"):
+        transferred_information([np.eye(3), np.eye(3) * np.nan], rng=np.random.default_rng(6))
