@@ -1,8 +1,8 @@
-"""Figures of people's answers: ratings, correct rates, confusions."""
+"""Figures of people's answers: ratings and correct rates."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,8 +19,7 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import ALL_TEXTURES, IDENTICAL, MODELS, SCALES, significance_mark
-from analysis.statistics.confusion import ConfusionMatrix
+from analysis.labels import ALL_TEXTURES, IDENTICAL, SCALES, significance_mark
 from analysis.statistics.paired import CONFIDENCE, ignoring_case
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Floats
@@ -180,42 +179,3 @@ def _significance_bracket(ax: Axes, x: float, *, top: float, p: float) -> None:
         ax.annotate(
             mark, (x, top), xytext=(0, 8), textcoords="offset points", ha="center", va="bottom"
         )
-
-
-def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool) -> Figure:
-    """Who was taken for whom, full beside simplified (PAPER fig. 10)."""
-    figure = Figure(figsize=(12.5, 6.2), layout="constrained")
-    axes = figure.subplots(1, 2, sharey=True)
-    for panel, ax, model in zip("ab", axes, MODELS, strict=True):
-        plot_confusion(matrices[model], simulated=simulated, ax=ax)
-        ax.set_title(f"({panel}) {model} model", loc="left")
-    axes[1].set_ylabel("")
-    bar = figure.colorbar(axes[1].images[0], ax=axes, shrink=0.8, pad=0.01)
-    bar.set_label("share of the row's answers (%)")
-    chance = 1 / len(matrices["full"].textures)
-    figure.supxlabel(
-        f"rows: real surface presented; columns: virtual surface answered; each row adds up to "
-        f"100%; chance {chance:.1%}; in brackets: number of answers",
-        fontsize=9,
-        color=GREY,
-    )
-    return figure
-
-
-def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None = None) -> Axes:
-    """One confusion matrix: row shares in per cent with counts."""
-    ax = axes_or_new(ax)
-    shares = 100 * matrix.row_shares
-    ax.imshow(shares, vmin=0, vmax=100, cmap="Blues", aspect="auto")
-    for (row, column), share in np.ndenumerate(shares):
-        text = f"{share:.0f}\n({matrix.counts[row, column]})" if np.isfinite(share) else "–"
-        shade = "black" if not share > 65 else "white"
-        shade = shade if np.isfinite(share) else GREY
-        ax.text(column, row, text, ha="center", va="center", fontsize=9, color=shade)
-    names = list(matrix.textures)
-    ax.set_xticks(range(len(names)), names, rotation=30, ha="right")
-    ax.set_yticks(range(len(names)), names)
-    ax.set_xlabel("virtual surface answered")
-    ax.set_ylabel("real surface presented")
-    stamp_if_simulated(ax, simulated)
-    return ax

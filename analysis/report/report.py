@@ -32,6 +32,7 @@ from analysis.report.page import (
 )
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
+from analysis.report.section_confusions import confusion_section
 from analysis.report.section_hand import hand_section
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
@@ -41,7 +42,13 @@ from analysis.report.section_reliability import reliability_section
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
 from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import ODDITY_CHANCE, ClaimFound, chance_of, claims_found
+from analysis.statistics.verdicts import (
+    ODDITY_CHANCE,
+    ClaimFound,
+    chance_of,
+    claims_found,
+    models_of,
+)
 from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
@@ -208,6 +215,9 @@ def _answer_sections(
         sections.append(rating_section(responses, by_task["absolute"]))
     if by_task.get("relative"):
         sections.append(choice_section(responses, by_task["relative"], rng=rng))
+        models = models_of(responses, "relative")
+        confused = confusion_section(responses.relative, models, simulated=simulated, rng=rng)
+        sections.append(confused)
     tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
     sections.append(
         reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)

@@ -9,20 +9,14 @@ import pandas as pd
 
 from analysis.answers.loading import Responses
 from analysis.columns import chosen, names, without
-from analysis.figures.answers import figure_confusion, figure_correct_rates, figure_ratings
+from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
-from analysis.report.sentences import confusion_outcomes, rate_outcomes
+from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
-from analysis.statistics.confusion import (
-    CONFUSION_COLUMNS,
-    ConfusionMatrix,
-    confusion_matrices,
-    confusion_table,
-)
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
 from analysis.statistics.verdicts import (
     PLANTED_COLUMNS,
@@ -30,7 +24,7 @@ from analysis.statistics.verdicts import (
     ClaimFound,
     chance_of,
     differences_by_setup,
-    pairs_of,
+    models_of,
     planted_verdicts,
 )
 from modeling.files.writing import file_stem
@@ -163,29 +157,21 @@ def choice_section(
 ) -> Section:
     """Relative evaluation (PAPER VIII-B); `found` are its claims, `rng` draws the bootstrap."""
     relative, simulated = responses.relative, responses.simulated
-    pairs = pairs_of(responses, "relative")
-    models = tuple(dict.fromkeys(name for pair in pairs for name in pair))
-    matrices = confusion_matrices(relative)
+    models = models_of(responses, "relative")
     chance = chance_of(relative)
     rates = correct_rates(relative, models, rng=rng, chance=chance)
     done, tile = _participants(responses, "relative")
     overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in models if model in overall)
     rate_tile = (shown, f"right answers, {' → '.join(models)} (chance {chance:.0%})")
-    counts = Fold(
-        "Confusion matrices as tables",
-        tuple(_confusion_table(matrix, simulated=simulated) for matrix in matrices.values()),
-    )
     return Section(
         "choices",
         "Relative evaluation: forced choice",
         (
             *(_rates_picture(one, chance=chance, simulated=simulated) for one in found),
-            _confusion_picture(matrices, chance=chance, simulated=simulated),
             _rates_table(rates, simulated=simulated),
-            counts,
         ),
-        outcomes=(*rate_outcomes(rates, chance=chance), *confusion_outcomes(matrices)),
+        outcomes=tuple(rate_outcomes(rates, chance=chance)),
         done=(done,),
         tiles=(tile, rate_tile),
     )
@@ -204,19 +190,6 @@ def _rates_picture(found: ClaimFound, *, chance: float, simulated: bool) -> Pict
         "Bars: means over participants with 95% confidence intervals; points: participants; "
         "dashed: chance. Cf. the paper's figure 11, whose bars are standard errors.",
         figure_correct_rates(found, chance=chance, simulated=simulated),
-        simulated,
-    )
-
-
-def _confusion_picture(
-    matrices: dict[str, ConfusionMatrix], *, chance: float, simulated: bool
-) -> Picture:
-    return Picture(
-        "confusion",
-        "Who was taken for whom",
-        "Rows: real surface presented; columns: virtual surface answered. Per cent of the row, in "
-        f"brackets the number of answers; chance is {chance:.1%}. Cf. the paper's figure 10.",
-        figure_confusion(matrices, simulated=simulated),
         simulated,
     )
 
@@ -251,10 +224,3 @@ def _participants(responses: Responses, task: str) -> tuple[str, tuple[str, str]
         f"planned sessions, {trials}."
     )
     return sentence, (people, f"planned {who}, {where}")
-
-
-def _confusion_table(matrix: ConfusionMatrix, *, simulated: bool) -> Table:
-    title = f"Confusion matrix, {matrix.model} model"
-    note = "Counts and shares of the row (0–1)."
-    table = confusion_table(matrix)
-    return Table(f"confusion_{matrix.model}", title, note, table, CONFUSION_COLUMNS, simulated)

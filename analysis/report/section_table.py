@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.answers.imported import Imported
 from analysis.columns import p_value
-from analysis.figures.answers import plot_confusion
+from analysis.figures.confusions import plot_confusion
 from analysis.figures.factorial import figure_factorial
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Picture, Table

@@ -69,6 +69,39 @@ def confusion_matrices(
     return matrices
 
 
+def participant_counts(
+    relative: pd.DataFrame, matrix: ConfusionMatrix
+) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """The counts behind a matrix, person by person.
+
+    Parameters
+    ----------
+    relative : DataFrame
+        That the matrix was counted from.
+    matrix : ConfusionMatrix
+
+    Returns
+    -------
+    (participants, (n, k, k) ndarray of int)
+        Who answered with this model, in order, and their counts.
+    """
+    chosen = relative[relative["answer"].notna() & (relative["model"] == matrix.model)]
+    people = tuple(sorted(chosen["participant_id"].unique()))
+    counts = np.zeros((len(people), *matrix.counts.shape), dtype=np.int64)
+    place = {texture: number for number, texture in enumerate(matrix.textures)}
+    who = {name: number for number, name in enumerate(people)}
+    np.add.at(
+        counts,
+        (
+            chosen["participant_id"].map(who).to_numpy(dtype=int),
+            chosen["texture"].map(place).to_numpy(dtype=int),
+            chosen["answer"].map(place).to_numpy(dtype=int),
+        ),
+        1,
+    )
+    return people, counts
+
+
 CONFUSION_COLUMNS = (
     Column("presented", is_name=True),
     Column("answered", is_name=True),

@@ -114,10 +114,17 @@ def measures_of(task: str) -> tuple[str, ...]:
 
 def pairs_of(responses: Responses, task: str) -> list[tuple[str, str]]:
     """The reference with each other set of models that a task compares."""
+    reference, *others = models_of(responses, task)
+    return [(reference, other) for other in others]
+
+
+def models_of(responses: Responses, task: str) -> tuple[str, ...]:
+    """The sets of models that a task compares, the reference first."""
     planned = responses.planned.get(task)
     asked = set(responses.answers[task]["model"].dropna())
-    sets = planned.models if planned else MODELS if asked <= set(MODELS) else tuple(sorted(asked))
-    return [(sets[0], other) for other in sets[1:]]
+    if planned:
+        return planned.models
+    return MODELS if asked <= set(MODELS) else tuple(sorted(asked))
 
 
 def claim_values(responses: Responses, claim: Claim) -> Values:

@@ -15,10 +15,10 @@ from analysis.answers.loading import Responses
 from analysis.figures.answers import (
     BAR_WIDTH,
     ROLE_COLOURS,
-    figure_confusion,
     figure_correct_rates,
     figure_ratings,
 )
+from analysis.figures.confusions import figure_confusion, figure_similarities
 from analysis.figures.drawing import LAYER_COLOURS, VERMILLION
 from analysis.figures.forest import figure_forest
 from analysis.figures.layers_over_speed import figure_layers_over_speed
@@ -202,6 +202,22 @@ def test_confusion_matrices_state_orientation_counts_and_chance(choices):
         assert f"{100 * matrix.row_shares[0, 0]:.0f}\n({matrix.counts[0, 0]})" in texts(ax)
     assert "chance 14.3%" in texts(figure)
     assert "share of the row's answers (%)" in texts(figure)
+
+
+@pytest.mark.parametrize("classes", [3, 16])
+def test_similarities_of_any_number_of_classes(classes):
+    similarities = np.full((classes, classes), 0.25)
+    similarities[1, 0] = similarities[0, 1] = np.nan
+    names = [f"t{number}" for number in range(classes)]
+    figure = figure_similarities({"full": similarities, "AR": similarities}, names, simulated=True)
+    axes = drawn(figure)
+    assert [ax.get_title(loc="left") for ax in axes] == ["(a) full model", "(b) AR model"]
+    for ax in axes:
+        shown = [text.get_text() for text in ax.texts if text.get_text() != "SIMULATED"]
+        assert len(shown) == classes * (classes - 1) // 2
+        assert shown.count("–") == 1
+        assert [label.get_text() for label in ax.get_xticklabels()] == names
+    assert "SIMULATED" in texts(figure)
 
 
 def test_layers_over_speed_beside_the_planted_ones(results):

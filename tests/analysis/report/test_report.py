@@ -211,14 +211,14 @@ def test_names_that_no_font_has_are_told_once(tmp_path, ratings, monkeypatch):
 
 def test_links_lead_somewhere(shown):
     anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
-    assert len(anchors) == 9
+    assert len(anchors) == 10
     assert set(anchors) <= set(shown.identifiers)
     assert len(shown.identifiers) == len(set(shown.identifiers))
 
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     pictures = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    assert len(pictures) == 2 * 2 + 1 + 4
+    assert len(pictures) == 2 * 2 + 1 + 5
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
         for reference in shown.references
@@ -242,7 +242,13 @@ def test_every_table_is_in_the_report_and_beside_it(folder, shown):
         "correct_rates",
         "planted_truth",
     } <= names
-    assert {"planted_layers", "confusion_full", "confusion_simplified", "provenance"} <= names
+    assert {
+        "planted_layers",
+        "confusion_full",
+        "confusion_simplified",
+        "provenance",
+        "buttons",
+    } <= names
     assert {"regressions", "regression_support", "regression_coefficients"} <= names
     assert {"centroid", "centroid_amplitude", "driving"} <= names
     assert sum(name.startswith("verdicts_") for name in names) == 2

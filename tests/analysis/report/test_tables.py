@@ -29,6 +29,14 @@ from analysis.labels import ALL_TEXTURES
 from analysis.report.chart_page import chart_section
 from analysis.report.page import Fold, Item, Table, table_html
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
+from analysis.report.section_confusions import (
+    BIAS_COLUMNS,
+    CHANGE_COLUMNS,
+    FIT_COLUMNS,
+    INFORMATION_COLUMNS,
+    SIMILARITY_COLUMNS,
+    confusion_section,
+)
 from analysis.report.section_models import model_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
@@ -41,6 +49,7 @@ from analysis.report.section_scenes import (
 )
 from analysis.report.section_stability import stability_section
 from analysis.report.sections import Section
+from analysis.statistics.buttons import BUTTON_COLUMNS
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.hand import HAND_TEST_COLUMNS
@@ -79,6 +88,12 @@ DECLARED = {
     "hand_tests": HAND_TEST_COLUMNS,
     "correct_rates": CORRECT_RATE_COLUMNS,
     "confusion": CONFUSION_COLUMNS,
+    "confusion_change": CHANGE_COLUMNS,
+    "transferred_information": INFORMATION_COLUMNS,
+    "similarity_fit": FIT_COLUMNS,
+    "similarities": SIMILARITY_COLUMNS,
+    "biases": BIAS_COLUMNS,
+    "buttons": BUTTON_COLUMNS,
     "gfc": GFC_COLUMNS,
     "left_out": LEFT_OUT_COLUMNS,
     "verdicts": LAYER_VERDICT_COLUMNS,
@@ -108,7 +123,7 @@ EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
 
 def kind(table: Table) -> str:
     """The declaration that a table's name stands for: there is one per texture or per model."""
-    return re.sub(r"^(verdicts|confusion)_.*", r"\1", table.name)
+    return re.sub(r"^(verdicts|confusion)_(?!change$).*", r"\1", table.name)
 
 
 def tables_in(items: Iterable[Item]) -> list[Table]:
@@ -165,6 +180,9 @@ def tables(results, ratings, choices, found) -> list[Table]:
         verdict_section(found, simulated=True, planted={"PVC": {"magnitude_similarity": -30.0}}),
         rating_section(responses, found[:2]),
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
+        confusion_section(
+            choices, ("full", "simplified"), simulated=True, rng=np.random.default_rng(1)
+        ),
         reliability(ratings, choices),
         planted_section(textures),
         chart_section(chart_of([judge(surface, methods=("joint, 1 layer", "truth"))], turns=1)),
