@@ -57,7 +57,7 @@ def plot_confusion(matrix: ConfusionMatrix, *, simulated: bool, ax: Axes | None 
         shade = "black" if not share > DARK else "white"
         shade = shade if np.isfinite(share) else GREY
         ax.text(column, row, text, ha="center", va="center", fontsize=size, color=shade)
-    _name_axes(ax, matrix.textures)
+    _name_axes(ax, rows=matrix.textures, columns=matrix.textures)
     ax.set_xlabel("virtual surface answered")
     ax.set_ylabel("real surface presented")
     stamp_if_simulated(ax, simulated)
@@ -81,15 +81,16 @@ def figure_similarities(
     figure, axes = _panels(len(similarities), len(textures))
     for panel, ax, model in zip("abcdefgh", axes, similarities, strict=False):
         values = similarities[model]
-        below = np.where(np.tri(len(textures), k=-1, dtype=bool), values, np.nan)
+        # Each pair once: neither the first row nor the last column would hold any.
+        below = np.where(np.tri(len(textures) - 1, dtype=bool), values[1:, :-1], np.nan)
         ax.imshow(below, vmin=0, vmax=1, cmap="Blues", aspect="auto")
         for (row, column), value in np.ndenumerate(below):
-            if column >= row:
+            if column > row:
                 continue
             text = f"{value:.2f}" if np.isfinite(value) else "–"
             shade = "white" if value > DARK / 100 else "black"
             ax.text(column, row, text, ha="center", va="center", fontsize=TEXT, color=shade)
-        _name_axes(ax, textures)
+        _name_axes(ax, rows=textures[1:], columns=textures[:-1])
         ax.set_title(f"({panel}) {model} model", loc="left")
         ax.spines[:].set_visible(False)
         stamp_if_simulated(ax, simulated)
@@ -106,6 +107,6 @@ def _panels(count: int, classes: int) -> tuple[Figure, list[Axes]]:
     return figure, list(axes[0])
 
 
-def _name_axes(ax: Axes, names: Sequence[str]) -> None:
-    ax.set_xticks(range(len(names)), list(names), rotation=30, ha="right")
-    ax.set_yticks(range(len(names)), list(names))
+def _name_axes(ax: Axes, *, rows: Sequence[str], columns: Sequence[str]) -> None:
+    ax.set_xticks(range(len(columns)), list(columns), rotation=30, ha="right")
+    ax.set_yticks(range(len(rows)), list(rows))

@@ -24,6 +24,13 @@ def test_binary_channel_has_its_capacity():
     assert information_bits(np.array([[90.0, 10], [10, 90]])) == pytest.approx(1 + noise)
 
 
+def test_a_textbook_example():
+    # Cover and Thomas, Elements of Information Theory (2006), example 2.2.1: I(X; Y) = 3/8 bit.
+    joint = np.array([[4, 2, 1, 1], [2, 4, 1, 1], [2, 2, 2, 2], [8, 0, 0, 0]]) / 32
+    assert information_bits(joint) == pytest.approx(3 / 8)
+    assert information_bits(320 * joint.T) == pytest.approx(3 / 8)
+
+
 def test_correction_takes_chance_to_nothing():
     rng = np.random.default_rng(2)
     tables = rng.multinomial(60, np.full(7, 1 / 7), size=(400, 7)).astype(float)
