@@ -185,7 +185,7 @@ def _table(
             raise ValueError(f"{table.shape[1]} columns")
         table = table.set_axis(list(columns), axis=1) if columns else table
         return table[list(needed)].astype(dict.fromkeys(numbers, float))
-    except (OSError, EOFError, zlib.error, ValueError, KeyError) as error:
+    except (OSError, EOFError, zlib.error, ValueError, KeyError, OverflowError) as error:
         told = shown((str(error) or type(error).__name__).splitlines()[0])
         expected = f"a table with {len(columns)} columns" if columns else f"{', '.join(needed)}"
         raise InputError(f"expected {expected} in {path}, got {told}; {_ADVICE}.") from None

@@ -381,13 +381,14 @@ def _check_matrix(
     if sorted(presented) != sorted(answered) or len(set(answered)) != len(answered):
         raise InputError(
             f"expected the same classes, each once, in the first row and column of {file.path}, "
-            f"got {', '.join(answered)} and {', '.join(presented)}; make the matrix square."
+            f"got {shown(', '.join(answered))} and {shown(', '.join(presented))}; make the matrix "
+            "square."
         )
     _check_classes(answered, file.header.where)
     if before and sorted(answered) != sorted(before):
         raise InputError(
-            f"expected the classes of the files before ({', '.join(before)}) in "
-            f"{file.header.where}, got {', '.join(answered)}; analyse them on their own."
+            f"expected the classes of the files before ({shown(', '.join(before))}) in "
+            f"{file.header.where}, got {shown(', '.join(answered))}; analyse them on their own."
         )
 
 

@@ -82,12 +82,12 @@ def confusion_section(
         Two sets at least.
     simulated : bool
     rng : Generator
-        Draws swaps, layouts, participants and tables.
+        Draws swaps, layouts and tables.
     """
     matrices = confusion_matrices(relative, tuple(models))
     textures = next(iter(matrices.values())).textures
     change = _changes(relative, matrices, rng=rng)
-    information = _information(relative, matrices, rng=rng)
+    information = _information(relative, matrices)
     liked = button_preference(relative, rng=rng)
     choices = {}
     if FEWEST_CLASSES <= len(textures) <= MOST_CLASSES:
@@ -137,16 +137,14 @@ def _changes(
     return pd.DataFrame(rows, columns=names(CHANGE_COLUMNS))
 
 
-def _information(
-    relative: pd.DataFrame, matrices: Mapping[str, ConfusionMatrix], *, rng: np.random.Generator
-) -> pd.DataFrame:
+def _information(relative: pd.DataFrame, matrices: Mapping[str, ConfusionMatrix]) -> pd.DataFrame:
     """Of each set of models that two people or more answered on."""
     rows = []
     for model, matrix in matrices.items():
         people, counts = participant_counts(relative, matrix)
         if len(people) < 2:
             continue
-        found = transferred_information(counts, rng=rng)
+        found = transferred_information(counts)
         rows.append({"model": model, **vars(found)})
     return pd.DataFrame(rows, columns=names(INFORMATION_COLUMNS))
 
@@ -180,8 +178,8 @@ def _information_table(information: pd.DataFrame, *, simulated: bool) -> Table:
         "transferred_information",
         "Transferred information",
         "Of all participants' answers in one matrix, corrected after Miller and Madow; intervals: "
-        "bootstrap over participants, whose coverage was not measured. None for single persons: 21 "
-        "trials read 1.27 bit at pure chance.",
+        "jackknife over participants. None for single persons: 21 trials read 1.27 bit at pure "
+        "chance.",
         information,
         INFORMATION_COLUMNS,
         simulated,

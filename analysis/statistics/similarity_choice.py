@@ -32,7 +32,8 @@ class SimilarityChoice:
     biases : (k,) ndarray
         Adding up to 1; NaN as above, and where nothing was confused.
     deviance : float
-        Of the fitted counts; NaN where no class was left to compare.
+        Of the fitted counts; NaN where no class was left to compare, or the counts are too few for
+        a fit.
     df : int
         (k−1)(k−2)/2, less one for each pair that was never confused.
     p : float
@@ -80,7 +81,10 @@ def similarity_choice(counts: ArrayLike, *, rng: np.random.Generator) -> Similar
     if known.size < 2:
         return SimilarityChoice(similarities, biases, float("nan"), 0, float("nan"), float("nan"))
     kept = table[np.ix_(known, known)]
-    fitted, logs = _fit(kept)
+    try:
+        fitted, logs = _fit(kept)
+    except ValueError:  # of statsmodels, where a parameter runs away
+        return SimilarityChoice(similarities, biases, float("nan"), 0, float("nan"), float("nan"))
     deviance, df = _deviance(kept, fitted), _degrees(kept)
     similarities[np.ix_(known, known)] = logs
     biases[known] = _biases(fitted)
@@ -173,5 +177,8 @@ def _simulated_p(
         drawn = rng.multinomial(totals, shares).astype(float)
         known = np.flatnonzero(np.diag(drawn) > 0)
         drawn = drawn[np.ix_(known, known)]
-        worse += len(known) > 1 and _deviance(drawn, _fit(drawn)[0]) >= deviance - 1e-9
+        try:
+            worse += len(known) > 1 and _deviance(drawn, _fit(drawn)[0]) >= deviance - 1e-9
+        except ValueError:
+            worse += 1  # counted against the difference
     return worse / (SIMULATIONS + 1)

@@ -17,6 +17,7 @@ from scipy import integrate, stats
 
 from analysis.columns import Column, names
 from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
+from analysis.statistics.information import information_bits, transferred_information
 from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
 from analysis.statistics.rates import bootstrap_intervals
 from modeling.arrays import Floats
@@ -236,6 +237,27 @@ def _bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> 
     return _told(rates, told)
 
 
+def _confusions(
+    rng: np.random.Generator, shape: tuple[int, int], truth: float, *, concentration: float = 5.0
+) -> Floats:
+    """Counts (k, n, 7, 7) of people whose abilities follow a beta distribution.
+
+    `truth` is their mean share of right answers; wrong ones fall on all others alike.
+    """
+    ability = rng.beta(concentration * truth, concentration * (1 - truth), shape)
+    right = np.eye(TEXTURES)
+    wrong = (1 - right) / (TEXTURES - 1)
+    shares = ability[..., None, None] * right + (1 - ability)[..., None, None] * wrong
+    return rng.multinomial(TRIALS // TEXTURES, shares).astype(float)
+
+
+def _information_covers(counts: Floats, truth: float, rng: np.random.Generator) -> Hits:
+    pooled = truth * np.eye(TEXTURES) + (1 - truth) * (1 - np.eye(TEXTURES)) / (TEXTURES - 1)
+    bits = float(information_bits(pooled))
+    found = [transferred_information(each) for each in counts]
+    return np.array([one.ci_low <= bits <= one.ci_high for one in found])
+
+
 def t_test_power(n: int, truth: float) -> float:
     """Power of the two-sided paired t-test at α = .05 where differences are normal (noncentral t).
 
@@ -433,6 +455,22 @@ _CHECKS = (
         nominal=_always(CONFIDENCE),
         truth=0.95,
         situations={"ceiling": _rates},
+    ),
+    Check(
+        procedure="interval of transferred information",
+        quantity=COVERAGE,
+        hits=_information_covers,
+        nominal=_always(CONFIDENCE),
+        truth=0.5,
+        situations={"normal": _confusions},
+    ),
+    Check(
+        procedure="interval of transferred information",
+        quantity=COVERAGE,
+        hits=_information_covers,
+        nominal=_always(CONFIDENCE),
+        truth=0.85,
+        situations={"ceiling": _confusions},
     ),
 )
 Cell = tuple[int, str, int]  # number of a check, situation, participants

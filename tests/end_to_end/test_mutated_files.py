@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import io
 import json
 import re
@@ -14,6 +15,8 @@ import numpy as np
 import pytest
 import soundfile
 
+from analysis.answers.hand import load_hand
+from analysis.answers.imported import load_imported, parse_map
 from analysis.answers.loading import load_responses
 from experiments.study.study import SHIPPED_STUDY, Study
 from experiments.tasks import plan_session
@@ -335,6 +338,23 @@ def use_answers(path: Path) -> Iterable[object]:
     yield len(responses.textures)
 
 
+def use_hand(path: Path) -> Iterable[object]:
+    folder = next(parent for parent in path.parents if parent.name == "data")
+    hand = load_hand(folder, load_responses(folder).answers)
+    yield hand["trials"].to_numpy(float)
+    yield hand[["speed_mm_s", "force_n", "contact_s", "presentations"]].fillna(0.0).to_numpy(float)
+
+
+def use_table(path: Path) -> Iterable[object]:
+    imported = load_imported([path], parse_map("participant=who,correct=right,factor=size"))
+    yield imported.answers["correct"].dropna().to_numpy(float)
+
+
+def use_matrix(path: Path) -> Iterable[object]:
+    imported = load_imported([path], parse_map("factor=size"))
+    yield imported.answers["count"].to_numpy(float)
+
+
 def use_vibrator(path: Path) -> Iterable[object]:
     found = Vibrator.load(path)
     yield found.peq.response(FREQUENCY_HZ * found.rate_hz)
@@ -444,6 +464,20 @@ DATA = {
         }
     ),
 }
+HAND_STEM = ANSWERS.removesuffix("beh")
+EVENTS = (
+    "onset\tduration\ttrial_type\tsurface\trun\ttrial\n0\t1\tpresented\tvirtual\t1\t2\n"
+    "1.5\tn/a\tpresented\treal\t1\t2\n4\t1\tpresented\tvirtual\t1\t3\n"
+)
+OF_HAND = ["speed_mm_s", "force_n", "surface", "force_assumed", "trial"]
+READINGS = "".join(f"{90 + n}\t{n % 3}\t2\t0\t{2 + n // 10}\n" for n in range(30))
+SAMPLED = {
+    "Columns": OF_HAND,
+    "SamplingFrequency": 250.0,
+    "surface": {"Levels": {"0": "none", "1": "the real surface", "2": "a virtual surface"}},
+}
+TRIALS = "who;size;right\nP1;1;1\nP1;2;0\nP2;1;1\nP2;2;1\nP3;1;0\nP3;2;\n"
+MATRIX = ",a,b,c\na,5,1,0\nb,2,4,1\nc,0,0,6\n"
 RECIPE = b"""version = 1
 [set]
 name = "test"
@@ -562,6 +596,11 @@ KINDS: dict[str, tuple[str, Use]] = {
     "simplification": ("x_simplification.json", use_simplification),
     "threshold": ("threshold.tsv", use_threshold),
     **{f"answers: {Path(name).name}": (name, use_answers) for name in DATA},
+    "events of a session": (f"{HAND_STEM}events.tsv", use_hand),
+    "readings of the hand": (f"{HAND_STEM}recording-start1_physio.tsv.gz", use_hand),
+    "what the readings are": (f"{HAND_STEM}recording-start1_physio.json", use_hand),
+    "table of another experiment": ("answers.csv", use_table),
+    "confusion matrix": ("P1_small.csv", use_matrix),
 }
 
 
@@ -594,6 +633,11 @@ def write_good_files(folder: Path, hatt_xml: str) -> None:
         "strokes/pieces/pieces.tsv": PIECES,
         "threshold.tsv": THRESHOLD,
         **{name: text.encode() for name, text in DATA.items()},
+        f"{HAND_STEM}events.tsv": EVENTS.encode(),
+        f"{HAND_STEM}recording-start1_physio.tsv.gz": gzip.compress(READINGS.encode(), mtime=0),
+        f"{HAND_STEM}recording-start1_physio.json": json.dumps(SAMPLED).encode(),
+        "answers.csv": TRIALS.encode(),
+        "P1_small.csv": MATRIX.encode(),
     }
     for name, data in contents.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)

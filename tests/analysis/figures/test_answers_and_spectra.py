@@ -217,7 +217,7 @@ def test_similarities_of_any_number_of_classes(classes):
         assert len(shown) == classes * (classes - 1) // 2
         assert shown.count("–") == 1
         assert [label.get_text() for label in ax.get_xticklabels()] == names[:-1]
-        assert [label.get_text() for label in ax.get_yticklabels()] == names[1:]
+    assert [label.get_text() for label in axes[0].get_yticklabels()] == names[1:]
     assert "SIMULATED" in texts(figure)
 
 
