@@ -425,21 +425,22 @@ def time_ratio(
 def _mixed_model(own: pd.DataFrame, models: tuple[str, str]) -> tuple[float, float] | str:
     """The model's effect on log time and its standard error, or why there is none."""
     from statsmodels.regression.mixed_linear_model import MixedLM  # late: it takes a second
-    from statsmodels.tools.sm_exceptions import ModelWarning
+    from statsmodels.tools.sm_exceptions import ConvergenceWarning, SingularMatrixWarning
 
     other = np.where(own["model"] == models[1], 0.5, -0.5)
     textures = pd.get_dummies(own["texture"], dtype=float)
     try:
         with warnings.catch_warnings():
             # On the boundary of its parameters its standard errors cannot be relied on, either.
-            warnings.simplefilter("error", ModelWarning)
+            warnings.simplefilter("error", ConvergenceWarning)
+            warnings.simplefilter("ignore", SingularMatrixWarning)  # met on the way, not in the end
             found = MixedLM(
                 np.log(own["response_time_s"].to_numpy(dtype=float)),
                 np.column_stack([other, textures]),
                 groups=own["participant_id"].to_numpy(),
                 exog_re=np.column_stack([np.ones_like(other), other]),
             ).fit(method="lbfgs")
-    except (ModelWarning, np.linalg.LinAlgError) as reason:
+    except (ConvergenceWarning, np.linalg.LinAlgError) as reason:
         return f"it did not converge ({str(reason).rstrip('.')})"
     estimate, error = float(found.fe_params[0]), float(found.bse_fe[0])
     return (estimate, error) if found.converged and error > 0 else "it did not converge"
