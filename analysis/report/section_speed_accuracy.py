@@ -162,8 +162,8 @@ def _compared(
         "Time, accuracy and both together",
         f"Paired t-tests over participants, {other} to {reference} models; time is tested in "
         "logarithms, its effect is a ratio. LISAS: mean time of right answers plus weighted share "
-        "of wrong ones (Vandierendonck 2017), low where answers are fast and right. Not corrected "
-        "for the number of tests; no claim rests on them.",
+        "of wrong ones (Vandierendonck 2017), low where answers are fast and right; it does not "
+        "settle a trade-off. Not corrected for the number of tests; no claim rests on them.",
         comparison.replace({"measure": MEASURES}),
         COMPARISON_COLUMNS,
         simulated,
