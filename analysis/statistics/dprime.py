@@ -1,6 +1,6 @@
 """Sensitivity d′ from shares of right answers, each task by its own decision model.
 
-docs/method/statistics.md#d-prime
+docs/method/statistics.md#d-prime, docs/method/speed-accuracy.md#same-or-different
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from math import inf, sqrt
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.special import ndtr
+from scipy.special import ndtr, ndtri
 
 from modeling import InputError
 
@@ -75,9 +75,74 @@ def oddity_d_prime(share: float) -> float:
     return inf if share == 1 else _inverse(oddity_share, share, lowest=0.0)
 
 
-def _inverse(model: Model, share: float, *, lowest: float) -> float:
+def same_different_d_prime(hits: float, false_alarms: float) -> float:
+    """d′ of who judges the two surfaces of a trial one by one: independent observations.
+
+    Infinite for hits of 1 or false alarms of 0 (Macmillan and Creelman 2005, ch. 9).
+    docs/method/speed-accuracy.md#same-or-different
+
+    Parameters
+    ----------
+    hits, false_alarms : float
+        Share of "different" where the surfaces differ, and where they are the same, 0 … 1; 0 where
+        the former is not the larger.
+    """
+    if not _more_hits(hits, false_alarms):
+        return 0.0
+    # Neighbouring numbers may change places when rounded.
+    unbiased = ndtr(max(0.0, ndtri(hits) - ndtri(false_alarms)) / 2)
+    return float(2 * ndtri((1 + np.sqrt(2 * unbiased - 1)) / 2))
+
+
+def same_different_differencing_d_prime(hits: float, false_alarms: float) -> float:
+    """d′ of who answers by the difference of what was felt in a trial: differencing.
+
+    Parameters and limits as in `same_different_d_prime`.
+    docs/method/speed-accuracy.md#same-or-different
+    """
+    if not _more_hits(hits, false_alarms):
+        return 0.0
+    if hits == 1 or false_alarms == 0:
+        return inf
+    criterion = -sqrt(2) * ndtri(false_alarms / 2)
+
+    def model(d_prime: float) -> float:
+        above, below = d_prime - criterion, -d_prime - criterion
+        return float(ndtr(above / sqrt(2)) + ndtr(below / sqrt(2)))
+
+    return _inverse(model, hits, lowest=0.0)
+
+
+def d_primes(*shares: float, of: Callable[[float], float]) -> tuple[float, ...]:
+    """d′ of a mean share of right answers, of the limits of its interval, or of a bound.
+
+    docs/method/speed-accuracy.md#interval-of-d-prime
+
+    Parameters
+    ----------
+    shares : float
+        Cut to 0 … 1; NaN stays NaN.
+    of : callable
+        From a share to d′, rising.
+    """
+    return tuple(
+        share if np.isnan(share) else of(float(np.clip(share, 0.0, 1.0))) for share in shares
+    )
+
+
+def _more_hits(hits: float, false_alarms: float) -> bool:
+    for share in (hits, false_alarms):
+        _check_share(share)
+    return hits > false_alarms
+
+
+def _check_share(share: float) -> None:
     if not 0 <= share <= 1:
-        raise InputError(f"expected a share of right answers from 0 to 1, got {share}; correct it.")
+        raise InputError(f"expected a share of answers from 0 to 1, got {share}; correct it.")
+
+
+def _inverse(model: Model, share: float, *, lowest: float) -> float:
+    _check_share(share)
     if share >= model(HIGHEST):
         return inf
     return float(brentq(lambda d: model(d) - share, lowest, HIGHEST, xtol=1e-12))

@@ -1,0 +1,122 @@
+"""The section on the odd one out: shares of right answers and the d′ that they mean.
+
+docs/method/speed-accuracy.md#odd-one-out
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from analysis.columns import TEXTURE, Column, names
+from analysis.labels import ALL_TEXTURES
+from analysis.report.claim_sentences import NO_TEST
+from analysis.report.outcomes import Outcome, Weight
+from analysis.report.page import Table
+from analysis.report.sections import Section
+from analysis.statistics.dprime import d_primes, oddity_d_prime
+from analysis.statistics.verdicts import ODDITY_CHANCE, ClaimFound
+
+ODDITY_COLUMNS = (
+    Column("claim", is_name=True),
+    TEXTURE,
+    Column("verdict", is_name=True),
+    Column("n", "participants"),
+    Column("share", "share of right answers", format=".3f"),
+    Column("share_low", "95% CI from", format=".3f"),
+    Column("share_high", "to", format=".3f"),
+    Column("d_prime", "d′", format=".2f"),
+    Column("d_prime_low", "95% CI from", format=".2f"),
+    Column("d_prime_high", "to", format=".2f"),
+    Column("bound", "upper bound of the share", format=".3f"),
+    Column("bound_d_prime", "as d′", format=".2f"),
+)
+
+
+def oddity_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section | None:
+    """Right answers and d′ of the odd-one-out task; None without claims about it.
+
+    Parameters
+    ----------
+    found : sequence of ClaimFound
+        Of any tasks.
+    simulated : bool
+    """
+    shown = [one for one in found if one.claim.task == "oddity" and len(one.tests)]
+    if not shown:
+        return None
+    sensitivity = pd.concat([oddity_sensitivity(one) for one in shown], ignore_index=True)
+    table = Table(
+        "oddity",
+        "Right answers and d′",
+        "The one of three that differs was looked for; chance is 1/3. d′ by the decision model of "
+        "the task (the one farthest from the other two is chosen), its interval that of the mean "
+        "share. Who feels no difference is right by chance, so of the claim's bounds the upper one "
+        "counts; it is given as a share and as a d′. Verdicts rest on the tests of the shares.",
+        sensitivity,
+        ODDITY_COLUMNS,
+        simulated,
+    )
+    overall = sensitivity[sensitivity["texture"] == ALL_TEXTURES].to_dict("records")
+    outcomes = tuple(Outcome(Weight.SECONDARY, _told(row)) for row in overall)
+    return Section("oddity", "Odd one out: d′", (table,), outcomes=outcomes)
+
+
+def oddity_sensitivity(found: ClaimFound) -> pd.DataFrame:
+    """The tests of a claim about the odd-one-out task as shares of right answers and d′.
+
+    docs/method/speed-accuracy.md#odd-one-out
+
+    Parameters
+    ----------
+    found : ClaimFound
+        Its differences are those of the share from chance.
+
+    Returns
+    -------
+    DataFrame
+        `ODDITY_COLUMNS`, a row for each row of its tests. Infinite where everybody was right, NaN
+        where there is no interval or no bound.
+    """
+    rows = [_sensitivity(row) for row in found.tests.to_dict("records")]
+    return pd.DataFrame(rows, columns=names(ODDITY_COLUMNS))
+
+
+def _sensitivity(row: Mapping[Hashable, Any]) -> dict[str, object]:
+    share = float(row["mean_other"])
+    low, high, bound = (ODDITY_CHANCE + row[name] for name in ("ci_low", "ci_high", "bound_high"))
+    d_prime, d_low, d_high, as_d_prime = d_primes(share, low, high, bound, of=oddity_d_prime)
+    return {
+        **{name: row[name] for name in ("claim", "texture", "verdict", "n")},
+        "share": share,
+        "share_low": low,
+        "share_high": high,
+        "d_prime": d_prime,
+        "d_prime_low": d_low,
+        "d_prime_high": d_high,
+        "bound": bound,
+        "bound_d_prime": as_d_prime,
+    }
+
+
+def _told(row: Mapping[Hashable, Any]) -> str:
+    intervals = ("", "")
+    if np.isfinite(row["share_low"]):
+        intervals = (
+            f" (95% CI {row['share_low']:.1%} to {row['share_high']:.1%})",
+            f" ({_number(row['d_prime_low'])} to {_number(row['d_prime_high'])})",
+        )
+    told = (
+        f"Odd one out, {row['claim']}: {row['share']:.1%} of the answers were right over all "
+        f"textures{intervals[0]}, d′ {_number(row['d_prime'])}{intervals[1]}"
+    )
+    if np.isfinite(row["bound"]):
+        told += f"; upper bound {row['bound']:.1%}, d′ {_number(row['bound_d_prime'])}"
+    return f"{told}; {row['verdict'] or NO_TEST}."
+
+
+def _number(d_prime: float) -> str:
+    return "∞" if np.isinf(d_prime) else f"{d_prime:.2f}"
