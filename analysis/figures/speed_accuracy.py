@@ -23,6 +23,7 @@ from analysis.figures.drawing import (
 
 COLOURS = tuple(ROLE_COLOURS.values())
 MARKERS = ("o", "s")
+NARROWEST = 1.3  # factor from the middle of the time axis to either end, at least
 
 
 def figure_speed_accuracy(
@@ -158,6 +159,10 @@ def figure_conditional_accuracy(
 def _time_axis(ax: Axes) -> None:
     """Response time in seconds, logarithmic; people differ by a factor of a few only."""
     ax.set_xscale("log")
+    low, high = ax.get_xlim()
+    # Times of simulated participants may all be alike.
+    middle, reach = np.sqrt(low * high), max(np.sqrt(high / low), NARROWEST)
+    ax.set_xlim(middle / reach, middle * reach)
     ax.xaxis.set_major_locator(LogLocator(subs=(1, 1.5, 2, 3, 4, 5, 7)))
     ax.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     ax.xaxis.set_minor_formatter(NullFormatter())

@@ -34,11 +34,14 @@ from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
 from analysis.report.section_confusions import confusion_section
 from analysis.report.section_hand import hand_section
+from analysis.report.section_mixed import mixed_section
 from analysis.report.section_models import model_section
+from analysis.report.section_oddity import oddity_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
 from analysis.report.section_reliability import reliability_section
+from analysis.report.section_speed_accuracy import speed_accuracy_section
 from analysis.report.sections import Progress, Section
 from analysis.report.sentences import cautions
 from analysis.statistics.equivalence import INCONCLUSIVE
@@ -218,14 +221,18 @@ def _answer_sections(
         models = models_of(responses, "relative")
         confused = confusion_section(responses.relative, models, simulated=simulated, rng=rng)
         sections.append(confused)
+    sections.append(oddity_section(shown, simulated=simulated))
+    sections.append(mixed_section(responses, shown, rng=rng))
+    pair = shown[0].claim.models  # of several pairs the first
+    same = list(responses.identical(pair))
+    different = {task: t[~t["texture"].isin(same)] for task, t in responses.answers.items()}
+    sections.append(speed_accuracy_section(different, models=pair, simulated=simulated, rng=rng))
     tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
     sections.append(
         reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
     )
     if hand is not None:
-        # Of several pairs of models the first.
-        pair = shown[0].claim.models
-        hand = hand[~hand["texture"].isin(list(responses.identical(pair)))]
+        hand = hand[~hand["texture"].isin(same)]
         sections.append(hand_section(hand, models=pair, simulated=simulated, rng=rng))
     return [section for section in sections if section is not None]
 

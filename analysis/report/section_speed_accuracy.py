@@ -6,12 +6,10 @@ docs/method/speed-accuracy.md
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 
 import numpy as np
 import pandas as pd
 
-from analysis.columns import Column, P, names
 from analysis.figures.speed_accuracy import figure_conditional_accuracy, figure_speed_accuracy
 from analysis.labels import TASKS
 from analysis.report.outcomes import Outcome, Weight
@@ -22,17 +20,16 @@ from analysis.statistics.speed_accuracy import (
     COMPARISON_COLUMNS,
     CONDITIONAL_COLUMNS,
     MEASURES,
-    MIXED_MODEL,
     RIGHT_WRONG_COLUMNS,
     SCORE_COLUMNS,
-    TimeRatio,
+    TIME_RATIO_COLUMNS,
     compare_models,
     conditional_accuracy,
     participant_scores,
     right_and_wrong,
     score_means,
     speed_and_accuracy,
-    time_ratio,
+    time_ratios,
     trade_off_sentence,
 )
 from analysis.statistics.verdicts import ODDITY_CHANCE, chance_of
@@ -58,18 +55,6 @@ _DETAILS = {
         CONDITIONAL_COLUMNS,
     ),
 }
-TIME_RATIO_COLUMNS = (
-    Column("method", is_name=True),
-    Column("n", "participants"),
-    Column("trials"),
-    Column("ratio", "time, other to reference", format=".3f"),
-    Column("ci_low", "95% CI from", format=".3f"),
-    Column("ci_high", "to", format=".3f"),
-    Column("t", format=".2f"),
-    Column("df"),
-    P,
-    Column("note"),
-)
 
 
 def speed_accuracy_section(
@@ -156,7 +141,7 @@ def _compared(
     """What two models do to time, accuracy and both together."""
     reference, other = models
     comparison = compare_models(answers, models=models, rng=rng)
-    ratio = time_ratio(answers, models=models, rng=rng)
+    ratios = time_ratios(answers, models=models, rng=rng)
     paired = Table(
         "speed_accuracy",
         "Time, accuracy and both together",
@@ -171,23 +156,24 @@ def _compared(
     mixed = Table(
         "time_ratio",
         "Response time by a mixed model",
-        "Log time by texture and model, with a random intercept and slope of the model per "
-        "participant; t with one degree of freedom less than participants.",
-        pd.DataFrame([asdict(ratio)], columns=names(TIME_RATIO_COLUMNS)),
+        "Log time by texture × model, session and order, with a random intercept and slope of the "
+        "model per participant; t with one degree of freedom less than participants.",
+        ratios,
         TIME_RATIO_COLUMNS,
         simulated,
     )
-    told = [trade_off_sentence(comparison, models=models), *_ratio_told(ratio, models)]
+    told = [trade_off_sentence(comparison, models=models), *_ratio_told(ratios, models)]
     return [paired, mixed], [Outcome(Weight.SECONDARY, sentence) for sentence in told]
 
 
-def _ratio_told(found: TimeRatio, models: tuple[str, str]) -> list[str]:
-    if not np.isfinite(found.ci_low):
+def _ratio_told(ratios: pd.DataFrame, models: tuple[str, str]) -> list[str]:
+    found = ratios.to_dict("records")[0]
+    if not np.isfinite(found["ci_low"]):
         return []
-    how = MIXED_MODEL if found.method == MIXED_MODEL else f"{found.method}; {found.note}"
+    how = "; ".join(filter(None, [f"{found['method']} of log time", found["note"]]))
     return [
-        f"Answers with {models[1]} models took {found.ratio:.2f} times as long as with "
-        f"{models[0]} ones (95% CI {found.ci_low:.2f} to {found.ci_high:.2f}; {how})."
+        f"Answers with {models[1]} models took {found['ratio']:.2f} times as long as with "
+        f"{models[0]} ones (95% CI {found['ci_low']:.2f} to {found['ci_high']:.2f}; {how})."
     ]
 
 

@@ -197,11 +197,13 @@ def wilcoxon(differences: Floats, *, rng: np.random.Generator) -> tuple[float, f
     moved = differences[differences != 0]
     if not moved.size:
         return float("nan"), float("nan")
-    result = stats.wilcoxon(moved)
     ranks = stats.rankdata(np.abs(moved))
     if np.unique(ranks).size == ranks.size:
+        result = stats.wilcoxon(moved)
         return float(result.statistic), float(result.pvalue)
-    return float(result.statistic), sign_flips_p(np.sign(moved) * ranks, rng=rng)
+    signed = np.sign(moved) * ranks
+    w = min(signed[signed > 0].sum(), -signed[signed < 0].sum())
+    return float(w), sign_flips_p(signed, rng=rng)
 
 
 def sign_flips_p(

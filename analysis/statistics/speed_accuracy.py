@@ -5,18 +5,15 @@ docs/method/speed-accuracy.md
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
 from analysis.columns import MODEL, TEXTURE, Column, P, names
 from analysis.statistics.equivalence import ALPHA
+from analysis.statistics.mixed import mixed_effects
 from analysis.statistics.paired import (
-    CONFIDENCE,
     ignoring_case,
     paired_test,
     t_test,
@@ -32,8 +29,6 @@ MEASURES = {
     "lisas_s": "LISAS (s)",
 }
 RATIO, DIFFERENCE = "ratio", "difference"
-MIXED_MODEL = "log-normal mixed model"
-PAIRED = "paired test of log time"
 
 PARTICIPANT = Column("participant_id", "participant", is_name=True)
 CELL_COLUMNS = (
@@ -100,6 +95,19 @@ RIGHT_WRONG_COLUMNS = (
     P,
     Column("note"),
 )
+TIME_RATIO_COLUMNS = (
+    Column("term", is_name=True),
+    Column("method", is_name=True),
+    Column("n", "participants"),
+    Column("answers"),
+    Column("ratio", "times as long", format=".3f"),
+    Column("ci_low", "95% CI from", format=".3f"),
+    Column("ci_high", "to", format=".3f"),
+    Column("t", format=".2f"),
+    Column("df"),
+    P,
+    Column("note"),
+)
 
 _TRADE_OFFS = {
     (-1, -1): "faster and less accurate: a speed–accuracy trade-off",
@@ -114,26 +122,6 @@ _ONE_SIDED = {
     (0, -1): "less accurate",
     (0, 1): "more accurate",
 }
-
-
-@dataclass(frozen=True)
-class TimeRatio:
-    """Time with the other model over that with the reference, over textures.
-
-    `method` is the one whose numbers these are, `note` says why it is not the mixed model. The
-    interval is that of 95 %, t has one degree of freedom less than there are participants.
-    """
-
-    n: int
-    trials: int
-    ratio: float
-    ci_low: float
-    ci_high: float
-    t: float
-    df: int
-    p: float
-    method: str
-    note: str
 
 
 def speed_and_accuracy(answers: pd.DataFrame, *, models: Sequence[str]) -> pd.DataFrame:
@@ -386,64 +374,36 @@ def right_and_wrong(
     return pd.DataFrame(rows, columns=names(RIGHT_WRONG_COLUMNS))
 
 
-def time_ratio(
+def time_ratios(
     answers: pd.DataFrame, *, models: tuple[str, str], rng: np.random.Generator
-) -> TimeRatio:
-    """Time with the other model over that with the reference, by a log-normal mixed model.
+) -> pd.DataFrame:
+    """Time with the other model over that with the reference, by a mixed model of log time.
 
-    log time = texture + model + a random intercept and slope of the model per participant. Where
-    the fit does not converge the paired test is given instead.
     docs/method/speed-accuracy.md#mixed-model
 
     Parameters
     ----------
     answers : DataFrame
-        As in `speed_and_accuracy`.
+        As in `speed_and_accuracy`, in the order of the trials; session where there are several.
     models : (str, str)
         The reference, and the other one.
     rng : Generator
-        Draws sign flips of the paired test.
+        Draws sign flips of the paired test, where nothing can be fitted.
+
+    Returns
+    -------
+    DataFrame
+        `TIME_RATIO_COLUMNS`, a row for each term of `analysis.statistics.mixed.mixed_effects`.
     """
     own = _in_all(answers, models)
-    people = own["participant_id"].nunique()
-    fit = _mixed_model(own, models) if people > 1 else "fewer than two participants"
-    if isinstance(fit, str):
-        row = compare_models(answers, models=models, rng=rng).to_dict("records")[0]
-        note = "; ".join(filter(None, [f"no mixed model: {fit}", row["note"]]))
-        shown = {name: row[name] for name in ("ci_low", "ci_high", "t", "df", "p")}
-        ratio = row["estimate"]
-        return TimeRatio(people, len(own), ratio, **shown, method=PAIRED, note=note)
-    estimate, error = fit
-    df = people - 1
-    wide = error * float(stats.t.isf((1 - CONFIDENCE) / 2, df))
-    ratio, low, high = (float(np.exp(x)) for x in (estimate, estimate - wide, estimate + wide))
-    t = estimate / error
-    p = float(2 * stats.t.sf(abs(t), df))
-    return TimeRatio(people, len(own), ratio, low, high, t, df, p, MIXED_MODEL, "")
-
-
-def _mixed_model(own: pd.DataFrame, models: tuple[str, str]) -> tuple[float, float] | str:
-    """The model's effect on log time and its standard error, or why there is none."""
-    from statsmodels.regression.mixed_linear_model import MixedLM  # late: it takes a second
-    from statsmodels.tools.sm_exceptions import ConvergenceWarning, SingularMatrixWarning
-
-    other = np.where(own["model"] == models[1], 0.5, -0.5)
-    textures = pd.get_dummies(own["texture"], dtype=float)
-    try:
-        with warnings.catch_warnings():
-            # On the boundary of its parameters its standard errors cannot be relied on, either.
-            warnings.simplefilter("error", ConvergenceWarning)
-            warnings.simplefilter("ignore", SingularMatrixWarning)  # met on the way, not in the end
-            found = MixedLM(
-                np.log(own["response_time_s"].to_numpy(dtype=float)),
-                np.column_stack([other, textures]),
-                groups=own["participant_id"].to_numpy(),
-                exog_re=np.column_stack([np.ones_like(other), other]),
-            ).fit(method="lbfgs")
-    except (ConvergenceWarning, np.linalg.LinAlgError) as reason:
-        return f"it did not converge ({str(reason).rstrip('.')})"
-    estimate, error = float(found.fe_params[0]), float(found.bse_fe[0])
-    return (estimate, error) if found.converged and error > 0 else "it did not converge"
+    logs = own.assign(log_time=np.log(own["response_time_s"]))
+    found = mixed_effects(logs, "log_time", models=models, rng=rng)
+    ratios = found.assign(
+        ratio=np.exp(found["estimate"].astype(float)),
+        ci_low=np.exp(found["ci_low"].astype(float)),
+        ci_high=np.exp(found["ci_high"].astype(float)),
+    )
+    return ratios[names(TIME_RATIO_COLUMNS)]
 
 
 def trade_off_sentence(comparison: pd.DataFrame, *, models: tuple[str, str]) -> str:
@@ -511,7 +471,8 @@ def _timed(answers: pd.DataFrame, models: Sequence[str]) -> pd.DataFrame:
         )
     known = answers["response_time_s"].between(0, np.inf, inclusive="neither")
     known &= answers["correct"].notna() & answers["model"].isin(models)
-    return answers.loc[known, list(needed)].astype({"correct": float})
+    kept = [*needed, *(["session"] if "session" in answers else [])]
+    return answers.loc[known, kept].astype({"correct": float})
 
 
 def _in_all(answers: pd.DataFrame, models: Sequence[str]) -> pd.DataFrame:

@@ -146,10 +146,9 @@ def choice_table(
                             "layout": "|".join(TEXTURES),
                             "answer": answer,
                             "correct": float(answer == texture),
-                            "response_time_s": 9.0 + len(rows) % 7,
                         }
                     )
-    return pd.DataFrame(rows)
+    return _as_presented(rows)
 
 
 def rating_table(
@@ -169,10 +168,17 @@ def rating_table(
                         "model": model,
                         "magnitude_similarity": ratings[0],
                         "frequency_similarity": ratings[1],
-                        "response_time_s": 12.0 + len(rows) % 5,
                     }
                 )
-    return pd.DataFrame(rows)
+    return _as_presented(rows)
+
+
+def _as_presented(rows: Rows) -> pd.DataFrame:
+    """The trials of each participant in an order and with times of their own."""
+    draws = np.random.default_rng(11)
+    answers = pd.DataFrame(rows).assign(response_time_s=draws.lognormal(2.3, 0.4, len(rows)))
+    mixed = answers.iloc[draws.permutation(len(rows))]
+    return mixed.sort_values("participant_id", kind="stable", ignore_index=True)
 
 
 def claim(

@@ -211,14 +211,14 @@ def test_names_that_no_font_has_are_told_once(tmp_path, ratings, monkeypatch):
 
 def test_links_lead_somewhere(shown):
     anchors = [reference[1:] for reference in shown.references if reference.startswith("#")]
-    assert len(anchors) == 10
+    assert len(anchors) == 12
     assert set(anchors) <= set(shown.identifiers)
     assert len(shown.identifiers) == len(set(shown.identifiers))
 
 
 def test_every_figure_is_inline_and_beside_the_report(folder, shown):
     pictures = {path.stem: path.read_bytes() for path in (folder / "figures").glob("*.png")}
-    assert len(pictures) == 2 * 2 + 1 + 5
+    assert len(pictures) == 2 * 2 + 1 + 7
     inline = {
         base64.b64decode(reference.split(",", 1)[1])
         for reference in shown.references

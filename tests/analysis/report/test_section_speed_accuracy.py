@@ -75,7 +75,7 @@ def test_a_planted_ratio_is_told_without_praise(choices):
     told = [outcome.sentence for outcome in section.outcomes]
     assert told[0].startswith("Speed and accuracy, simplified against full models: faster; a diff")
     assert told[1].startswith("Answers with simplified models took 0.")
-    assert told[1].endswith("log-normal mixed model).")
+    assert told[1].endswith("mixed model of log time).")
     assert {outcome.weight for outcome in section.outcomes} == {Weight.SECONDARY}
     assert "better" not in " ".join(told)
 

@@ -37,7 +37,13 @@ from analysis.report.section_confusions import (
     SIMILARITY_COLUMNS,
     confusion_section,
 )
+from analysis.report.section_mixed import (
+    CLAIM_GEE_COLUMNS,
+    CLAIM_MIXED_COLUMNS,
+    mixed_section,
+)
 from analysis.report.section_models import model_section
+from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import PROVENANCE_COLUMNS
@@ -47,6 +53,7 @@ from analysis.report.section_scenes import (
     SCENE_TEXTURE_COLUMNS,
     scene_section,
 )
+from analysis.report.section_speed_accuracy import speed_accuracy_section
 from analysis.report.section_stability import stability_section
 from analysis.report.sections import Section
 from analysis.statistics.buttons import BUTTON_COLUMNS
@@ -55,7 +62,15 @@ from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.hand import HAND_TEST_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS
 from analysis.statistics.reliability import AGREEMENT_COLUMNS, RATER_COLUMNS
-from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
+from analysis.statistics.speed_accuracy import (
+    CELL_COLUMNS,
+    CONDITIONAL_COLUMNS,
+    RIGHT_WRONG_COLUMNS,
+    SCORE_COLUMNS,
+    TIME_RATIO_COLUMNS,
+)
+from analysis.statistics.speed_accuracy import COMPARISON_COLUMNS as SPEED_COLUMNS
+from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS, ClaimFound
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
 from analysis.textures.likeness import GFC_COLUMNS
@@ -94,6 +109,15 @@ DECLARED = {
     "similarities": SIMILARITY_COLUMNS,
     "biases": BIAS_COLUMNS,
     "buttons": BUTTON_COLUMNS,
+    "mixed_effects": CLAIM_MIXED_COLUMNS,
+    "gee_effects": CLAIM_GEE_COLUMNS,
+    "oddity": ODDITY_COLUMNS,
+    "speed_accuracy": SPEED_COLUMNS,
+    "time_ratio": TIME_RATIO_COLUMNS,
+    "speed_right_and_wrong": RIGHT_WRONG_COLUMNS,
+    "speed_scores": SCORE_COLUMNS,
+    "speed_cells": CELL_COLUMNS,
+    "speed_quantiles": CONDITIONAL_COLUMNS,
     "gfc": GFC_COLUMNS,
     "left_out": LEFT_OUT_COLUMNS,
     "verdicts": LAYER_VERDICT_COLUMNS,
@@ -123,7 +147,8 @@ EVERY_COLUMN = {column for columns in DECLARED.values() for column in columns}
 
 def kind(table: Table) -> str:
     """The declaration that a table's name stands for: there is one per texture or per model."""
-    return re.sub(r"^(verdicts|confusion)_(?!change$).*", r"\1", table.name)
+    name = re.sub(r"^(speed_.*)_relative$", r"\1", table.name)
+    return re.sub(r"^(verdicts|confusion)_(?!change$).*", r"\1", name)
 
 
 def tables_in(items: Iterable[Item]) -> list[Table]:
@@ -158,6 +183,10 @@ def reliability(ratings: pd.DataFrame, choices: pd.DataFrame) -> Section:
     return section
 
 
+def _about_the_odd_one(found: ClaimFound) -> ClaimFound:
+    return replace(found, claim=replace(found.claim, task="oddity"))
+
+
 @pytest.fixture(scope="module")
 def tables(results, ratings, choices, found) -> list[Table]:
     """All tables of a report but its provenance."""
@@ -182,6 +211,14 @@ def tables(results, ratings, choices, found) -> list[Table]:
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
         confusion_section(
             choices, ("full", "simplified"), simulated=True, rng=np.random.default_rng(1)
+        ),
+        mixed_section(responses, found, rng=np.random.default_rng(1)),
+        oddity_section([_about_the_odd_one(found[2])], simulated=True),
+        speed_accuracy_section(
+            {"relative": choices},
+            models=("full", "simplified"),
+            simulated=True,
+            rng=np.random.default_rng(1),
         ),
         reliability(ratings, choices),
         planted_section(textures),
