@@ -17,7 +17,9 @@ from scipy import integrate, stats
 
 from analysis.columns import Column, names
 from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
+from analysis.statistics.gee import fit_gee
 from analysis.statistics.information import information_bits, transferred_information
+from analysis.statistics.mixed import fit_mixed, t_of
 from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
 from analysis.statistics.rates import bootstrap_intervals
 from modeling.arrays import Floats
@@ -36,6 +38,8 @@ ABORTED = 0.15  # share of participants who do not finish
 HIGHEST_SHARE_AT_ENDS = 0.2
 TEXTURES = 7
 TRIALS = 21  # of the forced choice, of one participant with one model
+ANSWERS = 3  # single ratings of one participant with one model
+ANSWER_SD = 8.0  # of single ratings, around what a participant feels
 COVERAGE, TYPE_I, POWER = "coverage", "type I error", "power"
 AT_ONCE = 100  # simulations: keeps what the bootstrap holds below 200 MB
 
@@ -258,6 +262,58 @@ def _information_covers(counts: Floats, truth: float, rng: np.random.Generator) 
     return np.array([one.ci_low <= bits <= one.ci_high for one in found])
 
 
+def _single_ratings(
+    rng: np.random.Generator, shape: tuple[int, int], truth: float, *, sd: float = DIFFERENCE_SD
+) -> Floats:
+    """Single ratings (k, n, 2, 3) of people whose differences vary by `sd`."""
+    felt = _ratings(_people(rng, shape), rng.normal(truth, sd, shape))
+    return felt[..., None] + rng.normal(0, ANSWER_SD, (*shape, 2, ANSWERS))
+
+
+def _equal_slopes(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
+    return _single_ratings(rng, shape, truth, sd=0.0)
+
+
+def _single_choices(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
+    """Right and wrong answers (k, n, 2, 21); abilities with either model vary independently."""
+    ability = rng.beta(5 * truth, 5 * (1 - truth), (*shape, 2))
+    return (rng.random((*shape, 2, TRIALS)) < ability[..., None]).astype(float)
+
+
+def _columns_of(answers: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """Who gave each of the (n, 2, r) answers, and the columns of the model and of a constant."""
+    n, _, repeats = answers.shape
+    model = np.tile(np.repeat([-0.5, 0.5], repeats), n)
+    return np.repeat(np.arange(n), 2 * repeats), np.column_stack([model, np.ones_like(model)])
+
+
+def _mixed_covers(answers: Floats, truth: float, rng: np.random.Generator) -> Hits:
+    """By the paired t-test where the fit does not converge, as in the report."""
+    people, columns = _columns_of(answers[0])
+    hits = _t_covers(answers.mean(axis=-1), truth, rng)
+    for place, each in enumerate(answers):
+        fit = fit_mixed(each.ravel(), columns, slope=columns[:, 0], people=people)
+        if fit is not None:
+            found = t_of(float(fit.estimates[0]), float(fit.errors[0]), n=len(each))
+            hits[place] = found["ci_low"] <= truth <= found["ci_high"]
+    return hits
+
+
+def _gee_rejects(answers: Floats, truth: float, rng: np.random.Generator) -> Hits:
+    """By sign flips where nothing can be fitted, as in the report."""
+    people, columns = _columns_of(answers[0])
+    hits = np.zeros(len(answers), dtype=bool)
+    for place, each in enumerate(answers):
+        separated = np.isin(each.mean(axis=(0, 2)), (0.0, 1.0)).any()
+        fit = None if separated else fit_gee(each.ravel(), columns, people=people)
+        if fit is None:
+            p = sign_flips_p(np.diff(each.mean(axis=-1), axis=1).ravel(), rng=rng)
+        else:
+            p = t_of(float(fit[0][0]), float(fit[1][0]), n=len(each))["p"]
+        hits[place] = p < ALPHA
+    return hits
+
+
 def t_test_power(n: int, truth: float) -> float:
     """Power of the two-sided paired t-test at α = .05 where differences are normal (noncentral t).
 
@@ -471,6 +527,30 @@ _CHECKS = (
         nominal=_always(CONFIDENCE),
         truth=0.85,
         situations={"ceiling": _confusions},
+    ),
+    Check(
+        procedure="mixed model, 95 % interval",
+        quantity=COVERAGE,
+        hits=_mixed_covers,
+        nominal=_always(CONFIDENCE),
+        truth=BOUNDS[1],
+        situations={"normal": _single_ratings, "equal slopes": _equal_slopes},
+    ),
+    Check(
+        procedure="GEE",
+        quantity=TYPE_I,
+        hits=_gee_rejects,
+        nominal=_always(ALPHA),
+        truth=0.5,
+        situations={"normal": _single_choices},
+    ),
+    Check(
+        procedure="GEE",
+        quantity=TYPE_I,
+        hits=_gee_rejects,
+        nominal=_always(ALPHA),
+        truth=0.95,
+        situations={"ceiling": _single_choices},
     ),
 )
 Cell = tuple[int, str, int]  # number of a check, situation, participants
