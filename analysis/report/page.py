@@ -17,6 +17,7 @@ PIXELS_PER_INCH = 92
 MOST_COLUMNS_AT_FULL_SIZE = 11
 MOST_ROWS_KEPT_TOGETHER = 15
 LONGEST_WORD_KEPT_WHOLE = 20  # letters, on paper
+MOST_ROWS, ROWS_OF_LONGER = 200, 20  # shown of a table; its file has all
 
 STYLE = """
 :root { --ink: #1b1f24; --soft: #59636e; --line: #d8dee4; --paper: #fff; --tint: #f4f7fa;
@@ -65,6 +66,7 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
          font-size: 14px; }
 /* Paper lies across, since many tables have more columns than it is wide upright. */
 @page { size: A4 landscape; margin: 12mm; }
+@page upright { size: A4 portrait; margin: 12mm; }
 @media print {
   body { background: none; font-size: 10.5pt; }
   main, header > div, footer, .banner div { max-width: none; padding: 0; }
@@ -74,6 +76,8 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   h2, h3, h4, summary, caption { break-after: avoid; }
   figure, .tile, .short, caption, tr { break-inside: avoid; }
   figure img { max-height: 155mm; width: auto; }
+  figure.tall, h2:has(+ figure.tall) { page: upright; }
+  figure.tall img { max-height: 240mm; }
   .scroll { overflow: visible; }
   table { width: 100%; font-size: 8pt; }
   .wide table { font-size: 7pt; }
@@ -106,7 +110,8 @@ addEventListener("afterprint", () => { for (const fold of folds) {
 class Table:
     """A table of the report: `name` is its file's stem, `title` and `note` its caption.
 
-    The page shows `columns`, in this order and as they say; the file holds all of `frame`.
+    The page shows `columns`, in this order and as they say, and of very long tables only the
+    beginning; the file holds all of `frame`.
     """
 
     name: str
@@ -180,10 +185,11 @@ def picture_html(picture: Picture, png: bytes) -> str:
     """The figure inline, with its caption."""
     data = base64.b64encode(png).decode("ascii")
     # One scale for all pictures, so that their text has one size.
-    width = round(picture.figure.get_figwidth() * PIXELS_PER_INCH)
+    width, height = picture.figure.get_size_inches() * PIXELS_PER_INCH
+    tall = ' class="tall"' if height > width else ""
     return (
-        f'<figure id="figure-{escape(picture.name)}">'
-        f'<img alt="{escape(_full_title(picture))}" width="{width}" '
+        f'<figure id="figure-{escape(picture.name)}"{tall}>'
+        f'<img alt="{escape(_full_title(picture))}" width="{round(width)}" '
         f'src="data:image/png;base64,{data}">'
         f"<figcaption>{_caption(picture)}</figcaption></figure>"
     )
@@ -193,6 +199,10 @@ def table_html(table: Table) -> str:
     """The table with its caption; numbers are rounded, the file beside the report is exact."""
     columns = _with_content(table)
     frame = table.frame[names(columns)]
+    cut = ""
+    if len(frame) > MOST_ROWS:
+        cut = f" Rows 1 to {ROWS_OF_LONGER} of {len(frame)}; all are in tables/{table.name}.tsv."
+        frame = frame[:ROWS_OF_LONGER]
     css = [_css(column, frame[column.name]) for column in columns]
     head = "".join(
         f"<th {c}>{escape(column.heading)}</th>" for column, c in zip(columns, css, strict=True)
@@ -202,7 +212,7 @@ def table_html(table: Table) -> str:
     )
     return (
         f'<div class="{_classes(columns, len(frame))}" id="table-{escape(table.name)}"><table>'
-        f"<caption>{_caption(table)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
+        f"<caption>{_caption(table)}{escape(cut)}</caption><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>"
     )
 
 

@@ -42,7 +42,7 @@ from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
 from analysis.report.section_reliability import reliability_section
 from analysis.report.section_speed_accuracy import speed_accuracy_section
-from analysis.report.sections import Progress, Section
+from analysis.report.sections import Progress, Section, of_pairs
 from analysis.report.sentences import cautions
 from analysis.statistics.equivalence import INCONCLUSIVE
 from analysis.statistics.verdicts import (
@@ -223,17 +223,21 @@ def _answer_sections(
         sections.append(confused)
     sections.append(oddity_section(shown, simulated=simulated))
     sections.append(mixed_section(responses, shown, rng=rng))
-    pair = shown[0].claim.models  # of several pairs the first
-    same = list(responses.identical(pair))
-    different = {task: t[~t["texture"].isin(same)] for task, t in responses.answers.items()}
-    sections.append(speed_accuracy_section(different, models=pair, simulated=simulated, rng=rng))
+    pairs = list(dict.fromkeys(one.claim.models for one in shown))
+    speeds, hands = {}, {}
+    for pair in pairs:
+        same = list(responses.identical(pair))
+        different = {task: t[~t["texture"].isin(same)] for task, t in responses.answers.items()}
+        speeds[pair] = speed_accuracy_section(different, models=pair, simulated=simulated, rng=rng)
+        if hand is not None:
+            moved = hand[~hand["texture"].isin(same)]
+            hands[pair] = hand_section(moved, models=pair, simulated=simulated, rng=rng)
+    sections.append(of_pairs(speeds))
     tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
     sections.append(
         reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
     )
-    if hand is not None:
-        hand = hand[~hand["texture"].isin(same)]
-        sections.append(hand_section(hand, models=pair, simulated=simulated, rng=rng))
+    sections.append(of_pairs(hands))
     return [section for section in sections if section is not None]
 
 

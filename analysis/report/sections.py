@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 from analysis.report.outcomes import Outcome
-from analysis.report.page import Item
+from analysis.report.page import Fold, Item, Picture, Table
+from modeling.files.writing import file_stem
 
 Progress = Callable[[float, str], None]
 
@@ -34,3 +35,36 @@ class Section:
     outcomes: tuple[Outcome, ...] = ()
     done: tuple[str, ...] = ()
     tiles: tuple[tuple[str, str], ...] = ()
+
+
+def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | None:
+    """One section of those that are about pairs of models; what is in it says which pair.
+
+    Parameters
+    ----------
+    sections : mapping of (reference, other) to Section or None
+        One that has only one pair stays as it is.
+    """
+    kept = {pair: section for pair, section in sections.items() if section is not None}
+    first = next(iter(kept.values()), None)
+    if first is None or len(kept) == 1:
+        return first
+    return replace(
+        first,
+        items=tuple(_of_pair(item, pair) for pair, each in kept.items() for item in each.items),
+        outcomes=tuple(dict.fromkeys(told for each in kept.values() for told in each.outcomes)),
+    )
+
+
+def _of_pair(item: Item, pair: tuple[str, str]) -> Item:
+    reference, other = pair
+    told = f": {other} against {reference} models"
+
+    def named(single: Table | Picture) -> Table | Picture:
+        name = file_stem(f"{single.name}_{other}_{reference}")
+        return replace(single, name=name, title=single.title + told)
+
+    if isinstance(item, Fold):
+        inner = tuple(named(each) for each in item.items)
+        return replace(item, summary=item.summary + told, items=inner)
+    return named(item)

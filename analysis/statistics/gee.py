@@ -31,7 +31,7 @@ GEE_COLUMNS = (
     Column("ci_low", "95% CI from", format=".2f"),
     Column("ci_high", "to", format=".2f"),
     Column("t", format=".2f"),
-    Column("df"),
+    Column("df", format=".0f"),
     P,
     Column("note"),
 )

@@ -30,7 +30,7 @@ MIXED_COLUMNS = (
     Column("ci_low", "95% CI from", format=".2f"),
     Column("ci_high", "to", format=".2f"),
     Column("t", format=".2f"),
-    Column("df"),
+    Column("df", format=".0f"),
     P,
     Column("intercept_sd", "SD of intercepts", format=".2f"),
     Column("slope_sd", "SD of slopes", format=".2f"),

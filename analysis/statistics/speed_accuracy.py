@@ -104,7 +104,7 @@ TIME_RATIO_COLUMNS = (
     Column("ci_low", "95% CI from", format=".3f"),
     Column("ci_high", "to", format=".3f"),
     Column("t", format=".2f"),
-    Column("df"),
+    Column("df", format=".0f"),
     P,
     Column("note"),
 )

@@ -1,13 +1,24 @@
-"""Tables on paper: nothing cut, words whole, beginnings with their tables."""
+"""Tables and pictures on paper: nothing cut, words whole, beginnings with their tables."""
 
 from __future__ import annotations
 
 import re
 
 import pandas as pd
+from matplotlib.figure import Figure
 
 from analysis.columns import Column
-from analysis.report.page import LONGEST_WORD_KEPT_WHOLE, STYLE, Table, table_html
+from analysis.report.page import (
+    LONGEST_WORD_KEPT_WHOLE,
+    MOST_ROWS,
+    PIXELS_PER_INCH,
+    ROWS_OF_LONGER,
+    STYLE,
+    Picture,
+    Table,
+    picture_html,
+    table_html,
+)
 
 
 def classes(frame: pd.DataFrame, *columns: Column) -> list[list[str]]:
@@ -49,3 +60,25 @@ def test_paper_keeps_captions_heads_and_rows_together():
     assert "tbody tr:nth-child(-n + 3), tbody tr:nth-last-child(-n + 2) { break-before" in on_paper
     assert "td.long { overflow-wrap: anywhere; }" in on_paper
     assert on_paper.count("overflow-wrap") == 1
+
+
+def test_of_a_very_long_table_the_beginning_is_shown():
+    columns = (Column("a"),)
+    long = pd.DataFrame({"a": [f"row {number}" for number in range(1, MOST_ROWS + 2)]})
+    whole = table_html(Table("x", "X", "Told.", long[:-1], columns, simulated=False))
+    assert f"row {MOST_ROWS}<" in whole
+    assert "tables/x.tsv" not in whole
+    cut = table_html(Table("x", "X", "Told.", long, columns, simulated=False))
+    assert f"row {ROWS_OF_LONGER}<" in cut
+    assert f"row {ROWS_OF_LONGER + 1}<" not in cut
+    assert f"Told. Rows 1 to {ROWS_OF_LONGER} of {MOST_ROWS + 1}; all are in tables/x.tsv." in cut
+
+
+def test_a_picture_that_is_taller_than_wide_has_an_upright_page():
+    assert "@page upright { size: A4 portrait" in STYLE
+    assert "figure.tall, h2:has(+ figure.tall) { page: upright; }" in STYLE
+    for size, tall in (((4, 6), True), ((6, 4), False), ((5, 5), False)):
+        figure = Figure(figsize=size)
+        html = picture_html(Picture("x", "X", "", figure, simulated=False), b"")
+        assert ('class="tall"' in html) == tall
+        assert f'width="{round(size[0] * PIXELS_PER_INCH)}"' in html

@@ -403,3 +403,24 @@ def test_nothing_to_report_is_refused(tmp_path, ratings, choices):
     with pytest.raises(InputError, match="got neither"):
         write_report(tmp_path / "report.html", responses=nothing)
     assert not (tmp_path / "report.html").exists()
+
+
+def test_every_pair_of_three_sets_has_its_times(tmp_path, choices):
+    few = choices[choices["participant_id"] <= "sub-04"]
+    third = few[few["model"] == "full"].assign(model="AR")
+    three = pd.concat([few, third]).sort_values("participant_id", kind="stable", ignore_index=True)
+    relative = PlannedTask(
+        participants=4, sessions=4, models=("full", "simplified", "AR"), repeats=3
+    )
+    responses = Responses(
+        {"relative": three},
+        simulated_participants=True,
+        simulated_rig=True,
+        planned={"relative": relative},
+    )
+    page = Page(write_report(tmp_path / "report.html", responses=responses).read_text("utf-8"))
+    for other in ("simplified", "AR"):
+        assert (tmp_path / "tables" / f"speed_accuracy_{other}_full.tsv").exists()
+        assert f"Time, accuracy and both together: {other} against full models" in page.text
+        assert f"Speed and accuracy, {other} against full models" in page.text
+    assert len(page.identifiers) == len(set(page.identifiers))

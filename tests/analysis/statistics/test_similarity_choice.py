@@ -27,7 +27,7 @@ def planted(k: int, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return similarities, biases, shares / shares.sum(axis=1, keepdims=True)
 
 
-@settings(max_examples=20)
+@settings(max_examples=12)
 @given(st.integers(3, 9), st.integers(0, 1000))
 def test_exact_shares_give_exact_similarities_and_biases(k, seed):
     similarities, biases, shares = planted(k, seed)
