@@ -63,6 +63,8 @@ class Column:
             return str(value)
         if math.isnan(value):
             return "n/a"
+        if math.isinf(value):
+            return "∞" if value > 0 else "−∞"
         if self.is_p_value:
             return p_value(value)
         shown = f"{value:{self.format}}" if self.format else _three_digits(value)

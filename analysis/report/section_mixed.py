@@ -133,5 +133,5 @@ def _sign(effect: float, p: float) -> int:
 
 
 def _with_interval(numbers: Sequence[str]) -> str:
-    estimate, low, high = (number.replace("-", "−") for number in numbers)
+    estimate, low, high = (number.replace("-", "−").replace("inf", "∞") for number in numbers)
     return estimate if "nan" in low else f"{estimate} (95% CI {low} to {high})"

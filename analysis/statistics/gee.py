@@ -138,7 +138,8 @@ def _row(
         return {**row, "n": len(whole), "method": SIGN_FLIPS, "p": p, "note": why}
     (estimate, *_), (error, *_) = fit
     tested = t_of(float(estimate), float(error), n=built.participants)
-    limits = {name: float(np.exp(tested[name])) for name in ("ci_low", "ci_high")}
+    with np.errstate(over="ignore"):  # two participants leave limits open
+        limits = {name: float(np.exp(tested[name])) for name in ("ci_low", "ci_high")}
     ratio = float(np.exp(estimate))
     return {**row, **tested, **limits, "method": GEE, "odds_ratio": ratio, "note": ""}
 

@@ -26,6 +26,8 @@ COLUMNS = (PLAIN, P, EXACT)
         (PLAIN, 1e-16, "0.000"),
         (PLAIN, np.float64(0.5), "0.500"),
         (PLAIN, np.nan, "n/a"),
+        (PLAIN, np.inf, "∞"),
+        (EXACT, -np.inf, "−∞"),
         (PLAIN, 19, "19"),
         (PLAIN, "wall paper", "wall paper"),
         (EXACT, 0.98765, "0.9877"),

@@ -155,3 +155,10 @@ def test_nobody_and_one_participant():
     assert np.isnan(nobody["p"])
     one = effects(table[table["participant_id"] == "sub-00"]).loc[ALL_TEXTURES]
     assert (one["n"], one["method"], one["note"]) == (1, SIGN_FLIPS, "1 participant(s)")
+
+
+def test_two_participants_may_leave_the_limits_open():
+    """Twelve times an error of 60 and more: no warning of an overflow."""
+    row = effects(answers({"canvas": (0.0, 1.0), "PVC": (0.0, 0.0)}, people=2, repeats=2, seed=22))
+    assert row.loc["canvas", "method"] == GEE
+    assert row.loc["canvas", ["ci_low", "ci_high"]].tolist() == [0.0, np.inf]
