@@ -267,7 +267,7 @@ def _with_share(shares: Sequence[float], right: int, share: float) -> list[float
     # Not what is left of the sum, of which rounding would be a large part where it is small.
     rest = sum(other for place, other in enumerate(shares) if place != right)
     if rest > 0:
-        changed = [(1.0 - share) * other / rest for other in shares]
+        changed = [(1.0 - share) * (other / rest) for other in shares]
     else:
         changed = [(1.0 - share) / (len(shares) - 1)] * len(shares)
     changed[right] = share

@@ -112,9 +112,11 @@ def test_choice_shares_follow_luce(evidence: np.ndarray, lapse_rate: float) -> N
 
 
 def test_shares_that_rounding_could_swallow_keep_their_sum() -> None:
-    tiny = 2.220446049250313e-16
-    for changed in with_effect([0.375 / (0.375 + tiny), tiny / (0.375 + tiny)], 0, effect=1.0):
-        assert sum(changed) == pytest.approx(1.0)
+    for tiny in (2.220446049250313e-16, 5e-324):
+        for effect in (1.0, 0.5):
+            shares = [0.375 / (0.375 + tiny), tiny / (0.375 + tiny)]
+            for changed in with_effect(shares, 0, effect=effect):
+                assert sum(changed) == pytest.approx(1.0)
 
 
 @given(SHARES, st.floats(-1.0, 1.0), st.data())
