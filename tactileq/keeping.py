@@ -5,27 +5,32 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from modeling.files.folders import Contents
 
 
-def check_own_results(out: Path, command: str) -> None:
+def check_own_results(out: Path, command: str) -> Contents:
     """Refuse to replace a folder unless an earlier run of the same command made all of it.
 
-    Its provenance lists what that run wrote; any other file or folder below it is foreign.
+    Its provenance lists what that run wrote; any other file or folder below it is foreign. What is
+    in the folder is returned, for `replace_folder`, which puts nothing in the place of anything
+    else.
     """
-    from modeling.files.folders import folder_behind
+    from modeling.files.folders import contents_of, folder_behind
     from modeling.files.provenance import PROVENANCE_NAME
 
-    folder_behind(out)
+    seen = contents_of(folder_behind(out))
     if not out.exists():
-        return
+        return seen
     foreign = "a file"
     if out.is_dir():
         note = _object(out / PROVENANCE_NAME)
         own = {PROVENANCE_NAME, *_files(note)} if _is_of(note, command) else set()
         other = next(_beside(out, own), None)
         if other is None:
-            return
+            return seen
         foreign = f"a folder with other files in it ({other})"
     raise ValueError(
         f"expected a new folder or earlier results of tactileq {command} at {out}, got {foreign}; "
@@ -131,12 +136,14 @@ def _files(note: Mapping[str, Any]) -> list[str]:
 
 def _beside(folder: Path, own: Iterable[str]) -> Iterator[str]:
     """Names of files and folders below a folder that are not its own, in order."""
+    from modeling.files.places import is_hidden
+
     own = set(own)
     parents = {parent.as_posix() for name in own for parent in Path(name).parents}
     for here, folders, files in os.walk(folder):
         place = Path(here).relative_to(folder)
         for name in sorted(files):
-            if (place / name).as_posix() not in own:
+            if (place / name).as_posix() not in own and not is_hidden(name):
                 yield (place / name).as_posix()
         for name in sorted(folders):
             path = place / name

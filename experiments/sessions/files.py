@@ -10,7 +10,7 @@ from pathlib import Path
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.places import unfinished_file
+from modeling.files.writing import write_bytes
 
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
 
@@ -44,6 +44,11 @@ class SessionFiles:
         session = Path(f"sub-{self.subject:02d}", f"ses-{self.session:02d}")
         return self.root / "sourcedata" / session
 
+    @property
+    def lock(self) -> Path:
+        """What the process that runs it holds, there while it does."""
+        return lock_of(self.log)
+
     def named(self, ending: str) -> Path:
         """The file with this ending, such as "hand.tsv"."""
         return self.folder / f"{self.stem}_{ending}"
@@ -73,31 +78,16 @@ class SessionFiles:
         return files if files.manifest == path else None
 
 
+def lock_of(log: Path) -> Path:
+    """The lock file of the session with this log; hidden, since it is none of its data."""
+    return log.with_name(f".{log.stem}.lock")
+
+
 def sessions_in(data_folder: str | Path) -> tuple[SessionFiles, ...]:
     """The sessions of a data set that have a manifest, by subject, session and task."""
     found = Path(data_folder).glob("sourcedata/sub-*/ses-*/*_manifest.json")
     sessions = [files for path in found if (files := SessionFiles.of_manifest(path))]
     return tuple(sorted(sessions, key=lambda f: (f.subject, f.session, f.task)))
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder and those that it is in, so that a loss of power leaves them there."""
-    if folder.is_dir():
-        return
-    make_folder(folder.parent)
-    folder.mkdir(exist_ok=True)
-    sync_folder(folder.parent)
-
-
-def sync_folder(folder: Path) -> None:
-    """Force the names of new files to disk (Windows does so by itself)."""
-    if os.name == "nt":
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def open_file(path: Path, *, new: bool) -> int:
@@ -113,7 +103,7 @@ def write_all(handle: int, data: bytes) -> None:
 
 
 def write_new(path: Path, data: bytes) -> None:
-    """Write a file that is not there yet, as `put_file` does.
+    """Write a file that is not there yet, whole and forced to disk.
 
     Whoever may write the same one at the same time must hold the lock of its folder.
 
@@ -124,19 +114,7 @@ def write_new(path: Path, data: bytes) -> None:
     """
     if os.path.lexists(path):
         raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(path))
-    put_file(path, data)
-
-
-def put_file(path: Path, data: bytes) -> None:
-    """Write a file so that it is there whole and forced to disk, or is as it was before."""
-    with unfinished_file(path, data) as hidden:
-        handle = os.open(hidden, os.O_RDWR)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)
-        os.replace(hidden, path)
-    sync_folder(path.parent)
+    write_bytes(path, data)
 
 
 def require_data_folder(root: Path) -> None:

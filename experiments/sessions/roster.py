@@ -13,13 +13,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import make_folder, open_file, put_file, sync_folder, write_all
+from experiments.sessions.files import open_file, write_all
 from experiments.sessions.log import line_of, read_lines, utc_text
 from experiments.sessions.writer import StoreError, store_error
 from modeling import InputError
 from modeling.checks import check_whole
 from modeling.errors import shown
 from modeling.files.places import locked
+from modeling.files.syncing import make_folder, sync_folder
+from modeling.files.writing import write_bytes
 
 # Easy to say and to hear apart in English and in Japanese: TAKI-46.
 _SYLLABLES = tuple(consonant + vowel for consonant in "KMNRST" for vowel in "AEIO")
@@ -143,7 +145,7 @@ class Roster:
                 for event in read_lines(self.path, "the roster").events
             ]
             lines.append(line_of({"utc": utc_text(), "event": "withdrawn", "subject": subject}))
-            put_file(self.path, b"".join(lines))
+            write_bytes(self.path, b"".join(lines))
 
     def subjects(self) -> dict[int, dict[str, Any]]:
         """Everybody who was ever enrolled, by number.

@@ -12,6 +12,7 @@ from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
 from experiments.sessions.overrides import Overrides
+from experiments.sessions.program import program_facts
 from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Person, Roster
 from experiments.sessions.store import SessionStore
@@ -116,6 +117,8 @@ def run_session(
         rig.check_stimulus(stimulus)
     rig.open()
     try:
+        # Asks git, hashes models: nobody else can enroll while the roster is locked.
+        stated = _stated(study, task, models=models, rig=rig, people=people, said=said)
         enrolling = Roster(root).enrolling(
             subject,
             study.plan_of(task.name).participants,
@@ -125,11 +128,16 @@ def run_session(
         # Enrolled only if the session may begin.
         with enrolling as person:
             plan = draw_session(study, task, subject=subject, session=session, slot=person.slot)
-            manifest = _manifest(
-                plan, task, models=models, rig=rig, people=people, code=person.code
+            manifest = SessionManifest(
+                **stated,
+                subject=subject,
+                session=session,
+                slot=person.slot,
+                code=person.code,
+                trials=[asdict(trial) for trial in plan.trials],
             )
             opened = SessionStore.resume if said.resume else SessionStore.create
-            store = opened(root, _with(manifest, said, study), overrides=overrides)
+            store = opened(root, manifest, overrides=overrides)
         with store:
             stored = _stored_plan(plan, task, store=store, models=models)
             result = run_trials(
@@ -148,47 +156,33 @@ def run_session(
     return result, store.files.manifest
 
 
-def _manifest(
-    plan: SessionPlan,
+def _stated(
+    study: Study,
     task: Task,
     *,
     models: ModelSets,
     rig: TextureRig,
     people: People,
-    code: str,
-) -> SessionManifest:
-    """What is known before the first trial, but for the circumstances."""
-    study = plan.study
+    said: Circumstances,
+) -> dict[str, Any]:
+    """What a manifest holds whoever takes part."""
     sha256 = models.sha256(study.textures)
-    return SessionManifest(
-        task=plan.task,
-        subject=plan.subject,
-        session=plan.session,
-        slot=plan.slot,
-        code=code,
-        language=study.languages[0],
-        pilot=False,
-        simulated_participant=people.respondent.simulated,
-        simulated_rig=rig.simulated,
-        study=study.to_dict(),
-        study_sha256=study.sha256,
-        plan_sha256=plan_sha256(study, sha256),
-        models_sha256=sha256,
-        model_sources={},
-        identical=models.equal_models(study.textures, study.models_of(plan.task)),
-        rig=rig.stated,
-        description=task.description,
-        trials=[asdict(trial) for trial in plan.trials],
-    )
-
-
-def _with(manifest: SessionManifest, said: Circumstances, study: Study) -> SessionManifest:
-    return replace(
-        manifest,
-        pilot=said.pilot,
-        language=said.language or study.languages[0],
-        model_sources=dict(said.sources),
-    )
+    return {
+        "task": task.name,
+        "language": said.language or study.languages[0],
+        "pilot": said.pilot,
+        "simulated_participant": people.respondent.simulated,
+        "simulated_rig": rig.simulated,
+        "study": study.to_dict(),
+        "study_sha256": study.sha256,
+        "plan_sha256": plan_sha256(study, sha256),
+        "models_sha256": sha256,
+        "model_sources": dict(said.sources),
+        "identical": models.equal_models(study.textures, study.models_of(task.name)),
+        "rig": rig.stated,
+        "description": task.description,
+        "program": program_facts(),
+    }
 
 
 def _require_language(study: Study, language: str) -> None:

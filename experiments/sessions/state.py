@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from experiments.sessions.files import lock_of
 from experiments.sessions.log import Event, Log, read_log
-
-if sys.platform != "win32":
-    import fcntl
+from modeling.files.locks import is_held
 
 Status = Literal["running", "complete", "aborted", "crashed"]
 ENDINGS = ("complete", "aborted", "crashed")
@@ -87,38 +85,11 @@ def state_of(log: Log, *, running: bool) -> SessionState:
     )
 
 
-def claim(handle: int) -> bool:
-    """Take the lock of a session, which the system gives back when the process ends.
-
-    Windows has no such lock: there nobody is refused.
-    """
-    for _ in range(5):
-        if _flocked(handle, alone=True):
-            return True
-        time.sleep(0.01)  # it may only have been asked whether the session is running
-    return False
-
-
-def _flocked(handle: int, *, alone: bool) -> bool:
-    """Whether the lock was to be had; true where there are none."""
-    if sys.platform == "win32":
-        return True
-    try:
-        fcntl.flock(handle, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:  # a file system that knows no locks
-        return True
-    return True
-
-
 def is_running(log_path: Path) -> bool:
     """Whether a process holds the lock of a session."""
-    try:
-        handle = os.open(log_path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    except OSError:
-        return False
-    try:
-        return not _flocked(handle, alone=False)
-    finally:
-        os.close(handle)
+    lock = lock_of(log_path)
+    for _ in range(5):
+        if not is_held(lock):
+            return False
+        time.sleep(0.01)  # another one may only have asked the same
+    return True

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -18,15 +18,13 @@ from typing import Any, Protocol, Self
 from experiments.sessions.admission import admit, refuse_begun
 from experiments.sessions.files import (
     SessionFiles,
-    make_folder,
     open_file,
-    sync_folder,
     write_new,
 )
 from experiments.sessions.log import OWN_FIELDS, read_log, utc_text
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
-from experiments.sessions.state import ENDINGS, SessionState, claim, state_of
+from experiments.sessions.state import ENDINGS, SessionState, state_of
 from experiments.sessions.tables import GrowingTable
 from experiments.sessions.traces import (
     HAND_COLUMNS,
@@ -39,12 +37,15 @@ from experiments.sessions.writer import LogWriter, StoreError, store_error
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import dump_json
+from modeling.files.locks import HeldError, Lock
 from modeling.files.places import locked
+from modeling.files.syncing import make_folder, sync_folder
 from modeling.files.writing import write_bytes
 from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 
 __all__ = ["MemoryStore", "SessionStore", "Store", "StoreError"]
 
+CLAIM_S = 0.2  # who only asks whether a session is running holds its lock for a moment
 _NOTHING = "nothing was presented: make room or choose another data folder"
 
 
@@ -205,8 +206,10 @@ class SessionStore:
         From 1: how often the session was begun or taken up again, this run included.
     """
 
-    def __init__(self, files: SessionFiles, manifest: SessionManifest, *, handle: int) -> None:
-        self.files, self.manifest = files, manifest
+    def __init__(
+        self, files: SessionFiles, manifest: SessionManifest, *, handle: int, lock: Lock
+    ) -> None:
+        self.files, self.manifest, self._lock = files, manifest, lock
         self._began_s = time.monotonic()
         self._tables: list[GrowingTable] = []
         try:
@@ -261,23 +264,23 @@ class SessionStore:
             make_folder(files.folder)
             with locked(files.manifest):
                 refuse_begun(files)
-                try:
-                    return cls._begin(files, final)
-                except OSError:
-                    for path in files.there():  # all of them are ours, and nothing happened yet
-                        with suppress(OSError):
-                            path.unlink()
-                    raise
+                with _claimed(files) as lock:
+                    try:
+                        return cls._begin(files, final, lock)
+                    except OSError:
+                        for path in files.there():  # all of them ours, and nothing happened yet
+                            with suppress(OSError):
+                                path.unlink()
+                        raise
         except OSError as error:
             raise store_error(error, files.root, _NOTHING) from error
 
     @classmethod
-    def _begin(cls, files: SessionFiles, manifest: SessionManifest) -> SessionStore:
+    def _begin(cls, files: SessionFiles, manifest: SessionManifest, lock: Lock) -> SessionStore:
         write_new(files.manifest, manifest.text.encode())
         handle = open_file(files.log, new=True)
-        _claim(handle, files)
         sync_folder(files.folder)
-        store = cls(files, manifest, handle=handle)
+        store = cls(files, manifest, handle=handle, lock=lock)
         store._open({"resumed": False, "overrides": manifest.overrides})
         return store
 
@@ -317,18 +320,18 @@ class SessionStore:
         stored = SessionManifest.load(files.manifest)
         _check_unchanged(stored, manifest, files=files, overrides=overrides)
         try:
-            # Killed between manifest and log, it has none yet.
-            with locked(files.manifest):
-                handle = open_file(files.log, new=False)
-                _claim(handle, files)
-            store = cls(files, stored, handle=handle)
-            try:
-                _check_open(store.before, stored, files=files)
-            except InputError:
-                store.close()
-                raise
-            changed = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
-            store._open({"resumed": True, **changed})
+            with _claimed(files) as lock:
+                # Killed between manifest and log, it has none yet.
+                with locked(files.manifest):
+                    handle = open_file(files.log, new=False)
+                store = cls(files, stored, handle=handle, lock=lock)
+                try:
+                    _check_open(store.before, stored, files=files)
+                except InputError:
+                    store.close()
+                    raise
+                changed = {"changed": _changes(stored, manifest), "overrides": overrides.recorded}
+                store._open({"resumed": True, **changed})
         except StoreError:
             raise
         except OSError as error:
@@ -403,7 +406,10 @@ class SessionStore:
             If something queued could not be written.
         """
         self._close_tables()
-        self._writer.close()
+        try:
+            self._writer.close()
+        finally:
+            self._lock.release()
 
     def _table(self, name: str, columns: Mapping[str, Mapping[str, Any]]) -> GrowingTable:
         described = dump_json(dict(columns))
@@ -432,14 +438,22 @@ class SessionStore:
                 raise
 
 
-def _claim(handle: int, files: SessionFiles) -> None:
-    """Take the session's lock; the handle is closed where another process holds it."""
-    if not claim(handle):
-        os.close(handle)
+@contextmanager
+def _claimed(files: SessionFiles) -> Iterator[Lock]:
+    """The lock of a session, which stays held unless the block fails."""
+    lock = Lock(files.lock)
+    try:
+        lock.acquire(CLAIM_S)
+    except HeldError as holder:
         raise InputError(
             f"expected a session that nobody is running, got {files.stem}, which another console "
-            "runs now; wait for its end."
-        )
+            f"runs now ({holder}); wait for its end."
+        ) from None
+    try:
+        yield lock
+    except BaseException:
+        lock.release()
+        raise
 
 
 def _check_open(state: SessionState, stored: SessionManifest, *, files: SessionFiles) -> None:

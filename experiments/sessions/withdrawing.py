@@ -38,9 +38,11 @@ def withdraw(data_folder: str | Path, subject: int) -> None:
     """
     root = Path(data_folder)
     _require_still(root, subject)
+    roster = Roster(root)
+    for folder in (root, roster.path.parent):  # what was killed may have left data of the person
+        clear_unfinished(folder)
     left = [folder for folder in _folders(root, subject) if folder.exists()]
     listed = _without(root / "participants.tsv", subject)
-    roster = Roster(root)
     again = roster.subjects().get(subject, {}).get("left") == "withdrawn"
     if not (again and (left or listed)):
         roster.withdraw(subject)
@@ -49,7 +51,6 @@ def withdraw(data_folder: str | Path, subject: int) -> None:
         shutil.rmtree(folder)
     if listed is not None:
         write_bytes(root / "participants.tsv", listed)
-    clear_unfinished(root)
     export_all(root)
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import shutil
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,11 +14,15 @@ from modeling.errors import InputError, shown
 from modeling.files.places import (
     behind_links,
     clear_unfinished,
+    is_hidden,
     locked,
     unfinished_folder,
 )
 from modeling.files.reading import check_file
+from modeling.files.syncing import sync_folder, sync_tree
 from modeling.files.tables import read_table
+
+Contents = Mapping[str, tuple[int, ...]]
 
 
 def folder_behind(path: str | Path) -> Path:
@@ -43,29 +48,69 @@ def folder_behind(path: str | Path) -> Path:
     return target
 
 
+def contents_of(folder: Path) -> Contents:
+    """What is at a place, nothing where it is empty, to see later whether it is still that.
+
+    Returns
+    -------
+    dict
+        Path below the folder → number, size and time of change of a file; of a folder nothing.
+    """
+    if folder.is_file():
+        return {".": _stamp(folder)}
+    found: dict[str, tuple[int, ...]] = {}
+    for here, folders, files in os.walk(folder):
+        folders[:] = [name for name in folders if not is_hidden(name)]
+        for name in [*folders, *files]:
+            path = Path(here, name)
+            if not is_hidden(name):
+                place = path.relative_to(folder).as_posix()
+                found[place] = () if name in folders else _stamp(path)
+    return found
+
+
+def _stamp(path: Path) -> tuple[int, ...]:
+    status = path.lstat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
 @contextmanager
-def replace_folder(path: str | Path) -> Iterator[Path]:
+def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[Path]:
     """A fresh folder to fill, which takes the place of `path` when the block ends well.
 
-    After an exception nothing has changed at `path`. Of a link, what it leads to is replaced.
-    Of two processes that do so at once, what the one that ends last made stays.
+    After an exception nothing has changed at `path`. Of a link, what it leads to is replaced. What
+    is not at `path` as it was `seen`, because others changed it or put it there, stays; the fresh
+    folder is then kept beside it.
+
+    Parameters
+    ----------
+    path : str or Path
+    seen : dict, optional
+        `contents_of` the folder when it was found to be one that may be replaced; without it, that
+        is now.
 
     Raises
     ------
     InputError
-        For a `path` that `folder_behind` refuses.
+        For a `path` that `folder_behind` refuses, one that was changed meanwhile, and one that
+        another process keeps locked; the last two name where the fresh folder is.
     OSError
         With the name that a file would have had at `path`, not with its hidden one.
     """
     target = folder_behind(path)
+    before = contents_of(target) if seen is None else seen
     with unfinished_folder(target) as hidden:
         fresh = hidden / target.name
         with _named(target, fresh):
             fresh.mkdir()
             yield fresh
             fresh.chmod(0o755)
-            with locked(target):
-                _swap(fresh, target)
+            sync_tree(fresh)
+            try:
+                with locked(target):
+                    _swap(fresh, target, before)
+            except InputError as error:
+                raise InputError(f"{error} What was made is in {_kept(fresh, target)}.") from None
 
 
 @contextmanager
@@ -82,22 +127,27 @@ def _named(target: Path, fresh: Path) -> Iterator[None]:
         raise
 
 
-def _swap(fresh: Path, target: Path) -> None:
+def _swap(fresh: Path, target: Path, before: Contents) -> None:
     """Put `fresh` at `target`; what was there is deleted only once that has worked.
 
     What cannot be deleted then is no reason to fail: the new folder is in its place. A process that
     is killed between the two steps leaves the old folder to `clear_unfinished`.
     """
-    if not target.exists():
-        fresh.rename(target)
-        return
     old = fresh.with_name(fresh.name + ".old")
     try:
-        target.rename(old)
-        fresh.rename(target)
+        if target.exists():
+            target.rename(old)
+            # Only now, when nobody finds it any more, can nothing be added to it.
+            _check_same(contents_of(old), before, target)
+        try:
+            fresh.rename(target)
+        except OSError:
+            _check_same(contents_of(target), {}, target)
+            raise
+        sync_folder(target.parent)
     except BaseException:
-        if old.exists() and not target.exists():
-            old.rename(target)
+        if old.exists():
+            _put_back(old, target)
         raise
     shutil.rmtree(old, ignore_errors=True)
     if old.exists():
@@ -108,12 +158,44 @@ def _swap(fresh: Path, target: Path) -> None:
         )
 
 
+def _check_same(now: Contents, before: Contents, target: Path) -> None:
+    """InputError where what is replaced is not what was found to be replaceable."""
+    changed = sorted(name for name in now.keys() | before if now.get(name) != before.get(name))
+    if changed:
+        raise InputError(
+            f"expected {target} as it was before the run, got {changed[0]}, which was added, "
+            "changed or removed meanwhile, so all of it stays; move one of the two folders away."
+        )
+
+
+def _put_back(old: Path, target: Path) -> None:
+    """Put a folder back; beside its place where somebody has made another one there meanwhile."""
+    try:
+        old.rename(target)
+    except OSError:
+        _kept(old, target)
+
+
+def _kept(folder: Path, target: Path) -> Path:
+    """Move a hidden folder to a visible place beside `target`, and tell which."""
+    names = (f"{target.name}-{number}" for number in itertools.count(2))
+    place = next(p for name in names if not os.path.lexists(p := target.with_name(name)))
+    folder.rename(place)
+    sync_folder(place.parent)
+    return place
+
+
 def check_replaceable(
     target: Path, *, index_name: str, what: str, beside: Collection[str] = ()
-) -> None:
+) -> Contents:
     """Refuse to replace anything but an empty folder or a set with nothing beside its own files.
 
     Its own are the index, the files that the index lists, `provenance.json` and the names `beside`.
+
+    Returns
+    -------
+    dict
+        `contents_of` the folder, for `replace_folder`.
 
     Raises
     ------
@@ -124,19 +206,21 @@ def check_replaceable(
     folder_behind(target)
     if target.is_file():
         raise InputError(f"expected a folder, got the file {target}; choose another name.")
+    seen = contents_of(target)
     if not target.exists():
-        return
+        return seen
     own = {index_name, "provenance.json", *beside}
     if (target / index_name).is_file():
         listed = {row["file"] for row in read_table(target / index_name, ("file",))}
         # A folder of that name is none of the set's files, and may hold anything.
         own |= {name for name in listed if not (target / name).is_dir()}
-    foreign = sorted({path.name for path in target.iterdir()} - own)
+    foreign = sorted({name for name in seen if "/" not in name} - own)
     if foreign:
         raise InputError(
             f"expected a new folder or {what}, got {target} with other files in it "
             f"({foreign[0]}); choose another folder."
         )
+    return seen
 
 
 def listed_file(folder: Path, name: str, *, index_name: str) -> Path:

@@ -1,9 +1,8 @@
 """Places in folders: one process at a time, and nothing left by one that was killed.
 
-What is not finished yet lies beside its place under a hidden name (`.NAME.….unfinished`). The
-process that makes it holds a lock on it, which the system takes away when the process ends, however
-it ends. Windows has no such lock: there processes do not wait for each other, and what a killed one
-left stays.
+What is not finished yet lies beside its place under a hidden name (`.NAME.….unfinished`). While it
+makes a file, a process holds the lock of the folder; while it fills a hidden folder, the lock in
+that one. The system takes locks away when the process ends, however it ends.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import sys
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -19,16 +17,23 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from modeling.errors import InputError
-
-if sys.platform != "win32":
-    import fcntl
+from modeling.files.locks import WAIT_S, HeldError, Lock
+from modeling.files.syncing import make_folder
 
 ENDING = ".unfinished"
+LOCK_NAME = ".tactileq.lock"
 _UNFINISHED = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(ENDING))
 _NAME_LENGTH = 40  # characters of a place's name in a hidden one, which must not become too long
 
-_threads = threading.RLock()
-_held: set[tuple[int, int]] = set()
+
+class _Held(threading.local):
+    """The locks of folders that a thread holds, by device and number of the folder."""
+
+    def __init__(self) -> None:
+        self.locks: dict[tuple[int, int], Lock] = {}
+
+
+_held = _Held()
 
 
 def behind_links(path: str | Path) -> Path:
@@ -44,20 +49,31 @@ def behind_links(path: str | Path) -> Path:
     return target.resolve()
 
 
+def is_hidden(name: str) -> bool:
+    """Whether a file or folder of this name is a lock, or what a process has not finished."""
+    return name == LOCK_NAME or _UNFINISHED.fullmatch(name) is not None
+
+
 @contextmanager
 def locked(path: str | Path) -> Iterator[Path]:
-    """Let no other process of this program change what is at `path` until the block ends.
+    """Let nobody else of this program change what is at `path` until the block ends.
 
-    Others wait. The lock covers the folder that `path` is in, which is made if it is not there. A
-    block may hold it again inside. A file system that knows no locks is used without.
+    Other processes and threads wait for 30 s. The lock covers the folder that `path` is in, which
+    is made if it is not there. A block may hold it again inside. A file system that knows no locks
+    is used without.
 
     Yields
     ------
     Path
         The place behind links, with what a killed process had moved away put back.
+
+    Raises
+    ------
+    InputError
+        Naming the process that has held the lock for 30 s.
     """
     target = behind_links(path)
-    target.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(target.parent)
     with _folder_locked(target.parent):
         yield target
 
@@ -77,32 +93,34 @@ def unfinished_folder(target: Path) -> Iterator[Path]:
     """
     with locked(target):
         made = Path(tempfile.mkdtemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING))
-        handle, key = _claim(made), _key(made)
-        _held.add(key)  # what is written right into it must not wait for this lock
+        lock, key = Lock(made / LOCK_NAME), _key(made)
+        lock.acquire(WAIT_S)
+        _held.locks[key] = lock  # what is written right into it must not wait for this lock
     try:
         yield made
     finally:
         with suppress(OSError):
             _remove(made)
-        _held.discard(key)
-        _release(handle)
+        _held.locks.pop(key, None)
+        _give_back(lock)
 
 
 @contextmanager
 def unfinished_file(target: Path, data: bytes) -> Iterator[Path]:
-    """A hidden file beside `target` with these bytes; gone when the block ends, unless moved."""
+    """A hidden file beside `target` with these bytes, forced to disk; gone when the block ends,
+    unless moved. Its folder is locked meanwhile."""
     with locked(target):
         number, name = tempfile.mkstemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING)
-        handle = _claim(Path(name))
-    try:
-        with os.fdopen(number, "wb") as file:
-            file.write(data)
-        os.chmod(name, 0o644)
-        yield Path(name)
-    finally:
-        with suppress(FileNotFoundError):
-            os.unlink(name)
-        _release(handle)
+        try:
+            with os.fdopen(number, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(number)
+            os.chmod(name, 0o644)
+            yield Path(name)
+        finally:
+            with suppress(FileNotFoundError):
+                os.unlink(name)
 
 
 def _prefix(target: Path) -> str:
@@ -112,20 +130,26 @@ def _prefix(target: Path) -> str:
 @contextmanager
 def _folder_locked(folder: Path) -> Iterator[None]:
     """Hold the lock of a folder, and clear it up where it was not held already."""
-    with _threads:
-        key = _key(folder)
-        if key in _held:
-            yield
-            return
-        handle = _claim(folder, wait=True)
-        _held.add(key)
-        try:
-            if handle is not None:
-                _clear(folder)
-            yield
-        finally:
-            _held.discard(key)
-            _release(handle)
+    key = _key(folder)
+    if key in _held.locks and _held.locks[key].is_held:
+        yield
+        return
+    lock = Lock(folder / LOCK_NAME)
+    try:
+        lock.acquire(WAIT_S)
+    except HeldError as holder:
+        raise InputError(
+            f"expected to write in {folder}, got its lock, which {holder} has held for "
+            f"{WAIT_S:g} s; end that process if it hangs, or wait for it, then try again."
+        ) from None
+    _held.locks[key] = lock
+    try:
+        if lock.is_held:
+            _clear(folder)
+        yield
+    finally:
+        _held.locks.pop(key, None)
+        lock.release()
 
 
 def _key(folder: Path) -> tuple[int, int]:
@@ -134,47 +158,40 @@ def _key(folder: Path) -> tuple[int, int]:
 
 
 def _clear(folder: Path) -> None:
+    """Remove what killed processes left in a folder, whose lock this one holds."""
     with suppress(OSError):
         left = [entry for entry in folder.iterdir() if _UNFINISHED.fullmatch(entry.name)]
         for path in left:
-            # Who still works on it holds its lock.
-            handle = None if path.is_symlink() else _claim(path)
-            if handle is not None:
-                with suppress(OSError):
-                    _remove(path)
-                _release(handle)
+            with suppress(OSError, HeldError, InputError):
+                if path.is_dir() and not path.is_symlink():
+                    _clear_folder(path)
+                elif path.is_file() and not path.is_symlink():
+                    path.unlink()
+
+
+def _clear_folder(path: Path) -> None:
+    """Remove a hidden folder; HeldError where somebody still works on it."""
+    lock = Lock(path / LOCK_NAME)
+    lock.acquire(wait_s=0)
+    try:
+        if lock.is_held:
+            _remove(path)
+    finally:
+        _give_back(lock)
+
+
+def _give_back(lock: Lock) -> None:
+    """Release the lock in a hidden folder that was removed, but for the lock on Windows."""
+    lock.release()
+    with suppress(OSError):
+        lock.path.parent.rmdir()
 
 
 def _remove(path: Path) -> None:
-    """Remove a hidden file or folder; OSError, and all of it stays, where it holds the only copy
-    of a folder that cannot be put back."""
-    if not path.is_dir():
-        path.unlink()
-        return
+    """Remove a hidden folder; OSError, and all of it stays, where it holds the only copy of a
+    folder that cannot be put back."""
     for fresh in list(path.iterdir()):
         old, place = fresh.with_name(fresh.name + ".old"), path.parent / fresh.name
         if old.exists() and not place.exists():
             old.rename(place)
     shutil.rmtree(path, ignore_errors=True)
-
-
-def _claim(path: Path, *, wait: bool = False) -> int | None:
-    """A handle that holds the lock of a file or folder; None where it is not to be had."""
-    if sys.platform == "win32":
-        return None
-    handle = None
-    try:
-        handle = os.open(path, os.O_RDONLY)
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:
-        _release(handle)
-        return None
-    except BaseException:
-        _release(handle)
-        raise
-    return handle
-
-
-def _release(handle: int | None) -> None:
-    if handle is not None:
-        os.close(handle)

@@ -41,6 +41,10 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
     text = read_text(source, "a table")
     # Not splitlines(): that would also break cells at characters that `write_table` allows.
     lines = [line for line in text.split("\n") if line.strip() and not line.startswith("#")]
+    if not text:
+        raise InputError(
+            f"expected a table in {source}, got an empty file; restore it from a copy."
+        )
     header = lines[0].split("\t") if lines else []
     missing = [name for name in required if name not in header]
     if missing:

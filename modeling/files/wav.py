@@ -64,6 +64,8 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
     check_file(path, "a WAV file")
     with path.open("rb") as file:
         form, announced = file.read(4), int.from_bytes(file.read(4), "little") + 8
+    if not form:
+        raise InputError(f"expected a WAV file, got {path}, which is empty; record it again.")
     if form not in _FORMS:
         raise InputError(f"expected a WAV file, got {path}, which holds no sound; convert it.")
     try:

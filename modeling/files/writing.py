@@ -8,7 +8,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from modeling.files.places import behind_links, unfinished_file
+from modeling.files.places import behind_links, locked, unfinished_file
+from modeling.files.syncing import sync_folder
 
 
 def file_stem(name: str) -> str:
@@ -33,17 +34,20 @@ def write_bytes(path: str | Path, data: bytes) -> None:
 def write_files(contents: Mapping[Path, bytes]) -> None:
     """Write several files so that all are there, each whole, or none; links keep leading to theirs.
 
-    All are complete on the disk before the first takes its place, in the order given.
+    All are forced to disk before the first takes its place, in the order given; the last one, which
+    may name the others, once they are in theirs for good.
 
     Raises
     ------
     OSError
         With the name of the file that could not be written; then nothing has changed.
     """
+    targets = {behind_links(path): data for path, data in contents.items()}
     with ExitStack() as stack:
+        for target in sorted(targets):  # in one order, so that no two wait for each other
+            stack.enter_context(locked(target))
         ready: list[tuple[Path, Path]] = []
-        for path, data in contents.items():
-            target = behind_links(path)
+        for target, data in targets.items():
             if target.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
             with _named(target):
@@ -60,12 +64,23 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
 
 def _put(ready: list[tuple[Path, Path]]) -> None:
     """Move files to their places, and from the list."""
+    moved: set[Path] = set()
     while ready:
         hidden, target = ready[0]
+        if len(ready) == 1:
+            _sync(moved)
         if hidden.exists():
             with _named(target):
                 os.replace(hidden, target)
+        moved.add(target.parent)
         ready.pop(0)
+    _sync(moved)
+
+
+def _sync(folders: set[Path]) -> None:
+    for folder in sorted(folders):
+        with _named(folder):
+            sync_folder(folder)
 
 
 @contextmanager

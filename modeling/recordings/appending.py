@@ -11,6 +11,7 @@ from pathlib import Path
 from modeling.errors import InputError
 from modeling.files.folders import check_replaceable, replace_folder
 from modeling.files.reading import reason_of
+from modeling.files.syncing import sync_file, sync_folder
 from modeling.files.tables import number, read_table, table_text, whole_number
 from modeling.files.writing import write_files, write_text
 from modeling.recordings.recording import Recording
@@ -84,8 +85,8 @@ def append(
     try:
         if (target / INDEX_NAME).is_file():
             return _extend(target, recordings, sources, beside=beside or {})
-        check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
-        with replace_folder(target) as fresh:
+        seen = check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+        with replace_folder(target, seen) as fresh:
             return _extend(fresh, recordings, sources, beside=beside or {})
     except OSError as error:
         where = f" at {error.filename}" if error.filename else ""
@@ -113,6 +114,7 @@ def _extend(
             _write(folder / name, recording, source)
             for name, recording, source in zip(names, recordings, sources, strict=True)
         ]
+        sync_folder(folder)
         text = _index_text(index, added)
         others = {folder / name: data for name, data in beside.items()}
         write_files({**others, index: text.encode()})
@@ -144,9 +146,10 @@ def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet)
 def _remove_unfinished(folder: Path) -> None:
     """Remove what an addition that did not come to its end has left behind, and its note."""
     note, index = folder / UNFINISHED_NAME, folder / INDEX_NAME
-    if not note.is_file():
+    # Without the index nobody knows which files are recordings.
+    if not (note.is_file() and index.is_file()):
         return
-    listed_names = {row["file"] for row in read_table(index, ("file",))} if index.is_file() else ()
+    listed_names = {row["file"] for row in read_table(index, ("file",))}
     for name in note.read_text(encoding="utf-8").split("\n"):
         if _OWN_NAME.fullmatch(name) and name not in listed_names:
             (folder / name).unlink(missing_ok=True)
@@ -166,13 +169,15 @@ def _new_names(
 
 
 def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[str, str]:
-    """Write a recording's file; its row of the index."""
+    """Write a recording's file, forced to disk; its row of the index."""
     cells = (path.name, *index_cells(recording))
     row = dict(zip(INDEX_COLUMNS, cells, strict=True))
     if source is None:
         write_samples(path, recording)
+        sync_file(path)
         return row
     shutil.copyfile(source.path, path)
+    sync_file(path)
     scale = "" if source.g_per_fullscale is None else repr(source.g_per_fullscale)
     return row | dict(zip(WAV_COLUMNS, (scale, str(source.channel)), strict=True))
 

@@ -115,8 +115,8 @@ class RecordingSet:
             If the folder exists and holds something else than a recording set.
         """
         target = Path(folder)
-        check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
-        with replace_folder(target) as fresh:
+        seen = check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+        with replace_folder(target, seen) as fresh:
             rows = []
             for number, recording in enumerate(self.recordings, start=1):
                 name = f"{number:04d}.csv"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 import tempfile
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,14 +20,14 @@ from modeling.arrays import Floats
 from modeling.checks import check_duration, check_texture_name
 from modeling.errors import InputError, shown
 from modeling.files.folders import folder_behind
-from modeling.files.places import locked
+from modeling.files.places import clear_unfinished, locked
 from modeling.files.provenance import PROVENANCE_NAME, provenance_text
 from modeling.files.tables import number, read_table, table_text, whole_number, write_table
 from modeling.files.wav import read_wav
 from modeling.files.writing import write_files
 from modeling.models.grid import Condition
 from modeling.recordings.appending import WavSource, append
-from modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed
+from modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed, load_usable
 from rig.capture.coverage import Coverage
 from rig.capture.cutting import SHORTEST_S, Piece
 from rig.capture.grid import StrokeGrid
@@ -119,8 +119,10 @@ class PieceStore:
         self.plan = plan
         self._provenance = dict(provenance or {})
         self._kept: list[_Kept] = []
+        self.damaged: list[str] = []  # a sentence for each file that does not count
         self.counts = Counter(kept=0, clipped=0, silent=0, surplus=0)
         _check_folder(self.folder)
+        clear_unfinished(self.folder / PIECES)
         self._read()
         # A run that was killed may have ended between a last piece and its recording.
         for condition in self._filled():
@@ -163,10 +165,10 @@ class PieceStore:
         self._begin_index()
         with locked(self.folder / PIECES / TABLE_NAME) as table:
             rows = _rows(table)
-            file = _new_name(rows)
+            file = _new_name(table.parent, rows)
             rows.append(self._row(file, piece))
             text = table_text(COLUMNS, [[row.get(name, "") for name in COLUMNS] for row in rows])
-            # The table last: a file that it does not list is written over.
+            # The table last, once the piece is on disk for good.
             write_files(
                 {
                     table.with_name(file): _wav(piece.samples_g, self.plan.rate_hz),
@@ -198,13 +200,30 @@ class PieceStore:
 
     def _begin_index(self) -> None:
         """Make the folder a recording set, as yet of none, so that recordings can be added."""
-        if not (self.folder / INDEX_NAME).is_file():
-            with locked(self.folder / INDEX_NAME) as index:
-                write_table(index, INDEX_COLUMNS, [])
+        if (self.folder / INDEX_NAME).is_file():
+            return
+        if lost := sorted(path.name for path in self.folder.glob("[0-9]*.wav")):
+            self.damaged.append(
+                f"expected {INDEX_NAME} beside {lost[0]} in {self.folder}, got none, so no "
+                "recording there counts; restore it from a copy, or what there are pieces of is "
+                "recorded again under new names."
+            )
+        with locked(self.folder / INDEX_NAME) as index:
+            write_table(index, INDEX_COLUMNS, [])
 
     def _read(self) -> None:
         table = self.folder / PIECES / TABLE_NAME
-        for row in _rows(table):
+        rows = _rows(table)
+        listed_files = {row["file"] for row in rows}
+        # A run that was killed may have ended between its last piece and the table.
+        lost = _files(table.parent) - listed_files
+        if lost - ({_name_after(listed_files)} if rows else set()):
+            self.damaged.append(
+                f"expected each piece in {table}, got {len(lost)} that it does not list, such as "
+                f"{min(lost)}, of unknown speed and force; restore the table from a copy, or "
+                "stroke there again."
+            )
+        for row in rows:
             if row["texture"] != self.plan.texture:
                 continue
             rate_hz = number(row["rate_hz"], f"rate_hz of {row['file']}")
@@ -215,8 +234,28 @@ class PieceStore:
                     "folder."
                 )
             if whole_number(row["repeat"], f"repeat of {row['file']}") == self.plan.repeat:
-                self._kept.append(_kept(row))
+                self._keep_whole(_kept(row))
         self._recorded = self._listed_conditions()
+        if self._recorded:
+            self.damaged += self._unusable_recordings()
+
+    def _keep_whole(self, one: _Kept) -> None:
+        """Count a piece of an earlier run, unless its file is damaged."""
+        try:
+            self._samples(one)
+        except InputError as error:
+            self.damaged.append(str(error))
+        else:
+            self._kept.append(one)
+
+    def _samples(self, one: _Kept) -> Floats:
+        samples = read_wav(self.folder / PIECES / one.file)[0]
+        if samples.size != one.samples:
+            raise InputError(
+                f"expected {one.samples} samples in {self.folder / PIECES / one.file}, got "
+                f"{samples.size}; the file is damaged and does not count, stroke there again."
+            )
+        return samples
 
     def _listed_conditions(self) -> set[Condition]:
         """Conditions of which the set holds this repeat."""
@@ -229,6 +268,13 @@ class PieceStore:
             and whole_number(row.get("repeat") or "1", f"repeat of {row['file']}")
             == self.plan.repeat
         }
+
+    def _unusable_recordings(self) -> tuple[str, ...]:
+        """A sentence for each recording of the texture that its index lists and nobody can read."""
+        try:
+            return load_usable(self.folder, texture=self.plan.texture)[1]
+        except InputError as error:
+            return (str(error),)
 
     def _sizes(self) -> dict[Condition, list[int]]:
         sizes: dict[Condition, list[int]] = {}
@@ -247,6 +293,7 @@ class PieceStore:
 
     def _record(self, condition: Condition) -> None:
         """Join the pieces of a condition, and add its recording to the set."""
+        self._begin_index()
         chosen = [one for one in self._kept if one.condition == condition]
         samples = self._joined(chosen)
         with tempfile.TemporaryDirectory() as folder:
@@ -267,13 +314,7 @@ class PieceStore:
         self._recorded.add(condition)
 
     def _joined(self, chosen: Sequence[_Kept]) -> Floats:
-        pieces = [read_wav(self.folder / PIECES / one.file)[0] for one in chosen]
-        for one, piece in zip(chosen, pieces, strict=True):
-            if piece.size != one.samples:
-                raise InputError(
-                    f"expected {one.samples} samples in {PIECES}/{one.file}, got {piece.size}; "
-                    f"the file was changed, remove its line from {PIECES}/{TABLE_NAME}."
-                )
+        pieces = [self._samples(one) for one in chosen]
         return joined(pieces, self.plan.rate_hz)[: self.plan.wanted_samples]
 
     def _row(self, name: str, piece: Piece) -> dict[str, str]:
@@ -302,15 +343,32 @@ def _check_folder(folder: Path) -> None:
 
 
 def _rows(table: Path) -> list[dict[str, str]]:
-    rows = read_table(table, _NEEDED) if table.is_file() else []
+    if not table.is_file():
+        return []
+    rows = read_table(table, _NEEDED)
+    if not table.read_bytes().endswith(b"\n"):
+        raise InputError(
+            f"expected {table} to end with a whole line, got {shown(rows[-1:])} at its end; the "
+            "table is truncated, restore it from a copy, or remove that line."
+        )
     for row in rows:
         _check_name(row["file"])
     return rows
 
 
-def _new_name(rows: Sequence[Mapping[str, str]]) -> str:
-    last = max((int(Path(row["file"]).stem) for row in rows), default=0)
+def _new_name(folder: Path, rows: Sequence[Mapping[str, str]]) -> str:
+    """A name that neither the table nor a file has, since a file that is not listed may be data."""
+    return _name_after({row["file"] for row in rows} | _files(folder))
+
+
+def _name_after(names: Iterable[str]) -> str:
+    last = max((int(Path(name).stem) for name in names), default=0)
     return f"{last + 1:05d}.wav"
+
+
+def _files(folder: Path) -> set[str]:
+    """Names of the pieces in a folder, listed or not."""
+    return {path.name for path in folder.glob("*.wav") if _is_piece(path.name)}
 
 
 def _kept(row: Mapping[str, str]) -> _Kept:
@@ -324,11 +382,15 @@ def _kept(row: Mapping[str, str]) -> _Kept:
 
 def _check_name(name: str) -> None:
     """Refuse a file that no piece can be in: names are numbers, and lead nowhere else."""
-    if not (name.endswith(".wav") and name.removesuffix(".wav").isdecimal()):
+    if not _is_piece(name):
         raise InputError(
             f"expected a file such as 00001.wav in {PIECES}/{TABLE_NAME}, got {shown(name)}; "
             "remove the line."
         )
+
+
+def _is_piece(name: str) -> bool:
+    return name.endswith(".wav") and name.removesuffix(".wav").isdecimal()
 
 
 def _condition(row: Mapping[str, str]) -> Condition:

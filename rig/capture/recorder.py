@@ -186,7 +186,7 @@ class StrokeRecorder:
 
     def warnings(self) -> list[str]:
         """One sentence for everything that makes the recording slow or worse than it could be."""
-        told = []
+        told = list(self.store.damaged)
         if self.lost:
             told.append(
                 f"samples of the input were lost at {self.lost} places, and pieces end there; "

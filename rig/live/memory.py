@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import mmap
 import os
+import secrets
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from modeling.errors import InputError, shown
+from modeling.files.locks import WAIT_S, HeldError, Lock
 
 try:
     import rig.live._live as _live
@@ -52,6 +55,7 @@ BLOCK = np.dtype(
         ("spare", "u4"),
     ]
 )
+_PREFIX, _LOCK = "tactileq-live-", ".lock"
 _MOST_ROWS = 16384
 Rows = NDArray[np.void]
 
@@ -81,13 +85,13 @@ class Live:
     """Shared memory of one rig; made by `create`, found again by `attach`.
 
     A file in memory where the system has such, else in the temporary folder. Close it, or use it in
-    a `with` block; who made it removes the file.
+    a `with` block; who made it removes the file, and those of makers that were killed.
     """
 
-    def __init__(self, path: Path, memory: mmap.mmap, *, own: bool) -> None:
+    def __init__(self, path: Path, memory: mmap.mmap, *, lock: Lock | None = None) -> None:
         self.path = path
         self._memory: mmap.mmap | None = memory
-        self._own = own
+        self._lock = lock  # of who made it
         self._lib, ffi = compiled().lib, compiled().ffi
         self._ffi = ffi
         self._buffer = ffi.from_buffer(memory, require_writable=True)
@@ -99,16 +103,16 @@ class Live:
         lib = compiled().lib
         in_memory = Path("/dev/shm")
         folder = in_memory if os.access(in_memory, os.W_OK) else Path(tempfile.gettempdir())
-        handle, name = tempfile.mkstemp(prefix="tactileq-rig-", dir=folder)
+        _clear(folder)
+        path = folder / f"{_PREFIX}{secrets.token_hex(8)}"
+        lock = Lock(path.with_name(path.name + _LOCK))
+        lock.acquire(WAIT_S)
         try:
-            os.truncate(handle, lib.tq_live_size())
-            memory = mmap.mmap(handle, lib.tq_live_size())
-        except OSError:
-            Path(name).unlink()
+            live = cls(path, _made(path, lib.tq_live_size()), lock=lock)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            lock.release()
             raise
-        finally:
-            os.close(handle)
-        live = cls(Path(name), memory, own=True)
         lib.tq_live_start(live.address)
         return live
 
@@ -126,7 +130,7 @@ class Live:
             if os.fstat(file.fileno()).st_size != lib.tq_live_size():
                 raise _no_memory(path)
             memory = mmap.mmap(file.fileno(), 0)
-        live = cls(path, memory, own=False)
+        live = cls(path, memory)
         if not lib.tq_live_fits(live.address):
             live.close()
             raise _no_memory(path)
@@ -140,8 +144,9 @@ class Live:
         self._ffi.release(self._buffer)
         self._memory.close()
         self._memory = None
-        if self._own:
+        if self._lock:
             self.path.unlink(missing_ok=True)
+            self._lock.release()
 
     def __enter__(self) -> Live:
         return self
@@ -209,6 +214,29 @@ class Live:
         first = self._ffi.new("uint64_t *")
         taken = copy(self.address, count, self._ffi.from_buffer(pointer, rows), rows.size, first)
         return int(first[0]) + int(taken), rows[:taken].copy()
+
+
+def _made(path: Path, size: int) -> mmap.mmap:
+    """Memory in a file that must not be there yet."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o600)
+    try:
+        os.truncate(handle, size)
+        return mmap.mmap(handle, size)
+    finally:
+        os.close(handle)
+
+
+def _clear(folder: Path) -> None:
+    """Remove the memory of makers that were killed, which hold its lock no more."""
+    for path in folder.glob(f"{_PREFIX}*{_LOCK}"):
+        lock, memory = Lock(path), path.with_name(path.name.removesuffix(_LOCK))
+        with suppress(HeldError, InputError, OSError):
+            lock.acquire(wait_s=0)
+            try:
+                if lock.is_held:
+                    memory.unlink(missing_ok=True)
+            finally:
+                lock.release()
 
 
 def _no_memory(path: Path) -> InputError:

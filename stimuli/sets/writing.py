@@ -15,7 +15,7 @@ import numpy as np
 
 from modeling import InputError, Threshold, compensation_for
 from modeling.arrays import Floats
-from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.folders import Contents, check_replaceable, replace_folder
 from modeling.files.reading import reason_of
 from modeling.files.writing import file_stem
 from modeling.perception.sensation_level import SensationLevel, sensation_level
@@ -139,11 +139,11 @@ def write_set(
         that takes no more; then nothing is written.
     """
     target = Path(folder)
-    check_place(target)
+    seen = check_place(target)
     sources = sources or load_sources(recipe)
     stimuli = []
     try:
-        with replace_folder(target) as fresh, closing(rendered(recipe, sources)) as files:
+        with replace_folder(target, seen) as fresh, closing(rendered(recipe, sources)) as files:
             copy_sources(recipe, sources, folder=fresh)
             for stimulus, data in files:
                 _write_new(fresh / stimulus.file, data)
@@ -163,12 +163,15 @@ def write_set(
     return tuple(stimuli)
 
 
-def check_place(target: Path) -> None:
-    """Refuse a folder that holds anything but a set: its files and the copies of its sources."""
+def check_place(target: Path) -> Contents:
+    """Refuse a folder that holds anything but a set: its files and the copies of its sources.
+
+    What is in it is returned, for `replace_folder`.
+    """
     own = (RECIPE, COLUMNS_FILE, CONTACT_SHEET, FOLDER)
-    check_replaceable(target, index_name=MANIFEST, what="a stimulus set", beside=own)
+    seen = check_replaceable(target, index_name=MANIFEST, what="a stimulus set", beside=own)
     if not (target / FOLDER).is_dir():
-        return
+        return seen
     named = Recipe.load(target / RECIPE).files()
     foreign = sorted(set((target / FOLDER).iterdir()) - set(named))
     if foreign:
@@ -176,6 +179,7 @@ def check_place(target: Path) -> None:
             f"expected a new folder or a stimulus set, got {target} with a file in it that its "
             f"recipe does not name ({foreign[0]}); choose another folder."
         )
+    return seen
 
 
 def _write_new(path: Path, data: bytes) -> None:

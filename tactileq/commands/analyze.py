@@ -110,7 +110,7 @@ def analyze(
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
-    check_own_results(out, "analyze")
+    seen = check_own_results(out, "analyze")
     places = _places(data)
     responses = _answers(places, exclude or ())
     if plan is not None:
@@ -135,7 +135,7 @@ def analyze(
     appendix = []
     if validate is not None:
         appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
-    with replace_folder(out) as fresh, share_of("Reporting") as tell:
+    with replace_folder(out, seen) as fresh, share_of("Reporting") as tell:
         settings = settings_of(responses, results)
         settings |= {"validate": validate} if validate is not None else {}
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
@@ -169,10 +169,10 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     if not files or folders:
         got = f"the folder {folders[0]}" if folders else "none"
         raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
-    check_own_results(out, "analyze")
+    seen = check_own_results(out, "analyze")
     imported = load_imported(files, parse_map(columns))
     sections = table_sections(imported, rng=np.random.default_rng(seed))
-    with replace_folder(out) as fresh, share_of("Reporting") as tell:
+    with replace_folder(out, seen) as fresh, share_of("Reporting") as tell:
         provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=files)
         write_report(
             fresh / "report.html",

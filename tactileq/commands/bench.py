@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from analysis.benches.chart.chart import Chart
     from analysis.benches.chart.surfaces import Source
     from analysis.benches.rendering import RenderingBench
+    from modeling.files.folders import Contents
 
 bench = typer.Typer(
     no_args_is_help=True,
@@ -86,7 +87,7 @@ def bench_chart(
     """
     from analysis.benches.chart.methods import chosen_methods
 
-    check_own_results(out, "bench chart")
+    seen = check_own_results(out, "bench chart")
     methods = chosen_methods(method or [], full=full)
     sources = chart_sources(recordings or [], toolkit or [], models or [], full=full)
     chart = charted(sources, methods, jobs=jobs, dask=dask)
@@ -96,7 +97,7 @@ def bench_chart(
         "full": full,
         "machine": chart.machine,
     }
-    _write_chart(chart, out, settings)
+    _write_chart(chart, out, seen=seen, settings=settings)
     for warning in chart.warnings:
         print(f"warning: {warning}", file=sys.stderr)
     for comparison in chart.comparisons:
@@ -151,12 +152,12 @@ def charted(
     return chart_of([made[number] for number in sorted(made)])
 
 
-def _write_chart(chart: Chart, out: Path, settings: dict[str, object]) -> None:
+def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str, object]) -> None:
     from analysis.report.chart_page import chart_files
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 
-    with replace_folder(out) as fresh:
+    with replace_folder(out, seen) as fresh:
         for name, data in chart_files(chart).items():
             (fresh / name).write_bytes(data)
         seal_folder(fresh, provenance_of("bench chart", settings))
@@ -170,11 +171,11 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 
-    check_own_results(out, "bench render")
+    seen = check_own_results(out, "bench render")
     effort = QUICK if quick else Effort()
     with progress("Timing", effort.parts) as advance:
         timed = bench_rendering(effort, progress=advance)
-    with replace_folder(out) as fresh:
+    with replace_folder(out, seen) as fresh:
         tables = {"times": timed.times, "layers": timed.sweep, "aims": timed.aims}
         for name, table in {**tables, "operations": timed.operations}.items():
             table.to_csv(fresh / f"{name}.tsv", sep="\t", index=False)

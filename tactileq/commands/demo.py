@@ -45,11 +45,11 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     from modeling.files.provenance import provenance_of, seal_folder
     from stimuli.planted.textures import TEXTURES
 
-    check_own_results(out, "demo")
+    seen = check_own_results(out, "demo")
     plan = Study.load()
     threshold = Threshold.named("codec")
     print("A study in silico: simulated surfaces, simulated participants, the real program.")
-    with replace_folder(out) as fresh, mapping(jobs=JOBS) as mapped:
+    with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
             made = list(_told(mapped(record, TEXTURES), advance, _texture))

@@ -195,9 +195,9 @@ def add_to_set(
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
     provenance = out / PROVENANCE_NAME
+    origin = provenance_of(command, settings, inputs=files)
     with locked(out):  # another import must not add to what this one is adding to
-        before = imports_before(provenance)
-        origin = provenance_of(command, {**settings, "added to": before}, inputs=files)
+        origin["settings"]["added to"] = imports_before(provenance)
         beside = {PROVENANCE_NAME: provenance_text(origin).encode()}
         count = append(out, records, [one.source for one in new], beside=beside)
     if any(record.unit == "arbitrary" for record in records):

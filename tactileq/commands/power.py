@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from experiments.observers.psychometrics import Psychometrics
     from experiments.study.models import ModelSets
     from experiments.study.study import Study
+    from modeling.files.folders import Contents
 
 PICTURE_DPI = 150
 
@@ -80,7 +81,7 @@ def power(
     """
     from experiments.study.study import Study
 
-    check_own_results(out, "power")
+    seen = check_own_results(out, "power")
     plan = Study.load(study)
     sizes = sizes_of(subjects)
     largest = planned_for(plan, sizes)
@@ -110,7 +111,7 @@ def power(
         "simulations": simulations,
         "planted": planted,
     }
-    _write(table, plan, out, seed=seed, settings=settings, inputs=[study])
+    _write(table, plan, out, seen=seen, seed=seed, settings=settings, inputs=[study])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -384,6 +385,7 @@ def _write(
     plan: Study,
     out: Path,
     *,
+    seen: Contents,
     seed: int,
     settings: dict[str, object],
     inputs: Sequence[Path],
@@ -399,7 +401,7 @@ def _write(
     provenance = provenance_of("power", settings, seed=seed, inputs=inputs)
     marked = table.assign(simulated="true")
     figure = figure_power(table)
-    with replace_folder(out) as fresh:
+    with replace_folder(out, seen) as fresh:
         text = marked.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n")
         write_text(fresh / "power.tsv", text)
         save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)

@@ -94,7 +94,7 @@ def record_in_silico(
     with progress(f"Recording {texture} in silico", 1) as advance:
         records = record_texture(truth, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
         settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
-        with replace_folder(folder) as fresh:
+        with replace_folder(folder, {}) as fresh:
             records.save(fresh)
             write_provenance(fresh / "provenance.json", "record", settings, seed=seed)
         advance("")

@@ -52,7 +52,7 @@ def scene(
     from modeling.rendering.compiled import is_compiled
     from modeling.scenes.loading import full_models
 
-    check_own_results(out, "scene")
+    seen = check_own_results(out, "scene")
     asked = Scene.load(scene_file)
     folder, full = full_models(asked, models or asked.models or Path("models"))
     with progress("Compiling the scene", len(asked.textures or full)) as advance:
@@ -63,7 +63,7 @@ def scene(
         "full_sha256": {each.texture: each.full.sha256 for each in compiled.textures},
     }
     inputs = [*asked.files, folder]
-    with replace_folder(out) as fresh:
+    with replace_folder(out, seen) as fresh:
         write_scene(compiled, fresh, seed=seed)
         seal_folder(fresh, provenance_of("scene", settings, seed=seed, inputs=inputs))
     for texture in compiled.textures:

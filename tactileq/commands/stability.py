@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from analysis.benches.atlas.case import Case
     from analysis.benches.atlas.edges import Examined
+    from modeling.files.folders import Contents
 
 
 def stability(
@@ -43,12 +44,12 @@ def stability(
     """
     from analysis.benches.atlas.cases import CASES
 
-    check_own_results(out, "stability")
+    seen = check_own_results(out, "stability")
     chosen = cases_of(CASES, only)
     with progress("Examining", len(columns_of(chosen, full=not reduced))) as advance:
         found = examined(chosen, full=not reduced, jobs=jobs, advance=advance)
     settings = {"reduced": reduced, "only": sorted({case.family for case in chosen})}
-    _write(found, out, settings=settings)
+    _write(found, out, seen=seen, settings=settings)
 
 
 def cases_of(cases: Sequence[Case], families: Sequence[str] | None) -> list[Case]:
@@ -114,14 +115,16 @@ def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool)
     return examine(cases[number], column, full=full)
 
 
-def _write(found: Sequence[Examined], out: Path, *, settings: dict[str, object]) -> None:
+def _write(
+    found: Sequence[Examined], out: Path, *, seen: Contents, settings: dict[str, object]
+) -> None:
     from analysis.benches.atlas.tables import margin_table
     from analysis.report.section_stability import atlas_files
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 
     provenance = provenance_of("stability", settings)
-    with replace_folder(out) as fresh:
+    with replace_folder(out, seen) as fresh:
         for name, data in atlas_files(found, provenance).items():
             (fresh / name).write_bytes(data)
         seal_folder(fresh, provenance)

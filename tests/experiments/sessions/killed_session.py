@@ -18,6 +18,7 @@ import threading
 import time
 from pathlib import Path
 
+import filelock  # noqa: F401  # once, and not in each of a hundred children
 import numpy as np
 
 from experiments.sessions.manifest import SessionManifest

@@ -1,0 +1,158 @@
+"""What others put into a folder while its successor is made, and a loss of power, cost nothing."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from modeling import InputError
+from modeling.files import folders, places
+from modeling.files.folders import contents_of, folder_behind, replace_folder
+from modeling.files.locks import Lock
+from modeling.files.writing import write_files
+from tests.power_cut import Files, laid_out, watched
+
+OLD: Files = {"set": None, "set/figures": None, "set/a": b"old", "set/figures/b": b"old"}
+NEW: Files = {"set": None, "set/a": b"new"}
+Change = Callable[[Path], object]
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> Path:
+    return laid_out(OLD, tmp_path / "place") / "set"
+
+
+def files_in(folder: Path) -> Files:
+    return {
+        path.relative_to(folder).as_posix(): None if path.is_dir() else path.read_bytes()
+        for path in folder.rglob("*")
+    }
+
+
+def another_run(target: Path) -> None:
+    with replace_folder(target) as fresh:
+        (fresh / "a").write_bytes(b"another's")
+
+
+CHANGES: dict[str, Change] = {
+    "a new file": lambda target: (target / "mine").write_bytes(b"mine"),
+    "a new file below": lambda target: (target / "figures/mine").write_bytes(b"mine"),
+    "a new folder": lambda target: (target / "mine").mkdir(),
+    "a file changed": lambda target: (target / "a").write_bytes(b"Old"),
+    "a file replaced": lambda target: write_files({target / "a": b"Old"}),
+    "another run": another_run,
+    "a file in its place": lambda target: (shutil.rmtree(target), target.write_bytes(b"mine")),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
+@pytest.mark.parametrize("when", ["after the check", "while it is filled"])
+def test_what_others_changed_stays_and_the_new_is_beside(
+    target: Path, change: Change, when: str
+) -> None:
+    seen = contents_of(folder_behind(target)) if when == "after the check" else None
+    if seen is not None:
+        change(target)
+    refused = None
+    try:
+        with replace_folder(target, seen) as fresh:
+            (fresh / "a").write_bytes(b"new")
+            if seen is None:
+                change(target)
+            before = files_in(target.parent)
+    except InputError as error:
+        refused = str(error)
+    assert refused is not None
+    assert f"What was made is in {target}-2." in refused
+    after = files_in(target.parent)
+    assert after == {
+        **{name: data for name, data in before.items() if "unfinished" not in name},
+        "set-2": None,
+        "set-2/a": b"new",
+    }
+
+
+def test_what_came_where_nothing_was_stays(tmp_path: Path) -> None:
+    target = tmp_path / "set"
+
+    def replaced() -> None:
+        with replace_folder(target) as fresh:
+            (fresh / "a").write_text("new")
+            target.mkdir()
+            (target / "a").write_text("mine")
+            (tmp_path / "set-2").mkdir()
+
+    with pytest.raises(InputError, match=r"got a, which was added.* in .*set-3\."):
+        replaced()
+    assert (target / "a").read_text() == "mine"
+
+
+def test_what_comes_between_the_two_moves_stays(
+    target: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compared = folders._check_same
+
+    def meanwhile(*given: object) -> None:
+        compared(*given)  # type: ignore[arg-type]
+        if not target.exists():
+            target.mkdir()
+            (target / "mine").write_bytes(b"mine")
+
+    monkeypatch.setattr(folders, "_check_same", meanwhile)
+    with pytest.raises(InputError, match="got mine, which was added"), replace_folder(target) as f:
+        (f / "a").write_bytes(b"new")
+    kept = {(path.name, (path / "a").exists()) for path in target.parent.iterdir()}
+    assert kept == {("set", False), ("set-2", True), ("set-3", True)}
+    assert (target / "mine").read_bytes() == b"mine"
+
+
+def test_behind_a_lock_that_nobody_gives_back_the_new_is_kept(
+    target: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "WAIT_S", 0.1)
+    lock = Lock(target.parent / places.LOCK_NAME)
+
+    def replaced() -> None:
+        with replace_folder(target) as fresh:
+            (fresh / "a").write_bytes(b"new")
+            lock.acquire(0)
+
+    with pytest.raises(InputError, match=r"has held for .* What was made is in .*set-2\."):
+        replaced()
+    lock.release()
+    assert files_in(target.parent) == {**OLD, "set-2": None, "set-2/a": b"new"}
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_without_power_the_folder_is_the_old_or_the_new_one(tmp_path: Path, there: bool) -> None:
+    disk_folder = laid_out(OLD if there else {}, tmp_path / "disk")
+    with watched(disk_folder) as disk:
+        with replace_folder(disk_folder / "set") as fresh:
+            (fresh / "a").write_bytes(b"new")
+        disk.told = 1
+    old: Files = OLD if there else {}
+    for number, (files, told) in enumerate(disk.cuts):
+        left = laid_out(files, tmp_path / f"cut-{number}")
+        folder_behind(left / "set")
+        assert files_in(left) in ((NEW,) if told else (old, NEW))
+    assert len(disk.cuts) > 10
+
+
+def test_without_power_files_of_a_group_are_whole_and_the_last_names_the_first(
+    tmp_path: Path,
+) -> None:
+    old: Files = {"a": b"old", "index": b""}
+    disk_folder = laid_out(old, tmp_path / "disk")
+    with watched(disk_folder) as disk:
+        write_files({disk_folder / "a": b"new", disk_folder / "index": b"a"})
+        disk.told = 1
+    for number, (files, told) in enumerate(disk.cuts):
+        left = laid_out(files, tmp_path / f"cut-{number}")
+        folder_behind(left / "set")
+        found = files_in(left)
+        assert found in (old, {**old, "a": b"new"}, {"a": b"new", "index": b"a"})
+        if told or found["index"]:
+            assert found == {"a": b"new", "index": b"a"}
