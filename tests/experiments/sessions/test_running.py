@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from experiments.sessions import program
 from experiments.sessions.bids import export_all, export_session
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
@@ -30,6 +31,8 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
+from modeling.files.locks import is_held
+from modeling.files.places import LOCK_NAME
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
 from tests.rig.planted import planted_stimulus
@@ -95,6 +98,22 @@ def log_beside(manifest: Path) -> Path:
 
 def rows_of(manifest: Path) -> list[dict[str, Any]]:
     return [dict(row) for row in session_state(log_beside(manifest)).rows]
+
+
+def test_git_is_asked_before_the_roster_is_locked(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = []
+
+    def asked(*_: str) -> str:
+        held.append(is_held(tmp_path / "sourcedata" / LOCK_NAME))
+        return "0" * 40
+
+    monkeypatch.setattr(program, "_git", asked)
+    program.program_facts.cache_clear()
+    run()
+    program.program_facts.cache_clear()
+    assert held == [False] * 3
 
 
 def test_the_manifest_is_complete_before_the_first_trial(

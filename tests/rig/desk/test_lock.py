@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -37,3 +39,64 @@ def test_the_second_is_told_who_holds_the_rig_until_that_one_is_gone(tmp_path: P
         pass
     with rig_locked(name):
         pass
+
+
+def lock_of(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where the lock of a rig lies, if this is the folder for temporary files."""
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    with rig_locked(name):
+        (path,) = folder.iterdir()
+    assert not path.exists()
+    return path
+
+
+def test_a_link_in_its_place_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, precious = lock_of("rig", tmp_path, monkeypatch), tmp_path / "precious"
+    for contents in ("x", None):
+        if contents:
+            precious.write_text(contents)
+        path.symlink_to(precious)
+        with pytest.raises(InputError, match="locked at .*, got a link; have"), rig_locked("rig"):
+            raise AssertionError
+        assert (precious.read_text() if contents else precious.exists()) == (contents or False)
+        path.unlink()
+        precious.unlink(missing_ok=True)
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason="expected root, to run as two users")
+def test_two_users_of_a_machine_exclude_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = lock_of("rig", tmp_path, monkeypatch)
+    for folder in (tmp_path, *tmp_path.parents[:2]):
+        folder.chmod(0o755)
+    tmp_path.chmod(0o1777)
+
+    def told(uid: int, end: str) -> str:
+        """What another user is told, who then leaves or is killed."""
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            os.setuid(uid)
+            try:
+                with rig_locked("rig"):
+                    os.write(writing, b"held")
+                    os.kill(os.getpid(), signal.SIGKILL) if end == "killed" else None
+            except InputError as error:
+                os.write(writing, str(error).encode())
+            os._exit(0)
+        os.waitpid(child, 0)
+        os.close(writing)
+        with os.fdopen(reading) as pipe:
+            return pipe.read()
+
+    with rig_locked("rig"):
+        assert f"in use by process {os.getpid()}" in told(12345, "left")
+    assert told(12345, "left") == "held"
+    assert told(12345, "killed") == "held"
+    assert path.exists()
+    assert "have its owner remove it" in told(12346, "left")
+    assert told(12345, "left") == "held"
+    assert told(12346, "left") == "held"

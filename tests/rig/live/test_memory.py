@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from modeling import InputError
 from rig.live import memory
 from rig.live.memory import BLOCK, CONTACT, READING, Live, now_s
 
+ROOT = Path(__file__).parents[3]
 RING = 16384
 WRITER = """
 import sys
@@ -39,6 +41,29 @@ def test_rows_have_the_layout_of_the_header() -> None:
         assert [fields[key].offset for key in fields] == [
             kind.fields[key][1] for key in kind.names or () if kind.fields is not None
         ]
+
+
+def test_the_memory_of_a_killed_maker_goes_with_the_next_one() -> None:
+    making = "import sys\nfrom rig.live.memory import Live\nwith Live.create() as live: "
+    told = [making + "print(live.path, flush=True); sys.stdin.read()"]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with ExitStack() as stack:
+        makers = [
+            stack.enter_context(
+                subprocess.Popen([sys.executable, "-c", *told], cwd=ROOT, text=True, **pipes)
+            )
+            for _ in range(2)
+        ]
+        living, killed = (Path(maker.stdout.readline().strip()) for maker in makers)
+        makers[1].kill()
+        makers[1].wait()
+        assert killed.exists()
+        with Live.create() as live:
+            assert not list(killed.parent.glob(f"{killed.name}*"))
+            assert living.exists()
+            assert live.path.exists()
+        assert not list(live.path.parent.glob(f"{live.path.name}*"))
+    assert not list(living.parent.glob(f"{living.name}*"))
 
 
 def test_a_reading_is_read_by_another_who_attaches() -> None:
