@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from modeling.errors import InputError
 from modeling.files.folders import check_replaceable, replace_folder
+from modeling.files.places import behind_links, is_hidden, unfinished_folder
 from modeling.files.reading import reason_of
 from modeling.files.syncing import sync_file, sync_folder
 from modeling.files.tables import number, read_table, table_text, whole_number
@@ -55,11 +57,74 @@ def append(
     *,
     beside: Mapping[str, bytes] | None = None,
 ) -> int:
-    """Add recordings to a folder's; a folder that is not there yet is made.
+    """Add recordings to a folder's at once: `staged`, then `Staged.add`; how many it holds now."""
+    with staged(folder, recordings, sources) as ready:
+        return ready.add(beside or {})
 
-    Files of earlier recordings are not touched, and the index that lists the new ones takes the
-    place of the old one last: whatever ends this earlier, the set is as it was, and the next
-    addition removes what was left behind.
+
+@dataclass(frozen=True)
+class Staged:
+    """Recordings that are written already, and only have to be moved into a folder."""
+
+    folder: Path
+    recordings: RecordingSet
+    files: tuple[Path, ...]
+    rows: tuple[dict[str, str], ...]
+
+    def add(self, beside: Mapping[str, bytes]) -> int:
+        """Add them to the folder's; one that is not there yet is made.
+
+        Files of earlier recordings are not touched, and the index that lists the new ones takes the
+        place of the old one last: whatever ends this earlier, the set is as it was, and the next
+        addition removes what was left behind. Whoever may add at the same time must hold the lock
+        of the folder (`places.locked`).
+
+        Parameters
+        ----------
+        beside : mapping of name to contents
+            Files that take their places together with the index, such as provenance.
+
+        Returns
+        -------
+        int
+            How many recordings the set holds now.
+
+        Raises
+        ------
+        InputError
+            As `staged`.
+        """
+        with _told(self.folder):
+            if (self.folder / INDEX_NAME).is_file():
+                return self._move(self.folder, beside)
+            seen = check_replaceable(self.folder, index_name=INDEX_NAME, what="a recording set")
+            with replace_folder(self.folder, seen) as fresh:
+                return self._move(fresh, beside)
+
+    def _move(self, folder: Path, beside: Mapping[str, bytes]) -> int:
+        index = folder / INDEX_NAME
+        known = listed(folder) if index.is_file() else []
+        _check_conditions(known, self.recordings)
+        _remove_unfinished(folder)
+        names = _new_names(folder, known, self.files)
+        write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
+        try:
+            for file, name in zip(self.files, names, strict=True):
+                file.rename(folder / name)
+            sync_folder(folder)
+            rows = [{**row, "file": name} for row, name in zip(self.rows, names, strict=True)]
+            others = {folder / name: data for name, data in beside.items()}
+            write_files({**others, index: _index_text(index, rows).encode()})
+        finally:
+            _remove_unfinished(folder)
+        return len(known) + len(rows)
+
+
+@contextmanager
+def staged(
+    folder: str | Path, recordings: RecordingSet, sources: Sequence[WavSource | None]
+) -> Iterator[Staged]:
+    """Write recordings for a folder, forced to disk, without keeping others from it meanwhile.
 
     Parameters
     ----------
@@ -67,13 +132,6 @@ def append(
     recordings : RecordingSet
     sources : sequence of WavSource or None
         For each recording the file to copy into the set, or None: then it becomes a CSV file.
-    beside : mapping of name to contents, optional
-        Files that take their places together with the index, such as provenance.
-
-    Returns
-    -------
-    int
-        How many recordings the set holds now.
 
     Raises
     ------
@@ -82,45 +140,37 @@ def append(
         disk that takes no more.
     """
     target = Path(folder)
+    with ExitStack() as stack:
+        with _told(target):
+            if there := (target / INDEX_NAME).is_file():
+                _check_conditions(listed(target), recordings)
+            else:
+                check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+            place = target / INDEX_NAME if there else behind_links(target)
+            hidden = stack.enter_context(unfinished_folder(place))
+            files = [
+                hidden / f"{number}.{'csv' if source is None else 'wav'}"
+                for number, source in enumerate(sources)
+            ]
+            rows = [
+                _write(file, recording, source)
+                for file, recording, source in zip(files, recordings, sources, strict=True)
+            ]
+        yield Staged(target, recordings, tuple(files), tuple(rows))
+
+
+@contextmanager
+def _told(target: Path) -> Iterator[None]:
+    """What the disk refuses, as one sentence."""
     try:
-        if (target / INDEX_NAME).is_file():
-            return _extend(target, recordings, sources, beside=beside or {})
-        seen = check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
-        with replace_folder(target, seen) as fresh:
-            return _extend(fresh, recordings, sources, beside=beside or {})
+        yield
     except OSError as error:
-        where = f" at {error.filename}" if error.filename else ""
+        named = Path(error.filename or "")
+        where = f" at {named}" if named.parts and not any(map(is_hidden, named.parts)) else ""
         raise InputError(
             f"expected to add recordings to {target}, got {reason_of(error)}{where}, so it "
             "is as it was; check the path, its permissions and the space on the disk."
         ) from None
-
-
-def _extend(
-    folder: Path,
-    recordings: RecordingSet,
-    sources: Sequence[WavSource | None],
-    *,
-    beside: Mapping[str, bytes],
-) -> int:
-    index = folder / INDEX_NAME
-    known = listed(folder) if index.is_file() else []
-    _check_conditions(known, recordings)
-    _remove_unfinished(folder)
-    names = _new_names(folder, known, sources)
-    write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
-    try:
-        added = [
-            _write(folder / name, recording, source)
-            for name, recording, source in zip(names, recordings, sources, strict=True)
-        ]
-        sync_folder(folder)
-        text = _index_text(index, added)
-        others = {folder / name: data for name, data in beside.items()}
-        write_files({**others, index: text.encode()})
-    finally:
-        _remove_unfinished(folder)
-    return len(known) + len(added)
 
 
 def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
@@ -156,16 +206,11 @@ def _remove_unfinished(folder: Path) -> None:
     note.unlink()
 
 
-def _new_names(
-    folder: Path, known: Iterable[dict[str, str]], sources: Sequence[WavSource | None]
-) -> list[str]:
+def _new_names(folder: Path, known: Iterable[dict[str, str]], files: Iterable[Path]) -> list[str]:
     """Names that neither the index nor anything else in the folder has."""
     names = [row["file"] for row in known] + [path.name for path in folder.iterdir()]
     last = max((int(found[1]) for name in names if (found := _OWN_NAME.fullmatch(name))), default=0)
-    return [
-        f"{place:04d}.{'csv' if source is None else 'wav'}"
-        for place, source in enumerate(sources, start=last + 1)
-    ]
+    return [f"{place:04d}{file.suffix}" for place, file in enumerate(files, start=last + 1)]
 
 
 def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[str, str]:

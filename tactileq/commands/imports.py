@@ -185,7 +185,7 @@ def add_to_set(
     from modeling import RecordingSet
     from modeling.files.places import locked
     from modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
-    from modeling.recordings.appending import append
+    from modeling.recordings.appending import staged
 
     records = RecordingSet(one.recording for one in new)
     for warning in clipping_warnings(records):
@@ -196,10 +196,10 @@ def add_to_set(
         print(f"warning: left out: {sentence}", file=sys.stderr)
     provenance = out / PROVENANCE_NAME
     origin = provenance_of(command, settings, inputs=files)
-    with locked(out):  # another import must not add to what this one is adding to
+    # Only what is quick is done while another import cannot add to what this one adds to.
+    with staged(out, records, [one.source for one in new]) as ready, locked(out):
         origin["settings"]["added to"] = imports_before(provenance)
-        beside = {PROVENANCE_NAME: provenance_text(origin).encode()}
-        count = append(out, records, [one.source for one in new], beside=beside)
+        count = ready.add({PROVENANCE_NAME: provenance_text(origin).encode()})
     if any(record.unit == "arbitrary" for record in records):
         print(
             "note: the unit is arbitrary, so models cannot be simplified; give --g-per-fullscale "
