@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -79,8 +79,10 @@ def power(
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
     from experiments.study.study import Study
+    from modeling.files.hashes import sha256_of_paths
 
     check_own_results(out, "power")
+    inputs = sha256_of_paths([study])
     plan = Study.load(study)
     sizes = sizes_of(subjects)
     largest = planned_for(plan, sizes)
@@ -110,7 +112,7 @@ def power(
         "simulations": simulations,
         "planted": planted,
     }
-    _write(table, plan, out, seed=seed, settings=settings, inputs=[study])
+    _write(table, plan, out, seed=seed, settings=settings, inputs=inputs)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -386,7 +388,7 @@ def _write(
     *,
     seed: int,
     settings: dict[str, object],
-    inputs: Sequence[Path],
+    inputs: Mapping[str, str],
 ) -> None:
     from analysis.answers.plan import plan_from
     from analysis.figures.power import figure_power
