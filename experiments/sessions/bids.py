@@ -158,8 +158,8 @@ def require_tables(
         got = "differs" if wrong[0].exists() else "is not there"
         raise InputError(
             f"expected tables that say what the logs of their sessions do, got {wrong[0]}, which "
-            f"{got}{more}; make them again with tactileq study status --data {root}, which tells what "
-            "it changes."
+            f"{got}{more}; make them again with tactileq study status --data {root}, which tells "
+            "what it changes."
         )
 
 

@@ -101,10 +101,10 @@ def _are_objects(value: object) -> bool:
 # What may stand in the fields of every event, and of some; those that nothing is made of are free.
 _FIELDS: dict[str, Callable[[object], bool]] = {
     "n": is_whole,
+    "event": _is(str),
     "utc": is_time,
     "t_s": _is_seconds,
     "run": is_whole,
-    "event": _is(str),
     "trial": _or_none(is_whole),
     "index": _or_none(is_whole),
     "start_s": _or_none(is_number),

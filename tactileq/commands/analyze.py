@@ -75,6 +75,10 @@ def analyze(
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
+    DATA is only read: where a table differs from the log of its session, or is not complete, it is
+    named; tactileq study status makes it again. A session that is damaged is named, too, and has
+    to be restored, or its participant left out.
+
     Claims are those of the study that was run; those of --plan are exploratory. With --recordings,
     --models and --simplified the report also tells how good and how small the models are; why
     layers went stands in the folder that tactileq simplify wrote.

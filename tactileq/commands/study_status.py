@@ -35,16 +35,18 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     for task in progress.tasks:
         print(f"{task.task}: {task.complete} of {task.planned} planned sessions complete")
     tell_made(made)
-    for told in (*progress.damaged, *made.damaged):
+    for told in progress.damaged:
         print(f"damaged: {told}")
 
 
 def tell_made(made: Exported) -> None:
-    """Name what was written: each file that held something else, and folders with new ones."""
+    """Name each file that held something else, folders with new ones, and what is damaged."""
     for path in made.changed:
         print(f"changed, as the log says: {path}")
     for folder, count in sorted(Counter(path.parent for path in made.new).items()):
         print(f"written from the log: {count} new file{'s' * (count > 1)} in {folder}")
+    for told in made.damaged:
+        print(f"damaged: {told}")
 
 
 def table_of(progress: StudyProgress) -> Table:

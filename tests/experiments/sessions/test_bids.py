@@ -463,3 +463,29 @@ def test_levels_are_stored_untranslated_and_described_in_english(write_session) 
     described = json.loads((files.root / "participants.json").read_text(encoding="utf-8"))
     assert described["craft"]["Levels"] == {"一": "None", "二": "Some"}
     assert described["craft"]["Description"] == "Any craft?"
+
+
+def test_a_damaged_session_keeps_what_is_shown_of_it_and_costs_nobody_else_anything(
+    study_on_disk, write_session
+):
+    (log,) = study_on_disk.glob("sourcedata/sub-01/ses-01/*_task-absolute_log.jsonl")
+    log.write_bytes(log.read_bytes().replace(b'"trial": 4', b'"trial": "4"'))
+    before = contents(study_on_disk)
+    (told,) = export_all(study_on_disk).damaged
+    assert f"of {log}, got trial = '4'; restore" in told
+    assert contents(study_on_disk) == before
+    write_session("relative", subject=2)
+    assert beh_of(study_on_disk, "sub-02", "relative") in export_all(study_on_disk).new
+    after = contents(study_on_disk)
+    assert {name: after[name] for name in before if "sub-02_sessions" not in name} == {
+        name: data for name, data in before.items() if "sub-02_sessions" not in name
+    }
+    for named in ({}, {"task": "absolute"}, {"subject": 1}):
+        with pytest.raises(InputError, match=r"restore .*, or leave sub-01 out\.$"):
+            require_tables(study_on_disk, **named, otherwise="leave {who} out")
+    for others in ({"task": "threshold"}, {"subject": 2}, {"without": ["sub-01"]}):
+        require_tables(study_on_disk, **others, otherwise="")
+
+
+def beh_of(root: Path, participant: str, task: str) -> Path:
+    return root / participant / "ses-01/beh" / f"{participant}_ses-01_task-{task}_beh.tsv"
