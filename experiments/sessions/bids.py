@@ -76,7 +76,8 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
     root = Path(data_folder)
     held, damaged = held_sessions(root)
     _write(_people(root, held, damaged))
-    _write(_readme(root))
+    with suppress(InputError):  # the next session is refused for it
+        _write(_readme(root))
 
 
 def export_all(data_folder: str | Path) -> Exported:
@@ -106,7 +107,10 @@ def export_all(data_folder: str | Path) -> Exported:
         told += [f"{one.files.stem}: {row}" for row in rows]
         _write(made, new=new, changed=changed)
     _write(_people(root, held, damaged), new=new, changed=changed)
-    _write(_readme(root), new=new, changed=changed)
+    try:
+        _write(_readme(root), new=new, changed=changed)
+    except InputError as error:
+        told.append(str(error))
     return Exported(new=tuple(new), changed=tuple(changed), damaged=tuple(told))
 
 
@@ -172,7 +176,7 @@ def _tables(
     # Of who has a session running the table about sessions is that of before.
     unsettled = participants_of(one for one in held if one.running)
     unread = participants_of(one for one in held if not read(one.files))
-    if any(map(_has_table, held)):
+    if any(one.files.answers.is_file() for one in held):
         yield _people(root, held, damaged, kept=unsettled | unread)
 
 
@@ -188,13 +192,11 @@ def _people(
 
     Nothing of a data set that also holds people without source data, as one that was published.
     """
-    shown_ = [one for one in held if one.state.events and _has_table(one)]
+    shown_ = [one for one in held if one.files.answers.is_file()]
     if (damaged and not shown_) or not (held or (root / "participants.tsv").exists()):
         return {}
     # What is shown of a session whose log or manifest cannot be read stays as it is.
-    lost = participants_of(damaged) | participants_of(
-        one for one in held if not one.state.events and _has_table(one)
-    )
+    lost = participants_of(damaged)
     known = participants_of(shown_) | lost
     there = {path.name for path in root.glob("sub-*") if path.is_dir()}
     if not there <= known:
@@ -209,10 +211,6 @@ def _people(
         first = min(shown_, key=lambda one: one.state.begun_utc)
         made[description] = json_bytes(describe_data_set(first.manifest))
     return made
-
-
-def _has_table(held: Held) -> bool:
-    return (held.files.beh / f"{held.files.stem}_beh.tsv").is_file()
 
 
 def _readme(root: Path) -> Made:

@@ -36,7 +36,7 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
     files = held.files
     runs = {event["run"] for event in held.state.events}
     sources = _sources(files)
-    sidecar = files.beh / f"{files.stem}_beh.json"
+    sidecar = files.answers.with_suffix(".json")
     shown, lost_rows = presentation_rows(files.named("presentations.tsv"), runs=runs)
     hand, lost_readings = _hand_there(sidecar, sources) or _hand(held, runs)
     made = {**_answers(held), **_events(held, shown), **hand}
@@ -56,8 +56,7 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
 
 def _answers(held: Held) -> Made:
     names = [column.name for column in ANSWER_TABLES[held.manifest.task]]
-    table = held.files.beh / f"{held.files.stem}_beh.tsv"
-    return {table: table_bytes(names, held.state.rows)}
+    return {held.files.answers: table_bytes(names, held.state.rows)}
 
 
 def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
@@ -126,14 +125,14 @@ def _hand_there(sidecar: Path, sources: Mapping[str, str]) -> tuple[Made, tuple[
         stated = read_json_object(sidecar, advice="")
         names = [name for name in stated["Files"] if "_recording-" in name]
         made = {sidecar.parent / name: (sidecar.parent / name).read_bytes() for name in names}
-        damaged = stated.get("Damaged", {}).get("hand", [])
+        damaged = [str(row) for row in stated.get("Damaged", {}).get("hand", [])]
         hashes = [hashlib.sha256(data).hexdigest() for data in made.values()]
         as_made = hashes == [stated["Files"][name] for name in names]
     except (InputError, OSError, KeyError, AttributeError, TypeError, ValueError):
         return None
     if not as_made or stated.get("DerivedFrom") != sources:
         return None
-    return made, tuple(map(str, damaged))
+    return made, tuple(damaged)
 
 
 def _circumstances(held: Held) -> dict[str, Any]:

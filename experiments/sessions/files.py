@@ -54,6 +54,11 @@ class SessionFiles:
         return self.root / self.participant / self.session_id / "beh"
 
     @property
+    def answers(self) -> Path:
+        """The table of answers in it."""
+        return self.beh / f"{self.stem}_beh.tsv"
+
+    @property
     def folder(self) -> Path:
         """The folder that they are in."""
         return self.root / "sourcedata" / self.participant / self.session_id

@@ -58,6 +58,7 @@ def held_session(files: SessionFiles) -> Held:
     state = session_state(files.log)
     manifest = SessionManifest.load(files.manifest)
     _check_place(manifest, files)
+    _check_logged(state.events, files)
     _check_named(state.events, files)
     _check_rows(state.events, files)
     return Held(files=files, manifest=manifest, state=state)
@@ -77,6 +78,15 @@ def held_sessions(data_folder: str | Path) -> tuple[list[Held], list[Damaged]]:
 def participants_of(sessions: Iterable[Held | Damaged]) -> frozenset[str]:
     """Whose sessions these are, as sub-01."""
     return frozenset(one.files.participant for one in sessions)
+
+
+def _check_logged(events: Sequence[Event], files: SessionFiles) -> None:
+    """Refuse a session of which only the tables are left: begun again, it would replace them."""
+    if not events and files.answers.is_file():
+        raise InputError(
+            f"expected the log of the answers in {files.answers} at {files.log}, got none; restore "
+            "that file from a copy."
+        )
 
 
 def _check_named(events: Sequence[Event], files: SessionFiles) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -42,7 +43,13 @@ test = "equivalence"
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Path:
+def data(simulated: Path, tmp_path: Path) -> Path:
+    """A copy of the simulated study."""
+    return shutil.copytree(simulated, tmp_path / "data")
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated study with one claim."""
     truths = {texture: planted_texture(texture) for texture in TEXTURES}
     threshold = Threshold.shipped("codec")
@@ -66,7 +73,7 @@ def data(tmp_path: Path) -> Path:
         },
         plan=Plan(claims=(claim,), exclusions=("Whoever presses nothing.",)),
     )
-    folder = tmp_path / "data"
+    folder = tmp_path_factory.mktemp("study") / "data"
     simulate_study(
         study,
         real=truths,
@@ -201,7 +208,8 @@ def test_incomplete_pairs_are_refused_and_complete_ones_offered(main, data: Path
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:-1]))
     (log,) = data.glob("sourcedata/sub-03/ses-01/*_task-absolute_log.jsonl")
-    log.unlink()  # else the whole table is made from it again
+    log.with_name(log.name.replace("log.jsonl", "manifest.json")).unlink()
+    log.unlink()  # as in data that are given to others, without what they were made from
     refused = main("analyze", "data")
     assert refused.returncode == 1
     assert refused.stderr.count("\n") == 1

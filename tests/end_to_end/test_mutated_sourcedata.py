@@ -24,7 +24,7 @@ from tests.experiments.sessions.conftest import session_on_disk
 from tests.experiments.sessions.enrolling import enrolled
 from tests.mutating import mutated
 
-MUTATIONS = int(os.environ.get("TACTILEQ_MUTATIONS", "16"))
+MUTATIONS = int(os.environ.get("TACTILEQ_MUTATIONS", "10"))
 DAMAGED = "sub-01"
 SOURCE = f"sourcedata/{DAMAGED}/ses-01/{DAMAGED}_ses-01_task-absolute_"
 KINDS = {
@@ -125,6 +125,7 @@ class Trial:
             self.wrong.append(f"number {person.subject} and slot {person.slot} twice")
 
 
+@pytest.mark.timeout(max(600, 2 * MUTATIONS))
 def test_damage_costs_what_is_damaged_and_nothing_else(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
