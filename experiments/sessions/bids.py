@@ -5,7 +5,7 @@ All of it can be made again at any time, with the same bytes (docs/method/protoc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -202,7 +202,7 @@ def _people(
     if not there <= known:
         return {}
     roster = Roster(root).listed()
-    kept = {*lost, *kept}
+    kept = {*lost, *_without_source(root, [*held, *damaged]), *kept}
     made = people_files(
         root, shown_, roster.entries, rows_kept=there if roster.damaged else kept, kept=kept
     )
@@ -211,6 +211,12 @@ def _people(
         first = min(shown_, key=lambda one: one.state.begun_utc)
         made[description] = json_bytes(describe_data_set(first.manifest))
     return made
+
+
+def _without_source(root: Path, sessions: Iterable[Held | Damaged]) -> set[str]:
+    """People with a table of answers from which nothing is there that it was made from."""
+    read = {one.files.answers for one in sessions}
+    return {path.parts[-4] for path in root.glob("sub-*/ses-*/beh/*_beh.tsv") if path not in read}
 
 
 def _readme(root: Path) -> Made:

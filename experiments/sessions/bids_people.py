@@ -86,12 +86,13 @@ def people_files(
         columns, (_person(name, of_one, roster) for name, of_one in by_person.items())
     ).splitlines(keepends=True)
     made = dict(zip(by_person, lines, strict=True))
-    there = _rows_there(table, header)
-    made |= {name: there[name] for name in rows_kept if name in there}
-    files = {
-        table: header + b"".join(made[name] for name in sorted(made)),
-        table.with_suffix(".json"): json_bytes(columns),
-    }
+    first, there = _rows_there(table)
+    files = {}
+    # Rows that are kept cannot stand below other columns.
+    if first == header or not there.keys() & set(rows_kept):
+        made |= {name: there[name] for name in rows_kept if name in there}
+        files[table] = header + b"".join(made[name] for name in sorted(made))
+        files[table.with_suffix(".json")] = json_bytes(columns)
     for name, of_one in by_person.items():
         if name not in kept:
             own = root / name / f"{name}_sessions.tsv"
@@ -100,14 +101,12 @@ def people_files(
     return files
 
 
-def _rows_there(table: Path, header: bytes) -> dict[str, bytes]:
-    """The rows of a table of people by participant; none of one with other columns."""
+def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
+    """The header of a table of people, and its rows by participant; nothing where there is none."""
     if not table.is_file():
-        return {}
-    first, *rows = table.read_bytes().splitlines(keepends=True) or [b""]
-    if first != header:
-        return {}
-    return {row.split(b"\t", 1)[0].decode("utf-8", "replace"): row for row in rows}
+        return b"", {}
+    header, *rows = table.read_bytes().splitlines(keepends=True) or [b""]
+    return header, {row.split(b"\t", 1)[0].decode("utf-8", "replace"): row for row in rows}
 
 
 def _questions(sessions: Iterable[Held]) -> dict[str, dict[str, Any]]:

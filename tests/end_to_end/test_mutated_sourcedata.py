@@ -27,6 +27,7 @@ from tests.mutating import mutated
 MUTATIONS = int(os.environ.get("TACTILEQ_MUTATIONS", "10"))
 DAMAGED = "sub-01"
 SOURCE = f"sourcedata/{DAMAGED}/ses-01/{DAMAGED}_ses-01_task-absolute_"
+ANSWERS = "sub-02/ses-01/beh/sub-02_ses-01_task-absolute_beh.tsv"
 KINDS = {
     "log": f"{SOURCE}log.jsonl",
     "manifest": f"{SOURCE}manifest.json",
@@ -102,10 +103,12 @@ class Trial:
         if second is not None and not list(folder.glob("sub-02/ses-01/beh/*relative_beh.tsv")):
             self.wrong.append("no tables of a session of another participant")
         self.enrol_somebody()
-        self.tries("withdrawal", lambda: withdraw(folder, 3), must=not roster)
-        gone = not files_of(folder, 3)
-        if not gone and not roster:
-            self.wrong.append("a withdrawal that left files")
+        before = files_of(folder, 3)
+        withdrawn = self.tries("withdrawal", lambda: withdraw(folder, 3), must=not roster)
+        if files_of(folder, 3) != (before if withdrawn is None else ()):
+            self.wrong.append("a withdrawal that is neither refused nor done")
+        if folder.joinpath(ANSWERS).read_bytes() != self.good.joinpath(ANSWERS).read_bytes():
+            self.wrong.append("another table of another participant")
         if "damaged" in told:
             return "named" if every is not None else "named, and analysis asks for it"
         return "no difference" if every is not None else "analysis asks for it"

@@ -489,3 +489,13 @@ def test_a_damaged_session_keeps_what_is_shown_of_it_and_costs_nobody_else_anyth
 
 def beh_of(root: Path, participant: str, task: str) -> Path:
     return root / participant / "ses-01/beh" / f"{participant}_ses-01_task-{task}_beh.tsv"
+
+
+def test_a_table_without_source_beside_others_with_it_is_left_alone(study_on_disk):
+    """As in data that were given to others without a part."""
+    for path in study_on_disk.glob("sourcedata/sub-01/ses-02/*"):
+        path.unlink()
+    before = contents(study_on_disk)
+    require_tables(study_on_disk, otherwise="")
+    assert export_all(study_on_disk) == Exported()
+    assert contents(study_on_disk) == before
