@@ -167,6 +167,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
     from threadpoolctl import threadpool_limits
 
     from analysis.report.findings import find_in, findings_files
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.recordings.recording_set import load_usable
 
@@ -174,6 +175,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
     try:
         # One thread each: sums must not depend on how many cores a process finds.
         with threadpool_limits(limits=1):
+            inputs = sha256_of_paths([source.folder])
             records, unusable = load_usable(source.folder, texture=source.texture)
             found = find_in(
                 records,
@@ -190,7 +192,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
                 "keep_hum": how.keep_hum,
                 "left_out": list(unusable),
             }
-            provenance = provenance_of("model", settings, inputs=[source.folder])
+            provenance = provenance_of("model", settings, inputs=inputs)
     except (ValueError, OSError, MemoryError) as error:
         return _Made(Outcome(what, error=sentence_of(error)))
     notes = (*_rate_notes(records), *_told(found, _start(source, out), plot=how.plot))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -77,7 +77,8 @@ class Responses:
         Of tasks that have them the main trials whose virtual surface modelled another texture than
         the real one's, same columns; no statistic of the models uses them.
     left_out : mapping of task to DataFrame
-        The main trials of participants who were left out by hand (`leave_out`).
+        The main trials of participants who were left out by hand (`leave_out`); of a session of
+        theirs that cannot be read one row with nothing but participant and session.
     name : str
         The study's name.
     models : mapping of texture to mapping of set to SHA-256
@@ -163,7 +164,7 @@ class Responses:
         return self.simulated_participants or self.simulated_rig
 
 
-def load_responses(data_folder: str | Path) -> Responses:
+def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()) -> Responses:
     """Load and check all answers of a study.
 
     Parameters
@@ -173,6 +174,9 @@ def load_responses(data_folder: str | Path) -> Responses:
         sub-*/ses-*/beh/sub-*_ses-*_task-TASK_beh.tsv; beside each its sidecar, and
         below sourcedata/ the session's manifest, where they are there. Answers must follow the
         order of its trials.
+    leaving_out : collection of str
+        Participants whom `leave_out` is to leave out: what of theirs cannot be read is no reason
+        to refuse the others.
 
     Returns
     -------
@@ -194,7 +198,7 @@ def load_responses(data_folder: str | Path) -> Responses:
     models = _models(description, folder)
     simulated = {key: bool(description.get(key)) for key in _SIMULATED}
     origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
-    gathered = _Gathered(models)
+    gathered = _Gathered(models, frozenset(leaving_out))
     participants = simulated["SimulatedParticipant"]
     _check_participants(folder / "participants.tsv", participants)
     tables = {
@@ -214,6 +218,7 @@ def load_responses(data_folder: str | Path) -> Responses:
         anchors={task: anchors for task, (*_, anchors) in parts.items() if anchors is not None},
         name=str(description.get("Name", "")),
         models=models,
+        left_out={task: pd.DataFrame(unread) for task, unread in gathered.unread.items()},
         equal=gathered.equal,
         plan=_plan(description, gathered.plans, path=folder / "dataset_description.json"),
         study_sha256=str(description.get("StudySHA256", "")),
@@ -242,7 +247,8 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         For a participant who gave no answers, or an empty reason.
     """
     tables = (responses.answers, responses.training, responses.anchors)
-    known = {who for kind in tables for t in kind.values() for who in t["participant_id"]}
+    every = [*tables, responses.left_out]
+    known = {who for kind in every for t in kind.values() for who in t["participant_id"]}
     for who, why in reasons.items():
         if who not in known or not why.strip():
             raise InputError(
@@ -261,7 +267,12 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         training=training,
         anchors=anchors,
         left_out={
-            task: table[table["participant_id"].isin(list(reasons))]
+            task: pd.concat(
+                [
+                    table[table["participant_id"].isin(list(reasons))],
+                    responses.left_out.get(task, table[:0]),
+                ]
+            )
             for task, table in responses.answers.items()
         },
         warnings=(*responses.warnings, *told),
@@ -304,12 +315,17 @@ def _description(folder: Path) -> Mapping[str, object]:
 class _Gathered:
     """What is gathered while one session after the other is read."""
 
-    def __init__(self, models: Mapping[str, Mapping[str, str]]) -> None:
+    def __init__(
+        self, models: Mapping[str, Mapping[str, str]], leaving_out: frozenset[str]
+    ) -> None:
         self.textures = frozenset(models)
         self.sets = tuple(next(iter(models.values()), {}))
         self.equal: dict[str, list[Sequence[str]]] = {}
         self.plans: dict[str, None] = {}  # in the order of the sessions
         self.warnings: list[str] = []
+        self.leaving_out = leaving_out
+        # Sessions of those who are left out that cannot be read, by task.
+        self.unread: dict[str, list[dict[str, str]]] = {}
         self._whose: dict[str, str] = {}
 
     def add(self, sidecar: Mapping[str, object]) -> None:
@@ -402,39 +418,61 @@ def _load_task(
     gathered: _Gathered,
 ) -> pd.DataFrame | None:
     """All sessions of one task beneath each other, or None where there is none."""
-    sessions, unordered, warnings = [], [], gathered.warnings
+    sessions, warnings = [], gathered.warnings
+    unordered: list[str] = []
     for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
-        participant, session = path.parts[-4], path.parts[-3]
-        if path.name != f"{participant}_{session}_task-{task}_beh.tsv":
-            raise InputError(
-                f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
-                f"move the file back to its own participant's folder."
-            )
-        what = f"{participant} {task} {session}"
-        sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
-        table = _read_lines(path)
-        _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
-        _check_known(table, gathered, path=path)
-        gathered.check_once(table, what, path=path)
-        gathered.add(sidecar)
-        planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
-        if planned is None:
-            unordered.append(what)
-        elif told := told_of_open(table, planned):
-            warnings.append(f"{what} {told}")
-        check_order(table, planned, path=path)
-        table = _valid(table, what, warnings=warnings)
-        if (pilot := table["pilot"] == "true").any():
-            told = "its answers are no data of the study"
-            if not origin.get("Pilot", False):
-                table = table[~pilot].reset_index(drop=True)
-                told += " and are left out"
-            warnings.append(f"{what} was a pilot; {told}.")
-        table.insert(0, "participant_id", participant)
-        table.insert(1, "session", session)
-        sessions.append(table)
-    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task)]
+        told_before = len(warnings)
+        try:
+            sessions.append(_load_session(path, task, origin, gathered, unordered=unordered))
+        except InputError:
+            participant, session = path.parts[-4], path.parts[-3]
+            if participant not in gathered.leaving_out:
+                raise
+            del warnings[told_before:]
+            unread = {"participant_id": participant, "session": session}
+            gathered.unread.setdefault(task, []).append(unread)
+    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
+
+
+def _load_session(
+    path: Path,
+    task: str,
+    origin: Mapping[str, object],
+    gathered: _Gathered,
+    *,
+    unordered: list[str],
+) -> pd.DataFrame:
+    """The answers of one session; `unordered` takes its name where it has no manifest."""
+    participant, session, warnings = path.parts[-4], path.parts[-3], gathered.warnings
+    if path.name != f"{participant}_{session}_task-{task}_beh.tsv":
+        raise InputError(
+            f"expected the name {participant}_{session}_task-{task}_beh.tsv, but found {path}; "
+            f"move the file back to its own participant's folder."
+        )
+    what = f"{participant} {task} {session}"
+    sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
+    table = _read_lines(path)
+    _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
+    _check_known(table, gathered, path=path)
+    gathered.check_once(table, what, path=path)
+    planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
+    if planned is None:
+        unordered.append(what)
+    elif told := told_of_open(table, planned):
+        warnings.append(f"{what} {told}")
+    check_order(table, planned, path=path)
+    gathered.add(sidecar)
+    table = _valid(table, what, warnings=warnings)
+    if (pilot := table["pilot"] == "true").any():
+        told = "its answers are no data of the study"
+        if not origin.get("Pilot", False):
+            table = table[~pilot].reset_index(drop=True)
+            told += " and are left out"
+        warnings.append(f"{what} was a pilot; {told}.")
+    table.insert(0, "participant_id", participant)
+    table.insert(1, "session", session)
+    return table
 
 
 def _planned_of(
@@ -474,6 +512,7 @@ def _checked_sidecar(
         )
     sidecar = _json_object(path) if path.is_file() else {}
     allowed = _overridden(sidecar, what, warnings=warnings)
+    warnings += _damaged(sidecar, what)
     for key, value in origin.items():
         if sidecar.get(key, value) == value or _MAY_DIFFER.get(key) in allowed:
             continue
@@ -498,13 +537,29 @@ def _overridden(sidecar: Mapping[str, object], what: str, *, warnings: list[str]
     return frozenset(str(record.get("what")) for record in records)
 
 
-def _unanswered(folder: Path, task: str) -> list[str]:
+def _damaged(sidecar: Mapping[str, object], what: str) -> list[str]:
+    """A sentence for what of a session's traces is damaged, and in none of its tables."""
+    stated = sidecar.get("Damaged")
+    tables = stated.values() if isinstance(stated, Mapping) else ()
+    return [
+        f"{what}: damaged and left out: {row}."
+        for rows in tables
+        for row in (rows if isinstance(rows, list) else [])
+    ]
+
+
+def _unanswered(folder: Path, task: str, gathered: _Gathered) -> list[str]:
     """A sentence for each session that was begun but whose answers are not there."""
     told = []
     for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):
         stem = manifest.name.removesuffix("manifest.json")
         participant, session = manifest.parts[-3:-1]
-        if not (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():
+        if (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():
+            continue
+        if participant in gathered.leaving_out:
+            unread = {"participant_id": participant, "session": session}
+            gathered.unread.setdefault(task, []).append(unread)
+        else:
             told.append(
                 f"{participant} {task} {session} was begun, but has no table of answers; it is "
                 "running, or tactileq study status makes one."

@@ -53,6 +53,7 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
         answers=_joined({name: one.answers for name, one in setups.items()}),
         training=_joined({name: one.training for name, one in setups.items()}),
         anchors=_joined({name: one.anchors for name, one in setups.items()}),
+        left_out=_joined({name: one.left_out for name, one in setups.items()}),
         equal=groups,
         planned=planned,
         plan=replace(first.plan, sha256=tuple(hashes)),

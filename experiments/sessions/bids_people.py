@@ -5,15 +5,13 @@ docs/method/protocols.md#bids
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids_tables import json_bytes, table_bytes
-from experiments.sessions.manifest import SessionManifest
-from experiments.sessions.state import SessionState
+from experiments.sessions.held import Held
 from modeling.files.answer_tables import ANSWER_TABLES
 
 STATUS_LEVELS = {
@@ -56,26 +54,13 @@ _LAST: dict[str, dict[str, Any]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Held:
-    """One session that there is: its manifest, and how it stands."""
-
-    manifest: SessionManifest
-    state: SessionState
-
-    @property
-    def participant(self) -> str:
-        """As sub-01."""
-        return f"sub-{self.manifest.subject:02d}"
-
-    @property
-    def session(self) -> str:
-        """As ses-01."""
-        return f"ses-{self.manifest.session:02d}"
-
-
 def people_files(
-    root: Path, sessions: Sequence[Held], roster: Mapping[int, Mapping[str, Any]]
+    root: Path,
+    sessions: Sequence[Held],
+    roster: Mapping[int, Mapping[str, Any]],
+    *,
+    rows_kept: Collection[str] = (),
+    kept: Collection[str] = (),
 ) -> dict[Path, bytes]:
     """participants.tsv and each one's sessions.tsv, with their sidecars.
 
@@ -87,22 +72,41 @@ def people_files(
         By subject, session and task.
     roster : mapping of subject to mapping
         As `Roster.subjects` gives it.
+    rows_kept : collection of str
+        Participants whose row stays as it stands there, since what it follows from is damaged.
+    kept : collection of str
+        Participants whose sessions.tsv is left alone for that reason.
     """
     by_person: dict[str, list[Held]] = {}
     for held in sessions:
-        by_person.setdefault(held.participant, []).append(held)
-    questions = _questions(sessions)
-    columns = _FIRST | questions | _LAST
-    rows = [_person(name, of_one, roster) for name, of_one in sorted(by_person.items())]
-    files = {
-        root / "participants.tsv": table_bytes(columns, rows),
-        root / "participants.json": json_bytes(columns),
-    }
+        by_person.setdefault(held.files.participant, []).append(held)
+    columns = _FIRST | _questions(sessions) | _LAST
+    table = root / "participants.tsv"
+    header, *lines = table_bytes(
+        columns, (_person(name, of_one, roster) for name, of_one in by_person.items())
+    ).splitlines(keepends=True)
+    made = dict(zip(by_person, lines, strict=True))
+    first, there = _rows_there(table)
+    files = {}
+    # Rows that are kept cannot stand below other columns.
+    if first == header or not there.keys() & set(rows_kept):
+        made |= {name: there[name] for name in rows_kept if name in there}
+        files[table] = header + b"".join(made[name] for name in sorted(made))
+        files[table.with_suffix(".json")] = json_bytes(columns)
     for name, of_one in by_person.items():
-        table = root / name / f"{name}_sessions.tsv"
-        files[table] = table_bytes(_SESSION_COLUMNS, _session_rows(of_one))
-        files[table.with_suffix(".json")] = json_bytes(_SESSION_COLUMNS)
+        if name not in kept:
+            own = root / name / f"{name}_sessions.tsv"
+            files[own] = table_bytes(_SESSION_COLUMNS, _session_rows(of_one))
+            files[own.with_suffix(".json")] = json_bytes(_SESSION_COLUMNS)
     return files
+
+
+def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
+    """The header of a table of people, and its rows by participant; nothing where there is none."""
+    if not table.is_file():
+        return b"", {}
+    header, *rows = table.read_bytes().splitlines(keepends=True) or [b""]
+    return header, {row.split(b"\t", 1)[0].decode("utf-8", "replace"): row for row in rows}
 
 
 def _questions(sessions: Iterable[Held]) -> dict[str, dict[str, Any]]:
@@ -147,12 +151,13 @@ def _person(
 
 
 def _session_rows(sessions: Sequence[Held]) -> list[dict[str, object]]:
-    days = {s.session: datetime.fromisoformat(s.state.begun_utc).date() for s in sessions}
+    days = {s.files.session_id: datetime.fromisoformat(s.state.begun_utc).date() for s in sessions}
     first = min(days.values())
     rows: dict[str, dict[str, object]] = {}
     for held in sessions:
-        row = rows.setdefault(held.session, {"session_id": held.session})
-        row["day"] = (days[held.session] - first).days
+        session = held.files.session_id
+        row = rows.setdefault(session, {"session_id": session})
+        row["day"] = (days[session] - first).days
         row[held.manifest.task] = held.state.status
     return [rows[session] for session in sorted(rows)]
 

@@ -21,6 +21,10 @@ from rig.interface import SURFACES
 RATE_HZ = 250.0
 # Between readings further apart than this nobody knows what the hand did.
 LONGEST_GAP_S = 0.02
+# No table is longer than its readings warrant, whatever one of their times says: an hour of pauses,
+# and fifty rows for each reading (readings come at 200 Hz and more while a hand is on a surface).
+_LONGEST_PAUSE_S = 3600.0
+_MOST_ROWS_PER_READING = 50
 
 COLUMNS: dict[str, dict[str, Any]] = {
     "speed_mm_s": {
@@ -57,6 +61,24 @@ def by_run(hand: pd.DataFrame) -> dict[int, pd.DataFrame]:
     """The readings of each start of a session, whose rig has a clock of its own, by its number."""
     runs = sorted(set(hand["run"].astype(int)))
     return {run: hand[hand["run"] == run] for run in runs}
+
+
+def damaged_readings(hand: pd.DataFrame) -> str:
+    """What is wrong with the times of one start's readings, by line; empty where nothing is.
+
+    Parameters
+    ----------
+    hand : DataFrame
+        time_s; its index the lines of the file.
+    """
+    time_s = hand["time_s"].sort_values(kind="stable")
+    rows = (time_s.iloc[-1] - time_s.iloc[0]) * RATE_HZ
+    if rows <= _LONGEST_PAUSE_S * RATE_HZ + _MOST_ROWS_PER_READING * len(time_s):
+        return ""
+    apart_s = np.diff(time_s.to_numpy(float))
+    widest = int(np.argmax(apart_s))
+    line = time_s.index[widest + 1]
+    return f"line {line}, {apart_s[widest]:.3g} s after all readings before it, in"
 
 
 def at_regular_times(hand: pd.DataFrame) -> pd.DataFrame:

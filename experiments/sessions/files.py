@@ -36,13 +36,32 @@ class SessionFiles:
     @property
     def stem(self) -> str:
         """Beginning of their names, as sub-01_ses-01_task-absolute."""
-        return f"sub-{self.subject:02d}_ses-{self.session:02d}_task-{self.task}"
+        return f"{self.participant}_{self.session_id}_task-{self.task}"
+
+    @property
+    def participant(self) -> str:
+        """As sub-01."""
+        return f"sub-{self.subject:02d}"
+
+    @property
+    def session_id(self) -> str:
+        """As ses-01."""
+        return f"ses-{self.session:02d}"
+
+    @property
+    def beh(self) -> Path:
+        """The folder in which BIDS shows them."""
+        return self.root / self.participant / self.session_id / "beh"
+
+    @property
+    def answers(self) -> Path:
+        """The table of answers in it."""
+        return self.beh / f"{self.stem}_beh.tsv"
 
     @property
     def folder(self) -> Path:
         """The folder that they are in."""
-        session = Path(f"sub-{self.subject:02d}", f"ses-{self.session:02d}")
-        return self.root / "sourcedata" / session
+        return self.root / "sourcedata" / self.participant / self.session_id
 
     @property
     def lock(self) -> Path:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -16,11 +16,15 @@ from typing import Any
 import numpy as np
 
 from modeling import InputError
+from modeling.checks import is_number, is_whole
 from modeling.errors import shown
 from modeling.files.reading import read_bytes
 
 Event = dict[str, Any]
 OWN_FIELDS = ("n", "utc", "t_s", "run", "event")
+ENDINGS = ("complete", "aborted", "crashed")
+_LONGEST_S = 1e9  # of a run: 30 years
+_YEARS = range(2000, 2200)  # in which every time zone has a date for a moment
 
 
 @dataclass(frozen=True)
@@ -46,54 +50,101 @@ def read_log(path: str | Path) -> Log:
     Raises
     ------
     InputError
-        If the file cannot be read, or a whole line is not an event with the line's number.
+        If the file cannot be read, or a whole line is not an event with the line's number, of a
+        start of the session that an "opened" began, with fields as sessions write them.
     """
-    log = read_lines(Path(path), "the log of a session")
-    for number, event in enumerate(log.events, start=1):
-        if event.get("n") != number or not _is_event(event):
-            raise _malformed(Path(path), number, f"n = {shown(event.get('n'))}, or fields missing")
-    return log
+    *lines, cut = read_bytes(Path(path), "the log of a session").split(b"\n")
+    events: list[Event] = []
+    runs = 0
+    for number, line in enumerate(lines, start=1):
+        try:
+            event = object_of(line)
+        except ValueError:
+            got = shown(line.decode("utf-8", "replace"))
+            raise _malformed(Path(path), number, got) from None
+        runs += event.get("event") == "opened"
+        wanted = {"n": number, "run": runs}
+        for name, holds in (_FIELDS | _FIELDS_OF.get(str(event.get("event")), {})).items():
+            value = event.get(name)
+            if not holds(value) or value != wanted.get(name, value):
+                got = f"{name} = {shown(value)}" if name in event else f"no {name}"
+                raise _malformed(Path(path), number, got)
+        events.append(event)
+    return Log(tuple(events), cut)
 
 
-def _is_event(event: Event) -> bool:
-    kinds = {"utc": str, "t_s": int | float, "run": int, "event": str}
-    return all(isinstance(event.get(name), kind) for name, kind in kinds.items()) and is_time(
-        event["utc"]
-    )
-
-
-def is_time(text: str) -> bool:
-    """Whether a text is a time as `utc_text` writes it."""
+def is_time(value: object) -> bool:
+    """Whether this is a time as `utc_text` writes it."""
     try:
-        return datetime.fromisoformat(text).utcoffset() is not None
+        moment = datetime.fromisoformat(value) if isinstance(value, str) else None
     except ValueError:
         return False
+    return moment is not None and moment.utcoffset() is not None and moment.year in _YEARS
 
 
-def read_lines(path: Path, what: str) -> Log:
-    """The objects that stand in the whole lines of a file, and what follows them.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or a whole line holds no JSON object.
-    """
-    *lines, cut = read_bytes(path, what).split(b"\n")
-    return Log(tuple(_object(line, path, n) for n, line in enumerate(lines, start=1)), cut)
+def _or_none(holds: Callable[[object], bool]) -> Callable[[object], bool]:
+    return lambda value: value is None or holds(value)
 
 
-def _object(line: bytes, path: Path, number: int) -> Event:
+def _is(kind: type) -> Callable[[object], bool]:
+    return lambda value: isinstance(value, kind)
+
+
+def _is_seconds(value: object) -> bool:
+    return is_number(value) and 0.0 <= value <= _LONGEST_S
+
+
+def _are_objects(value: object) -> bool:
+    return isinstance(value, list) and all(isinstance(one, dict) for one in value)
+
+
+# What may stand in the fields of every event, and of some; those that nothing is made of are free.
+_FIELDS: dict[str, Callable[[object], bool]] = {
+    "n": is_whole,
+    "event": _is(str),
+    "utc": is_time,
+    "t_s": _is_seconds,
+    "run": is_whole,
+    "trial": _or_none(is_whole),
+    "index": _or_none(is_whole),
+    "start_s": _or_none(is_number),
+}
+_FIELDS_OF: dict[str, dict[str, Callable[[object], bool]]] = {
+    "opened": {"manifest_sha256": _is(str), "overrides": _or_none(_are_objects)},
+    "welcome": {"consent": _or_none(_is(str)), "answers": _or_none(_is(dict))},
+    "answer": {"row": _is(dict)},
+    "ended": {"status": lambda value: value in ENDINGS},
+}
+
+
+def object_of(line: bytes) -> Event:
+    """The JSON object of a line, its numbers finite; ValueError where it holds none."""
     try:
-        value = json.loads(line.decode("utf-8"), parse_constant=_refuse)
-    except (ValueError, RecursionError):
+        value = _DECODER.decode(line.decode("utf-8"))
+    except RecursionError:
         value = None
     if not isinstance(value, dict):
-        raise _malformed(path, number, shown(line.decode("utf-8", "replace")))
+        raise ValueError(line)
     return value
 
 
 def _refuse(constant: str) -> None:
     raise ValueError(constant)
+
+
+def _finite(text: str) -> float:
+    """A number; ValueError beyond floating-point ones."""
+    if math.isinf(value := float(text)):
+        raise ValueError(text)
+    return value
+
+
+def _whole(text: str) -> int:
+    _finite(text)
+    return int(text)
+
+
+_DECODER = json.JSONDecoder(parse_constant=_refuse, parse_float=_finite, parse_int=_whole)
 
 
 def _malformed(path: Path, number: int, got: str) -> InputError:

@@ -18,7 +18,7 @@ from modeling import InputError
 from modeling.checks import check_keys
 from modeling.errors import shown
 from modeling.files.documents import dump_json, read_json_object
-from modeling.files.hashes import sha256_of
+from modeling.files.hashes import sha256_of, sha256_of_values
 
 FORMAT = "tactileq.session-manifest"
 VERSION = 1
@@ -137,9 +137,10 @@ _PROGRAM = {
     "git_uncommitted": bool | None,
     "lock_sha256": str,
 }
+_NUMBERS = ("subject", "session", "slot")
 _KINDS: dict[str, Any] = {
     **dict.fromkeys(("task", "code", "language", "study_sha256", "plan_sha256"), str),
-    **dict.fromkeys(("subject", "session", "slot"), int),
+    **dict.fromkeys(_NUMBERS, int),
     **dict.fromkeys(("pilot", "simulated_participant", "simulated_rig"), bool),
     **dict.fromkeys(("study", "models_sha256", "model_sources", "identical", "rig"), dict),
     **dict.fromkeys(("trials", "overrides"), list),
@@ -153,6 +154,12 @@ def _check(values: Mapping[str, Any], path: Path) -> None:
     for name, kind in _KINDS.items():
         if name not in values or not isinstance(values[name], kind):
             raise _refused(path, name, values.get(name))
+    if any(isinstance(values[name], bool) or values[name] < 1 for name in _NUMBERS):
+        raise _refused(path, "numbers from 1", [values[name] for name in _NUMBERS])
+    if sha256_of_values(values["study"]) != values["study_sha256"]:
+        raise _refused(path, "the study of the stated SHA-256", values["study_sha256"])
+    if not all(isinstance(one, dict) for one in values["overrides"]):
+        raise _refused(path, "overrides", values["overrides"])
     for number, trial in enumerate(values["trials"], start=1):
         if not isinstance(trial, dict) or trial.get("trial") != number:
             raise _refused(path, f"trial {number} of trials", trial)

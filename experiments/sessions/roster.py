@@ -13,19 +13,37 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from experiments.sessions.files import open_file, write_all
-from experiments.sessions.log import line_of, read_lines, utc_text
+from experiments.sessions.files import open_file, sessions_in, write_all
+from experiments.sessions.log import line_of, object_of, utc_text
 from experiments.sessions.writer import StoreError, store_error
 from modeling import InputError
 from modeling.checks import check_whole
 from modeling.errors import shown
 from modeling.files.places import locked
+from modeling.files.reading import read_bytes
 from modeling.files.syncing import make_folder, sync_folder
 from modeling.files.writing import write_bytes
 
 # Easy to say and to hear apart in English and in Japanese: TAKI-46.
 _SYLLABLES = tuple(consonant + vowel for consonant in "KMNRST" for vowel in "AEIO")
 _ADVICE = "make room or choose another data folder"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Listed:
+    """What can be read of a roster.
+
+    Parameters
+    ----------
+    entries : mapping of subject to mapping
+        As `Roster.subjects` gives them.
+    damaged : str
+        What cannot be read, in words; empty where all can be. Then nobody new is enrolled: whose
+        number and slot stood there is not known.
+    """
+
+    entries: dict[int, dict[str, Any]]
+    damaged: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,7 +78,8 @@ class Roster:
     """
 
     def __init__(self, data_folder: str | Path) -> None:
-        self.path = Path(data_folder) / "sourcedata" / "roster.jsonl"
+        self._root = Path(data_folder)
+        self.path = self._root / "sourcedata" / "roster.jsonl"
 
     @contextmanager
     def enrolling(
@@ -92,16 +111,20 @@ class Roster:
         Raises
         ------
         InputError
-            If that participant left, is of another kind, or no slot is free.
+            If that participant left, is of another kind, or no slot is free; of somebody new also
+            if anything in the roster cannot be read.
         StoreError
             If the disk does not take it.
         """
         check_whole("subject", 1 if subject is None else subject, low=1, high=9999)
-        with self._locked() as entries:
+        with self._locked() as listed:
+            entries = listed.entries
             number = subject if subject is not None else _first_free(entries)
             if number in entries:
+                _require_own_slot(number, entries)
                 yield self._known(entries[number], participants, simulated=simulated)
                 return
+            self._require_whole(listed)
             slot = _slot(number, participants, entries)
             code = f"SIM-{number:03d}" if simulated else _new_code(entries)
             kind = {"simulated": simulated, "pilot": pilot}
@@ -123,8 +146,9 @@ class Roster:
         StoreError
             If the disk does not take it.
         """
-        with self._locked() as entries:
-            self._taking_part(subject, entries)
+        with self._locked() as listed:
+            if subject not in listed.entries or listed.entries[subject]["left"]:
+                raise self._not_there(subject, listed)
             self._append("dropped", subject=subject)
 
     def withdraw(self, subject: int) -> None:
@@ -133,22 +157,23 @@ class Roster:
         Raises
         ------
         InputError
-            If nobody of that number was enrolled, or the data are deleted already.
+            If nobody of that number was enrolled, or the data are deleted already, or the line
+            that says so cannot be read.
         StoreError
             If the disk does not take it.
         """
-        with self._locked() as entries:
-            if subject not in entries or entries[subject]["left"] == "withdrawn":
-                raise _not_there(subject, self.path)
-            lines = [
-                line_of({**event, "code": ""} if _is_enrolment(event, subject) else event)
-                for event in read_lines(self.path, "the roster").events
-            ]
+        with self._locked() as listed:
+            entry = listed.entries.get(subject, {"left": "withdrawn"})
+            if entry["left"] == "withdrawn":
+                raise self._not_there(subject, listed)
+            # Damaged lines stay as they are: they may be all that there is of somebody else.
+            lines = self.path.read_bytes().splitlines(keepends=True)
+            lines = [_without_code(line, subject) for line in lines]
             lines.append(line_of({"utc": utc_text(), "event": "withdrawn", "subject": subject}))
             write_bytes(self.path, b"".join(lines))
 
     def subjects(self) -> dict[int, dict[str, Any]]:
-        """Everybody who was ever enrolled, by number.
+        """Everybody who was ever enrolled, by number, as far as it can be read.
 
         Returns
         -------
@@ -159,20 +184,35 @@ class Roster:
         Raises
         ------
         InputError
-            If the file cannot be read.
+            If there is something that is no file.
         """
-        if not os.path.lexists(self.path):
-            return {}
-        return _entries(read_lines(self.path, "the roster").events, self.path)
+        return self.listed().entries
+
+    def listed(self) -> Listed:
+        """What can be read of it, line by line; raises as `subjects`."""
+        entries: dict[int, dict[str, Any]] = {}
+        damaged = []
+        if os.path.lexists(self.path):
+            *lines, _ = read_bytes(self.path, "the roster").split(b"\n")
+            for number, line in enumerate(lines, start=1):
+                try:
+                    _enter(object_of(line), entries)
+                except (KeyError, TypeError, ValueError):
+                    damaged.append(f"line {number} of {self.path}")
+        # A list that was cut short between two lines misses somebody who was here.
+        here = {files.subject: files.participant for files in sessions_in(self._root)}
+        missing = [name for subject, name in here.items() if subject not in entries]
+        damaged += [f"no line of {name} in {self.path}" for name in missing]
+        return Listed(entries=entries, damaged=damaged[0] if damaged else "")
 
     @contextmanager
-    def _locked(self) -> Iterator[dict[int, dict[str, Any]]]:
-        """The entries, while no other process can change them."""
+    def _locked(self) -> Iterator[Listed]:
+        """What it holds, while no other process can change it."""
         try:
             make_folder(self.path.parent)
             with locked(self.path):
                 self._cut_half_line()
-                yield self.subjects()
+                yield self.listed()
         except StoreError:
             raise
         except OSError as error:
@@ -198,9 +238,20 @@ class Roster:
             )
         return Person(subject=number, slot=slot, code=entry["code"], known=True)
 
-    def _taking_part(self, subject: int, entries: Mapping[int, Mapping[str, Any]]) -> None:
-        if subject not in entries or entries[subject]["left"]:
-            raise _not_there(subject, self.path)
+    def _require_whole(self, listed: Listed) -> None:
+        if listed.damaged:
+            raise InputError(
+                "expected a roster that can be read before somebody new gets a number and a slot, "
+                f"got {listed.damaged}, which may be another one's; restore the file from a copy."
+            )
+
+    def _not_there(self, subject: int, listed: Listed) -> InputError:
+        damaged = f", which is damaged ({listed.damaged})" if listed.damaged else ""
+        advice = "restore the file from a copy, or " if listed.damaged else ""
+        return InputError(
+            f"expected a subject who takes part, got {shown(subject)}, who is not on {self.path}"
+            f"{damaged} or has left; {advice}give the number of one who does."
+        )
 
     def _cut_half_line(self) -> None:
         """Take away what a process left that was killed before it had enrolled anybody."""
@@ -227,33 +278,43 @@ class Roster:
 _LEFT = {"dropped": "dropped out", "withdrawn": "withdrew"}
 
 
-def _is_enrolment(event: Mapping[str, Any], subject: int) -> bool:
-    return bool(event["event"] == "enrolled" and event["subject"] == subject)
-
-
-def _entries(events: tuple[dict[str, Any], ...], path: Path) -> dict[int, dict[str, Any]]:
-    entries: dict[int, dict[str, Any]] = {}
-    for line, event in enumerate(events, start=1):
-        try:
-            _enter(event, entries)
-        except (KeyError, TypeError):
-            raise InputError(
-                f"expected somebody who enrolled or left in line {line} of {path}, got "
-                f"{shown(event)}; restore the file from a copy."
-            ) from None
-    return entries
+def _without_code(line: bytes, subject: int) -> bytes:
+    """A line of the roster; the one that enrolled this subject without its pseudonym."""
+    try:
+        event = object_of(line)
+    except ValueError:
+        return line
+    enrolment = event.get("event") == "enrolled" and event.get("subject") == subject
+    return line_of({**event, "code": ""}) if enrolment else line
 
 
 def _enter(event: Mapping[str, Any], entries: dict[int, dict[str, Any]]) -> None:
+    """Note who enrolled or left; KeyError, TypeError or ValueError for what says neither."""
     subject, what = event["subject"], event["event"]
-    if what == "enrolled":
-        names = ("subject", "slot", "code", "utc", "simulated", "pilot")
-        entry = {name: event[name] for name in names}
-        if type(subject) is not int or type(entry["slot"]) is not int or subject in entries:
-            raise TypeError
-        entries[subject] = {**entry, "left": ""}
-    else:
+    if what != "enrolled":
         entries[subject]["left"] = {"dropped": "dropped", "withdrawn": "withdrawn"}[what]
+        return
+    entry = {name: event[name] for name in _KINDS}
+    fits = all(type(value) is _KINDS[name] for name, value in entry.items())
+    if not fits or not 1 <= subject <= 9999 or entry["slot"] < 1 or subject in entries:
+        raise ValueError(subject)
+    entries[subject] = {**entry, "left": ""}
+
+
+_KINDS = {"subject": int, "slot": int, "code": str, "utc": str, "simulated": bool, "pilot": bool}
+
+
+def _require_own_slot(subject: int, entries: Mapping[int, Mapping[str, Any]]) -> None:
+    """Refuse whose slot somebody has who came later: the line that freed it was lost."""
+    later = list(entries.values())[list(entries).index(subject) + 1 :]
+    slot = entries[subject]["slot"]
+    if not entries[subject]["left"] and any(
+        one["slot"] == slot and not one["left"] for one in later
+    ):
+        raise InputError(
+            f"expected slot {slot} to be that of subject {subject} alone, got one more who was "
+            "enrolled later in its place; note that the subject dropped out, or restore the roster."
+        )
 
 
 def _first_free(entries: Mapping[int, object]) -> int:
@@ -281,10 +342,3 @@ def _new_code(entries: Mapping[int, Mapping[str, Any]]) -> str:
         code = f"{first}{second}-{10 + secrets.randbelow(90)}"
         if first != second and code not in taken:
             return code
-
-
-def _not_there(subject: int, path: Path) -> InputError:
-    return InputError(
-        f"expected a subject who takes part, got {shown(subject)}, who is not on {path} or has "
-        "left; give the number of one who does."
-    )

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.sessions.agenda import Agenda
+from experiments.sessions.held import held_session
 from experiments.sessions.log import read_log
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.order import draw_session
@@ -136,6 +137,9 @@ def run_session(
                 code=person.code,
                 trials=[asdict(trial) for trial in plan.trials],
             )
+            files = manifest.files(root)
+            if said.resume and files.manifest.exists():
+                held_session(files)  # nothing goes on that cannot be read to its end
             opened = SessionStore.resume if said.resume else SessionStore.create
             store = opened(root, manifest, overrides=overrides)
         with store:
@@ -244,4 +248,10 @@ def _trial(task: Task, values: Mapping[str, Any]) -> Trial:
     stored: dict[str, Any] = {
         name: tuple(value) if isinstance(value, list) else value for name, value in values.items()
     }
-    return task.trial(**stored)
+    try:
+        return task.trial(**stored)
+    except TypeError:
+        raise InputError(
+            f"expected a trial of the task {task.name} in the manifest, got {shown(stored)}; "
+            "restore the file from a copy."
+        ) from None

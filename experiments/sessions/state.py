@@ -13,7 +13,6 @@ from experiments.sessions.log import Event, Log, read_log
 from modeling.files.locks import is_held
 
 Status = Literal["running", "complete", "aborted", "crashed"]
-ENDINGS = ("complete", "aborted", "crashed")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,9 +70,8 @@ def state_of(log: Log, *, running: bool) -> SessionState:
     last_run = runs[-1]["n"] if runs else 0
     ended = [e for e in log.events if e["event"] == "ended" and e["n"] > last_run]
     end = ended[-1] if ended else {}
-    status = end.get("status", "running" if running else "crashed")
     return SessionState(
-        status=status if status in (*ENDINGS, "running") else "crashed",
+        status=end.get("status", "running" if running else "crashed"),
         events=log.events,
         rows=tuple(event["row"] for event in log.events if event["event"] == "answer"),
         runs=len(runs),

@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date, datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-from experiments.sessions.files import SessionFiles, require_data_folder, sessions_in
-from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.files import require_data_folder
+from experiments.sessions.held import Damaged, Held, held_sessions
 from experiments.sessions.roster import Roster
-from experiments.sessions.state import SessionState, Status, session_state
+from experiments.sessions.state import Status
 from experiments.study.study import Study
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
@@ -28,14 +28,15 @@ class SessionProgress:
     ----------
     task : str
     session : int
-    status : {"running", "complete", "aborted", "crashed"}
+    status : {"running", "complete", "aborted", "crashed", "damaged"}
+        Damaged where its manifest or log cannot be read, so that nothing else is known.
     answered, planned : int
         Of the main trials; repeats are not counted.
     """
 
     task: str
     session: int
-    status: Status
+    status: Status | Literal["damaged"]
     answered: int
     planned: int
 
@@ -75,10 +76,19 @@ class TaskProgress:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyProgress:
-    """How far a study is."""
+    """How far a study is.
+
+    Parameters
+    ----------
+    people : tuple of PersonProgress
+    tasks : tuple of TaskProgress
+    damaged : tuple of str
+        What cannot be read of the roster.
+    """
 
     people: tuple[PersonProgress, ...]
     tasks: tuple[TaskProgress, ...]
+    damaged: tuple[str, ...] = ()
 
 
 def study_progress(
@@ -98,34 +108,33 @@ def study_progress(
     Raises
     ------
     InputError
-        If there is no such folder, nobody was there yet and no study is given, or a manifest, a
-        log or the roster cannot be read.
+        If there is no such folder, or there is no session that can be read and no study is given.
     """
     root = Path(data_folder)
     require_data_folder(root)
-    held = [
-        (files, SessionManifest.load(files.manifest), session_state(files.log))
-        for files in sessions_in(root)
-    ]
+    held, damaged = held_sessions(root)
     if study is None and not held:
         raise InputError(
-            f"expected sessions below {root / 'sourcedata'}, found none; name the study's "
-            "file with --study."
+            f"expected sessions below {root / 'sourcedata'}, found none"
+            f"{' that can be read' if damaged else ''}; name the study's file with --study."
         )
-    design = study.to_dict() if study is not None else held[0][1].study
+    design = study.to_dict() if study is not None else held[0].manifest.study
     wanted = {
         task: (design[task]["participants"], _sessions(design[task]))
         for task in ANSWER_TABLES
         if isinstance(design.get(task), Mapping)
     }
+    roster = Roster(root).listed()
+    sessions: list[Held | Damaged] = [*held, *damaged]
     people = tuple(
-        _person(entry, [h for h in held if h[0].subject == entry["subject"]], wanted, today=today)
-        for entry in Roster(root).subjects().values()
+        _person(entry, [s for s in sessions if s.files.subject == number], wanted, today=today)
+        for number, entry in roster.entries.items()
     )
-    return StudyProgress(people=people, tasks=_tasks(people, wanted))
-
-
-Held = tuple[SessionFiles, SessionManifest, SessionState]
+    return StudyProgress(
+        people=people,
+        tasks=_tasks(people, wanted),
+        damaged=(roster.damaged,) if roster.damaged else (),
+    )
 
 
 def _sessions(plan: Mapping[str, Any]) -> int:
@@ -135,33 +144,40 @@ def _sessions(plan: Mapping[str, Any]) -> int:
 
 def _person(
     entry: Mapping[str, Any],
-    held: Sequence[Held],
+    sessions: Sequence[Held | Damaged],
     wanted: Mapping[str, tuple[int, int]],
     *,
     today: date | None,
 ) -> PersonProgress:
-    order = list(ANSWER_TABLES)
-    found = sorted(held, key=lambda one: (order.index(one[0].task), one[0].session))
+    order = {task: place for place, task in enumerate(ANSWER_TABLES)}
+    found = sorted(
+        sessions, key=lambda one: (order.get(one.files.task, len(order)), one.files.session)
+    )
     person = PersonProgress(
         subject=entry["subject"],
         slot=entry["slot"],
         code=entry["code"],
         left=entry["left"],
-        sessions=tuple(_session(*one) for one in found),
+        sessions=tuple(map(_session, found)),
     )
-    begun = {(one[0].task, one[0].session): one[2].last_utc for one in found}
+    begun = {
+        (one.files.task, one.files.session): one.state.last_utc
+        for one in found
+        if isinstance(one, Held)
+    }
     return person if person.left else replace(person, due=_due(person, begun, wanted, today=today))
 
 
-def _session(
-    files: SessionFiles, manifest: SessionManifest, state: SessionState
-) -> SessionProgress:
-    main = {trial["trial"] for trial in manifest.trials if trial["phase"] == "main"}
-    answered = main & {row["trial"] for row in state.rows}
+def _session(one: Held | Damaged) -> SessionProgress:
+    task, session = one.files.task, one.files.session
+    if isinstance(one, Damaged):
+        return SessionProgress(task=task, session=session, status="damaged", answered=0, planned=0)
+    main = {trial["trial"] for trial in one.manifest.trials if trial["phase"] == "main"}
+    answered = main & {row["trial"] for row in one.state.rows}
     return SessionProgress(
-        task=files.task,
-        session=files.session,
-        status=state.status,
+        task=task,
+        session=session,
+        status=one.state.status,
         answered=len(answered),
         planned=len(main),
     )
@@ -182,8 +198,8 @@ def _due(
         for session in range(1, sessions + 1):
             name = f"{task} {session}" if sessions > 1 else task
             stands = status.get((task, session))
-            if stands == "running":
-                return f"{name} is running"
+            if stands in ("running", "damaged"):
+                return f"{name} is {stands}"
             if stands in ("aborted", "crashed"):
                 return f"{name}, with --resume"
             if stands is None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from experiments.sessions.bids import export_all
+from experiments.sessions.bids import Exported, export_all
 from experiments.sessions.files import require_data_folder, sessions_in
 from experiments.sessions.roster import Roster
 from experiments.sessions.state import is_running
@@ -17,7 +17,7 @@ from modeling.files.places import clear_unfinished
 from modeling.files.writing import write_bytes
 
 
-def withdraw(data_folder: str | Path, subject: int) -> None:
+def withdraw(data_folder: str | Path, subject: int) -> Exported:
     """Delete all files of a person; the number is never given again, the slot becomes free.
 
     Begun again after a failure, it goes on where it stopped.
@@ -28,11 +28,17 @@ def withdraw(data_folder: str | Path, subject: int) -> None:
         Root of the data set.
     subject : int
 
+    Returns
+    -------
+    Exported
+        What of the others' tables was made again, and what of theirs is damaged.
+
     Raises
     ------
     InputError
-        If nobody of that number was enrolled, a session of that person is running, or there is
-        nothing left to delete.
+        If nobody of that number was enrolled, a session of that person is running, there is
+        nothing left to delete, or the roster's line of that person cannot be read; then nothing
+        was deleted.
     OSError
         If files cannot be deleted.
     """
@@ -51,16 +57,21 @@ def withdraw(data_folder: str | Path, subject: int) -> None:
         shutil.rmtree(folder)
     if listed is not None:
         write_bytes(root / "participants.tsv", listed)
-    export_all(root)
+    return export_all(root)
 
 
-def drop_out(data_folder: str | Path, subject: int) -> None:
+def drop_out(data_folder: str | Path, subject: int) -> Exported:
     """Note that a person will not come again: the data stay, the slot becomes free.
 
     Parameters
     ----------
     data_folder : path
     subject : int
+
+    Returns
+    -------
+    Exported
+        As of `withdraw`.
 
     Raises
     ------
@@ -70,7 +81,7 @@ def drop_out(data_folder: str | Path, subject: int) -> None:
     root = Path(data_folder)
     _require_still(root, subject)
     Roster(root).drop(subject)
-    export_all(root)
+    return export_all(root)
 
 
 def files_of(data_folder: str | Path, subject: int) -> tuple[Path, ...]:

@@ -95,8 +95,7 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
         Where nobody has answered, a table is damaged, or simulated and real people are mixed.
     """
     folder = Path(data_folder)
-    who = "*" if subject is None else f"{subject:02d}"
-    files = sorted(folder.glob(f"sub-{who}/ses-*/beh/sub-*_task-threshold_beh.tsv"))
+    files = answer_files(folder, subject=subject)
     rows: dict[str, list[dict[str, str]]] = {}
     simulated = set()
     for file in files:
@@ -117,7 +116,14 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
             f"expected answers{whose} to main trials of the threshold task in {folder}, got none; "
             "run tactileq session --task threshold first (pilots do not count)."
         )
-    return Answered(files=tuple(files), estimates=estimates, simulated=simulated == {"true"})
+    return Answered(files=files, estimates=estimates, simulated=simulated == {"true"})
+
+
+def answer_files(data_folder: str | Path, *, subject: int | None = None) -> tuple[Path, ...]:
+    """The tables with the answers of one participant, or of all."""
+    who = "*" if subject is None else f"{subject:02d}"
+    found = Path(data_folder).glob(f"sub-{who}/ses-*/beh/sub-*_task-threshold_beh.tsv")
+    return tuple(sorted(found))
 
 
 def _estimates(rows: Sequence[Mapping[str, object]]) -> dict[float, Estimate]:

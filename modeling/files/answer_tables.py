@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from math import inf
 from typing import Any
 
+from modeling.checks import is_number
+
 
 @dataclass(frozen=True, kw_only=True)
 class AnswerColumn:
@@ -38,6 +40,15 @@ class AnswerColumn:
     unit: str = ""
     required: bool = False
     right: str = "texture"
+
+    def holds(self, value: object) -> bool:
+        """Whether this may stand in the column; None where nothing was answered."""
+        if value is None or value == "":
+            return not self.required
+        if self.limits is not None:
+            return is_number(value) and self.limits[0] <= value <= self.limits[1]
+        text = str(value).lower() if isinstance(value, bool) else value
+        return isinstance(text, str) and (not self.levels or text in self.levels)
 
     def sidecar(self) -> dict[str, Any]:
         """The column as a BIDS sidecar describes it."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,13 @@ def provenance_of(
     settings: Mapping[str, object],
     *,
     seed: int | None = None,
-    inputs: Sequence[Path] = (),
+    inputs: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """What results come from: versions, seed, settings, hashes of the inputs."""
+    """What results come from: versions, seed, settings, hashes of the inputs.
+
+    `inputs` are `hashes.sha256_of_paths` of them, taken before they were read: what is edited
+    meanwhile must not stand beside results of what was there before.
+    """
     libraries = ("tactileq", "numpy", "scipy", "pandas", "pingouin", "psychopy")
     return {
         "command": f"tactileq {command}",
@@ -30,7 +33,7 @@ def provenance_of(
         "versions": {name: version(name) for name in libraries},
         "settings": dict(settings),
         "seed": seed,
-        "inputs_sha256": {str(path): _hash(path) for path in inputs},
+        "inputs_sha256": dict(inputs or {}),
     }
 
 
@@ -40,7 +43,7 @@ def write_provenance(
     settings: Mapping[str, object],
     *,
     seed: int | None = None,
-    inputs: Sequence[Path] = (),
+    inputs: Mapping[str, str] | None = None,
 ) -> None:
     """Write what the results beside `path` came from."""
     write_text(path, provenance_text(provenance_of(command, settings, seed=seed, inputs=inputs)))
@@ -58,13 +61,3 @@ def seal_folder(folder: Path, provenance: Mapping[str, Any]) -> None:
 def provenance_text(values: Mapping[str, Any]) -> str:
     """The text of a file of provenance."""
     return json.dumps(values, indent=2) + "\n"
-
-
-def _hash(path: Path) -> str:
-    """SHA-256 of a file, or of all files below a folder with their names."""
-    digest = hashlib.sha256()
-    files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
-    for file in files:
-        digest.update(str(file.relative_to(path.parent)).encode())
-        digest.update(file.read_bytes())
-    return digest.hexdigest()

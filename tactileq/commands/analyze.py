@@ -75,6 +75,10 @@ def analyze(
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
+    DATA is only read: where a table differs from the log of its session, or is not complete, it is
+    named; tactileq study status makes it again. A session that is damaged is named, too, and has
+    to be restored, or its participant left out.
+
     Claims are those of the study that was run; those of --plan are exploratory. With --recordings,
     --models and --simplified the report also tells how good and how small the models are; why
     layers went stands in the folder that tactileq simplify wrote.
@@ -106,13 +110,15 @@ def analyze(
     from analysis.report.section_validation import validation_section
     from analysis.statistics.verdicts import check_complete
     from modeling.files.folders import replace_folder
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.models.loading import load_models
     from modeling.perception.verdicts import load_simplifications
 
     seen = check_own_results(out, "analyze")
     places = _places(data)
-    responses = _answers(places, exclude or ())
+    inputs = sha256_of_paths(path for path in (*places.values(), *folders) if path is not None)
+    responses = read_answers(places, exclude or ())
     if plan is not None:
         responses = replace(responses, plan=_later_plan(plan, responses.plan))
     if not complete:
@@ -131,7 +137,6 @@ def analyze(
             "expected --recordings, --models and --simplified together, got only some of them; "
             "give all three or none."
         )
-    inputs = [path for path in (*places.values(), *folders) if path is not None]
     appendix = []
     if validate is not None:
         appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
@@ -163,6 +168,7 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     from analysis.report.report import write_report
     from analysis.report.section_table import answer_of_table, table_sections
     from modeling.files.folders import replace_folder
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder
 
     folders = [path for path in files if path.is_dir()]
@@ -170,10 +176,11 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
         got = f"the folder {folders[0]}" if folders else "none"
         raise ValueError(f"expected files of answers with --table, got {got}; give files only.")
     seen = check_own_results(out, "analyze")
+    inputs = sha256_of_paths(files)
     imported = load_imported(files, parse_map(columns))
     sections = table_sections(imported, rng=np.random.default_rng(seed))
     with replace_folder(out, seen) as fresh, share_of("Reporting") as tell:
-        provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=files)
+        provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",
             benches=sections,
@@ -201,17 +208,32 @@ def _places(data: Sequence[str]) -> dict[str, Path]:
     return places
 
 
-def _answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Responses:
-    """The answers at all set-ups, without those who are left out."""
-    from analysis.answers.loading import leave_out, load_responses
-    from analysis.answers.setups import pool_setups
-    from experiments.sessions.bids import export_all
+def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Responses:
+    """The answers at all set-ups, without those who are left out; nothing is written.
 
-    for place in places.values():
-        export_all(place)  # of sessions that were killed
-    setups = {name: load_responses(place) for name, place in places.items()}
+    Raises
+    ------
+    InputError
+        Where a session is damaged, or tables are not what its log says, of those who are not left
+        out, or the answers cannot be used.
+    """
+    from analysis.answers.loading import leave_out, load_responses
+    from analysis.answers.setups import BETWEEN, pool_setups
+    from experiments.sessions.bids import require_tables
+
+    reasons = dict(map(_with_reason, exclude))
+    setups = {}
+    for name, place in places.items():
+        before = f"{name}{BETWEEN}" if name else ""
+        without = {who.removeprefix(before) for who in reasons if who.startswith(before)}
+        require_tables(
+            place,
+            without=without,
+            otherwise=f"leave the participant out with --exclude {before}{{who}}=REASON",
+        )
+        setups[name] = load_responses(place, leaving_out=without)
     responses = pool_setups(setups) if len(setups) > 1 else next(iter(setups.values()))
-    return leave_out(responses, dict(map(_with_reason, exclude)))
+    return leave_out(responses, reasons)
 
 
 def _hand(places: Mapping[str, Path], responses: Responses) -> pd.DataFrame:

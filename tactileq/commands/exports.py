@@ -116,11 +116,13 @@ def export_c_header(
     `limits` are those of `modeling.Limits`, None for none.
     """
     from modeling import Limits, Vibrator, compensation_for
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
     from stimuli.exports.c_header import c_header
 
+    inputs = sha256_of_paths(path for path in (model_file, vibrator) if path is not None)
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}.h")
     note = note_of_file(target, "export c", texture=model.texture)
@@ -140,7 +142,6 @@ def export_c_header(
         compensation=compensation,
     )
     settings = {"rate_hz": rate_hz, "single": single, "limits": dict(limits)}
-    inputs = [path for path in (model_file, vibrator) if path is not None]
     provenance = provenance_of("export c", settings, seed=seed, inputs=inputs)
     write_own_files({target: text.encode()}, note, provenance, texture=model.texture)
     print(f"{name}{simulated_note(model)}{played_by}: {target}")
@@ -158,6 +159,7 @@ def export_wav_file(
     vibrator: Path | None,
 ) -> None:
     """Write a model's vibration at one speed and force, with provenance, and tell its level."""
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
@@ -177,10 +179,11 @@ def export_wav_file(
         seed=seed,
         vibrator=vibrator,
     )
+    inputs = sha256_of_paths(recipe.files())
     sources = load_sources(recipe)
     stimulus, data = only_stimulus(recipe, sources)
     settings = {"recipe": recipe.to_toml()}
-    provenance = provenance_of("export wav", settings, seed=seed, inputs=recipe.files())
+    provenance = provenance_of("export wav", settings, seed=seed, inputs=inputs)
     write_own_files({target: data}, note, provenance, texture=model.texture)
     tell_beyond_grid(sources)
     drive = "" if vibrator is None else ", as drive for the vibrator"
@@ -197,18 +200,20 @@ def export_peq_json(
 ) -> None:
     """Write a model's equalizer at one condition or over its grid as JSON, with provenance."""
     from modeling.files.documents import dump_json
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
     from modeling.models.loading import load_model
     from stimuli.exports.peq_json import peq_document
 
+    inputs = sha256_of_paths([model_file])
     model = load_model(model_file)
     target = out or Path(f"{file_stem(model.texture)}_peq.json")
     note = note_of_file(target, "export json", texture=model.texture)
     document = peq_document(model, speed_mm_s=speed, force_n=force)
     count = len(document["conditions"])
     settings = {"speed_mm_s": speed, "force_n": force}
-    provenance = provenance_of("export json", settings, inputs=[model_file])
+    provenance = provenance_of("export json", settings, inputs=inputs)
     contents = {target: dump_json(document).encode()}
     write_own_files(contents, note, provenance, texture=model.texture)
     conditions = "1 condition" if count == 1 else f"{count} conditions"

@@ -57,13 +57,15 @@ def import_wav(
 
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
+    from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import import_wav_file, usable
 
+    inputs = sha256_of_paths(files)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
     records, refused = usable(read, files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
-    add_to_set(out, records, "import wav", settings=settings, files=files, left_out=refused)
+    add_to_set(out, records, "import wav", settings=settings, inputs=inputs, left_out=refused)
 
 
 @imports.command("csv")
@@ -87,13 +89,15 @@ def import_csv(
 
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
     """
+    from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import import_csv_file, usable
 
+    inputs = sha256_of_paths(files)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
     read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
     records, refused = usable(read, files, named)
     settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
-    add_to_set(out, records, "import csv", settings=settings, files=files, left_out=refused)
+    add_to_set(out, records, "import csv", settings=settings, inputs=inputs, left_out=refused)
 
 
 @imports.command("hatt")
@@ -115,9 +119,11 @@ def import_hatt(
 
     Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
     """
+    from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import Imported
     from rig.importing.hatt import load_hatt
 
+    inputs = sha256_of_paths(files)
     speeds = speed or [50.0 * step for step in range(1, 8)]
     forces = force or [0.5 * step for step in range(1, 8)]
     textures = [load_hatt(file) for file in files]
@@ -132,7 +138,7 @@ def import_hatt(
             advance(texture.material)
     records = [Imported(record) for of_texture in made for record in of_texture]
     settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
-    add_to_set(out, records, "import hatt", settings=settings, files=files)
+    add_to_set(out, records, "import hatt", settings=settings, inputs=inputs)
     for texture in textures:
         tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
 
@@ -175,12 +181,13 @@ def add_to_set(
     command: str,
     *,
     settings: Mapping[str, object],
-    files: Sequence[Path],
+    inputs: Mapping[str, str],
     left_out: Sequence[str] = (),
 ) -> None:
     """Add imported recordings to those that `out` already holds.
 
-    `left_out`: a sentence for each file that could not be used.
+    `inputs`: the hashes of the files that were read. `left_out`: a sentence for each file that
+    could not be used.
     """
     from modeling import RecordingSet
     from modeling.files.places import locked
@@ -195,7 +202,7 @@ def add_to_set(
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
     provenance = out / PROVENANCE_NAME
-    origin = provenance_of(command, settings, inputs=files)
+    origin = provenance_of(command, settings, inputs=inputs)
     # Only what is quick is done while another import cannot add to what this one adds to.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):
         origin["settings"]["added to"] = imports_before(provenance)
@@ -207,7 +214,7 @@ def add_to_set(
         )
     rates = sorted({f"{record.rate_hz:g}" for record in records})
     if left_out:
-        print(f"note: {len(left_out)} of {len(files)} files left out")
+        print(f"note: {len(left_out)} of {len(inputs)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -80,8 +80,10 @@ def power(
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
     from experiments.study.study import Study
+    from modeling.files.hashes import sha256_of_paths
 
     seen = check_own_results(out, "power")
+    inputs = sha256_of_paths([study])
     plan = Study.load(study)
     sizes = sizes_of(subjects)
     largest = planned_for(plan, sizes)
@@ -111,7 +113,7 @@ def power(
         "simulations": simulations,
         "planted": planted,
     }
-    _write(table, plan, out, seen=seen, seed=seed, settings=settings, inputs=[study])
+    _write(table, plan, out, seen=seen, seed=seed, settings=settings, inputs=inputs)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -388,7 +390,7 @@ def _write(
     seen: Contents,
     seed: int,
     settings: dict[str, object],
-    inputs: Sequence[Path],
+    inputs: Mapping[str, str],
 ) -> None:
     from analysis.answers.plan import plan_from
     from analysis.figures.power import figure_power

@@ -186,6 +186,7 @@ def provenance_of_run(
     folder: Path, options: HandRecording, plan: Plan, *, settings: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What the recordings of this run came from, with what made those before them."""
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import PROVENANCE_NAME, provenance_of
 
     every = {
@@ -199,7 +200,7 @@ def provenance_of_run(
         "added to": imports_before(folder / PROVENANCE_NAME),
     }
     files = [path for path in (options.rig, options.grid) if path is not None]
-    return provenance_of("record --audio", every, inputs=files)
+    return provenance_of("record --audio", every, inputs=sha256_of_paths(files))
 
 
 def tell_assumed(rig: RigFile) -> None:

@@ -43,10 +43,12 @@ def rig_range(
 
     Example: tactileq rig range --rig rig.toml --seconds 30 --out grid.toml
     """
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from rig.capture.exploration import explored, grid_for, grid_text
 
     note = note_of_file(out, COMMAND)
+    inputs = sha256_of_paths([] if rig is None else [rig])
     settings = hand_from(rig_from(rig), HandOptions(hand, hand_device, counts_per_mm, force))
     found = explored(watched(settings, seconds))
     grid = grid_for(found, speeds=speeds, forces=forces)
@@ -54,7 +56,7 @@ def rig_range(
     origin = provenance_of(
         COMMAND,
         {"hand": settings.to_dict(), "seconds": seconds, **found.to_dict()},
-        inputs=[] if rig is None else [rig],
+        inputs=inputs,
     )
     write_own_files({out: grid_text(grid, found).encode()}, note, origin)
     for told in notes_on(found, grid):

@@ -48,13 +48,15 @@ def scene(
     """
     from modeling import Scene, compile_scene
     from modeling.files.folders import replace_folder
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.rendering.compiled import is_compiled
     from modeling.scenes.loading import full_models
 
     seen = check_own_results(out, "scene")
     asked = Scene.load(scene_file)
-    folder, full = full_models(asked, models or asked.models or Path("models"))
+    inputs = sha256_of_paths([*asked.files, models or asked.models or Path("models")])
+    _, full = full_models(asked, models or asked.models or Path("models"))
     with progress("Compiling the scene", len(asked.textures or full)) as advance:
         compiled = compile_scene(asked, full, progress=advance)
     settings = {
@@ -62,7 +64,6 @@ def scene(
         "scene_sha256": asked.sha256,
         "full_sha256": {each.texture: each.full.sha256 for each in compiled.textures},
     }
-    inputs = [*asked.files, folder]
     with replace_folder(out, seen) as fresh:
         write_scene(compiled, fresh, seed=seed)
         seal_folder(fresh, provenance_of("scene", settings, seed=seed, inputs=inputs))

@@ -49,9 +49,11 @@ def simplify(
     from analysis.textures.results import simplification_table
     from modeling import TextureModel, Threshold
     from modeling import simplify as drop_layers
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
 
+    inputs = sha256_of_paths([model_file])
     full = TextureModel.load(model_file)
     start = out / file_stem(full.texture)
     note = Path(f"{start}_provenance.json")
@@ -90,7 +92,7 @@ def simplify(
     }
     settings |= {"full_sha256": full.sha256, "threshold_sha256": result.threshold.sha256}
     contents = {Path(f"{start}{ending}"): data for ending, data in files.items()}
-    provenance = provenance_of("simplify", settings, inputs=[model_file])
+    provenance = provenance_of("simplify", settings, inputs=inputs)
     write_own_files(contents, note, provenance, texture=full.texture)
     tell_verdicts(result)
     if result.identical:

@@ -42,6 +42,7 @@ def simulate(
     """
     from experiments.study.study import Study
     from modeling import Threshold
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import write_provenance
     from stimuli.planted.textures import TEXTURES, planted_texture
 
@@ -53,6 +54,7 @@ def simulate(
         )
     real = {name: planted_texture(name) for name in plan.textures}
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)
+    inputs = sha256_of_paths(file for place in sources.values() for file in _read_for(Path(place)))
     sets.require(plan)
     felt_above = Threshold.named(threshold)
     run_study(
@@ -73,7 +75,6 @@ def simulate(
         "threshold_sha256": felt_above.sha256,
         **_scene_settings(sets),
     }
-    inputs = [file for place in sources.values() for file in _read_for(Path(place))]
     write_provenance(note, "simulate", settings, seed=seed, inputs=inputs)
     print(f"simulated answers: {data}")
 

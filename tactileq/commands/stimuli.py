@@ -115,13 +115,15 @@ def tell_passed_over(others: Sequence[Path]) -> None:
 
 def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
     """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import write_provenance
     from stimuli.sets.sources import files_behind
 
+    hashes = sha256_of_paths([*inputs, *files_behind(recipe)])
+
     def tell_origin(folder: Path) -> None:
         settings = {"recipe": recipe.to_toml()}
-        files = [*inputs, *files_behind(recipe)]
-        write_provenance(folder / "provenance.json", "stimuli", settings, inputs=files)
+        write_provenance(folder / "provenance.json", "stimuli", settings, inputs=hashes)
 
     sources, count = render_set(recipe, out, finish=tell_origin)
     tell_passed_over(sources.passed_over)

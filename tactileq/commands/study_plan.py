@@ -24,6 +24,7 @@ def study_plan(
     """
     from experiments.study.study import plan_sha256
     from experiments.tasks.page import plan_page
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
 
     if out.suffix.lower() != ".md":
@@ -32,6 +33,6 @@ def study_plan(
     plan, sets, files = loaded(path)
     sha256 = plan_sha256(plan, sets.sha256(plan.textures))
     settings = {"study_sha256": plan.sha256, "plan_sha256": sha256}
-    provenance = provenance_of("study plan", settings, inputs=files)
+    provenance = provenance_of("study plan", settings, inputs=sha256_of_paths(files))
     write_own_files({out: plan_page(plan, sets).encode()}, note, provenance)
     print(f"plan {sha256[:12]}…: {out}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,13 +11,15 @@ from tactileq.options import Data, StudyFile
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from experiments.sessions.bids import Exported
     from experiments.sessions.status import PersonProgress, StudyProgress
 
 
 def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     """Show each participant's sessions and the next one due; no names of conditions.
 
-    What BIDS shows of sessions that were killed is written on the way.
+    Tables that a killed session left incomplete, or that differ from its log, are made again from
+    it; what was written and what is damaged is told.
 
     Example: tactileq study status --data data
     """
@@ -27,12 +30,23 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     from experiments.study.study import Study
 
     progress = study_progress(data, None if study is None else Study.load(study))
-    written = export_all(data)
+    made = export_all(data)
     Console().print(table_of(progress))
     for task in progress.tasks:
         print(f"{task.task}: {task.complete} of {task.planned} planned sessions complete")
-    for name in written:
-        print(f"written from the log: {name}")
+    tell_made(made)
+    for told in progress.damaged:
+        print(f"damaged: {told}")
+
+
+def tell_made(made: Exported) -> None:
+    """Name each file that held something else, folders with new ones, and what is damaged."""
+    for path in made.changed:
+        print(f"changed, as the log says: {path}")
+    for folder, count in sorted(Counter(path.parent for path in made.new).items()):
+        print(f"written from the log: {count} new file{'s' * (count > 1)} in {folder}")
+    for told in made.damaged:
+        print(f"damaged: {told}")
 
 
 def table_of(progress: StudyProgress) -> Table:
@@ -52,7 +66,9 @@ def table_of(progress: StudyProgress) -> Table:
 def _sessions(person: PersonProgress, task: str) -> str:
     """One line for each session, such as "1: aborted, 5 of 14"."""
     return "\n".join(
-        f"{one.session}: {one.status}, {one.answered} of {one.planned}"
+        f"{one.session}: damaged"
+        if one.status == "damaged"
+        else f"{one.session}: {one.status}, {one.answered} of {one.planned}"
         for one in person.sessions
         if one.task == task
     )

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from tactileq.commands.study_status import tell_made
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
@@ -22,9 +23,10 @@ def study_withdraw(subject: Subject, data: Data = Path("data"), yes: Yes = False
 
     there = len(files_of(data, subject))
     _confirm(f"Delete {there} files of subject {subject} in {data}, for good?", yes=yes)
-    withdraw(data, subject)
+    made = withdraw(data, subject)
     print(f"withdrawn: subject {subject}; {there} files deleted, the slot is free")
     print("Copies elsewhere, such as backups and reports, are yours to delete.")
+    tell_made(made)
 
 
 def study_dropout(subject: Subject, data: Data = Path("data"), yes: Yes = False) -> None:
@@ -35,8 +37,9 @@ def study_dropout(subject: Subject, data: Data = Path("data"), yes: Yes = False)
     from experiments.sessions.withdrawing import drop_out
 
     _confirm(f"Give the slot of subject {subject} to somebody else?", yes=yes)
-    drop_out(data, subject)
+    made = drop_out(data, subject)
     print(f"dropped out: subject {subject}; the data stay, the slot is free")
+    tell_made(made)
 
 
 def _confirm(question: str, *, yes: bool) -> None:

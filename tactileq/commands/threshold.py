@@ -28,20 +28,32 @@ def threshold(
     Example: tactileq threshold --data data --subject 1 --out mine.tsv, then tactileq simplify
     models/canvas.json --threshold mine.tsv
     """
-    from experiments.sessions.bids import export_all
-    from experiments.tasks.threshold_table import mean_thresholds, read_answers, threshold_text
+    from experiments.sessions.bids import require_tables
+    from experiments.tasks.threshold_table import (
+        answer_files,
+        mean_thresholds,
+        read_answers,
+        threshold_text,
+    )
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
 
     if out.suffix != ".tsv":
         raise ValueError(f"expected a file that ends with .tsv, got {out}; rename it.")
     note = note_of_file(out, "threshold")
-    export_all(data)  # of sessions that were killed
+    require_tables(
+        data,
+        task="threshold",
+        subject=subject,
+        otherwise="name another participant with --subject",
+    )
+    inputs = sha256_of_paths(answer_files(data, subject=subject))
     answered = read_answers(data, subject=subject)
     means = mean_thresholds(answered.estimates)
     people = len(answered.estimates)
     text = threshold_text(means, people=people, simulated=answered.simulated)
     settings: dict[str, object] = {"subject": subject, "people": sorted(answered.estimates)}
-    provenance = provenance_of("threshold", settings, inputs=answered.files)
+    provenance = provenance_of("threshold", settings, inputs=inputs)
     write_own_files({out: text.encode()}, note, provenance)
     for one in means:
         within = "" if one.interval_db is None else "{:+.1f} to {:+.1f}, ".format(*one.interval_db)

@@ -54,6 +54,7 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     from analysis.report.findings import picture_bytes
     from analysis.spectra.vibrator import compensated
     from modeling import identify_vibrator
+    from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.wav import read_wav_channels
 
@@ -62,6 +63,7 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
         if path.suffix.lower() != ending:
             raise ValueError(f"expected a name that ends in {ending}, got {path}; rename it.")
     notes = {path: note_of_file(path, "vibrator") for path in files}
+    inputs = sha256_of_paths([test])
     samples, rate_hz = read_wav_channels(test)
     if samples.shape[1] != 2:
         raise ValueError(
@@ -75,7 +77,7 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     contents = {out: shown.vibrator.to_json().encode()}
     if plot is not None:
         contents[plot] = picture_bytes(figure_vibrator(shown))
-    provenance = provenance_of("vibrator", {"simulated": simulated}, inputs=[test])
+    provenance = provenance_of("vibrator", {"simulated": simulated}, inputs=inputs)
     for path, data in contents.items():
         write_own_files({path: data}, notes[path], provenance)
     print(f"{_found(shown)}: {out}")

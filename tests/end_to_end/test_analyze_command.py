@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
+import re
+import shutil
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
+from analysis.answers import loading
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
 from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import Threshold, simplify
+from modeling.files.hashes import sha256_of_paths
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
+from tactileq.commands.analyze import read_answers
 
 TEXTURES = ("leather", "MDF", "PVC")
 LATER = """
@@ -37,7 +43,13 @@ test = "equivalence"
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Path:
+def data(simulated: Path, tmp_path: Path) -> Path:
+    """A copy of the simulated study."""
+    return shutil.copytree(simulated, tmp_path / "data")
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A simulated study with one claim."""
     truths = {texture: planted_texture(texture) for texture in TEXTURES}
     threshold = Threshold.shipped("codec")
@@ -61,7 +73,7 @@ def data(tmp_path: Path) -> Path:
         },
         plan=Plan(claims=(claim,), exclusions=("Whoever presses nothing.",)),
     )
-    folder = tmp_path / "data"
+    folder = tmp_path_factory.mktemp("study") / "data"
     simulate_study(
         study,
         real=truths,
@@ -78,8 +90,23 @@ def claims(folder: Path) -> pd.DataFrame:
     return pd.read_csv(folder / "tables/claim_tests.tsv", sep="\t", na_values="n/a")
 
 
-def test_claims_are_those_of_the_study_and_others_exploratory(main, data: Path) -> None:
+def test_claims_are_those_of_the_study_and_others_exploratory(
+    main, data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = sha256_of_paths([data])[str(data)]
+    real = loading.load_responses
+
+    def edited_meanwhile(*given: Any, **named: Any) -> Any:
+        responses = real(*given, **named)
+        (data / "README").write_text("edited while it was read\n")
+        return responses
+
+    monkeypatch.setattr(loading, "load_responses", edited_meanwhile)
     assert main("analyze", "data", "--out", "first").returncode == 0
+    note = json.loads((data.parent / "first/provenance.json").read_text())
+    assert note["inputs_sha256"] == {"data": before}
+    monkeypatch.undo()
+    monkeypatch.chdir(data.parent)
     tests = claims(data.parent / "first")
     planned = tests.groupby("claim")["planned"].first().to_dict()
     assert planned == {
@@ -108,6 +135,63 @@ def test_claims_are_those_of_the_study_and_others_exploratory(main, data: Path) 
     assert set(tests[tests["claim"] == "as strong"]["planned"]) == {"yes"}
 
 
+def contents(folder: Path) -> dict[Path, tuple[bytes, int]]:
+    """Every file, and when it was written."""
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path: (path.read_bytes(), path.stat().st_mtime_ns) for path in files}
+
+
+def test_tables_that_differ_from_their_log_are_named_and_only_status_changes_them(
+    main, data: Path
+) -> None:
+    good = read_answers({"": data}, ())
+    (table,) = data.glob("sub-02/ses-01/beh/*_task-absolute_beh.tsv")
+    table.write_text(table.read_text().replace("\t1\tn/a\tfalse", "\t0\tn/a\tfalse", 1))
+    physio = next(data.glob("sub-03/ses-01/beh/*_physio.tsv.gz"))
+    physio.unlink()
+    before = contents(data)
+    refused = main("analyze", "data")
+    assert refused.returncode == 1
+    assert refused.stderr.count("\n") == 1
+    name = table.relative_to(data)
+    assert f"data/{name}, which differs (and 1 more file)" in refused.stderr
+    assert "tactileq study status --data data" in refused.stderr
+    assert contents(data) == before
+    status = main("study", "status", "--data", "data")
+    assert f"changed, as the log says: data/{name}\n" in status.stdout
+    assert "written from the log: 1 new file in data/sub-03/ses-01/beh\n" in status.stdout
+    assert contents(data).keys() - before.keys() == {physio}
+    assert read_answers({"": data}, ()).absolute.equals(good.absolute)
+
+
+def test_a_damaged_session_is_named_and_nobody_is_lost_without_a_word(main, data: Path) -> None:
+    good = read_answers({"": data}, ())
+    (log,) = data.glob("sourcedata/sub-03/ses-01/*_task-absolute_log.jsonl")
+    log.write_bytes(log.read_bytes().replace(b'"event"', b'"evemt"', 5))
+    before = contents(data)
+    refused = main("analyze", "data")
+    assert refused.returncode == 1
+    assert refused.stderr.count("\n") == 1
+    assert re.search(rf"line 1 of \S*{log.name}", refused.stderr)
+    assert "leave the participant out with --exclude sub-03=REASON" in refused.stderr
+    status = " ".join(main("study", "status", "--data", "data").stdout.split())
+    assert "1: damaged" in status
+    assert f"{log.name}, got no event" in status
+    assert contents(data) == before
+    without = ["sub-03=damaged on the stick"]
+    found = read_answers({"": data}, without)
+    wanted = good.absolute[good.absolute["participant_id"] != "sub-03"].reset_index(drop=True)
+    assert found.absolute.equals(wanted)
+    assert "sub-03 was left out by hand: damaged on the stick." in found.warnings
+    # Nothing of theirs is read that cannot be, and they took part: nobody is missing.
+    next(data.glob("sourcedata/sub-03/ses-01/*_manifest.json")).write_text("{")
+    for lost in (data / "README", next(data.glob("sub-03/ses-01/beh/*absolute_beh.tsv"))):
+        lost.unlink()
+        found = read_answers({"": data}, without)
+        assert found.absolute.equals(wanted)
+        assert found.unfinished == ()
+
+
 def test_several_set_ups_have_names_and_answers_of_their_own(main, data: Path) -> None:
     for words, told in (
         (("data", "data"), "expected a name of its own for each of several set-ups"),
@@ -124,7 +208,8 @@ def test_incomplete_pairs_are_refused_and_complete_ones_offered(main, data: Path
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:-1]))
     (log,) = data.glob("sourcedata/sub-03/ses-01/*_task-absolute_log.jsonl")
-    log.unlink()  # else the whole table is made from it again
+    log.with_name(log.name.replace("log.jsonl", "manifest.json")).unlink()
+    log.unlink()  # as in data that are given to others, without what they were made from
     refused = main("analyze", "data")
     assert refused.returncode == 1
     assert refused.stderr.count("\n") == 1

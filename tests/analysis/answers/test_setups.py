@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses
+from analysis.answers.loading import PlannedTask, Responses, leave_out
 from analysis.answers.setups import answers_at, pool_setups, setup_of
 from analysis.statistics.verdicts import claims_found, differences_by_setup
 from modeling import InputError
@@ -48,6 +49,10 @@ def test_people_of_one_number_at_two_set_ups_are_two(leipzig, nara):
     assert both.plan.sha256 == ("0a" * 32, "0b")
     for task, table in answers_at("nara", both.answers).items():
         assert table.reset_index(drop=True).equals(nara.answers[task])
+    # Of somebody who is left out at one set-up, and whose answers cannot be read.
+    gone = replace(nara, left_out={"absolute": pd.DataFrame([{"participant_id": "sub-17"}])})
+    short = leave_out(pool_setups({"leipzig": leipzig, "nara": gone}), {"nara/sub-17": "damaged"})
+    assert short.left_out["absolute"]["participant_id"].tolist() == ["nara/sub-17"]
     alone = claims_found(leipzig, rng=np.random.default_rng(0))
     found = claims_found(both, rng=np.random.default_rng(0))
     assert found[0].tests["n"].iloc[0] == 32

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +81,12 @@ def answer_to(trial: Mapping[str, Any], task: str) -> dict[str, Any]:
     if task == "oddity":
         own = {"layout": "|".join(trial["layout"]), "odd_position": trial["odd_position"]}
         return {**own, "answer": 2, "correct": 0, "presses": 5, "response_time_s": 1.5}
-    own = {"frequency_hz": trial["frequency_hz"], "amplitude_g": 0.0125, "interval": 1}
+    own = {
+        "frequency_hz": trial["frequency_hz"],
+        "amplitude_g": 0.0125,
+        "highest_g": 0.5,
+        "interval": 1,
+    }
     return {**own, "answer": 1, "correct": 1, "response_time_s": 0.75}
 
 
@@ -93,7 +99,6 @@ def a_manifest(
         "simulated_participant": True,
         "simulated_rig": True,
         "study": STUDY,
-        "study_sha256": sha256_of_values(STUDY),
         "plan_sha256": "0" * 64,
         "models_sha256": MODELS,
         "model_sources": {name: name for name in SETS},
@@ -102,8 +107,10 @@ def a_manifest(
         "description": f"The task {task}.",
         "trials": planned(task),
     }
+    values |= others
+    values = {"study_sha256": sha256_of_values(values["study"]), **values}
     return SessionManifest(
-        task=task, subject=subject, session=session, code=code, slot=slot, **values | others
+        task=task, subject=subject, session=session, code=code, slot=slot, **values
     )
 
 
@@ -151,52 +158,47 @@ def run_trial(
     store.trace(number, rows, presentations=shown, faults=())
 
 
+def session_on_disk(
+    folder: Path,
+    task: str = "absolute",
+    *,
+    subject: int = 1,
+    session: int = 1,
+    answered: int | None = None,
+    status: str | None = "complete",
+    reason: str = "",
+    answers: Mapping[str, Any] | None = None,
+    resume: bool = False,
+    invalid: Sequence[int] = (),
+    **others: Any,
+) -> SessionFiles:
+    """Run a session, or go on with one: `answered` trials, then its end, if it has one."""
+    simulated = others.get("simulated_participant", True)
+    person = enrolled(Roster(folder), subject, 3, simulated=simulated)
+    manifest = a_manifest(
+        task=task, subject=subject, session=session, code=person.code, slot=person.slot, **others
+    )
+    begin = SessionStore.resume if resume else SessionStore.create
+    with begin(folder, manifest) as store:
+        if answers is not None:
+            store.log("welcome", consent="2026-11", answers=dict(answers))
+        store.log("phase", phase="training", again=False)
+        done = {row["trial"] for row in store.before.rows}
+        left = [trial for trial in manifest.trials if trial["trial"] not in done]
+        for trial in left[:answered]:
+            row = {name: trial[name] for name in ("trial", "phase", "texture", "model", "tray")}
+            facts = {"run": store.run, "valid": int(trial["trial"] not in invalid)}
+            kind = {"pilot": manifest.pilot, "simulated": manifest.simulated}
+            run_trial(store, trial, task, row={**row, **facts, "repeats": None, **kind})
+        if status is not None:
+            store.finish(status, reason, by="participant")
+    return manifest.files(folder)
+
+
 @pytest.fixture
 def write_session(tmp_path: Path) -> WriteSession:
-    """Runs a session, or goes on with one: `answered` trials, then its end, if it has one."""
-
-    def write(
-        task: str = "absolute",
-        *,
-        subject: int = 1,
-        session: int = 1,
-        answered: int | None = None,
-        status: str | None = "complete",
-        reason: str = "",
-        answers: Mapping[str, Any] | None = None,
-        resume: bool = False,
-        invalid: Sequence[int] = (),
-        **others: Any,
-    ) -> SessionFiles:
-        folder = tmp_path / "data"
-        person = enrolled(
-            Roster(folder), subject, 2, simulated=others.get("simulated_participant", True)
-        )
-        manifest = a_manifest(
-            task=task,
-            subject=subject,
-            session=session,
-            code=person.code,
-            slot=person.slot,
-            **others,
-        )
-        begin = SessionStore.resume if resume else SessionStore.create
-        with begin(folder, manifest) as store:
-            if answers is not None:
-                store.log("welcome", consent="2026-11", answers=dict(answers))
-            store.log("phase", phase="training", again=False)
-            done = {row["trial"] for row in store.before.rows}
-            left = [trial for trial in manifest.trials if trial["trial"] not in done]
-            for trial in left[:answered]:
-                row = {name: trial[name] for name in ("trial", "phase", "texture", "model", "tray")}
-                facts = {"run": store.run, "valid": int(trial["trial"] not in invalid)}
-                kind = {"pilot": manifest.pilot, "simulated": manifest.simulated}
-                run_trial(store, trial, task, row={**row, **facts, "repeats": None, **kind})
-            if status is not None:
-                store.finish(status, reason, by="participant")
-        return manifest.files(folder)
-
-    return write
+    """`session_on_disk` in the folder `data`."""
+    return partial(session_on_disk, tmp_path / "data")
 
 
 def _manifest(**changed: Any) -> SessionManifest:
@@ -212,7 +214,6 @@ def _manifest(**changed: Any) -> SessionManifest:
         "simulated_participant": False,
         "simulated_rig": False,
         "study": {"name": "Small", "seed": 3, "data_license": "CC0"},
-        "study_sha256": "aa",
         "plan_sha256": "bb",
         "models_sha256": {"canvas": {"full": "cc", "simplified": "dd"}},
         "model_sources": {"full": "models", "simplified": "simplified"},
@@ -224,7 +225,8 @@ def _manifest(**changed: Any) -> SessionManifest:
             for n, phase in enumerate(phases, start=1)
         ],
     }
-    return SessionManifest(**{**values, **changed})
+    values |= changed
+    return SessionManifest(**{"study_sha256": sha256_of_values(values["study"]), **values})
 
 
 @pytest.fixture

@@ -26,6 +26,7 @@ from experiments.sessions.resume import resumption
 from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from modeling import InputError
+from modeling.files.hashes import sha256_of_values
 from rig.interface import HandRows, PresentationRecord
 
 CALLS = ("write", "fsync", "replace", "ftruncate", "mkdir", "open")
@@ -53,7 +54,7 @@ def manifest(subject=1):
         simulated_participant=False,
         simulated_rig=False,
         study={"name": "Small"},
-        study_sha256="aa",
+        study_sha256=sha256_of_values({"name": "Small"}),
         plan_sha256="bb",
         models_sha256={"canvas": {"full": "cc", "simplified": "dd"}},
         model_sources={},

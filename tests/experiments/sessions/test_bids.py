@@ -18,7 +18,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from experiments.observers.whole_study import simulate_study
-from experiments.sessions.bids import export_all, export_session
+from experiments.sessions.bids import Exported, export_all, export_session, require_tables
 from experiments.sessions.bids_events import onsets_s
 from experiments.sessions.bids_physio import RATE_HZ, at_regular_times
 from experiments.sessions.bids_tables import cell, table_bytes
@@ -181,14 +181,16 @@ def test_every_column_of_every_table_is_described(study_on_disk):
 
 def test_exporting_again_gives_the_same_bytes(study_on_disk, tmp_path):
     before = contents(study_on_disk)
-    assert export_all(study_on_disk) == ()
+    assert export_all(study_on_disk) == Exported()
     assert contents(study_on_disk) == before
     for path in study_on_disk.glob("sub-*"):
         for file in sorted(path.rglob("*"), reverse=True):
             file.rmdir() if file.is_dir() else file.unlink()
     for name in ("participants.tsv", "participants.json", "README", "dataset_description.json"):
         (study_on_disk / name).unlink()
-    assert len(export_all(study_on_disk)) == 7
+    made = export_all(study_on_disk)
+    assert (made.changed, made.damaged) == ((), ())
+    assert {str(path.relative_to(study_on_disk)) for path in made.new} == before.keys()
     again = contents(study_on_disk)
     assert again.keys() == before.keys()
     changed = [name for name in before if before[name] != again[name]]
@@ -217,9 +219,17 @@ def test_a_half_exported_session_is_mended(write_session, spoil, ending):
     files = write_session()
     export_all(files.root)
     before = contents(files.root)
-    spoil(beh(files, ending))
-    assert export_all(files.root) == (files.stem,)
+    path = beh(files, ending)
+    spoil(path)
+    spoilt = contents(files.root)
+    with pytest.raises(InputError, match=rf"{path.name}, which .*tactileq study status --data"):
+        require_tables(files.root, otherwise="")
+    require_tables(files.root, without=["sub-01"], otherwise="")
+    assert contents(files.root) == spoilt  # who only reads changes nothing
+    made = export_all(files.root)
+    assert (made.new, made.changed) == (((path,), ()) if spoil is _gone else ((), (path,)))
     assert contents(files.root) == before
+    require_tables(files.root, otherwise="")
 
 
 def test_what_was_answered_since_is_added(write_session):
@@ -227,7 +237,9 @@ def test_what_was_answered_since_is_added(write_session):
     export_all(files.root)
     assert len(table(beh(files, "beh.tsv"))) == 3
     write_session(resume=True)
-    assert export_all(files.root) == (files.stem,)
+    with pytest.raises(InputError, match="and . more file"):
+        require_tables(files.root, otherwise="")
+    assert beh(files, "beh.tsv") in export_all(files.root).changed
     found = table(beh(files, "beh.tsv"))
     assert found["run"].tolist() == [1, 1, 1, 2, 2, 2, 2, 2, 2]
     sessions = table(files.root / "sub-01" / "sub-01_sessions.tsv")
@@ -239,9 +251,12 @@ def test_what_was_answered_since_is_added(write_session):
 def test_a_running_session_is_left_alone(write_session):
     files = write_session(answered=3, status="aborted")
     with SessionStore.resume(files.root, SessionManifest.load(files.manifest)):
-        assert export_all(files.root) == ()
+        require_tables(files.root, otherwise="")
+        assert export_all(files.root).damaged == ()
         assert not beh(files, "beh.tsv").exists()
-    assert export_all(files.root) == (files.stem,)
+    assert beh(files, "beh.tsv") in export_all(files.root).new
+    with SessionStore.resume(files.root, SessionManifest.load(files.manifest)):
+        require_tables(files.root, otherwise="")  # those of before say how it stood then
 
 
 def test_a_full_disk_leaves_the_files_as_they_were(write_session, file_size_limit):
@@ -278,13 +293,48 @@ def test_events_tell_what_happened_in_order(write_session):
 
 
 @pytest.mark.parametrize("name", ["hand", "presentations"])
-def test_a_table_of_an_earlier_version_is_refused_in_one_sentence(write_session, name):
+def test_a_damaged_row_costs_itself_and_is_named(write_session, name):
     files = write_session()
+    export_all(files.root)
     path = files.named(f"{name}.tsv")
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line.split("\t", 1)[1] for line in lines))
-    with pytest.raises(InputError, match=f"expected the column run in .*{name}.tsv, got a table"):
-        export_session(files.root, files.manifest)
+    lines = path.read_bytes().split(b"\n")
+    lines[4], lines[7] = lines[4].replace(b"\t", b" "), b"9" + lines[7]  # a run that never was
+    path.write_bytes(b"\n".join(lines))
+    made = export_all(files.root)
+    assert made.damaged == (f"{files.stem}: line 5 and 1 more line of {path.name}",)
+    sidecar = json.loads(beh(files, "beh.json").read_text())
+    assert sidecar["Damaged"] == {name: [f"line 5 and 1 more line of {path.name}"]}
+    assert len(table(beh(files, "beh.tsv"))) == 9
+    shown = table(beh(files, "events.tsv")).query("trial_type == 'presented'")
+    assert shown["presentation"].isna().sum() == (2 if name == "presentations" else 0)
+    assert export_all(files.root) == Exported(damaged=made.damaged)
+    require_tables(files.root, otherwise="")
+
+
+def test_a_table_of_an_earlier_version_is_named_and_costs_what_follows_from_it(write_session):
+    files = write_session()
+    for name in ("hand", "presentations"):
+        path = files.named(f"{name}.tsv")
+        lines = path.read_text().splitlines(keepends=True)
+        path.write_text("".join(line.split("\t", 1)[1] for line in lines))
+    made = export_all(files.root)
+    assert [told.split(",")[0] for told in made.damaged] == [
+        f"{files.stem}: line 1 of {files.stem}_{name}.tsv" for name in ("presentations", "hand")
+    ]
+    assert len(table(beh(files, "beh.tsv"))) == 9
+    assert not list(files.beh.glob("*_physio.tsv.gz"))
+
+
+def test_a_time_that_cannot_be_asks_for_no_memory(write_session):
+    files = write_session(answered=3, status="aborted")
+    path = files.named("hand.tsv")
+    lines = path.read_bytes().splitlines(keepends=True)
+    cells = lines[9].split(b"\t")
+    lines[9] = b"\t".join([*cells[:3], b"3.2e+14", *cells[4:]])  # 291 TiB at 250 Hz
+    path.write_bytes(b"".join(lines))
+    (told,) = export_all(files.root).damaged
+    assert told.startswith(f"{files.stem}: line 10, 3.2e+14 s after")
+    assert len(table(beh(files, "beh.tsv"))) == 3
 
 
 def test_a_run_begins_when_its_date_says_and_never_before_the_last_one():
@@ -386,7 +436,8 @@ def test_people_and_their_sessions_are_listed(study_on_disk):
 def test_a_data_set_without_source_data_is_left_alone(study_on_disk):
     shutil.rmtree(study_on_disk / "sourcedata")
     before = contents(study_on_disk)
-    assert export_all(study_on_disk) == ()
+    require_tables(study_on_disk, otherwise="")
+    assert export_all(study_on_disk) == Exported()
     assert contents(study_on_disk) == before
 
 
@@ -412,3 +463,39 @@ def test_levels_are_stored_untranslated_and_described_in_english(write_session) 
     described = json.loads((files.root / "participants.json").read_text(encoding="utf-8"))
     assert described["craft"]["Levels"] == {"一": "None", "二": "Some"}
     assert described["craft"]["Description"] == "Any craft?"
+
+
+def test_a_damaged_session_keeps_what_is_shown_of_it_and_costs_nobody_else_anything(
+    study_on_disk, write_session
+):
+    (log,) = study_on_disk.glob("sourcedata/sub-01/ses-01/*_task-absolute_log.jsonl")
+    log.write_bytes(log.read_bytes().replace(b'"trial": 4', b'"trial": "4"'))
+    before = contents(study_on_disk)
+    (told,) = export_all(study_on_disk).damaged
+    assert f"of {log}, got trial = '4'; restore" in told
+    assert contents(study_on_disk) == before
+    write_session("relative", subject=2)
+    assert beh_of(study_on_disk, "sub-02", "relative") in export_all(study_on_disk).new
+    after = contents(study_on_disk)
+    assert {name: after[name] for name in before if "sub-02_sessions" not in name} == {
+        name: data for name, data in before.items() if "sub-02_sessions" not in name
+    }
+    for named in ({}, {"task": "absolute"}, {"subject": 1}):
+        with pytest.raises(InputError, match=r"restore .*, or leave sub-01 out\.$"):
+            require_tables(study_on_disk, **named, otherwise="leave {who} out")
+    for others in ({"task": "threshold"}, {"subject": 2}, {"without": ["sub-01"]}):
+        require_tables(study_on_disk, **others, otherwise="")
+
+
+def beh_of(root: Path, participant: str, task: str) -> Path:
+    return root / participant / "ses-01/beh" / f"{participant}_ses-01_task-{task}_beh.tsv"
+
+
+def test_a_table_without_source_beside_others_with_it_is_left_alone(study_on_disk):
+    """As in data that were given to others without a part."""
+    for path in study_on_disk.glob("sourcedata/sub-01/ses-02/*"):
+        path.unlink()
+    before = contents(study_on_disk)
+    require_tables(study_on_disk, otherwise="")
+    assert export_all(study_on_disk) == Exported()
+    assert contents(study_on_disk) == before

@@ -23,6 +23,7 @@ VALUES = st.recursive(
     lambda inner: st.lists(inner, max_size=4) | st.dictionaries(TEXTS, inner, max_size=4),
     max_leaves=12,
 )
+OPENED = {"event": "opened", "manifest_sha256": "aa"}
 LINE = {"n": 1, "utc": "2026-11-22T09:30:00.125Z", "t_s": 0.5, "run": 1, "event": "phase"}
 
 
@@ -67,23 +68,23 @@ def test_what_json_has_no_word_for() -> None:
 
 
 def test_it_is_read_as_it_was_written(tmp_path: Path) -> None:
-    path = written(tmp_path / "log", event(told="zwölf\u2028\x85"), event(event="answer", row={}))
-    log = read_log(path)
-    assert [e["event"] for e in log.events] == ["phase", "answer"]
-    assert log.events[0]["told"] == "zwölf\u2028\x85"
+    lines = (event(**OPENED), event(told="zwölf\u2028\x85"), event(event="answer", row={}))
+    log = read_log(written(tmp_path / "log", *lines))
+    assert [e["event"] for e in log.events] == ["opened", "phase", "answer"]
+    assert log.events[1]["told"] == "zwölf\u2028\x85"
     assert log.cut == b""
 
 
 def test_wherever_the_last_line_is_cut_the_lines_before_it_are_read(tmp_path: Path) -> None:
     whole = line_of({**LINE, "n": 2, "told": "ü"})
     for end in range(len(whole)):
-        log = read_log(written(tmp_path / "log", event(), cut=whole[:end]))
+        log = read_log(written(tmp_path / "log", event(**OPENED), cut=whole[:end]))
         assert len(log.events) == 1
         assert log.cut == whole[:end]
 
 
 def test_a_tail_of_zeros_as_after_a_loss_of_power_is_no_line(tmp_path: Path) -> None:
-    log = read_log(written(tmp_path / "log", event(), cut=b'{"n": 2' + bytes(500)))
+    log = read_log(written(tmp_path / "log", event(**OPENED), cut=b'{"n": 2' + bytes(500)))
     assert len(log.events) == 1
 
 
@@ -97,13 +98,21 @@ def test_a_tail_of_zeros_as_after_a_loss_of_power_is_no_line(tmp_path: Path) -> 
         b'{"n": 2, "event": "phase"}\n',
         line_of({**LINE, "n": 3}),
         line_of({**LINE, "n": 2, "utc": "yesterday"}),
+        line_of({**LINE, "n": 2, "utc": "9999-12-31T23:59:59Z"}),
+        line_of({**LINE, "n": 2, "t_s": -1.0}),
+        line_of({**LINE, "n": 2, "run": 2}),
+        line_of({**LINE, "n": 2, "start_s": "soon"}),
+        line_of({**LINE, "n": 2, "event": "answer", "row": None}),
+        line_of({**LINE, "n": 2, "event": "ended", "status": "complxte"}),
         line_of({**LINE, "n": 2})[:-2] + b', "x": NaN}\n',
+        line_of({**LINE, "n": 2})[:-2] + b', "x": 1e400}\n',
+        line_of({**LINE, "n": 2})[:-2] + b', "x": ' + b"9" * 310 + b"}\n",
         line_of({**LINE, "n": 2})[:40] + b"\n",
         b"[" * 100_000 + b"\n",
     ],
 )
 def test_a_whole_line_that_is_no_event_is_named(tmp_path: Path, line: bytes) -> None:
-    path = written(tmp_path / "log", event(), cut=line)
+    path = written(tmp_path / "log", event(**OPENED), cut=line)
     with pytest.raises(InputError, match=r"line 2 of .*log.*restore the file") as refused:
         read_log(path)
     assert len(str(refused.value)) < 400
@@ -111,7 +120,7 @@ def test_a_whole_line_that_is_no_event_is_named(tmp_path: Path, line: bytes) -> 
 
 
 def test_a_lost_line_is_noticed(tmp_path: Path) -> None:
-    path = written(tmp_path / "log", event(), event(), event())
+    path = written(tmp_path / "log", event(**OPENED), event(), event())
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(lines[0] + lines[2])
     with pytest.raises(InputError, match=r"line 2 of .*n = 3"):

@@ -151,16 +151,60 @@ def test_a_full_disk_enrolls_nobody(tmp_path: Path, file_size_limit: object) -> 
     assert not enrolled(roster, 2, 3).known
 
 
+ENROLLED = '{"utc": "", "event": "enrolled", "subject": %s, "slot": %s, "code": "TAKI-46", '
+ENROLLED += '"simulated": false, "pilot": false}'
+
+
 @pytest.mark.parametrize(
-    "line", ['{"event": "enrolled"}', '{"event": "dropped", "subject": 9}', "x", "[]"]
+    "line",
+    [
+        '{"event": "enrolled"}',
+        '{"event": "dropped", "subject": 9}',
+        '{"event": "dropped", "subject": []}',
+        '{"event": {}, "subject": 1}',
+        "x",
+        "[]",
+        ENROLLED % ('"3"', 3),
+        ENROLLED % (3, 2.5),
+        ENROLLED % (3, 0),
+        ENROLLED % (1, 3),
+        ENROLLED % (1e400, 3),
+    ],
 )
-def test_what_is_no_roster_is_refused(tmp_path: Path, line: str) -> None:
+def test_a_damaged_line_is_named_and_nobody_new_gets_what_may_stand_there(
+    tmp_path: Path, line: str
+) -> None:
     roster = Roster(tmp_path)
-    enrolled(roster, 1, 3)
-    with roster.path.open("a") as file:
-        file.write(line + "\n")
-    with pytest.raises(InputError, match=r"line 2 of .*restore the file"):
-        roster.subjects()
+    first, last = enrolled(roster, 1, 4), enrolled(roster, 2, 4)
+    one, other = roster.path.read_bytes().splitlines(keepends=True)
+    roster.path.write_bytes(one + line.encode() + b"\n" + other)
+    before = roster.path.read_bytes()
+    assert roster.listed().damaged == f"line 2 of {roster.path}"
+    for subject in (None, 3):
+        with pytest.raises(InputError, match=r"got line 2 of .*restore the file"):
+            enrolled(roster, subject, 4)
+    with pytest.raises(InputError, match=r"not on .*damaged \(line 2 of"):
+        roster.withdraw(3)
+    assert roster.path.read_bytes() == before
+    # Who can be read goes on, drops out and withdraws; the damaged line stays for whose it is.
+    assert [enrolled(roster, n, 4).code for n in (1, 2)] == [first.code, last.code]
+    roster.drop(1)
+    roster.withdraw(2)
+    assert {n: p["left"] for n, p in roster.subjects().items()} == {1: "dropped", 2: "withdrawn"}
+    assert line.encode() in roster.path.read_bytes()
+    assert last.code.encode() not in roster.path.read_bytes()
+
+
+def test_a_lost_line_of_who_left_gives_no_slot_to_two(tmp_path: Path) -> None:
+    roster = Roster(tmp_path)
+    enrolled(roster, 1, 2)
+    roster.drop(1)
+    assert enrolled(roster, 3, 2).slot == 1
+    lines = roster.path.read_bytes().splitlines(keepends=True)
+    roster.path.write_bytes(lines[0] + lines[2])
+    with pytest.raises(InputError, match="slot 1 to be that of subject 1 alone"):
+        enrolled(roster, 1, 2)
+    assert enrolled(roster, 3, 2).slot == 1
 
 
 def test_a_task_with_more_participants_gets_all_its_slots_after_a_dropout(tmp_path: Path) -> None:

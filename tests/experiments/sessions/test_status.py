@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 import pytest
 
 from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.roster import Roster
 from experiments.sessions.status import TaskProgress, study_progress
 from experiments.sessions.store import SessionStore
 from experiments.sessions.withdrawing import drop_out, withdraw
@@ -54,6 +55,23 @@ def test_the_next_session_is_the_first_that_is_not_complete(write_session):
         write_session(task)
     assert due(root) == ""
     assert [task.complete for task in study_progress(root).tasks] == [1, 2, 1, 1]
+
+
+@pytest.mark.parametrize("ending", ["manifest.json", "log.jsonl"])
+def test_a_damaged_session_is_one_and_the_others_stand_as_they_do(write_session, ending):
+    files = write_session()
+    write_session(subject=2)
+    path = files.named(ending)
+    path.write_bytes(path.read_bytes().replace(b'"utc"', b'"utx"').replace(b'"plan', b'"plam'))
+    damaged, other = study_progress(files.root).people
+    assert [(one.status, one.planned) for one in damaged.sessions] == [("damaged", 0)]
+    assert [(one.status, one.answered) for one in other.sessions] == [("complete", 7)]
+    assert (damaged.due, other.due) == ("absolute is damaged", "relative 1")
+    roster = Roster(files.root).path
+    roster.write_bytes(b"x" + roster.read_bytes())
+    progress = study_progress(files.root)
+    assert [person.subject for person in progress.people] == [2]
+    assert progress.damaged == (f"line 1 of {roster}",)
 
 
 def test_who_left_counts_no_more(write_session):

@@ -493,7 +493,7 @@ def test_people_and_simulations_never_share_a_folder(
     ("changed", "what", "told"),
     [
         (
-            {"study": {"name": "Small", "seed": 4, "data_license": "CC0"}, "study_sha256": "x"},
+            {"study": {"name": "Small", "seed": 4, "data_license": "CC0"}},
             "study",
             "expected a data folder of this study, got another seed",
         ),

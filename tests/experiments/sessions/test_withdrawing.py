@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from experiments.sessions import withdrawing
-from experiments.sessions.bids import export_all
+from experiments.sessions.bids import Exported, export_all
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
@@ -82,7 +82,7 @@ def test_the_last_one_leaves_an_empty_list(root):
     withdraw(root, 1)
     withdraw(root, 2)
     assert (root / "participants.tsv").read_text().count("\n") == 1
-    assert export_all(root) == ()
+    assert export_all(root) == Exported()
 
 
 @pytest.mark.parametrize("broken", ["sourcedata", "sub-01"])

@@ -1,0 +1,183 @@
+"""What BIDS shows of one session: answers, events and the hand, made from what it wrote.
+
+docs/method/protocols.md#bids
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions import bids_events
+from experiments.sessions.bids_tables import json_bytes, table_bytes
+from experiments.sessions.files import SessionFiles
+from experiments.sessions.held import Held
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
+from experiments.sessions.traces import HAND_COLUMNS
+from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.documents import read_json_object
+from modeling.files.hashes import sha256_of_paths
+
+Made = dict[Path, bytes]
+
+
+def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
+    """All files of a session, and which rows of its traces are damaged and not in them.
+
+    The last file is the sidecar that says that the others are there, and what is not in them. The
+    hand at a regular rate takes longest to make: it is taken as it is there where the sidecar says
+    that it was made from the same files.
+    """
+    files = held.files
+    runs = {event["run"] for event in held.state.events}
+    sources = _sources(files)
+    sidecar = files.answers.with_suffix(".json")
+    shown, lost_rows = presentation_rows(files.named("presentations.tsv"), runs=runs)
+    hand, lost_readings = _hand_there(sidecar, sources) or _hand(held, runs)
+    made = {**_answers(held), **_events(held, shown), **hand}
+    lost = {"presentations": lost_rows, "hand": lost_readings}
+    damaged = {name: list(told) for name, told in lost.items() if told}
+    made[sidecar] = json_bytes(
+        {
+            **_circumstances(held),
+            "DerivedFrom": sources,
+            **({"Damaged": damaged} if damaged else {}),
+            "Files": {path.name: hashlib.sha256(data).hexdigest() for path, data in made.items()},
+            **{c.name: c.sidecar() for c in ANSWER_TABLES[held.manifest.task]},
+        }
+    )
+    return made, (*lost_rows, *lost_readings)
+
+
+def _answers(held: Held) -> Made:
+    names = [column.name for column in ANSWER_TABLES[held.manifest.task]]
+    return {held.files.answers: table_bytes(names, held.state.rows)}
+
+
+def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
+    rows = bids_events.event_rows(held.state.events, presentations)
+    table = held.files.beh / f"{held.files.stem}_events.tsv"
+    columns = {name: dict(told) for name, told in bids_events.COLUMNS.items()}
+    columns["trial_type"]["Levels"] = bids_events.trial_types(rows)
+    manifest = held.manifest
+    sidecar = {
+        "TaskName": manifest.task,
+        "TaskDescription": manifest.description,
+        "StimulusPresentation": {
+            "SoftwareName": "tactileq",
+            "SoftwareVersion": manifest.program["versions"].get("tactileq", "not stated"),
+            "OperatingSystem": manifest.program["platform"],
+        },
+        **columns,
+    }
+    return {table: table_bytes(columns, rows), table.with_suffix(".json"): json_bytes(sidecar)}
+
+
+def _hand(held: Held, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
+    """A file for each start of the session, whose rig has a clock of its own."""
+    path = held.files.named("hand.tsv")
+    found = hand_rows(path, runs=runs)
+    if not found.rows:
+        return {}, found.damaged
+    from experiments.sessions import bids_physio  # late: pandas takes longer to load than all else
+
+    onsets = bids_events.onsets_s(held.state.events)
+    made, damaged = {}, [*found.damaged]
+    for run, readings in bids_physio.by_run(_readings(found)).items():
+        if wrong := bids_physio.damaged_readings(readings):
+            damaged.append(f"{wrong} {path.name}, so no table of start {run}")
+            continue
+        stem = held.files.beh / f"{held.files.stem}_recording-start{run}_physio"
+        start_s = bids_physio.start_onset_s(readings, held.state.events, onsets, run=run)
+        made[Path(f"{stem}.json")] = json_bytes(
+            {
+                "SamplingFrequency": bids_physio.RATE_HZ,
+                "StartTime": start_s,
+                "Columns": list(bids_physio.COLUMNS),
+                "TaskName": held.manifest.task,
+                "PhysioType": "generic",
+                **_simulated(held.manifest),
+                **bids_physio.COLUMNS,
+            }
+        )
+        regular = bids_physio.at_regular_times(readings)
+        made[Path(f"{stem}.tsv.gz")] = bids_physio.physio_bytes(regular)
+    return made, tuple(damaged)
+
+
+def _readings(found: TraceRows) -> Any:
+    """A DataFrame of the hand's readings, its index the lines of the file."""
+    import pandas as pd
+
+    text = io.BytesIO(b"\n".join(found.rows))
+    hand = pd.read_csv(text, sep="\t", header=None, names=list(HAND_COLUMNS))
+    return hand.set_axis(list(found.lines), axis=0)
+
+
+def _hand_there(sidecar: Path, sources: Mapping[str, str]) -> tuple[Made, tuple[str, ...]] | None:
+    """The hand's files as they were made from the same sources; None where they are not there."""
+    try:
+        stated = read_json_object(sidecar, advice="")
+        names = [name for name in stated["Files"] if "_recording-" in name]
+        made = {sidecar.parent / name: (sidecar.parent / name).read_bytes() for name in names}
+        damaged = [str(row) for row in stated.get("Damaged", {}).get("hand", [])]
+        hashes = [hashlib.sha256(data).hexdigest() for data in made.values()]
+        as_made = hashes == [stated["Files"][name] for name in names]
+    except (InputError, OSError, KeyError, AttributeError, TypeError, ValueError):
+        return None
+    if not as_made or stated.get("DerivedFrom") != sources:
+        return None
+    return made, tuple(damaged)
+
+
+def _circumstances(held: Held) -> dict[str, Any]:
+    """What was the same in all trials."""
+    manifest = held.manifest
+    study = manifest.study
+    plan = study.get(manifest.task, {})
+    overrides = [*manifest.overrides]
+    for event in held.state.events:
+        if event["event"] == "opened":
+            overrides += [o for o in event.get("overrides", ()) if o not in overrides]
+    return {
+        "TaskName": manifest.task,
+        "TaskDescription": manifest.description,
+        "StudyName": study.get("name", "not stated"),
+        "Masking": study.get("masking", "not stated"),
+        "SurfaceVisible": study.get("surface_visible", "not stated"),
+        "Schedule": plan.get("schedule", "not stated"),
+        "Status": held.state.status,
+        "Starts": held.state.runs,
+        **_simulated(manifest),
+        "Pilot": manifest.pilot,
+        "StudySHA256": manifest.study_sha256,
+        "PlanSHA256": manifest.plan_sha256,
+        "ModelsSHA256": manifest.models_sha256,
+        "Identical": manifest.identical,
+        "Overrides": overrides,
+        "Rig": manifest.rig,
+    }
+
+
+def _simulated(manifest: SessionManifest) -> dict[str, bool]:
+    return {
+        "Simulated": manifest.simulated,
+        "SimulatedParticipant": manifest.simulated_participant,
+        "SimulatedRig": manifest.simulated_rig,
+    }
+
+
+def _sources(files: SessionFiles) -> dict[str, str]:
+    """SHA-256 of what the files of a session are made from."""
+    paths = {
+        "manifest": files.manifest,
+        "log": files.log,
+        **{name: files.named(f"{name}.tsv") for name in ("hand", "presentations")},
+    }
+    hashes = sha256_of_paths(paths.values())
+    return {name: hashes[str(path)] for name, path in paths.items() if str(path) in hashes}

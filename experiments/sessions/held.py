@@ -1,0 +1,132 @@
+"""The sessions of a data set as they are read: those that can be, and those that are damaged.
+
+What a session stored is checked here, once, before anything is made of it. Damage costs the session
+whose file is damaged and no other one (docs/method/protocols.md#damage).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from experiments.sessions.files import SessionFiles, sessions_in
+from experiments.sessions.log import Event
+from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.state import SessionState, session_state
+from modeling import InputError
+from modeling.checks import is_whole
+from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.reading import read_bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held:
+    """One session that there is: its files, its manifest, and how it stands."""
+
+    files: SessionFiles
+    manifest: SessionManifest
+    state: SessionState
+
+    @property
+    def running(self) -> bool:
+        """Whether a process runs it now."""
+        return self.state.status == "running"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Damaged:
+    """One session whose manifest or log cannot be read, and why, in one sentence."""
+
+    files: SessionFiles
+    told: str
+
+
+def held_session(files: SessionFiles) -> Held:
+    """Read one session.
+
+    Raises
+    ------
+    InputError
+        If its manifest or its log cannot be read, they do not belong together, or an answer
+        cannot be one of its task.
+    """
+    # The log first: a session that begins meanwhile has its manifest by then.
+    state = session_state(files.log)
+    manifest = SessionManifest.load(files.manifest)
+    _check_place(manifest, files)
+    _check_logged(state.events, files)
+    _check_named(state.events, files)
+    _check_rows(state.events, files)
+    return Held(files=files, manifest=manifest, state=state)
+
+
+def held_sessions(data_folder: str | Path) -> tuple[list[Held], list[Damaged]]:
+    """All sessions of a data set that have a manifest, by subject, session and task."""
+    held, damaged = [], []
+    for files in sessions_in(data_folder):
+        try:
+            held.append(held_session(files))
+        except InputError as error:
+            damaged.append(Damaged(files=files, told=str(error)))
+    return held, damaged
+
+
+def participants_of(sessions: Iterable[Held | Damaged]) -> frozenset[str]:
+    """Whose sessions these are, as sub-01."""
+    return frozenset(one.files.participant for one in sessions)
+
+
+def _check_logged(events: Sequence[Event], files: SessionFiles) -> None:
+    """Refuse a session of which only the tables are left: begun again, it would replace them."""
+    if not events and files.answers.is_file():
+        raise InputError(
+            f"expected the log of the answers in {files.answers} at {files.log}, got none; restore "
+            "that file from a copy."
+        )
+
+
+def _check_named(events: Sequence[Event], files: SessionFiles) -> None:
+    """Refuse a manifest that is not the one with which the log began."""
+    stored = hashlib.sha256(read_bytes(files.manifest, "the manifest of a session")).hexdigest()
+    if events and events[0]["manifest_sha256"] != stored:
+        raise InputError(
+            f"expected the manifest that {files.log} names, got a changed {files.manifest}; "
+            "restore that file from a copy."
+        )
+
+
+def _check_place(manifest: SessionManifest, files: SessionFiles) -> None:
+    named = manifest.files(files.root)
+    if named != files or files.task not in ANSWER_TABLES:
+        raise InputError(
+            f"expected the manifest of {files.stem}, a session of a task of "
+            f"{', '.join(ANSWER_TABLES)}, in {files.manifest}, got that of {shown(named.stem)}; "
+            "restore the file from a copy, or update tactileq if the session is newer."
+        )
+
+
+def _check_rows(events: Iterable[Event], files: SessionFiles) -> None:
+    for event in events:
+        if event["event"] == "answer" and (wrong := _wrong_in(event["row"], files.task)):
+            raise InputError(
+                f"expected an answer to the task {files.task} in line {event['n']} of {files.log}, "
+                f"got {wrong}; restore the file from a copy."
+            )
+
+
+def _wrong_in(row: Mapping[str, Any], task: str) -> str:
+    """The first value of an answer that cannot be one; empty where there is none."""
+    columns = ANSWER_TABLES[task]
+    for column in columns:
+        value = row.get(column.name)
+        whole = column.name not in _WHOLE or value is None or is_whole(value)
+        if not (whole and column.holds(value)):
+            return f"{column.name} = {shown(value)}"
+    return ""
+
+
+_WHOLE = ("trial", "run", "valid", "repeats")

@@ -1,0 +1,95 @@
+"""The rows of a session's traces, line by line: one that is damaged costs itself, and is named."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
+from modeling import InputError
+from modeling.files.reading import read_bytes
+from rig.interface import SURFACES
+
+_WHOLE = r"\d{1,9}"
+# As `tables.cell` writes them: ten digits; no more than a floating-point number can have.
+_NUMBER = r"-?\d{1,20}(?:\.\d{1,20})?(?:e-\d{1,3}|e\+\d{1,2})?"
+_CELLS = {
+    **dict.fromkeys(("run", "trial", "presentation"), rf"({_WHOLE})"),
+    "time_s": _NUMBER,
+    "start_s": _NUMBER,
+    "end_s": _NUMBER,
+    "surface": "|".join(SURFACES),
+    "force_assumed": "[01]",
+    **dict.fromkeys(("texture", "model_sha256", "faults"), r"[^\t]*"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TraceRows:
+    """The rows of one table that can be read.
+
+    Parameters
+    ----------
+    rows : list of bytes
+        Lines of cells, whole and as sessions write them.
+    lines : list of int
+        In which line of the file each one stands.
+    damaged : tuple of str
+        What cannot be read, by line and file; empty where all can.
+    """
+
+    rows: Sequence[bytes] = ()
+    lines: Sequence[int] = ()
+    damaged: tuple[str, ...] = ()
+
+
+def hand_rows(path: Path, *, runs: Collection[int]) -> TraceRows:
+    """The readings of the hand in these starts of the session; none where there is no file."""
+    return _rows(path, tuple(HAND_COLUMNS), runs=runs)
+
+
+def presentation_rows(
+    path: Path, *, runs: Collection[int]
+) -> tuple[list[dict[str, str]], tuple[str, ...]]:
+    """The presentations in these starts of the session as text, and what is damaged."""
+    found = _rows(path, tuple(PRESENTATION_COLUMNS), runs=runs)
+    cells = (row.decode("utf-8", "replace").split("\t") for row in found.rows)
+    return [dict(zip(PRESENTATION_COLUMNS, row, strict=True)) for row in cells], found.damaged
+
+
+def _rows(path: Path, columns: tuple[str, ...], *, runs: Collection[int]) -> TraceRows:
+    if not path.is_file():
+        return TraceRows()
+    try:
+        data = read_bytes(path, "a table of a session")
+    except InputError as error:
+        return TraceRows(damaged=(str(error),))
+    # What follows the last line end is of a process that was killed.
+    lines = data.split(b"\n")[:-1]
+    if not lines:
+        return TraceRows()
+    header, *others = lines
+    if header != "\t".join(columns).encode():
+        return TraceRows(damaged=(f"line 1 of {path.name}, without which no other can be read",))
+    row = re.compile("\t".join(f"(?:{_cell(name)})" for name in columns).encode())
+    known = {str(run).encode() for run in runs}
+    fits = [(found := row.fullmatch(line)) is not None and found[1] in known for line in others]
+    numbers = range(2, len(others) + 2)
+    wrong = [number for number, fit in zip(numbers, fits, strict=True) if not fit]
+    return TraceRows(
+        rows=[line for line, fit in zip(others, fits, strict=True) if fit],
+        lines=[number for number, fit in zip(numbers, fits, strict=True) if fit],
+        damaged=(_told(wrong, path),) if wrong else (),
+    )
+
+
+def _cell(name: str) -> str:
+    return _CELLS.get(name, rf"{_NUMBER}|n/a")
+
+
+def _told(lines: Sequence[int], path: Path) -> str:
+    more = len(lines) - 1
+    others = f" and {more} more line{'s' * (more > 1)}" if more else ""
+    return f"line {lines[0]}{others} of {path.name}"
