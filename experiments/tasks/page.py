@@ -64,9 +64,12 @@ def _design(study: Study, task: str) -> Iterator[str]:
     training, main = trials_of_session(study, task)
     yield f"**{task.capitalize()} task.** {task_named(task).description}"
     yield ""
-    yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
-    times = "comes" if task == "oddity" else "comes with each model"
-    yield f"- Each texture {times} {_times(plan.repeats)}."
+    if task == "threshold":
+        yield f"- Each frequency comes {_times(plan.repeats)}."
+    else:
+        yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
+        times = "comes" if task == "oddity" else "comes with each model"
+        yield f"- Each texture {times} {_times(plan.repeats)}."
     yield (
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
         f"about {minutes_of_session(study, task)} minutes (an estimate)."
