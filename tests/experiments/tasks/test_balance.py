@@ -17,7 +17,7 @@ from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from experiments.tasks.balance import balance_of
 from experiments.tasks.durations import minutes_of_session, trials_of_session
-from experiments.tasks.page import plan_page
+from experiments.tasks.page import plan_page, proof_of_sensitivity
 from modeling import InputError, TextureModel, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES
 
@@ -117,12 +117,12 @@ def test_every_button_is_right_equally_often_in_the_oddity_task(
 
 
 def test_minutes_are_those_of_trials_and_breaks() -> None:
-    # 2 + 14 trials of 50 s and 5 min, and a break of 2 min after 5 and after 10 of 14 trials.
+    # 2 + 16 trials of 50 s and 5 min, and a break of 2 min after 5, 10 and 15 of 16 trials.
     paper = Study.load()
-    assert minutes_of_session(paper, "absolute") == round((16 * 50 + 300) / 60)
+    assert minutes_of_session(paper, "absolute") == round((18 * 50 + 300) / 60)
     breaks = replace(paper.plan_of("absolute"), break_after=5)
     slower = replace(paper, tasks={"absolute": breaks})
-    assert minutes_of_session(slower, "absolute") == round((16 * 50 + 300 + 240) / 60)
+    assert minutes_of_session(slower, "absolute") == round((18 * 50 + 300 + 360) / 60)
 
 
 @pytest.fixture
@@ -163,9 +163,25 @@ def test_the_page_says_all_that_is_fixed(planned: Study, models: ModelSets) -> N
         "real canvas beside the full model of PVC",
         "A break after every 4 trials",
         "each on a day of its own (2 sessions)",
+        "No equality unless the anchors are rated lower",
     ):
         assert told in page
     assert plan_page(Study.from_dict(planned.to_dict()), models) == page
+
+
+def test_each_claim_says_what_its_equality_hangs_on(planned: Study) -> None:
+    (rated,) = planned.plan.claims
+    chosen, odd = (
+        replace(rated, task=task, measure="correct", bounds=(-0.1, 0.1))
+        for task in ("relative", "oddity")
+    )
+    oddity = TaskPlan(participants=3, schedule="interleaved", repeats=2)
+    bare = replace(planned.plan_of("absolute"), anchors={})
+    study = replace(planned, tasks={**planned.tasks, "absolute": bare, "oddity": oddity})
+    assert "anchors are rated lower" in proof_of_sensitivity(planned, rated)
+    assert "give it anchors" in proof_of_sensitivity(study, rated)
+    assert "full models are recognised" in proof_of_sensitivity(study, chosen)
+    assert "No equality in any case" in proof_of_sensitivity(study, odd)
 
 
 def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:
