@@ -22,7 +22,7 @@ from analysis.figures.drawing import (
     VERMILLION,
     stamp_if_simulated,
 )
-from analysis.statistics.claims import CONTROL, INTERIM, WITHHELD
+from analysis.statistics.claims import BOUNDS_WITHHELD, CONTROL, WITHHELD
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.verdicts import ClaimFound
 
@@ -33,7 +33,7 @@ MARKS = {
     WITHIN_BOUNDS: ("s", ORANGE),
     INCONCLUSIVE: ("^", PURPLE),
     WITHHELD: ("v", GREEN),
-    INTERIM: ("P", BLACK),
+    BOUNDS_WITHHELD: ("P", GREEN),
     CONTROL: ("x", GREY),
     "": ("d", GREY),
 }
@@ -49,7 +49,7 @@ def figure_forest(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:
     Parameters
     ----------
     found : sequence of ClaimFound
-        A panel each, with at least one row.
+        A panel each, with at least one row; of finished tasks.
     simulated : bool
         Written into the figure.
     """
@@ -116,5 +116,5 @@ def _legend(found: Sequence[ClaimFound]) -> list[Line2D | Patch]:
         Line2D([], [], color=GREY, lw=1.2, label="95 % CI"),
     ]
     if any(one.claim.bounds is not None for one in found):
-        handles.append(Patch(color=GREY, alpha=0.15, label="within the bounds"))
+        handles.append(Patch(color=GREY, alpha=0.15, label="bounds"))
     return handles

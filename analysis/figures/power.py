@@ -25,7 +25,7 @@ from analysis.figures.drawing import (
     stamp_if_simulated,
 )
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import WITHHELD
+from analysis.statistics.claims import BOUNDS_WITHHELD, WITHHELD
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.power import EVERY_TEXTURE, NO_VERDICT, TARGET
 
@@ -36,6 +36,7 @@ STYLES = {
     DIFFERENT: (VERMILLION, "s", "-"),
     INCONCLUSIVE: (ORANGE, "D", "--"),
     WITHHELD: (PURPLE, "v", ":"),
+    BOUNDS_WITHHELD: (BLACK, "h", "--"),
     NO_VERDICT: (GREY, "X", ":"),
     EVERY_TEXTURE: (SKY_BLUE, "P", "-."),
 }

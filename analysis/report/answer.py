@@ -11,9 +11,14 @@ from analysis.report.claim_sentences import (
     by_verdict,
     difference,
     overall_row,
-    why_withheld,
 )
-from analysis.statistics.claims import INTERIM, WITHHELD
+from analysis.statistics.claims import (
+    BOUNDS_WITHHELD,
+    DIFFERENCES,
+    INTERIM,
+    WITHHELD,
+    WITHOUT_EQUALITY,
+)
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.verdicts import ClaimFound
 
@@ -24,6 +29,7 @@ WORDS = {
     DIFFERENT: "different in",
     INCONCLUSIVE: "inconclusive in",
     WITHHELD: "not called equivalent in",
+    BOUNDS_WITHHELD: "different, without a word on the bounds, in",
     INTERIM: "no verdict before the study is complete on",
     NO_TEST: "it cannot be told yet, for want of complete answers, in",
 }
@@ -93,10 +99,12 @@ def _parts(found: Sequence[ClaimFound]) -> list[str]:
         words = WORDS[verdict]
         if verdict == INCONCLUSIVE and one.claim.bounds is None:
             words = NO_BOUNDS
-        shown = "90%" if one.claim.bounds is not None else "95%"
-        told = f"{_what(one, found)} {difference(one, row, confidence=shown)}"
-        if verdict == WITHHELD:
-            told += f", since {why_withheld(one, row)}"
+        told = _what(one, found)
+        if verdict != INTERIM:
+            shown = "90%" if one.claim.bounds is not None else "95%"
+            told += f" {difference(one, row, confidence=shown)}"
+        if verdict in WITHOUT_EQUALITY:
+            told += f", since {row['doubt']}"
         groups.setdefault(words, []).append(told)
     return [f"{words} {' and '.join(told)}" for words, told in groups.items()]
 
@@ -117,7 +125,7 @@ def _differing_textures(found: Sequence[ClaimFound]) -> str:
     named = {}
     for one in found:
         groups = by_verdict(one)
-        rows = groups.get(DIFFERENT, []) + groups.get(WITHIN_BOUNDS, [])
+        rows = [row for verdict in DIFFERENCES for row in groups.get(verdict, [])]
         if rows:
             named[_what(one, found)] = ", ".join(sorted(str(row["texture"]) for row in rows))
     if not named:

@@ -83,12 +83,15 @@ METHODS_NOTE = (
     "counted at 5 kHz, updates included; at most: of a sample with an update. Layers: −1 where "
     "there are none to count. Distances are log-spectral, from the known truth, or smoothed from "
     "recordings; while stroking as the hand goes to and fro. Time: rendering alone, all methods in "
-    "turn in one process; FFT-shaped noise in NumPy."
+    "turn in one process; FFT-shaped noise in NumPy. Operations and times of autoregressive "
+    "filters hold coefficients made anew at every update, which ours read from a table: they "
+    "do not compare."
 )
 COMPARISON_NOTE = (
     "The rival over joint, geometric means over surfaces, with Student's t intervals (95%) of the "
     "logarithms. One dominates another if it takes no more operations and is nearer to the truth, "
-    "the upper ends of both intervals being at most 1."
+    "the upper ends of both intervals being at most 1. Operations of autoregressive filters are "
+    "not compared: they hold coefficients made anew at every update, which ours read from a table."
 )
 
 
@@ -126,7 +129,9 @@ def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
             f"chart_{kind}",
             f"Speed against accuracy: {KINDS[kind]}",
             "To the left is cheaper, below is nearer to the truth. The black line joins what no "
-            "other variant beats in both; how to read it: docs/chart.md.",
+            "other variant beats in both. Autoregressive filters stand too far to the right: their "
+            "coefficients are made anew at every update, ours read from a table. How to read it: "
+            "docs/chart.md.",
             figure_chart(chart, kind),
             bool(chart.summary["simulated"].any()),
         )

@@ -11,8 +11,13 @@ from analysis.columns import p_value
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.sentences import signed
-from analysis.statistics.claims import CONTROL, WITHHELD, all_equivalent
-from analysis.statistics.equivalence import DIFFERENT, WITHIN_BOUNDS
+from analysis.statistics.claims import (
+    CONTROL,
+    DIFFERENCES,
+    INTERIM,
+    WITHOUT_EQUALITY,
+    all_equivalent,
+)
 from analysis.statistics.verdicts import ClaimFound
 
 Row = Mapping[Hashable, Any]
@@ -20,14 +25,19 @@ NO_TEST = "no test"
 
 
 def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
-    """For each claim a sentence on all textures together, and one on each of them."""
+    """For each claim a sentence on all textures together, and one on each of them.
+
+    Of an unfinished task one sentence alone, which tells no effect.
+    """
     outcomes = []
     for one in found:
         row = overall_row(one)
         if row is not None:
             outcomes.append(Outcome(Weight.OVERALL, _overall(one, row)))
+        if one.standing.unfinished:
+            continue
         textures = by_verdict(one)
-        differ = {DIFFERENT, WITHIN_BOUNDS} & textures.keys()
+        differ = set(DIFFERENCES) & textures.keys()
         weight = Weight.TEXTURES if differ else Weight.SECONDARY
         outcomes.append(Outcome(weight, _textures(one, textures)))
     return outcomes
@@ -66,17 +76,6 @@ def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
     return f"{signed(middle, 1)} {unit} ({interval})"
 
 
-def why_withheld(found: ClaimFound, row: Row) -> str:
-    """Why no equality is concluded from a row, though the test would."""
-    standing = found.standing
-    if standing.insensitive:
-        return standing.insensitive
-    return (
-        f"{row['share_at_ends']:.0%} of the ratings lie at an end of the scale (at most "
-        f"{standing.highest_share_at_ends:.0%} were planned)"
-    )
-
-
 def comparison(found: ClaimFound) -> str:
     """What is subtracted from what."""
     reference, other = found.claim.models
@@ -88,37 +87,42 @@ def comparison(found: ClaimFound) -> str:
 def _overall(found: ClaimFound, row: Row) -> str:
     verdict = row["verdict"] or NO_TEST
     told = f"{found.claim.name} ({MEASURES[found.claim.measure]}, {comparison(found)}): {verdict}"
-    if verdict == WITHHELD:
-        told += f", since {why_withheld(found, row)}"
-    told += f"; {difference(found, row, confidence='90%')}"
+    if verdict in WITHOUT_EQUALITY:
+        told += f", since {row['doubt']}"
+    if verdict != INTERIM:
+        told += f"; {difference(found, row, confidence='90%')}{_tests(row)}"
+    return f"{told[0].upper()}{told[1:]} (participants: {row['n']})."
+
+
+def _tests(row: Row) -> str:
+    """The tests of a row; those that speak for equality only where no doubt stands against it."""
+    told = ""
     if np.isfinite(row["t"]):
         told += f", t({row['df']:.0f}) = {signed(row['t'], 2)}"
     if np.isfinite(row["p"]):
         told += f", {_p(row['p'])}"
-    if np.isfinite(row["p_equivalence"]):
+    if np.isfinite(row["p_equivalence"]) and not row["doubt"]:
         told += f", TOST {_p(row['p_equivalence'])}"
     if np.isfinite(row["d_z"]):
-        told += (
-            f", d_z = {signed(row['d_z'], 2)}, BF₀₁ = {row['bf01']:.2g} (at most "
-            f"{row['bf01_highest']:.2g} with so many)"
-        )
-    return f"{told[0].upper()}{told[1:]} (participants: {row['n']})."
+        told += f", d_z = {signed(row['d_z'], 2)}"
+        if not row["doubt"]:
+            told += f", BF₀₁ = {row['bf01']:.2g} (at most {row['bf01_highest']:.2g} with so many)"
+    return told
 
 
 def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
     parts = []
     for verdict, rows in groups.items():
-        if verdict in (DIFFERENT, WITHIN_BOUNDS):
-            shown = "; ".join(
+        shown = [str(row["texture"]) for row in rows]
+        if verdict in DIFFERENCES:
+            shown = [
                 f"{row['texture']} {difference(found, row)}, Holm {_p(row['p_holm'])}"
                 for row in rows
-            )
-            parts.append(f"{verdict}: {shown}")
-        elif verdict == WITHHELD:
-            shown = "; ".join(f"{row['texture']} ({why_withheld(found, row)})" for row in rows)
-            parts.append(f"{verdict}: {shown}")
-        else:
-            parts.append(f"{verdict}: {', '.join(str(row['texture']) for row in rows)}")
+            ]
+        if verdict in WITHOUT_EQUALITY:
+            shown = [f"{told} ({row['doubt']})" for told, row in zip(shown, rows, strict=True)]
+        apart = "; " if verdict in (*DIFFERENCES, *WITHOUT_EQUALITY) else ", "
+        parts.append(f"{verdict}: {apart.join(shown)}")
     if found.claim.bounds is not None and all_equivalent(found.tests):
         parts.append("every texture is equivalent at once (largest p of TOST below .05)")
     same = found.tests[found.tests["note"] == IDENTICAL]["texture"]

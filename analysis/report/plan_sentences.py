@@ -35,7 +35,7 @@ def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
         "participants, first on the mean over the textures whose models differ, each texture "
         "counting once, then for each texture with Holm's correction over the textures."
     )
-    sentences += _bounds(claims)
+    sentences += _bounds(found)
     sentences.append(
         "Effect sizes are d_z with intervals from the noncentral t distribution (Steiger & "
         "Fouladi, 1997); Bayes factors are those of Rouder et al. (2009; r = 0.707). Wilcoxon's "
@@ -110,9 +110,9 @@ def _who(responses: Responses, claims: Sequence[Claim]) -> str:
     return f"{told[:1].upper()}{told[1:]}."
 
 
-def _bounds(claims: Sequence[Claim]) -> list[str]:
-    """The smallest effects of interest, where some were fixed."""
-    bounded = [claim for claim in claims if claim.bounds is not None]
+def _bounds(found: Sequence[ClaimFound]) -> list[str]:
+    """The smallest effects of interest, where some were fixed, and where equality could be said."""
+    bounded = [one.claim for one in found if one.claim.bounds is not None]
     if not bounded:
         return []
     listed = "; ".join(
@@ -127,5 +127,20 @@ def _bounds(claims: Sequence[Claim]) -> list[str]:
         f"5% with bounds {when} ({listed}), with Holm's correction of its own. A claim is called "
         "equivalent where only the test of equivalence is significant, different where only that "
         "of a difference is, different but within bounds where both are, and inconclusive where "
-        "neither is."
+        f"neither is. {_sensitivity(found)}"
     ]
+
+
+def _sensitivity(found: Sequence[ClaimFound]) -> str:
+    """Whether people were shown to tell surfaces apart, claim by claim."""
+    states = "; ".join(
+        f"{one.claim.name}: {one.standing.sensitivity}"
+        for one in found
+        if one.claim.bounds is not None and not one.standing.unfinished
+    )
+    return (
+        "Words of equality were withheld where the data do not show that participants told "
+        "different surfaces apart (ratings: anchors rated lower than the textures' own models; "
+        "forced choice: the reference recognised above chance) or where too many ratings lie at an "
+        f"end of the scale{f' (sensitivity: {states})' if states else ''}."
+    )

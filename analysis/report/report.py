@@ -207,13 +207,18 @@ def _answer_sections(
     planted: Mapping[str, Mapping[str, float]] | None,
     rng: np.random.Generator,
 ) -> list[Section]:
-    """What people answered, and how far that can be relied on."""
+    """What people answered, and how far that can be relied on.
+
+    Models are compared in no answers of an unfinished task.
+    """
     shown = [one for one in found if len(one.tests)]
     if not shown:
         return []
     simulated = responses.simulated
-    by_task = {task: [one for one in shown if one.claim.task == task] for task in responses.answers}
-    sections: list[Section | None] = [verdict_section(shown, simulated=simulated, planted=planted)]
+    sections: list[Section | None] = [verdict_section(responses, shown, planted=planted)]
+    judged = [one for one in shown if not one.standing.unfinished]
+    finished = {t: own for t, own in responses.answers.items() if t not in responses.unfinished}
+    by_task = {task: [one for one in judged if one.claim.task == task] for task in finished}
     if by_task.get("absolute"):
         sections.append(rating_section(responses, by_task["absolute"]))
     if by_task.get("relative"):
@@ -221,19 +226,20 @@ def _answer_sections(
         models = models_of(responses, "relative")
         confused = confusion_section(responses.relative, models, simulated=simulated, rng=rng)
         sections.append(confused)
-    sections.append(oddity_section(shown, simulated=simulated))
-    sections.append(mixed_section(responses, shown, rng=rng))
-    pairs = list(dict.fromkeys(one.claim.models for one in shown))
+    sections.append(oddity_section(judged, simulated=simulated))
+    sections.append(mixed_section(responses, judged, rng=rng))
+    pairs = list(dict.fromkeys(one.claim.models for one in judged))
     speeds, hands = {}, {}
     for pair in pairs:
         same = list(responses.identical(pair))
-        different = {task: t[~t["texture"].isin(same)] for task, t in responses.answers.items()}
+        different = {task: t[~t["texture"].isin(same)] for task, t in finished.items()}
         speeds[pair] = speed_accuracy_section(different, models=pair, simulated=simulated, rng=rng)
         if hand is not None:
-            moved = hand[~hand["texture"].isin(same)]
+            moved = hand[~hand["texture"].isin(same) & hand["task"].isin(list(finished))]
             hands[pair] = hand_section(moved, models=pair, simulated=simulated, rng=rng)
     sections.append(of_pairs(speeds))
-    tasks = {task: responses.answers[task] for task, claims in by_task.items() if claims}
+    asked = {one.claim.task for one in shown}
+    tasks = {task: answers for task, answers in responses.answers.items() if task in asked}
     sections.append(
         reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
     )

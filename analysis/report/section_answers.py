@@ -42,21 +42,19 @@ CORRECT_RATES_SHOWN = (
 
 
 def verdict_section(
+    responses: Responses,
     found: Sequence[ClaimFound],
     *,
-    simulated: bool,
     planted: Mapping[str, Mapping[str, float]] | None = None,
 ) -> Section:
-    """Every claim with its tests; at least one. `planted` as in `verdicts.planted_verdicts`."""
-    picture = Picture(
-        "forest",
-        "Differences and their bounds",
-        "Mean differences over participants with 90% and 95% confidence intervals. Where the 90% "
-        "interval lies within the bounds (grey), a test of equivalence is significant, Holm's "
-        "correction left aside; where the 95% interval does not hold 0, a test of a difference is.",
-        figure_forest(found, simulated=simulated),
-        simulated,
-    )
+    """Every claim with its tests; at least one. `planted` as in `verdicts.planted_verdicts`.
+
+    Of claims about unfinished tasks the tables tell how many took part, and no effect.
+    """
+    simulated = responses.simulated
+    judged = [one for one in found if not one.standing.unfinished]
+    begun = dict.fromkeys(one.claim.task for one in found if one.standing.unfinished)
+    so_far = [_participants(responses, task) for task in begun]
     tests = pd.concat([one.tests for one in found], ignore_index=True)
     verdicts = Table(
         "claims",
@@ -65,7 +63,9 @@ def verdict_section(
         "who answered completely; then each texture, a family of its own with Holm's correction "
         "for tests of a difference and of equivalence (TOST) separately; identical models are "
         "controls. Differences and bounds in points of the scale, or shares of right answers. "
-        "The tests themselves are below.",
+        "Nothing is called equal, nor within bounds, where the last column says why not, whatever "
+        "p is. Of a task that lacks participants or sessions no effect is shown. The tests "
+        "themselves are below.",
         tests[names(VERDICT_COLUMNS)],
         VERDICT_COLUMNS,
         simulated,
@@ -76,7 +76,8 @@ def verdict_section(
         "Paired t-tests over participants, intervals 95%. d_z: mean difference over the standard "
         "deviation of the differences. BF₀₁: Bayes factor for no difference (JZS, r = 0.707). "
         "Beside them Shapiro and Wilk's test of the differences, Wilcoxon's signed-rank test, and "
-        "a permutation test that flips signs; where nobody varies, p is that of the sign flips.",
+        "a permutation test that flips signs; where nobody varies, p is that of the sign flips. "
+        "Where equality is withheld, neither TOST nor BF₀₁ speaks for it.",
         tests,
         TESTS_SHOWN,
         simulated,
@@ -85,14 +86,34 @@ def verdict_section(
         "verdicts",
         "Verdicts",
         (
-            picture,
+            *_forest(judged, simulated=simulated),
             verdicts,
-            *_setups_table(found, simulated=simulated),
-            *(_planted_table(found, planted),) * bool(planted),
+            *_setups_table(judged, simulated=simulated),
+            *(_planted_table(judged, planted),) * bool(planted and judged),
             Fold("Tests behind the verdicts", (detail,)),
         ),
         outcomes=tuple(claim_outcomes(found)),
+        done=tuple(sentence for sentence, _ in so_far),
+        tiles=tuple(tile for _, tile in so_far),
     )
+
+
+def _forest(judged: Sequence[ClaimFound], *, simulated: bool) -> tuple[Picture, ...]:
+    """The picture of all claims that may be judged; none where there is none."""
+    if not judged:
+        return ()
+    picture = Picture(
+        "forest",
+        "Differences and their bounds",
+        "Mean differences over participants with 90% and 95% confidence intervals. Where the 90% "
+        "interval lies inside the bounds (grey), a test of equivalence is significant, Holm's "
+        "correction left aside; where the 95% interval does not hold 0, a test of a difference is. "
+        "The verdict is told by the mark, as an interval inside the bounds is no equality where "
+        "people did not show that they tell surfaces apart.",
+        figure_forest(judged, simulated=simulated),
+        simulated,
+    )
+    return (picture,)
 
 
 def _setups_table(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Table, ...]:

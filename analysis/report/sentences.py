@@ -168,8 +168,8 @@ def cautions(
     sentences = []
     if unfinished:
         sentences.append(
-            f"The study is not complete ({'; '.join(unfinished)}): these results are preliminary, "
-            "there is no verdict, and p values do not hold where they decide whether to go on."
+            f"The study is not complete ({'; '.join(unfinished)}): of its claims there is neither "
+            "an effect nor a test before it is, since who sees them may stop or go on by them."
         )
     if simulated_participants:
         sentences.append(

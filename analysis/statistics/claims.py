@@ -5,9 +5,8 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import asdict, dataclass, field
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -17,7 +16,9 @@ from analysis.columns import TEXTURE, Column, P, chosen, names
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.statistics.equivalence import (
     ALPHA,
+    DIFFERENT,
     EQUIVALENT,
+    WITHIN_BOUNDS,
     Bounds,
     bayes_factor_null,
     equivalence_test,
@@ -32,8 +33,15 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
+from modeling.arrays import Floats
 
 WITHHELD = "equivalence withheld"
+BOUNDS_WITHHELD = "different, bounds withheld"
+# What is left of a verdict that says equality, where no equality may be concluded.
+_WITHOUT_EQUALITY = {EQUIVALENT: WITHHELD, WITHIN_BOUNDS: BOUNDS_WITHHELD}
+WITHOUT_EQUALITY = tuple(_WITHOUT_EQUALITY.values())
+DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
+SHOWN, NOT_TESTED = "shown", "sensitivity not tested"
 INTERIM = "interim, no verdict"
 CONTROL = "control"
 
@@ -73,6 +81,7 @@ CLAIM_COLUMNS = (
     Column("wilcoxon_p", "Wilcoxon p", is_p_value=True),
     Column("sign_flips_p", "sign flips p", is_p_value=True),
     Column("share_at_ends", "share at ends"),
+    Column("doubt", "no equality, since"),
     Column("excluded"),
     Column("note"),
 )
@@ -80,8 +89,10 @@ CLAIM_COLUMNS = (
 VERDICT_COLUMNS = chosen(
     CLAIM_COLUMNS,
     *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
-    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends"),
+    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends", "doubt"),
 )
+# Of a claim whose data are not complete: how many there are and how good, and no effect.
+_INTERIM = ("texture", "verdict", "n", "share_at_ends", "excluded")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -111,17 +122,53 @@ class Standing:
         Textures whose two models are the same: controls, described but never tested.
     highest_share_at_ends : float
         Above it no equality is concluded.
-    insensitive : str
-        Why people may not have been able to tell models apart had they differed; empty where the
-        data show that they are.
+    sensitivity : str
+        `SHOWN` where the data show that people told surfaces apart that differ; `NOT_TESTED` where
+        nothing in them could; else how they failed.
     unfinished : bool
         Whether participants or sessions are missing.
     """
 
     identical: Collection[str] = ()
     highest_share_at_ends: float = 1.0
-    insensitive: str = ""
+    sensitivity: str = NOT_TESTED
     unfinished: bool = False
+
+    def doubt(self, share_at_ends: float) -> str:
+        """Why no equality may be concluded, whatever the tests say; empty where it may.
+
+        docs/method/statistics.md#withheld
+
+        Parameters
+        ----------
+        share_at_ends : float
+            Share of the answers at an end of their scale; NaN of a measure that has none.
+        """
+        if self.sensitivity != SHOWN:
+            return self.sensitivity
+        if share_at_ends > self.highest_share_at_ends:
+            return (
+                f"{share_at_ends:.0%} of the ratings lie at an end of the scale (at most "
+                f"{self.highest_share_at_ends:.0%} were planned)"
+            )
+        return ""
+
+    def verdict(
+        self, p_difference: float, p_equivalence: float, *, share_at_ends: float = np.nan
+    ) -> str:
+        """The verdict of two tests, without words of equality where there is doubt.
+
+        Parameters
+        ----------
+        p_difference, p_equivalence : float
+            As for `equivalence.verdict`.
+        share_at_ends : float
+            As for `doubt`.
+        """
+        if self.unfinished:
+            return INTERIM
+        found = verdict(p_difference, p_equivalence)
+        return _WITHOUT_EQUALITY.get(found, found) if self.doubt(share_at_ends) else found
 
 
 def claim_tests(
@@ -143,12 +190,15 @@ def claim_tests(
         `CLAIM_COLUMNS`. The first row, of all textures, has complete participants only, each
         texture counting once, and is a family of its own. The textures are another, Holm for tests
         of difference and of equivalence separately; their verdicts rest on these. Identical
-        textures come last, without tests; where all are, there is nothing else.
+        textures come last, without tests; where all are, there is nothing else. Of an unfinished
+        task there are numbers of participants and shares at the ends, and no effect.
     """
     compared = values.table[~values.table["texture"].isin(list(standing.identical))]
     controls = _controls(values, claim, standing, rng=rng)
     tests = _tests(compared, values, claim, standing, rng=rng) if len(compared) else controls[:0]
     table = pd.concat([each for each in (tests, controls) if len(each)] or [controls])
+    if standing.unfinished:
+        table = _without_effects(table)
     reference, other = claim.models
     low, high = claim.bounds or (np.nan, np.nan)
     return table.reset_index(drop=True).assign(
@@ -183,11 +233,16 @@ def _tests(
     table = pd.concat([pd.DataFrame([overall]), textures], ignore_index=True)
     shares = table["texture"].map(values.share_at_ends).astype(float)
     table["share_at_ends"] = shares
-    table["verdict"] = [
-        _verdict(row, share, standing)
-        for row, share in zip(table.to_dict("records"), shares, strict=True)
-    ]
+    table["doubt"] = [standing.doubt(share) for share in shares]
+    adjusted = zip(table["p_holm"], table["p_equivalence_holm"], shares, strict=True)
+    table["verdict"] = [standing.verdict(*p, share_at_ends=share) for *p, share in adjusted]
     return table
+
+
+def _without_effects(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows of an unfinished task: who looks at a difference before the end may stop by it."""
+    notes = table["note"].where(table["note"] == IDENTICAL, "")
+    return table[list(_INTERIM)].assign(note=notes).reindex(columns=names(CLAIM_COLUMNS))
 
 
 def all_equivalent(tests: pd.DataFrame) -> bool:
@@ -202,9 +257,20 @@ def all_equivalent(tests: pd.DataFrame) -> bool:
         Of one claim, from `claim_tests`.
     """
     textures = tests[(tests["texture"] != ALL_TEXTURES) & (tests["verdict"] != CONTROL)]
-    held_back = textures["verdict"].isin([WITHHELD, INTERIM])
-    equal = textures["p_equivalence"] < ALPHA
-    return bool(len(textures) and equal.all() and not held_back.any())
+    return every_equivalent(textures["p_equivalence"].to_numpy(float), doubts=textures["doubt"])
+
+
+def every_equivalent(p_equivalence: Floats, *, doubts: Iterable[str]) -> bool:
+    """Whether the unadjusted p of TOST of all textures, one at least, say so, and no doubt stands.
+
+    Parameters
+    ----------
+    p_equivalence : (n,) ndarray
+        NaN where there is none.
+    doubts : iterable of str
+        `Standing.doubt` of each texture.
+    """
+    return bool(p_equivalence.size and (p_equivalence < ALPHA).all() and not any(doubts))
 
 
 def _over_textures(compared: pd.DataFrame) -> pd.DataFrame:
@@ -235,14 +301,6 @@ def _row(
         "bf01_highest": bayes_factor_null(0.0, result.n) if result.n > 1 else float("nan"),
         "excluded": ", ".join(sorted(set(rows["participant_id"]) - set(both["participant_id"]))),
     }
-
-
-def _verdict(row: Mapping[Hashable, Any], share_at_ends: float, standing: Standing) -> str:
-    if standing.unfinished:
-        return INTERIM
-    found = verdict(row["p_holm"], row["p_equivalence_holm"])
-    doubted = bool(standing.insensitive) or share_at_ends > standing.highest_share_at_ends
-    return WITHHELD if found == EQUIVALENT and doubted else found
 
 
 def _controls(

@@ -15,16 +15,20 @@ import pandas as pd
 from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.columns import TEXTURE, Column, names
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import WITHHELD, Standing, Values
+from analysis.statistics.claims import (
+    BOUNDS_WITHHELD,
+    WITHHELD,
+    Standing,
+    Values,
+    every_equivalent,
+)
 from analysis.statistics.equivalence import (
-    ALPHA,
     DIFFERENT,
     EQUIVALENT,
     INCONCLUSIVE,
     WITHIN_BOUNDS,
     Bounds,
     equivalence_test,
-    verdict,
 )
 from analysis.statistics.paired import (
     holm,
@@ -39,7 +43,10 @@ from modeling.arrays import Floats
 TARGET = 0.8  # usual power to plan for
 EVERY_TEXTURE = "every texture"
 NO_VERDICT = "no verdict"
-VERDICTS = (EQUIVALENT, WITHIN_BOUNDS, DIFFERENT, INCONCLUSIVE, WITHHELD, NO_VERDICT)
+VERDICTS = (
+    *(EQUIVALENT, WITHIN_BOUNDS, DIFFERENT, INCONCLUSIVE),
+    *(WITHHELD, BOUNDS_WITHHELD, NO_VERDICT),
+)
 
 POWER_COLUMNS = (
     Column("claim", is_name=True),
@@ -78,7 +85,7 @@ def verdicts(
     n : int
         Participants of the study, for the record.
     standing : Standing
-        Whether the study is unfinished does not count.
+        Of a finished study.
     rng : Generator
         Draws sign flips where participants do not vary.
 
@@ -101,17 +108,18 @@ def verdicts(
     each = np.array([_p_values(differences, claim.bounds, rng=rng) for differences in own])
     adjusted = np.column_stack([holm(each[:, 0]), holm(each[:, 1])])
     rows = {ALL_TEXTURES: overall, **dict(zip(map(str, wide), adjusted, strict=True))}
-    doubted = {
-        texture: bool(standing.insensitive)
-        or values.share_at_ends.get(texture, 0.0) > standing.highest_share_at_ends
-        for texture in rows
-    }
+    shares = {texture: values.share_at_ends.get(texture, np.nan) for texture in rows}
     found = [
-        Verdict(claim.name, texture, n, _verdict(*p, doubted=doubted[texture]))
+        Verdict(
+            claim.name,
+            texture,
+            n,
+            standing.verdict(*p, share_at_ends=shares[texture]) or NO_VERDICT,
+        )
         for texture, p in rows.items()
     ]
-    withheld = any(one.verdict == WITHHELD for one in found if one.texture != ALL_TEXTURES)
-    every = bool((each[:, 1] < ALPHA).all() and not withheld)
+    doubts = [standing.doubt(shares[str(texture)]) for texture in wide]
+    every = every_equivalent(each[:, 1], doubts=doubts)
     return [*found, Verdict(claim.name, EVERY_TEXTURE, n, EQUIVALENT if every else INCONCLUSIVE)]
 
 
@@ -123,11 +131,6 @@ def _p_values(
     undefined = why_undefined(differences)
     p = sign_flips_p(differences, rng=rng) if undefined else t_test(differences)[1]
     return p, equivalence_test(differences, bounds, rng=rng).p
-
-
-def _verdict(p_difference: float, p_equivalence: float, *, doubted: bool) -> str:
-    found = verdict(p_difference, p_equivalence)
-    return WITHHELD if found == EQUIVALENT and doubted else found or NO_VERDICT
 
 
 def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:

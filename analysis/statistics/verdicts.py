@@ -19,13 +19,16 @@ from analysis.columns import TEXTURE, Column, names
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
 from analysis.statistics.claims import (
     CONTROL,
+    DIFFERENCES,
+    NOT_TESTED,
+    SHOWN,
     Standing,
     Values,
     claim_tests,
     complete_means,
     share_at_ends,
 )
-from analysis.statistics.equivalence import ALPHA, DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
+from analysis.statistics.equivalence import ALPHA, EQUIVALENT, WITHIN_BOUNDS
 from analysis.statistics.paired import (
     sign_flips_p,
     t_test,
@@ -173,26 +176,30 @@ def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generat
     return Standing(
         identical=responses.identical(claim.models),
         highest_share_at_ends=responses.plan.highest_share_at_ends,
-        insensitive=_insensitive(responses, claim, rng=rng),
+        sensitivity=_sensitivity(responses, claim, rng=rng),
         unfinished=claim.task in responses.unfinished,
     )
 
 
-def _insensitive(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
-    """Why people may not have felt a difference had there been one; empty where they would have."""
-    if claim.task == "absolute" and claim.task in responses.anchors:
-        anchors = responses.anchors[claim.task]
+def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
+    """Whether people told surfaces apart that differ, as `Standing.sensitivity` says it.
+
+    Ratings show it by anchors, the forced choice by its reference; no other task can so far.
+    """
+    anchors = responses.anchors.get(claim.task)
+    if claim.task == "absolute" and anchors is not None and len(anchors):
         own = answers_about(responses, claim)
         own = own[own["texture"].isin(anchors["texture"])]
         means = [table.groupby("participant_id")[claim.measure].mean() for table in (own, anchors)]
-        if len(anchors) and _one_sided_p((means[0] - means[1]).dropna(), rng=rng) >= ALPHA:
-            return "anchors were not rated lower than the textures' own models"
-    if claim.task == "relative":
+        above = means[0] - means[1]
+        failed = "anchors were not rated lower than the textures' own models"
+    elif claim.task == "relative":
         values = claim_values(responses, claim).table.groupby("participant_id")["reference"].mean()
-        chance = chance_of(responses.relative)
-        if _one_sided_p((values - chance).dropna(), rng=rng) >= ALPHA:
-            return f"answers on {claim.models[0]} models were not above chance"
-    return ""
+        above = values - chance_of(responses.relative)
+        failed = f"answers on {claim.models[0]} models were not above chance"
+    else:
+        return NOT_TESTED
+    return SHOWN if _one_sided_p(above.dropna(), rng=rng) < ALPHA else failed
 
 
 def chance_of(relative: pd.DataFrame) -> float:
@@ -290,10 +297,10 @@ def planted_verdicts(
 def _agreement(verdict: str, truth: float, *, bounds: tuple[float, float] | None) -> str:
     within = bounds is not None and bounds[0] < truth < bounds[1]
     wrong_equality = not within and verdict in (EQUIVALENT, WITHIN_BOUNDS)
-    wrong_difference = truth == 0 and verdict in (DIFFERENT, WITHIN_BOUNDS)
+    wrong_difference = truth == 0 and verdict in DIFFERENCES
     if wrong_equality or wrong_difference:
         return "contradicts"
-    return "agrees" if verdict in (EQUIVALENT, DIFFERENT, WITHIN_BOUNDS) else "undecided"
+    return "agrees" if verdict in (EQUIVALENT, *DIFFERENCES) else "undecided"
 
 
 def check_complete(responses: Responses) -> None:

@@ -50,11 +50,13 @@ def balance_of(study: Study, task: str) -> list[Balance]:
         for slot in range(1, plan.participants + 1)
     ]
     models = study.models_of(task)
-    if plan.schedule == "by-day":
+    flat = [trials for days in sessions for trials in days]
+    if flat[0][0].texture not in study.textures:
+        found = []  # no surface, so no models to balance
+    elif plan.schedule == "by-day":
         found = [_begin(sessions, models)]
     else:
         found = list(_first(sessions, study, models))
-    flat = [trials for days in sessions for trials in days]
     if hasattr(flat[0][0], "first_surface"):
         found += _surfaces(flat, study, models)
     if hasattr(flat[0][0], "layout") and hasattr(flat[0][0], "texture"):
@@ -121,7 +123,7 @@ def _surfaces(
 
 
 def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
-    """How often each button is right; in the oddity task, that of the odd surface."""
+    """How often each button is right: that of the real texture, the odd surface, or the tone."""
     over: Counter[int] = Counter()
     within = []
     for trials in sessions:
@@ -135,4 +137,6 @@ def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
 
 def _right(trial: Trial) -> int:
     layout: tuple[str, ...] = trial.layout  # type: ignore[attr-defined]
-    return layout.index(trial.texture if trial.texture in layout else trial.model)
+    return next(
+        layout.index(what) for what in (trial.texture, trial.model, "tone") if what in layout
+    )

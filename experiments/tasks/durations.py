@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from experiments.study.study import Study
+from experiments.tasks import plan_session
 
-# Seconds of one trial with the mounting of its sample: assumed, not measured.
-TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0}
+# Seconds of one trial, with the mounting of its sample where there is one: assumed, not measured.
+TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0, "threshold": 4.0}
 OTHER_TRIAL_S = 60.0
 WELCOME_S = 300.0  # consent, questions, explanation
 BREAK_S = 120.0
@@ -19,11 +20,10 @@ def trials_of_session(study: Study, task: str) -> tuple[int, int]:
     InputError
         If the study has no such task.
     """
-    plan = study.plan_of(task)
-    times = plan.repeats * len(study.textures)
-    if task != "oddity" and plan.schedule == "interleaved":
-        times *= len(plan.models)
-    return plan.training_trials, times + len(plan.anchors)
+    # Counted in an order as sessions draw it: what a trial is, the task alone knows.
+    trials = plan_session(study, task=task, subject=1, session=1).trials
+    main = sum(trial.phase == "main" for trial in trials)
+    return study.plan_of(task).training_trials, main
 
 
 def minutes_of_session(study: Study, task: str) -> int:

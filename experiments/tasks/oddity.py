@@ -14,7 +14,7 @@ from typing import Any
 
 from experiments.sessions.surfaces import Respondent, Surfaces
 from experiments.sessions.task import Task
-from experiments.study.design import Occasion, Order, Trial, dealt
+from experiments.study.design import Occasion, Order, Trial, fisher_yates
 from experiments.study.models import ModelSets
 from rig.interface import Presentable
 
@@ -49,11 +49,8 @@ class OddityTrial(Trial):
 
 
 def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
-    """For each texture and odd model, the odd one is behind each button equally often (± 1)."""
-    positions = {
-        pair: dealt(range(1, BUTTONS + 1), count, occasion.rng)
-        for pair, count in Counter(order).items()
-    }
+    """Where the odd one is, is balanced for each texture and odd model, and over the study."""
+    positions = _positions(occasion, order)
     drafts = []
     for texture, odd in order:
         position = positions[texture, odd].pop()
@@ -64,6 +61,24 @@ def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
             {"texture": texture, "model": odd, "layout": tuple(layout), "odd_position": position}
         )
     return drafts
+
+
+def _positions(occasion: Occasion, order: Order) -> dict[tuple[str, str], list[int]]:
+    """The buttons of the odd one for each texture and odd model, in the order of their trials.
+
+    Over three neighbouring slots each pair has it behind each button equally often; within a
+    session each button is right equally often (± 1), over all pairs and within each (± 1).
+    """
+    counts = Counter(order)
+    pairs = sorted(counts)
+    rng, place = occasion.block(BUTTONS, f"odd position, {occasion.phase}")
+    positions, begun = {}, 0
+    for pair in fisher_yates(pairs, rng):
+        # Each pair goes on where the one before stopped, so that all buttons come in turn.
+        turns = [(begun + n + place) % BUTTONS + 1 for n in range(counts[pair])]
+        begun += counts[pair]
+        positions[pair] = fisher_yates(turns, occasion.rng)
+    return positions
 
 
 def _virtual(models: ModelSets, trial: OddityTrial) -> list[Presentable]:

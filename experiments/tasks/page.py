@@ -64,9 +64,12 @@ def _design(study: Study, task: str) -> Iterator[str]:
     training, main = trials_of_session(study, task)
     yield f"**{task.capitalize()} task.** {task_named(task).description}"
     yield ""
-    yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
-    times = "comes" if task == "oddity" else "comes with each model"
-    yield f"- Each texture {times} {_times(plan.repeats)}."
+    if task == "threshold":
+        yield f"- Each frequency comes {_times(plan.repeats)}."
+    else:
+        yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
+        times = "comes" if task == "oddity" else "comes with each model"
+        yield f"- Each texture {times} {_times(plan.repeats)}."
     yield (
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
         f"about {minutes_of_session(study, task)} minutes (an estimate)."
@@ -113,7 +116,18 @@ def _claims(study: Study) -> Iterator[str]:
     if not study.plan.claims:
         yield "None: whatever is found is exploratory."
     for number, claim in enumerate(study.plan.claims, start=1):
-        yield f"{number}. **{claim.name}.** {_claimed(claim)}"
+        yield f"{number}. **{claim.name}.** {_claimed(claim)} {proof_of_sensitivity(study, claim)}"
+
+
+def proof_of_sensitivity(study: Study, claim: Claim) -> str:
+    """What has to show that people tell surfaces apart, before a claim may end in equality."""
+    plan = study.plan_of(claim.task)
+    if claim.task == "relative":
+        return f"No equality unless {claim.models[0]} models are recognised above chance."
+    if claim.task == "absolute" and plan.anchors:
+        return "No equality unless the anchors are rated lower than the textures' own models."
+    advice = "; give it anchors" if claim.task == "absolute" else ""
+    return f"No equality in any case, as nothing in it tests sensitivity{advice}."
 
 
 def _claimed(claim: Claim) -> str:

@@ -27,8 +27,9 @@ if TYPE_CHECKING:
     from stimuli.sets.recipe import Recipe
 
 JOBS = 2
-# Points by which simulated participants rate simplified models lower; no points elsewhere.
-PLANTED_TEXTURE, PLANTED_POINTS = "MDF", -12.0
+# Points by which simulated participants rate simplified models lower; no points elsewhere. So many
+# that the tests find them in 39 of 40 simulations (12 points: in 32).
+PLANTED_TEXTURE, PLANTED_POINTS = "MDF", -15.0
 CHART_TURNS = 5
 Result = TypeVar("Result")
 

@@ -25,8 +25,7 @@ def study_check(path: StudyArgument) -> None:
     tell_models(sets, plan.textures)
     _tell_sessions(plan)
     _tell_balance(plan)
-    claims = len(plan.plan.claims)
-    print(f"claims: {claims}" if claims else "claims: none; whatever is found is exploratory")
+    _tell_claims(plan)
 
 
 def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
@@ -50,6 +49,15 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
         sets, files = load_model_sets(plan, path.parent)
     sets.require(plan)
     return plan, sets, [path, *files]
+
+
+def _tell_claims(plan: Study) -> None:
+    from experiments.tasks.page import proof_of_sensitivity
+
+    claims = plan.plan.claims
+    print(f"claims: {len(claims)}" if claims else "claims: none; whatever is found is exploratory")
+    for claim in claims:
+        print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 
 
 def _tell_sessions(plan: Study) -> None:

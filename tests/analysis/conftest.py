@@ -13,6 +13,7 @@ import pytest
 
 from analysis.answers.loading import Responses
 from analysis.answers.plan import AnalysisPlan, Claim
+from analysis.labels import SCALES
 from analysis.statistics.verdicts import ClaimFound, claims_found
 from analysis.textures.results import TextureResult
 from modeling import TextureModel, Threshold, fit_texture, simplify
@@ -214,12 +215,23 @@ def plan() -> AnalysisPlan:
 
 
 @pytest.fixture(scope="session")
-def found(ratings: pd.DataFrame, choices: pd.DataFrame) -> list[ClaimFound]:
-    """The claims of the plan about the answers of sixteen people."""
+def anchors(ratings: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """Canvas beside PVC's model, which everybody rates 30 points lower than beside its own."""
+    own = ratings[(ratings["texture"] == "canvas") & (ratings["model"] == "full")]
+    lower = {scale: own[scale] - 30.0 for scale in SCALES}
+    return {"absolute": own.assign(virtual_texture="PVC", **lower)}
+
+
+@pytest.fixture(scope="session")
+def found(
+    ratings: pd.DataFrame, choices: pd.DataFrame, anchors: dict[str, pd.DataFrame]
+) -> list[ClaimFound]:
+    """The claims of the plan about the answers of sixteen people, who tell surfaces apart."""
     responses = Responses(
         {"absolute": ratings, "relative": choices},
         simulated_participants=True,
         simulated_rig=True,
+        anchors=anchors,
         plan=PLAN,
     )
     return claims_found(responses, rng=np.random.default_rng(5))

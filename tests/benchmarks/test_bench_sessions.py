@@ -78,4 +78,4 @@ def test_simulated_sessions(
         benchmark.extra_info["rival"] = True
     answered = benchmark.pedantic(in_memory if way == WAYS[0] else on_disk, rounds=3)
     participants = paper.plan_of("absolute").participants
-    assert answered == participants * (16 + 2 * 23)
+    assert answered == participants * (18 + 2 * 23)

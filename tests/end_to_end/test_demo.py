@@ -49,15 +49,17 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     answers = {task: answers_of(demo / "data", task) for task in ("absolute", "relative")}
     assert answers["absolute"].participant.nunique() == 20
     assert answers["relative"].participant.nunique() == 24
-    # 7 textures × 2 models; 7 textures × 3 repeats on each of two days.
-    assert (answers["absolute"].groupby("participant").size() == 14).all()
+    # 7 textures × 2 models and two anchors; 7 textures × 3 repeats on each of two days.
+    assert (answers["absolute"].groupby("participant").size() == 16).all()
     assert (answers["relative"].groupby("participant").size() == 42).all()
     assert all(table.simulated.all() for table in answers.values())
-    ratings = answers["absolute"].set_index(["texture", "participant", "model"])
+    absolute = answers["absolute"]
+    own = absolute[absolute.virtual_texture == absolute.texture]
+    ratings = own.set_index(["texture", "participant", "model"])
     ratings = ratings[["magnitude_similarity", "frequency_similarity"]]
     assert (ratings >= 99.5).to_numpy().mean() < 0.05
     planted = json.loads((demo / "provenance.json").read_text())["settings"]["planted"]
-    assert {p for points in planted.values() for p in points.values()} == {-12.0, 0.0}
+    assert {p for points in planted.values() for p in points.values()} == {-15.0, 0.0}
     differences = ratings.xs("simplified", level="model") - ratings.xs("full", level="model")
     for texture, points in planted.items():
         found = differences.loc[texture]
@@ -83,8 +85,12 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     said = pd.read_csv(demo / "tables/planted_effects.tsv", sep="\t")
     assert set(said.agreement) <= {"agrees", "undecided"}
     magnitude = said[said.claim == "magnitude feels the same"].set_index("texture")
-    assert magnitude.loc["MDF", ["planted", "verdict"]].tolist() == [-12.0, "different"]
+    assert magnitude.loc["MDF", ["planted", "verdict"]].tolist() == [-15.0, "different"]
     assert (said.agreement == "agrees").sum() >= 4
+    tests = pd.read_csv(demo / "tables/claim_tests.tsv", sep="\t", na_values="n/a")
+    # Anchors and the reference are told apart: nothing withholds equality.
+    assert tests.doubt.isna().all()
+    assert "equivalent" in set(tests.verdict)
 
 
 def answers_of(data: Path, task: str) -> pd.DataFrame:

@@ -62,12 +62,14 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path) -> N
     assert done.returncode == 0, done.stderr
     for told in (
         "full and simplified are identical for MDF",
-        "absolute: 20 participants, 1 session each, 2 + 14 trials in a session; about 18 min",
+        "absolute: 20 participants, 1 session each, 2 + 16 trials in a session; about 20 min",
         "relative: 24 participants, 2 sessions each, 2 + 21 trials",
         "(an estimate)",
         "10 to 10 of 20",
         "12 to 12 of 24",
         "claims: 3",
+        "as well: No equality unless full models are recognised above chance",
+        "magnitude feels the same: No equality unless the anchors are rated lower",
     ):
         assert told in done.stdout
     assert "warning" not in done.stdout

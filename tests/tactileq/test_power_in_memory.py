@@ -10,6 +10,8 @@ import pytest
 
 from analysis.answers.loading import load_responses
 from analysis.labels import ALL_TEXTURES
+from analysis.statistics.claims import WITHHELD
+from analysis.statistics.equivalence import EQUIVALENT, WITHIN_BOUNDS
 from analysis.statistics.power import EVERY_TEXTURE, POWER_COLUMNS
 from analysis.statistics.validation import cells, simulate_cell
 from analysis.statistics.verdicts import claim_values
@@ -118,6 +120,19 @@ def test_a_planted_difference_is_found_and_none_is_called_equivalent(
     assert chance(tables[-25.0], **known, verdict="different") > 0.7
     of_four = chance(tables[0.0], RATED.name, ALL_TEXTURES, n=4, verdict="inconclusive")
     assert of_four > chance(tables[0.0], **known, verdict="inconclusive")
+    # Nothing in this task shows that a difference would have been felt.
+    odd = tables[0.0][(tables[0.0]["claim"] == ODD.name) & (tables[0.0]["hits"] > 0)]
+    assert WITHHELD in set(odd["verdict"])
+    assert not {EQUIVALENT, WITHIN_BOUNDS} & set(odd["verdict"])
+
+
+def test_without_anchors_equalities_are_counted_as_withheld(study: Study, models: ModelSets):
+    bare = replace(study.plan_of("absolute"), anchors={})
+    plain = replace(study, plan=Plan(claims=(RATED,)), tasks={"absolute": bare})
+    table = chances(people(plain, models, most=12), (12,), simulations=6, seed=1, jobs=1)
+    known = {"texture": ALL_TEXTURES, "n": 12, "claim": RATED.name}
+    assert chance(table, **known, verdict=WITHHELD) > 0.6
+    assert not {EQUIVALENT, WITHIN_BOUNDS} & set(table[table["hits"] > 0]["verdict"])
 
 
 def test_answers_in_memory_are_those_of_the_disk(tmp_path, study: Study, models: ModelSets):

@@ -12,7 +12,7 @@ from scipy.special import stdtrit
 
 from analysis.benches.chart.judging import BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from analysis.benches.chart.measures import SUMMARIES
-from analysis.benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
+from analysis.benches.chart.methods import METHODS, OUR_FAMILIES, OURS, RIVALS
 from analysis.columns import Column, Columns, names
 from modeling.arrays import Bools, Floats
 from modeling.models.texture_model import BLENDINGS
@@ -21,6 +21,8 @@ VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_m
 COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers")
 MEASURES = tuple(f"{place}_{name}" for place in PLACES for name in SUMMARIES)
 CONFIDENCE = 0.95
+# They are charged for making coefficients at every update, which ours read from a table.
+COUNTED_OTHERWISE = "autoregressive"
 FEWEST_SURFACES = 3
 
 
@@ -155,7 +157,7 @@ class Comparison:
     Parameters
     ----------
     operations, numbers : Ratio
-        The rival's over ours.
+        The rival's over ours; operations NaN where they are not counted alike.
     between, stroking : Ratio
         The rival's distance from the truth over ours.
     surfaces : int
@@ -176,8 +178,18 @@ class Comparison:
     dominates_by: Dominating | None
 
     @property
+    def is_counted_alike(self) -> bool:
+        """Whether the rival's operations are counted as ours are."""
+        return METHODS[self.rival].family != COUNTED_OTHERWISE
+
+    @property
     def verdict(self) -> str:
         """Who dominates whom: with no more operations nearer, beyond the doubt of the interval."""
+        if not self.is_counted_alike:
+            return (
+                "who dominates is not said, since its coefficients are made anew at every update "
+                "and ours are read from a table"
+            )
         if self.dominates_by is not None:
             return f"{self.rival} dominates joint as {self.dominates_by.text()}"
         if self.dominated_by is not None:
@@ -195,10 +207,8 @@ class Comparison:
         )
         if np.isfinite(self.stroking.mean):
             farther += f" and {self.stroking.text()} times while stroking"
-        return (
-            f"{farther}, for {self.operations.text()} times the operations and "
-            f"{self.numbers.text()} times the numbers; {self.verdict}."
-        )
+        counted = f"{self.operations.text()} times the operations and " * self.is_counted_alike
+        return f"{farther}, for {counted}{self.numbers.text()} times the numbers; {self.verdict}."
 
 
 def comparisons(rows: pd.DataFrame) -> list[Comparison]:
@@ -214,21 +224,32 @@ def comparisons(rows: pd.DataFrame) -> list[Comparison]:
             other = default[default["method"] == rival].set_index("surface")
             if not len(mine.index.intersection(other.index)):
                 continue
-            pair = _paired(other, mine)
-            found.append(
-                Comparison(
-                    kind=str(kind),
-                    rival=rival,
-                    operations=_ratio("operations", *pair),
-                    numbers=_ratio("numbers", *pair),
-                    between=_ratio(f"{BETWEEN}_distance_db", *pair),
-                    stroking=_ratio(f"{STROKING}_distance_db", *pair),
-                    surfaces=len(pair[0]),
-                    dominated_by=_dominating(of_kind[of_kind["family"].isin(OUR_FAMILIES)], other),
-                    dominates_by=_dominating(of_kind[of_kind["method"] == rival], mine),
-                )
-            )
+            found.append(_comparison(of_kind, mine, other, kind=str(kind), rival=rival))
     return found
+
+
+def _comparison(
+    of_kind: pd.DataFrame, mine: pd.DataFrame, other: pd.DataFrame, *, kind: str, rival: str
+) -> Comparison:
+    """Of one rival; costs that are not counted alike are not compared."""
+    pair = _paired(other, mine)
+    operations = Ratio(np.nan, np.nan, np.nan)
+    dominated_by = dominates_by = None
+    if METHODS[rival].family != COUNTED_OTHERWISE:
+        operations = _ratio("operations", *pair)
+        dominated_by = _dominating(of_kind[of_kind["family"].isin(OUR_FAMILIES)], other)
+        dominates_by = _dominating(of_kind[of_kind["method"] == rival], mine)
+    return Comparison(
+        kind=kind,
+        rival=rival,
+        operations=operations,
+        numbers=_ratio("numbers", *pair),
+        between=_ratio(f"{BETWEEN}_distance_db", *pair),
+        stroking=_ratio(f"{STROKING}_distance_db", *pair),
+        surfaces=len(pair[0]),
+        dominated_by=dominated_by,
+        dominates_by=dominates_by,
+    )
 
 
 def _dominating(variants: pd.DataFrame, target: pd.DataFrame) -> Dominating | None:

@@ -174,7 +174,7 @@ def test_differences_stand_beside_their_bounds(found: list[ClaimFound]):
         assert ax.get_xlabel() == f"simplified − full ({unit})"
         assert "SIMULATED" in texts(ax)
     shown = texts(axes[0].figure)
-    for verdict in set(found[0].tests["verdict"]) | {"90 % CI", "95 % CI", "within the bounds"}:
+    for verdict in set(found[0].tests["verdict"]) | {"90 % CI", "95 % CI", "bounds"}:
         assert verdict in shown
 
 

@@ -78,25 +78,17 @@ def test_each_verdict_has_its_words(people, found, verdict, words):
     sentence = answer(with_verdict(found, verdict), people)
     assert words in sentence
     # Those of one verdict stand together.
-    assert " and the correct rate " in sentence
+    assert " and the correct rate" in sentence
+    assert ("CI" in sentence) == (not verdict.startswith("interim"))
 
 
 def test_why_equality_is_withheld_is_said(people, found):
     withheld = with_verdict(found, "equivalence withheld")
-    crowded = withheld[0].tests.copy()
-    crowded["share_at_ends"] = 0.65
-    crowded_one = replace(
-        withheld[0],
-        tests=crowded,
-        standing=replace(withheld[0].standing, highest_share_at_ends=0.2),
-    )
-    sentence = answer([crowded_one], people)
-    assert "since 65% of the ratings lie at an end of the scale (at most 20% were planned)" in (
-        sentence
-    )
-    alike = replace(withheld[1], standing=replace(withheld[1].standing, insensitive="all alike"))
+    alike = replace(withheld[1], tests=withheld[1].tests.assign(doubt="all alike"))
     assert "since all alike" in answer([alike], people)
     assert "withheld, since all alike" in claim_outcomes([alike])[0].sentence
+    assert "BF₀₁" not in claim_outcomes([alike])[0].sentence
+    assert "BF₀₁" in claim_outcomes([found[1]])[0].sentence
 
 
 def test_without_a_plan_nothing_is_called_equal(people):

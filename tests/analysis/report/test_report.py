@@ -184,9 +184,36 @@ def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choic
     assert "Forced choice: 16 of 24 planned participants, 16 of 48 planned sessions" in shown.text
     assert (
         "The study is not complete (forced choice: 16 of 24 planned participants, 16 of 48 "
-        "planned sessions): these results are preliminary"
+        "planned sessions): of its claims there is neither an effect nor a test"
     ) in shown.text
     assert "So far, simplified models against full ones" in shown.text
+    assert "Ratings by a mixed model" in shown.text  # of the finished task
+
+
+def test_nothing_of_an_unfinished_task_compares_models(tmp_path, ratings, choices):
+    """Neither on the page nor in a file: not of claims, and not beside them."""
+    begun = replace(
+        responses_of(ratings, choices, simulated=False),
+        planned={"absolute": PlannedTask(20, 20), "relative": PlannedTask(24, 48)},
+    )
+    moved = {"speed_mm_s": 100.0, "force_n": 1.0, "contact_s": 3.0, "presentations": 2.0}
+    hand = ratings.assign(task="absolute", trials=1, **moved)
+    path = write_report(tmp_path / "report.html", responses=begun, hand=hand)
+    shown = Page(path.read_text("utf-8"))
+    assert not re.search(r"CI [+−]|TOST p|BF₀₁ =|d_z =|d′|p [=<]|t\(\d|answers, full", shown.text)
+    tables = {
+        file.stem: pd.read_csv(file, sep="\t", na_values="n/a")
+        for file in tmp_path.glob("tables/*")
+    }
+    assert set(tables) == {"claims", "claim_tests", "agreement", "raters", "careless", "provenance"}
+    for name in ("claims", "claim_tests"):
+        told = tables[name]
+        assert set(told["verdict"]) == {"interim, no verdict"}
+        assert (told["n"] == 16).all()
+        numbers = told.drop(columns="n").select_dtypes("number").dropna(axis=1, how="all")
+        assert set(numbers) <= {"share_at_ends"}
+    assert not list(tmp_path.glob("figures/*"))
+    assert "16 of 20planned participants, absolute evaluation" in shown.text
 
 
 @pytest.fixture

@@ -15,9 +15,9 @@ from analysis.columns import names
 from analysis.labels import ALL_TEXTURES
 from analysis.report.page import Table, table_html
 from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section, oddity_sensitivity
-from analysis.statistics.claims import Standing, Values, claim_tests
+from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
 from analysis.statistics.dprime import oddity_d_prime, oddity_share
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT
+from analysis.statistics.equivalence import DIFFERENT
 from analysis.statistics.verdicts import ClaimFound
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -58,7 +58,7 @@ def test_planted_d_primes_are_within_their_intervals(odd):
         assert_allclose(row["d_prime"], oddity_d_prime(row["share"]))
     assert table.loc["PVC", "d_prime_low"] < 2.5 < table.loc["PVC", "d_prime_high"]
     assert table.loc["canvas", "d_prime_low"] == 0.0
-    assert table["verdict"][["canvas", "PVC"]].tolist() == [EQUIVALENT, DIFFERENT]
+    assert table["verdict"][["canvas", "PVC"]].tolist() == [WITHHELD, DIFFERENT]
 
 
 def test_the_upper_bound_is_a_share_and_a_d_prime(odd):

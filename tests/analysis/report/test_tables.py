@@ -206,7 +206,7 @@ def tables(results, ratings, choices, found) -> list[Table]:
     sections = (
         model_section(textures, pd.concat([each.gfc for each in compared])),
         parameter_section(textures, driving_table([each.driven for each in compared])),
-        verdict_section(found, simulated=True, planted={"PVC": {"magnitude_similarity": -30.0}}),
+        verdict_section(responses, found, planted={"PVC": {"magnitude_similarity": -30.0}}),
         rating_section(responses, found[:2]),
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
         confusion_section(

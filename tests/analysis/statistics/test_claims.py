@@ -14,9 +14,12 @@ from analysis.answers.plan import Claim
 from analysis.columns import names
 from analysis.labels import ALL_TEXTURES, IDENTICAL
 from analysis.statistics.claims import (
+    BOUNDS_WITHHELD,
     CLAIM_COLUMNS,
     CONTROL,
     INTERIM,
+    NOT_TESTED,
+    SHOWN,
     WITHHELD,
     Standing,
     Values,
@@ -37,6 +40,7 @@ CLAIM = Claim(
     test="equivalence",
 )
 PEOPLE = 24
+SENSITIVE = Standing(sensitivity=SHOWN)
 
 
 def values(effects: dict[str, float], *, sd: float = 4.0, seed: int = 0) -> Values:
@@ -65,7 +69,7 @@ def values(effects: dict[str, float], *, sd: float = 4.0, seed: int = 0) -> Valu
 def verdicts_on(
     what: Values, *, standing: Standing | None = None, claim: Claim = CLAIM
 ) -> pd.DataFrame:
-    return claim_tests(claim, what, standing=standing or Standing(), rng=np.random.default_rng(1))
+    return claim_tests(claim, what, standing=standing or SENSITIVE, rng=np.random.default_rng(1))
 
 
 EFFECTS = {"canvas": 0.0, "PVC": -12.0, "MDF": 3.5, "leather": -7.0}
@@ -116,7 +120,7 @@ def test_the_row_over_all_textures_weighs_textures_equally_and_has_complete_peop
 
 def test_identical_models_are_controls_outside_the_family():
     what = values(EFFECTS)
-    alone = verdicts_on(what, standing=Standing(identical={"canvas", "MDF"}))
+    alone = verdicts_on(what, standing=replace(SENSITIVE, identical={"canvas", "MDF"}))
     assert alone["texture"].tolist() == [ALL_TEXTURES, "leather", "PVC", "canvas", "MDF"]
     controls = alone[alone["verdict"] == CONTROL]
     assert (controls["note"] == IDENTICAL).all()
@@ -125,7 +129,7 @@ def test_identical_models_are_controls_outside_the_family():
     fewer = Values(table=what.table[what.table["texture"].isin(["leather", "PVC"])])
     same = verdicts_on(fewer)
     pd.testing.assert_frame_equal(alone.iloc[:3], same, check_dtype=False)
-    nothing = verdicts_on(what, standing=Standing(identical=set(EFFECTS)))
+    nothing = verdicts_on(what, standing=replace(SENSITIVE, identical=set(EFFECTS)))
     assert (nothing["verdict"] == CONTROL).all()
     assert not all_equivalent(nothing)
 
@@ -133,21 +137,53 @@ def test_identical_models_are_controls_outside_the_family():
 @pytest.mark.parametrize(
     ("standing", "share", "expected"),
     [
-        (Standing(highest_share_at_ends=0.2), 0.1, EQUIVALENT),
-        (Standing(highest_share_at_ends=0.2), 0.2, EQUIVALENT),  # not more than planned
-        (Standing(highest_share_at_ends=0.2), 0.65, WITHHELD),
-        (Standing(insensitive="anchors alike"), 0.0, WITHHELD),
-        (Standing(unfinished=True), 0.0, INTERIM),
+        (replace(SENSITIVE, highest_share_at_ends=0.2), 0.1, (EQUIVALENT, WITHIN_BOUNDS, "")),
+        # Not more than planned.
+        (replace(SENSITIVE, highest_share_at_ends=0.2), 0.2, (EQUIVALENT, WITHIN_BOUNDS, "")),
+        (
+            replace(SENSITIVE, highest_share_at_ends=0.2),
+            0.65,
+            (WITHHELD, BOUNDS_WITHHELD, "65% of the ratings lie at an end of the scale"),
+        ),
+        (Standing(), 0.0, (WITHHELD, BOUNDS_WITHHELD, NOT_TESTED)),
+        (Standing(sensitivity="anchors alike"), 0.0, (WITHHELD, BOUNDS_WITHHELD, "anchors alike")),
     ],
 )
 def test_what_withholds_equality(standing, share, expected):
-    what = values({"canvas": 0.0, "PVC": -12.0})
-    shares = {"canvas": share, "PVC": share, ALL_TEXTURES: share}
+    what = values({"canvas": 0.0, "PVC": -12.0, "MDF": 3.5})
+    shares = {"canvas": share, "PVC": share, "MDF": share, ALL_TEXTURES: share}
     table = verdicts_on(replace(what, share_at_ends=shares), standing=standing).set_index("texture")
-    assert table.loc["canvas", "verdict"] == expected
+    assert (*table.loc[["canvas", "MDF"], "verdict"],) == expected[:2]
     # A difference is a difference, whatever the ends of the scale hide.
-    assert table.loc["PVC", "verdict"] == (INTERIM if standing.unfinished else DIFFERENT)
-    assert all_equivalent(verdicts_on(replace(values({"a": 0.0}), share_at_ends={}))) is True
+    assert table.loc["PVC", "verdict"] == DIFFERENT
+    assert table["doubt"].str.startswith(expected[2]).all()
+    assert (table["doubt"] == "").all() == (expected[2] == "")
+    alike = replace(values({"a": 0.0}), share_at_ends={"a": share})
+    assert all_equivalent(verdicts_on(alike, standing=standing)) is (expected[2] == "")
+
+
+def test_no_doubt_is_hidden_by_holm():
+    """Every texture is equivalent without Holm, none with it: nothing is left to be withheld."""
+    close = values({"a": 6.0, "b": 6.0, "c": -6.0})
+    assert (verdicts_on(close).iloc[1:]["p_equivalence"] < 0.05).all()
+    doubted = verdicts_on(close, standing=Standing())
+    assert WITHHELD not in set(doubted["verdict"])
+    assert all_equivalent(verdicts_on(close))
+    assert not all_equivalent(doubted)
+
+
+def test_an_unfinished_task_shows_no_effect():
+    standing = replace(SENSITIVE, unfinished=True, identical={"MDF"})
+    what = replace(values(EFFECTS), share_at_ends={"PVC": 0.1, ALL_TEXTURES: 0.2})
+    table = verdicts_on(what, standing=standing)
+    assert list(table) == names(CLAIM_COLUMNS)
+    assert table["verdict"].tolist() == [*[INTERIM] * 4, CONTROL]
+    told = ["claim", "measure", "planned", "texture", "verdict", "reference", "other", "n"]
+    told += ["bound_low", "bound_high", "share_at_ends", "excluded", "note"]
+    assert table.drop(columns=told).isna().all(axis=None)
+    assert (table["n"] == PEOPLE).all()
+    assert table["note"].tolist() == [*[""] * 4, IDENTICAL]
+    assert not all_equivalent(table)
 
 
 def test_all_equivalent_takes_the_largest_unadjusted_p():
@@ -158,7 +194,6 @@ def test_all_equivalent_takes_the_largest_unadjusted_p():
     assert (textures["p_equivalence_holm"] >= 0.05).any()  # Holm alone would not allow it
     assert all_equivalent(table)
     assert not all_equivalent(verdicts_on(values({**close, "d": 7.0})))
-    assert not all_equivalent(verdicts_on(values(close), standing=Standing(unfinished=True)))
 
 
 def test_a_claim_without_bounds_finds_no_equality():

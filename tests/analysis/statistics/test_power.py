@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 
 from analysis.answers.plan import Claim
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import WITHHELD, Standing, Values, all_equivalent, claim_tests
+from analysis.statistics.claims import (
+    NOT_TESTED,
+    SHOWN,
+    WITHHELD,
+    Standing,
+    Values,
+    all_equivalent,
+    claim_tests,
+)
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE
 from analysis.statistics.power import (
     EVERY_TEXTURE,
@@ -55,18 +63,18 @@ def told(values: Values, standing: Standing, *, n: int) -> dict[str, str]:
     seed=st.integers(0, 10**6),
     mean=st.sampled_from([0.0, 4.0, 12.0]),
     sd=st.sampled_from([0.0, 1.0, 9.0]),
-    insensitive=st.sampled_from(["", "nobody felt anything"]),
+    sensitivity=st.sampled_from([SHOWN, NOT_TESTED, "nobody felt anything"]),
     at_end=st.sampled_from([0.0, 0.5]),
 )
 def test_verdicts_are_those_of_the_report(
-    seed: int, mean: float, sd: float, insensitive: str, at_end: float
+    seed: int, mean: float, sd: float, sensitivity: str, at_end: float
 ):
     rng = np.random.default_rng(seed)
     differences = rng.normal(mean, sd, (4, 10))
     differences[1, 3:5] = np.nan
     values = Values(table=table_of(differences), share_at_ends={"t0": at_end})
     standing = Standing(
-        identical=["t3"], highest_share_at_ends=0.2, insensitive=insensitive, unfinished=False
+        identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity, unfinished=False
     )
     tests = claim_tests(CLAIM, values, standing=standing, rng=np.random.default_rng(1))
     compared = tests[tests["texture"] != "t3"]
@@ -88,7 +96,7 @@ def test_a_doubted_texture_is_no_equivalent_one():
     values = Values(
         table=table_of(np.tile([-0.5, 0.5, 0.0, 0.1], (2, 3))), share_at_ends={"t1": 0.3}
     )
-    found = told(values, Standing(highest_share_at_ends=0.2), n=12)
+    found = told(values, Standing(highest_share_at_ends=0.2, sensitivity=SHOWN), n=12)
     assert found == {ALL_TEXTURES: EQUIVALENT, "t0": EQUIVALENT, "t1": WITHHELD} | {
         EVERY_TEXTURE: INCONCLUSIVE
     }
@@ -101,7 +109,8 @@ def test_the_chance_of_equivalence_is_that_of_the_closed_form():
     found = []
     for _ in range(simulations):
         values = Values(table=table_of(rng.normal(0, 11, (1, 20))))
-        found += verdicts(CLAIM, values, n=20, standing=Standing(), rng=rng)
+        standing = Standing(sensitivity=SHOWN)
+        found += verdicts(CLAIM, values, n=20, standing=standing, rng=rng)
     table = power_table(found, simulations=simulations)
     every = table[table["texture"] == EVERY_TEXTURE].iloc[0]
     assert every["ci_low"] < equivalence_power(20, 0.0) < every["ci_high"]

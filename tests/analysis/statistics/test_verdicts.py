@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -11,8 +13,18 @@ import pytest
 from analysis.answers.loading import PlannedTask, Responses, leave_out
 from analysis.answers.plan import AnalysisPlan
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import INTERIM, WITHHELD
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT
+from analysis.report.answer import answer
+from analysis.report.claim_sentences import claim_outcomes
+from analysis.report.plan_sentences import methods_paragraph
+from analysis.statistics.claims import (
+    BOUNDS_WITHHELD,
+    INTERIM,
+    NOT_TESTED,
+    SHOWN,
+    WITHHELD,
+)
+from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
+from analysis.statistics.power import verdicts
 from analysis.statistics.verdicts import (
     all_claims,
     chance_of,
@@ -32,12 +44,13 @@ def rng() -> np.random.Generator:
 
 
 @pytest.fixture
-def answers(ratings, choices, plan) -> Responses:
+def answers(ratings, choices, plan, anchors) -> Responses:
     return Responses(
         {"absolute": ratings, "relative": choices},
         simulated_participants=False,
         simulated_rig=False,
         plan=plan,
+        anchors=anchors,
     )
 
 
@@ -70,7 +83,7 @@ def test_any_sets_of_models_are_compared_with_the_first_that_was_planned(answers
     three = replace(
         answers,
         answers={"relative": pd.concat([answers.relative, third])},
-        planned={"relative": PlannedTask(16, 48, ("simplified", "AR", "full"), 3)},
+        planned={"relative": PlannedTask(16, 16, ("simplified", "AR", "full"), 3)},
         plan=AnalysisPlan(claims=()),
     )
     assert pairs_of(three, "relative") == [("simplified", "AR"), ("simplified", "full")]
@@ -98,6 +111,7 @@ def test_an_unfinished_task_has_no_verdict(answers):
     begun = replace(answers, planned={"relative": PlannedTask(24, 48, repeats=3)})
     found = claims_found(begun, rng=rng())
     assert set(found[2].tests["verdict"]) == {INTERIM}
+    assert found[2].tests["mean_difference"].isna().all()
     assert INTERIM not in set(found[0].tests["verdict"])
 
 
@@ -111,11 +125,84 @@ def test_equality_needs_anchors_that_are_told_apart(answers, lower, told_apart):
     claim = answers.plan.claims[0]
     with_anchors = replace(answers, anchors={"absolute": anchors})
     standing = claim_standing(with_anchors, claim, rng=rng())
-    assert (standing.insensitive == "") is told_apart
+    assert (standing.sensitivity == SHOWN) is told_apart
     verdicts = set(claims_found(with_anchors, rng=rng())[0].tests["verdict"])
     assert (WITHHELD in verdicts) is not told_apart
     assert (EQUIVALENT in verdicts) is told_apart
-    assert claim_standing(answers, claim, rng=rng()).insensitive == ""  # none were planned
+    for none in ({}, {"absolute": anchors.iloc[:0]}):
+        standing = claim_standing(replace(answers, anchors=none), claim, rng=rng())
+        assert standing.sensitivity == NOT_TESTED
+
+
+EQUAL = {EQUIVALENT, WITHIN_BOUNDS}
+
+
+def rated(make, plan, *, anchors: bool) -> Responses:
+    """Twenty people rate seven textures with two models; anchors come from the same `make`."""
+    rows = pd.DataFrame(
+        {"participant_id": f"sub-{person:02d}", "texture": f"t{texture}", "model": model}
+        for person in range(20)
+        for texture in range(7)
+        for model in ("full", "simplified")
+    )
+    other = (rows["model"] == "simplified").to_numpy()
+    own = rows.assign(magnitude_similarity=make(other), frequency_similarity=make(other))
+    canvas = rows[(rows["texture"] == "t0") & (rows["model"] == "full")]
+    alike = canvas.assign(magnitude_similarity=make(np.zeros(len(canvas))))
+    return Responses(
+        {"absolute": own},
+        simulated_participants=True,
+        simulated_rig=True,
+        anchors={"absolute": alike} if anchors else {},
+        plan=replace(plan, claims=plan.claims[:1], highest_share_at_ends=1.0),
+        planned={"absolute": PlannedTask(20, 20)},
+    )
+
+
+def noise(draws: np.random.Generator, other: np.ndarray) -> np.ndarray:
+    """What nobody felt: N(50, 8) in place of every rating."""
+    return draws.normal(50.0, 8.0, len(other))
+
+
+def at_the_end(draws: np.random.Generator, other: np.ndarray) -> np.ndarray:
+    """A latent difference of −9 points, six ratings of ten at 100."""
+    return np.minimum(draws.normal(107.0, 10.0, len(other)) - 9.0 * other, 100.0)
+
+
+@pytest.mark.parametrize(("world", "withheld"), [(noise, WITHHELD), (at_the_end, BOUNDS_WITHHELD)])
+# Without anchors nothing is said, with them what one test in twenty says by chance.
+@pytest.mark.parametrize(("anchors", "allowed"), [(False, 0), (True, 2)])
+def test_worlds_without_proof_of_sensitivity_are_not_called_equal(
+    world, withheld, anchors, allowed, plan
+):
+    """Of ten studies each: all textures together, each one, and every one at once."""
+    draws = np.random.default_rng(3)
+    said = []
+    for _ in range(10):
+        answers = rated(partial(world, draws), plan, anchors=anchors)
+        claim = answers.plan.claims[0]
+        standing = claim_standing(answers, claim, rng=draws)
+        values = claim_values(answers, claim)
+        found = verdicts(claim, values, n=20, standing=standing, rng=draws)
+        said.append({one.texture: one.verdict for one in found})
+    assert sum(bool(EQUAL & set(one.values())) for one in said) <= allowed
+    # The tests alone would have said it.
+    assert sum(one[ALL_TEXTURES] == withheld for one in said) >= 10 - allowed - 1
+
+
+@pytest.mark.parametrize(("world", "told"), [(noise, WITHHELD), (at_the_end, BOUNDS_WITHHELD)])
+def test_the_report_on_such_a_world_says_nothing_of_equality(world, told, plan):
+    draws = np.random.default_rng(3)
+    answers = rated(partial(world, draws), plan, anchors=False)
+    found = claims_found(answers, rng=rng())
+    assert found[0].tests["verdict"].iloc[0] == told
+    sentences = [outcome.sentence for outcome in claim_outcomes(found[:1])]
+    sentences.append(answer(found[:1], answers))
+    for sentence in sentences:
+        assert NOT_TESTED in sentence
+        assert not re.search("TOST|BF₀₁|within (the )?bounds|at once", sentence)
+        assert "equivalent" not in sentence.replace("not called equivalent", "")
+    assert "sensitivity not tested" in methods_paragraph(answers, found[:1])
 
 
 def test_equality_of_guesses_is_none(answers):
@@ -126,7 +213,7 @@ def test_equality_of_guesses_is_none(answers):
     )
     blind = replace(answers, answers={"relative": guessed})
     standing = claim_standing(blind, answers.plan.claims[2], rng=rng())
-    assert standing.insensitive == "answers on full models were not above chance"
+    assert standing.sensitivity == "answers on full models were not above chance"
     assert chance_of(guessed) == 1 / 7
     wide = replace(answers.plan.claims[2], bounds=(-0.3, 0.3))
     (one,) = claims_found(replace(blind, plan=AnalysisPlan(claims=(wide,))), rng=rng())
@@ -136,7 +223,7 @@ def test_equality_of_guesses_is_none(answers):
 def test_everybody_right_is_above_chance_and_equal(answers):
     always = replace(answers, answers={"relative": answers.relative.assign(correct=1.0)})
     (one,) = claims_found(always, rng=rng())
-    assert one.standing.insensitive == ""
+    assert one.standing.sensitivity == SHOWN
     assert set(one.tests["verdict"]) == {EQUIVALENT}
     assert (one.tests["p"] == 1).all()
     assert (one.tests["p_equivalence"] <= 1e-3).all()
@@ -171,7 +258,9 @@ def test_the_odd_one_out_is_compared_with_chance(answers, plan):
     assert values["reference"].unique() == pytest.approx([1 / 3])
     (one,) = claims_found(odd, rng=rng())
     verdicts = one.tests.set_index("texture")["verdict"]
-    assert verdicts[["canvas", "PVC"]].tolist() == [EQUIVALENT, DIFFERENT]
+    # Nothing in this task shows that a difference would have been felt.
+    assert one.standing.sensitivity == NOT_TESTED
+    assert verdicts[["canvas", "PVC"]].tolist() == [WITHHELD, DIFFERENT]
     assert (one.tests["n"] == 24).all()
 
 

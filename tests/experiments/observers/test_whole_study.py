@@ -52,7 +52,9 @@ def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: 
 
     absolute = [r for p in tmp_path.rglob("*_task-absolute_beh.tsv") for r in rows(p)]
     main = [row for row in absolute if row["phase"] == "main"]
-    assert set(Counter((row["texture"], row["model"]) for row in main).values()) == {20}
+    own = [row for row in main if row["virtual_texture"] == row["texture"]]
+    assert set(Counter((row["texture"], row["model"]) for row in own).values()) == {20}
+    assert len(main) - len(own) == 20 * len(study.plan_of("absolute").anchors)
     assert len(absolute) - len(main) == 20 * study.plan_of("absolute").training_trials
     assert all(0 <= float(row["magnitude_similarity"]) <= 100 for row in absolute)
 

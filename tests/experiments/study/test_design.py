@@ -96,7 +96,17 @@ def tiny(*, textures: int, plan: TaskPlan, seed: int = 1, **changes: object) -> 
 
 def main_of(study: Study, task: str, slot: int, session: int = 1) -> list[Trial]:
     trials = plan_session(study, task=task, subject=slot, session=session).trials
-    return [trial for trial in trials if trial.phase == "main"]
+    return without_anchors(trials)
+
+
+def without_anchors(trials: Iterable[Trial]) -> list[Trial]:
+    """The main trials, but those beside another texture's model."""
+    return [
+        trial
+        for trial in trials
+        if trial.phase == "main"
+        and getattr(trial, "virtual_texture", trial.texture) == trial.texture
+    ]
 
 
 def firsts(trials: list[Trial]) -> dict[str, str]:
@@ -111,7 +121,8 @@ def test_shipped_study_is_the_papers() -> None:
     assert len(study.textures) == 7
     assert study.models_of("absolute") == study.models_of("relative") == ("full", "simplified")
     wanted = TaskPlan(participants=20, schedule="interleaved", models=("full", "simplified"))
-    assert study.plan_of("absolute") == wanted
+    anchors = {"wall paper": "aluminum", "canvas": "PVC"}  # the paper has none
+    assert study.plan_of("absolute") == replace(wanted, anchors=anchors)
     by_day = replace(wanted, participants=24, schedule="by-day", repeats=3)
     assert study.plan_of("relative") == by_day
     assert (study.sessions("absolute"), study.sessions("relative")) == (1, 2)
@@ -257,9 +268,7 @@ def test_a_replacement_takes_over_the_cells_of_the_slot_with_other_shuffles() ->
         plan_session(study, task="absolute", subject=subject, session=1, slot=4)
         for subject in (4, 31)
     )
-    first, second = (
-        [trial for trial in plan.trials if trial.phase == "main"] for plan in (gone, new)
-    )
+    first, second = (without_anchors(plan.trials) for plan in (gone, new))
     assert firsts(first) == firsts(second)
     assert {(t.texture, t.model, t.first_surface) for t in first} == {
         (t.texture, t.model, t.first_surface) for t in second

@@ -131,6 +131,7 @@ def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
 ASKED = 'name = "sex"\ntext.en = "Mood?"\ntext.ja = "気分?"\nlevels_text'
 JAPANESE = ["女", "男", "その他", "答えない"]
 ABSOLUTE = 'participants = 20\nschedule = "interleaved"'
+ANCHORS = '{"wall paper" = "aluminum", canvas = "PVC"}'
 RELATIVE = 'participants = 24\nschedule = "by-day"'
 LEVELS = str([f"level {number}" for number in range(19)])
 CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
@@ -156,9 +157,9 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "full"]\n', "different models"),
         ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "AR"]\n', r"\[relative\], got AR"),
         (ABSOLUTE, f"{ABSOLUTE}\nfeel_all = true", r"got it in \[absolute\]"),
-        (ABSOLUTE, f'{ABSOLUTE}\nanchors = {{canvas = "canvas"}}', "two different textures"),
-        (ABSOLUTE, f'{ABSOLUTE}\nanchors = {{canvas = "silk"}}', "got 'canvas' = 'silk'"),
-        (ABSOLUTE, f'{ABSOLUTE}\nanchors = ["canvas"]', "expected a table anchors"),
+        ('canvas = "PVC"}', 'canvas = "canvas"}', "two different textures"),
+        ('canvas = "PVC"}', 'canvas = "silk"}', "got 'canvas' = 'silk'"),
+        (ANCHORS, '["canvas"]', "expected a table anchors"),
         (RELATIVE, RELATIVE.replace("24", "23"), "even number of participants"),
         (RELATIVE, RELATIVE.replace("participants", "subjects"), "got subjects"),
         (RELATIVE, 'schedule = "by-day"', "got no participants"),

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
 
+from experiments.observers.in_memory import simulate_sessions
+from experiments.observers.percepts import Perception
+from experiments.observers.psychometrics import Psychometrics
 from experiments.study.models import ModelSets
 from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study, plan_sha256
@@ -13,8 +17,9 @@ from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from experiments.tasks.balance import balance_of
 from experiments.tasks.durations import minutes_of_session, trials_of_session
-from experiments.tasks.page import plan_page
-from modeling import InputError
+from experiments.tasks.page import plan_page, proof_of_sensitivity
+from modeling import InputError, TextureModel, Threshold
+from modeling.files.answer_tables import ANSWER_TABLES
 
 
 def test_the_papers_study_is_balanced() -> None:
@@ -40,17 +45,84 @@ def test_anchors_count_for_nothing(study: Study) -> None:
         assert row.most - row.least <= 1
 
 
-def test_trials_and_minutes_are_those_of_the_plan(study: Study) -> None:
-    for task in study.tasks:
+@pytest.mark.parametrize("repeats", [1, 2])
+def test_planned_trials_are_those_that_sessions_run(
+    study: Study,
+    models: ModelSets,
+    truths: dict[str, TextureModel],
+    threshold: Threshold,
+    repeats: int,
+) -> None:
+    """Of every task; the odd one out takes even repeats alone."""
+    mixed = TaskPlan(participants=1, schedule="interleaved", repeats=repeats, training_trials=3)
+    tasks = {
+        "absolute": replace(mixed, anchors={"canvas": "PVC"}),
+        "relative": replace(mixed, participants=2, schedule="by-day"),
+        "oddity": replace(mixed, repeats=2 * repeats),
+        "threshold": mixed,
+    }
+    study = replace(study, tasks=tasks)
+    answers = simulate_sessions(
+        study,
+        models=models,
+        perception=Perception(study, real=truths, models=models, threshold=threshold),
+        psychometrics=Psychometrics(),
+        seed=3,
+        subjects=[1],
+    )
+    assert answers.keys() == set(ANSWER_TABLES)
+    for task, rows in answers.items():
+        run = Counter((row["session"], row["phase"]) for row in rows)
         training, main = trials_of_session(study, task)
-        trials = plan_session(study, task=task, subject=1, session=1).trials
-        assert len(trials) == training + main
-    # 2 + 14 trials of 50 s and 5 min, and a break of 2 min after 5 and after 10 of 14 trials.
+        assert run == {
+            (session, phase): count
+            for session in range(1, study.sessions(task) + 1)
+            for phase, count in (("training", training), ("main", main))
+        }
+
+
+def test_thresholds_are_planned_by_frequencies(study: Study, models: ModelSets) -> None:
+    plan = TaskPlan(participants=10, schedule="interleaved", repeats=60, break_after=80)
+    study = replace(study, tasks={"threshold": plan})
+    assert trials_of_session(study, "threshold") == (2, 480)
+    # 482 trials of 4 s, 5 min, and 5 breaks of 2 min.
+    assert minutes_of_session(study, "threshold") == round((482 * 4 + 300 + 600) / 60)
+    page = plan_page(study, models)
+    design, _, _ = page.partition("## Models")
+    assert "Each frequency comes 60 times" in design.partition("**Threshold")[2]
+    assert "with each model" not in design.partition("**Threshold")[2]
+    found = [(row.least, row.most, row.of) for row in balance_of(study, "threshold")]
+    assert found == [(240, 240, 480), (2400, 2400, 4800)]
+
+
+@pytest.mark.parametrize("repeats", [2, 4, 6])
+@pytest.mark.parametrize("seed", range(5))
+def test_every_button_is_right_equally_often_in_the_oddity_task(
+    study: Study, repeats: int, seed: int
+) -> None:
+    plan = TaskPlan(participants=24, schedule="interleaved", repeats=repeats)
+    study = replace(study, seed=seed, textures=("canvas", "MDF"), trays={"canvas": "C", "MDF": "A"})
+    study = replace(study, tasks={"oddity": plan})
+    *_, within, over = balance_of(study, "oddity")
+    assert within.most - within.least <= 1
+    assert (over.least, over.most, over.of) == (16 * repeats, 16 * repeats, 48 * repeats)
+    cells = Counter(
+        (trial.texture, trial.model, trial.layout.index(trial.model))
+        for slot in range(1, 25)
+        for trial in plan_session(study, task="oddity", subject=slot, session=1).trials
+        if trial.phase == "main"
+    )
+    assert set(cells.values()) == {4 * repeats}
+    assert len(cells) == 2 * 2 * 3
+
+
+def test_minutes_are_those_of_trials_and_breaks() -> None:
+    # 2 + 16 trials of 50 s and 5 min, and a break of 2 min after 5, 10 and 15 of 16 trials.
     paper = Study.load()
-    assert minutes_of_session(paper, "absolute") == round((16 * 50 + 300) / 60)
+    assert minutes_of_session(paper, "absolute") == round((18 * 50 + 300) / 60)
     breaks = replace(paper.plan_of("absolute"), break_after=5)
     slower = replace(paper, tasks={"absolute": breaks})
-    assert minutes_of_session(slower, "absolute") == round((16 * 50 + 300 + 240) / 60)
+    assert minutes_of_session(slower, "absolute") == round((18 * 50 + 300 + 360) / 60)
 
 
 @pytest.fixture
@@ -91,9 +163,25 @@ def test_the_page_says_all_that_is_fixed(planned: Study, models: ModelSets) -> N
         "real canvas beside the full model of PVC",
         "A break after every 4 trials",
         "each on a day of its own (2 sessions)",
+        "No equality unless the anchors are rated lower",
     ):
         assert told in page
     assert plan_page(Study.from_dict(planned.to_dict()), models) == page
+
+
+def test_each_claim_says_what_its_equality_hangs_on(planned: Study) -> None:
+    (rated,) = planned.plan.claims
+    chosen, odd = (
+        replace(rated, task=task, measure="correct", bounds=(-0.1, 0.1))
+        for task in ("relative", "oddity")
+    )
+    oddity = TaskPlan(participants=3, schedule="interleaved", repeats=2)
+    bare = replace(planned.plan_of("absolute"), anchors={})
+    study = replace(planned, tasks={**planned.tasks, "absolute": bare, "oddity": oddity})
+    assert "anchors are rated lower" in proof_of_sensitivity(planned, rated)
+    assert "give it anchors" in proof_of_sensitivity(study, rated)
+    assert "full models are recognised" in proof_of_sensitivity(study, chosen)
+    assert "No equality in any case" in proof_of_sensitivity(study, odd)
 
 
 def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:
