@@ -1,4 +1,4 @@
-"""A session that plays a steady signal and looks after it; says which process plays, and the memory.
+"""A session that plays a steady signal and looks after it; says which process plays, and where.
 
 To a line "play" it plays anew, to "hang" it says so and hangs; faults it writes, a line each.
 """
