@@ -4,8 +4,8 @@ Simulated: JACK's dummy driver instead of a sound card, a planted texture (wall 
 strokes to and fro. *C callback*: `rig.sound`, a process of its own. *Python callback*: what one
 would write with sounddevice alone, `Renderer.render` in a callback of the session's process. In the
 second half of each run the session holds Python's lock for 0.8 s, as a slow page or a garbage
-collection may (after a second the rig would be silent by itself). A bare process that only sleeps until each block is due shows what the machine
-itself misses.
+collection may; after a second without it the rig would fall silent. A bare process that only sleeps
+until each block is due shows what the machine itself misses.
 
 Example: python docs/studies/live_study.py writes live_study.tsv beside this file and prints it.
 """
