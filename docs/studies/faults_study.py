@@ -4,7 +4,8 @@ In software: JACK's dummy driver instead of a sound card, a planted texture, a s
 pseudo-terminal that moves steadily at 100 mm/s. A session in its own process presents the texture
 and reads the rig every 20 ms; after half a second to a second one thing fails. Another client of
 the server listens to what the card would get. A run's time is from the fault to the first silent
-block that it gets, from which on it is silent for 50 ms at least; none where no more blocks come.
+block that it gets, after which it is silent for 0.3 s at least (a lost reader of the hand is
+replaced later); none where no more blocks come.
 
 Example: python docs/studies/faults_study.py writes faults_study.tsv beside this file and prints it.
 """
@@ -40,9 +41,9 @@ from stimuli.planted.textures import planted_texture
 
 RATE_HZ, BLOCK = 48000, 128
 BLOCK_S = BLOCK / RATE_HZ
-REPEATS = 10
+REPEATS = 6
 WATCHED_S = 1.6
-SILENT_S = 0.05
+SILENT_S = 0.3
 SPEED_MM_S, LINE_S = 100, 0.002
 TEXTURE = "wall paper"
 SERVER = "tactileq-faults"

@@ -146,7 +146,7 @@ def sit_down(monkeypatch: pytest.MonkeyPatch, someone: Scripted) -> Ready:
 def answered(
     main: Any, study: Path, jack_server: Any, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Path, str]:
-    """The study after a session that stands still and three parts of which fail, and what it said."""
+    """The study after a session that stands still once and loses three parts, and what it said."""
     someone = Unlucky(
         {1: hold_the_interpreter, 2: kill_the_sound, 3: pull_the_plug, 4: kill_the_reader}
     )
