@@ -283,7 +283,9 @@ class TextureRig(Protocol):
     """A device that puts surfaces under a hand, one at a time.
 
     All times are in seconds since it was opened. Between `open` and `close` it can be read; it is
-    silent before the first presentation.
+    silent before the first presentation. While a virtual surface is presented a loop has to call
+    `read`, best ten times a second: where nobody does for a second a rig falls silent, which is a
+    fault (docs/method/live.md#heartbeat).
     """
 
     @property

@@ -36,6 +36,7 @@ def hold(live: Live, speed: float, seconds: float) -> float:
     """A hand of this speed for so long, a reading every 2 ms; when its first one was written."""
     began_s = now_s()
     while now_s() - began_s < seconds:
+        live.heartbeat()
         live.write_reading(
             now_s(), 0.0, y_mm=0.0, speed_mm_s=speed, force_n=1.5 * (speed > 0), flags=1
         )

@@ -3,9 +3,9 @@
 Simulated: JACK's dummy driver instead of a sound card, a planted texture (wall paper), a hand that
 strokes to and fro. *C callback*: `rig.sound`, a process of its own. *Python callback*: what one
 would write with sounddevice alone, `Renderer.render` in a callback of the session's process. In the
-second half of each run the session holds Python's lock for a second, as a slow page or a garbage
-collection may. A bare process that only sleeps until each block is due shows what the machine
-itself misses.
+second half of each run the session holds Python's lock for 0.8 s, as a slow page or a garbage
+collection may; after a second without it the rig would fall silent. A bare process that only sleeps
+until each block is due shows what the machine itself misses.
 
 Example: python docs/studies/live_study.py writes live_study.tsv beside this file and prints it.
 """
@@ -19,6 +19,7 @@ import os
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,8 @@ from stimuli.planted.textures import planted_texture
 RATE_HZ = 48000
 BLOCKS = (64, 128, 256)
 SECONDS = 20.0
-HELD_S = 1.0
+HELD_S = 0.8
+LOOK_S = 0.1
 LIMITS = Limits(peak=5.0, rms=2.0, duration_s=3600.0)
 TEXTURE = "wall paper"
 SERVER = "tactileq-study"
@@ -60,14 +62,24 @@ def hand_in_its_process(path: str) -> None:
         time.sleep(0.002)
 
 
-def calm_and_held(seconds: float) -> tuple[float, float, float]:
+def calm_and_held(
+    seconds: float, look: Callable[[], object] = lambda: None
+) -> tuple[float, float, float]:
     """Wait half of the time; then hold the lock once. When that was, and when all ended."""
-    time.sleep(seconds / 2)
+    wait(seconds / 2, look)
     began_s = now_s()
     hold_lock(HELD_S)
     held_until_s = now_s()
-    time.sleep(seconds / 2 - HELD_S)
+    wait(seconds / 2 - HELD_S, look)
     return began_s, held_until_s, now_s()
+
+
+def wait(seconds: float, look: Callable[[], object]) -> None:
+    """Wait, and look ten times a second."""
+    end_s = now_s() + seconds
+    while now_s() < end_s:
+        look()
+        time.sleep(LOOK_S)
 
 
 def in_c(block: int, seconds: float) -> dict[str, Any]:
@@ -83,7 +95,7 @@ def in_c(block: int, seconds: float) -> dict[str, Any]:
         with sound:
             sound.play(planted_texture(TEXTURE))
             began = live.blocks_written
-            held = calm_and_held(seconds)
+            held = calm_and_held(seconds, sound.faults)
             _, rows = live.blocks_since(began)
         hand.kill()
         hand.wait()

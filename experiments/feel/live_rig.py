@@ -52,6 +52,7 @@ class LiveRig:
         self._pointed, self._masking_level = pointed, masking_level
         self._notes = tuple(notes)
         self._faults: list[str] = []
+        self._model: Layered | None = None
         self._seen = live.blocks_written
         self._played: deque[tuple[float, float, int, float]] = deque()
         self._counters = RenderCounters()
@@ -64,6 +65,7 @@ class LiveRig:
     def present_model(self, model: Layered) -> None:
         """Render this model under the hand; a fault is told by `take_faults`."""
         self._counters = RenderCounters()
+        self._model = model
         if self._sound is None:
             return
         try:
@@ -73,6 +75,7 @@ class LiveRig:
 
     def silence(self) -> None:
         """Render nothing."""
+        self._model = None
         if self._sound is not None:
             self._sound.silence()
 
@@ -141,8 +144,24 @@ class LiveRig:
             if getattr(self._counters, field) > getattr(before, field)
         )
 
+    @property
+    def halted(self) -> bool:
+        """Whether what was presented last was halted, since nobody took the faults for a second."""
+        return self._sound is not None and self._sound.halted
+
     def take_faults(self) -> tuple[str, ...]:
-        """What went wrong since the last call."""
+        """What went wrong since the last call; where the sound was lost another process plays on.
+
+        Raises
+        ------
+        SoundLost, InputError
+            Where nothing can be played any more.
+        """
         told, self._faults = tuple(self._faults), []
         sound = () if self._sound is None else self._sound.faults()
+        if self.halted:
+            self._model = None
+        if self._sound is not None and self._sound.pid is None:
+            self._counters = RenderCounters()
+            self._sound.open() if self._model is None else self._sound.play(self._model)
         return (*told, *sound, *self._hand.faults())

@@ -80,5 +80,13 @@ class FeltRig(Protocol):
     def output(self) -> OutputNow | None:
         """What leaves now, None where nothing can; never waits."""
 
+    @property
+    def halted(self) -> bool:
+        """Whether what was presented last was halted, as a rig does that nobody looks after."""
+
     def take_faults(self) -> tuple[str, ...]:
-        """What went wrong since the last call, one sentence each."""
+        """What went wrong since the last call, one sentence each.
+
+        To be called ten times a second while something is presented; an exception where nothing
+        can be played any more.
+        """

@@ -80,6 +80,12 @@ class Visit:
         self.masked = not self.masked
         self.rig.mask(self.masked)
 
+    def take_faults(self) -> tuple[str, ...]:
+        """What went wrong at the rig since the last call; what it has halted does not play."""
+        told = self.rig.take_faults()
+        self.playing = self.playing and not self.rig.halted
+        return told
+
     def press(self, key: str) -> None:
         """Act on a key by PsychoPy's name for it; other keys have no effect."""
         self._keys.get(key, lambda: None)()

@@ -121,7 +121,9 @@ class FeelWindow:
         from psychopy import event
 
         event.clearEvents()
+        self._draw()  # the first drawing may take longer than a rig plays unattended
         self._visit.play()
+        self._renew()
         while not self._ended:
             due = time.perf_counter() + FRAME_S
             self._draw()
@@ -299,8 +301,8 @@ class FeelWindow:
         visit = self._visit
         kind = "full model" if shown is now.full else "simplified model"
         name = short(visit.texture.name, LONGEST_TITLE)
+        self._fault = (*visit.take_faults(), self._fault)[0]
         self._title.show(f"{name}, {kind}" + ("" if visit.playing else ": stopped"))
-        self._fault = (*visit.rig.take_faults(), self._fault)[0]
         simulated = ("simulated texture",) if visit.texture.full.simulated else ()
         changes = (
             self._notes.show(", ".join([*simulated, *visit.rig.notes])),

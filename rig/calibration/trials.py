@@ -92,13 +92,14 @@ class Watched:
 def watched(
     live: Live, accelerometer: Accelerometer, seconds: float, *, tick: Callable[[float], None]
 ) -> Watched:
-    """Log everything for some time; `tick` is told the share that is over."""
+    """Log everything for some time and look after what plays; `tick` is told the share over."""
     accelerometer.forget()
     reading, block = live.readings_written, live.blocks_written
     readings, blocks = [], []
     start = time.monotonic()
     while (share := (time.monotonic() - start) / seconds) < 1:
         tick(share)
+        live.heartbeat()
         time.sleep(_POLL_S)
         reading, rows = live.readings_since(reading)
         readings.append(rows)

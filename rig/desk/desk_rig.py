@@ -45,6 +45,7 @@ from rig.sound.signals import tone_burst
 
 OLDEST_READING_S = 0.1
 FIRST_READING_S = 5.0
+LOOK_S = 0.1  # so often it looks after a burst that it waits for
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,8 @@ class Parts:
 class DeskRig:
     """A rig of parts on a desk; implements `rig.interface.TextureRig`.
 
-    What fails while it is open is told by `take_faults`, and what was lost is started again.
+    What fails while it is open is told by `take_faults`, and what was lost is started again by what
+    is presented next. `read` and `take_faults` look after what plays: see `TextureRig`.
 
     Parameters
     ----------
@@ -232,7 +234,9 @@ class DeskRig:
         """
         if isinstance(signal, Stimulus):
             return self._present_stimulus(signal)
-        time.sleep(max(0.0, self._signal_end_s - now_s()))
+        while (left_s := self._signal_end_s - now_s()) > 0:
+            self._notice()
+            time.sleep(min(left_s, LOOK_S))
         self.silence()
         sound, samples = self.parts.sound, self._samples(signal)
         start_s = self._started(lambda: sound.play_signal(samples))

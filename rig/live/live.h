@@ -1,4 +1,4 @@
-/* What the processes of a rig share: readings of the hand, and what was played.
+/* What the processes of a rig share: readings of the hand, what was played, the session's heartbeat.
    docs/method/live.md#shared-memory
 
    One process writes readings, the audio callback of another one writes blocks; anybody reads. Nobody
@@ -22,13 +22,13 @@
 #include <time.h>
 #endif
 
-#define TQ_LIVE_FORMAT 0x7471000000000001u /* changes with anything in this file */
+#define TQ_LIVE_FORMAT 0x7471000000000002u /* changes with anything in this file */
 #define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
 
 /* Flags of a reading. */
 enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16 };
 /* Flags of a block. */
-enum { TQ_STALE = 1, TQ_UNDERFLOW = 2 };
+enum { TQ_STALE = 1, TQ_UNDERFLOW = 2, TQ_NO_HEARTBEAT = 4 };
 
 /* A reading of the hand; NaN where nothing measures. */
 typedef struct {
@@ -54,7 +54,8 @@ typedef struct {
 struct tq_live {
     uint64_t format;
     uint64_t readings, blocks; /* how many were ever written */
-    uint64_t spare[5];
+    uint64_t heartbeat;        /* when the session last looked, by tq_put_time */
+    uint64_t spare[4];
     uint64_t reading[TQ_RING][TQ_WORDS(tq_reading)];
     uint64_t block[TQ_RING][TQ_WORDS(tq_block)];
 };
@@ -77,6 +78,22 @@ static inline double tq_now(void)
     clock_gettime(CLOCK_MONOTONIC, &now);
     return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 #endif
+}
+
+/* A time of tq_now, written and read whole. */
+static inline void tq_put_time(uint64_t *place, double time_s)
+{
+    uint64_t word;
+    memcpy(&word, &time_s, 8);
+    __atomic_store_n(place, word, __ATOMIC_RELEASE);
+}
+
+static inline double tq_take_time(const uint64_t *place)
+{
+    uint64_t word = __atomic_load_n(place, __ATOMIC_ACQUIRE);
+    double time_s;
+    memcpy(&time_s, &word, 8);
+    return time_s;
 }
 
 static inline void tq_put(uint64_t *slot, const void *row, size_t words)
@@ -147,6 +164,12 @@ static inline void tq_live_start(tq_live *live)
 static inline int tq_live_fits(const tq_live *live)
 {
     return __atomic_load_n(&live->format, __ATOMIC_ACQUIRE) == TQ_LIVE_FORMAT;
+}
+
+/* The session was there at this time, and looked after what plays. */
+static inline void tq_heartbeat(tq_live *live, double time_s)
+{
+    tq_put_time(&live->heartbeat, time_s);
 }
 
 static inline void tq_write_reading(tq_live *live, double time_s, double x_mm, double y_mm,

@@ -1,4 +1,4 @@
-"""The memory that the processes of a rig share: readings of the hand, blocks that were played.
+"""What the processes of a rig share: readings of the hand, blocks that were played, a heartbeat.
 
 docs/method/live.md#shared-memory
 """
@@ -26,7 +26,9 @@ except ImportError:  # no compiler at installation
 
 # Flags of a reading, and of a block.
 CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
-STALE, UNDERFLOW = 1, 2
+STALE, UNDERFLOW, NO_HEARTBEAT = 1, 2, 4
+
+HEARTBEAT_S = 1.0  # the session looks after what plays as often at least
 
 READING = np.dtype(
     [
@@ -180,6 +182,14 @@ class Live:
             Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE.
         """
         self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
+
+    def heartbeat(self) -> None:
+        """Say that the session looks after what plays: without it what plays falls silent.
+
+        Only the loop that polls the participant or the keys may call this, never a thread of its
+        own: where the loop hangs nobody looks.
+        """
+        self._lib.tq_heartbeat(self.address, self._lib.tq_now())
 
     def latest(self) -> np.void | None:
         """The latest reading (READING), None before the first."""

@@ -9,6 +9,9 @@
    A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and voices
    when no signal does: all changes pass through silence.
 
+   What plays is halted where the session's heartbeat in shared memory stays away: it fades, masking noise
+   with it, and nothing more is heard of it. What is asked for later plays.
+
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
 #ifndef TQ_SOUND_H
@@ -40,12 +43,16 @@ struct tq_sound {
     TQ_SHARED(tq_surface *) surface_wanted; /* written by the control thread */
     TQ_SHARED(tq_signal *) signal_wanted;   /* written by the control thread */
     TQ_SHARED(tq_signal *) signal_playing;  /* written by the callback */
+    uint64_t asked;          /* when, by tq_put_time; written by the control thread after the sources */
     uint64_t masking_wanted; /* RMS of the masking noise, in millionths of full scale */
     tq_live *live;
     int channels, vibration, masking; /* channels count from 0; masking is -1 for none */
     float scale;                      /* full scale per g */
     double stale_s;                   /* a hand older than this counts as lifted off */
+    double heartbeat_s;               /* the session looks as often at least while something plays */
     /* The callback's own. */
+    double halted_s; /* when that was asked for which was halted last */
+    int halted;      /* whether that is what is asked for now */
     tq_real masking_level;
     uint64_t masking_key, position, signal_samples;
 };
@@ -60,13 +67,15 @@ static inline size_t tq_sound_size(void)
 
 /* Silence. Before the callback is first called. Fades take `fade` samples. */
 static inline void tq_sound_start(tq_sound *s, tq_live *live, int fade, int channels, int vibration,
-                                  int masking, float scale, double stale_s, uint64_t masking_key)
+                                  int masking, float scale, double stale_s, double heartbeat_s,
+                                  uint64_t masking_key)
 {
     TQ_FILL(s, 0, sizeof *s);
     tq_player_start(&s->player, fade);
     s->live = live;
     s->channels = channels, s->vibration = vibration, s->masking = masking;
-    s->scale = scale, s->stale_s = stale_s;
+    s->scale = scale, s->stale_s = stale_s, s->heartbeat_s = heartbeat_s;
+    s->halted_s = -1;
     s->masking_key = masking_key;
 }
 
@@ -94,11 +103,13 @@ static inline void tq_signal_start(tq_signal *c, const float *samples, size_t co
     c->level = 0, c->presentation = presentation;
 }
 
-/* What shall play from now on: a surface, a signal, or silence where both are NULL. */
-static inline void tq_sound_want(tq_sound *s, tq_surface *surface, tq_signal *signal)
+/* What shall play from now on: a surface, a signal, or silence where both are NULL. It is asked for now
+   (tq_now), and at no time twice. */
+static inline void tq_sound_want(tq_sound *s, tq_surface *surface, tq_signal *signal, double asked_s)
 {
     TQ_SET(&s->surface_wanted, surface);
     TQ_SET(&s->signal_wanted, signal);
+    tq_put_time(&s->asked, asked_s); /* last: what was halted before must not begin again */
 }
 
 /* The RMS of the masking noise from now on, in millionths of full scale; 0 for none. */
@@ -138,10 +149,21 @@ TQ_INLINE int tq_hand_now(const tq_sound *s, double now_s, double *speed, double
     return 0;
 }
 
+/* Halts what plays where the session has neither asked for it nor looked after it for too long. It stays
+   halted, also when the session comes back: only what is asked for later plays. */
+TQ_INLINE void tq_sound_mind(tq_sound *s, double now_s)
+{
+    double asked_s = tq_take_time(&s->asked), beat_s = tq_take_time(&s->live->heartbeat);
+    if (tq_sound_plays(s) && !(now_s - beat_s <= s->heartbeat_s)
+        && !(now_s - asked_s <= s->heartbeat_s))
+        s->halted_s = asked_s;
+    s->halted = s->halted_s == asked_s;
+}
+
 /* Tells the player what is wanted, which is silence while a signal plays. */
 TQ_INLINE void tq_sound_tell(tq_sound *s)
 {
-    tq_surface *u = TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);
+    tq_surface *u = s->halted || TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);
     tq_player_want(&s->player, (tq_voice *)u);
     if (u && TQ_GET(&s->surface_wanted) != u) /* perhaps freed before it was seen to be wanted */
         tq_player_want(&s->player, NULL);
@@ -153,7 +175,7 @@ TQ_INLINE tq_signal *tq_signal_now(tq_sound *s)
     tq_signal *c = TQ_GET(&s->signal_playing);
     if (c || tq_player_playing(&s->player))
         return c;
-    c = TQ_GET(&s->signal_wanted);
+    c = s->halted ? NULL : TQ_GET(&s->signal_wanted);
     if (!c)
         return NULL;
     TQ_SET(&s->signal_playing, c);
@@ -168,7 +190,7 @@ TQ_INLINE tq_signal *tq_signal_now(tq_sound *s)
 /* The next samples of a signal, into zeros: up to its end, or to that of its fade. */
 TQ_INLINE void tq_signal_render(tq_sound *s, tq_signal *c, float *out, size_t count)
 {
-    int leaves = TQ_GET(&s->signal_wanted) != c;
+    int leaves = s->halted || TQ_GET(&s->signal_wanted) != c;
     size_t n = 0;
     for (; n < count && c->position < c->count && c->level > 0; n++) {
         c->level -= leaves;
@@ -191,7 +213,8 @@ TQ_INLINE void tq_signal_render(tq_sound *s, tq_signal *c, float *out, size_t co
 /* The next samples of the masking noise, which reaches its level within a fade. */
 TQ_INLINE void tq_masking_render(tq_sound *s, float *out, size_t count)
 {
-    tq_real wanted = (tq_real)1e-6 * (tq_real)__atomic_load_n(&s->masking_wanted, __ATOMIC_RELAXED);
+    uint64_t millionths = s->halted ? 0 : __atomic_load_n(&s->masking_wanted, __ATOMIC_RELAXED);
+    tq_real wanted = (tq_real)1e-6 * (tq_real)millionths;
     size_t n;
     for (n = 0; n < count; n++) {
         s->masking_level += tq_within(wanted - s->masking_level, -s->player.step, s->player.step);
@@ -259,6 +282,9 @@ static int tq_sound_callback(const void *in, void *out, unsigned long frames, co
         block.flags |= TQ_STALE;
     if (flags & TQ_UNDERFLOWED)
         block.flags |= TQ_UNDERFLOW;
+    tq_sound_mind(s, block.time_s);
+    if (s->halted)
+        block.flags |= TQ_NO_HEARTBEAT;
     TQ_FILL(to, 0, frames * (size_t)s->channels * sizeof *to);
     while (left) {
         size_t count = left < TQ_PIECE ? left : TQ_PIECE;

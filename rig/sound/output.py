@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
@@ -24,16 +24,21 @@ from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
 from rig.live.child import Child, ChildLost
-from rig.live.memory import UNDERFLOW, Live, Rows, now_s
+from rig.live.memory import HEARTBEAT_S, NO_HEARTBEAT, UNDERFLOW, Live, Rows, now_s
 
 STALLED_S = 0.5  # without a block: the server is gone
 LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63
 _POLL_S = 0.001
+_HALTED = (
+    f"expected the program to look after what plays at least every {HEARTBEAT_S:g} s, got a longer "
+    "time without; the vibration was stopped, and nothing is felt until something is presented "
+    "again."
+)
 
 
 class SoundLost(OSError):
-    """Nothing can be played, not even by a new process; the message is one sentence."""
+    """Nothing can be played, or not to its end; the message is one sentence."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +62,9 @@ class SoundOutput:
 
     The process may be killed and its sound server may die: what is asked for next starts another
     one, and `faults` tells of it.
+
+    While something plays `faults` has to be called, best ten times a second: where nobody calls it
+    for a second what plays is halted, and stays so (docs/method/live.md#heartbeat).
 
     Parameters
     ----------
@@ -127,6 +135,7 @@ class SoundOutput:
         self._seen = live.blocks_written
         self._last_block_s = 0.0
         self._misses = 0
+        self._halted = False
         # The vibration that has had no pause yet: since when and until when it was felt.
         self._felt_since_s = self._felt_until_s = 0.0
 
@@ -167,6 +176,11 @@ class SoundOutput:
     def latency_s(self) -> float:
         """Of the output, as PortAudio states it; NaN while it is closed."""
         return float("nan") if self._child is None else float(self._child.ready["latency_s"])
+
+    @property
+    def halted(self) -> bool:
+        """Whether what was presented last was halted, by what `faults` has seen."""
+        return self._halted
 
     @property
     def misses(self) -> int:
@@ -224,7 +238,8 @@ class SoundOutput:
         InputError
             For a signal beyond the limits, or with values that are not finite.
         SoundLost
-            Where nothing can be played; with `wait` also where the process is lost meanwhile.
+            Where nothing can be played; with `wait` also where the process is lost meanwhile, or
+            the signal halted.
         """
         samples = self.checked(samples_g, compensated=compensated)
         self._pause_before(samples.size / self._rate_hz)
@@ -322,7 +337,7 @@ class SoundOutput:
     # --- Health -----------------------------------------------------------------------------
 
     def faults(self) -> tuple[str, ...]:
-        """What went wrong since the last call, one sentence each."""
+        """What went wrong since the last call, one sentence each; a heartbeat for what plays."""
         self._look()
         if self._child is not None and not self._child.runs:
             self._lose("it has ended")
@@ -332,13 +347,21 @@ class SoundOutput:
         return told
 
     def _look(self) -> Rows:
-        """The blocks since the last look, counted."""
+        """The blocks since the last look, counted; who looks is there, which is the heartbeat."""
+        self._live.heartbeat()
         self._seen, rows = self._live.blocks_since(self._seen)
         if rows.size:
             self._last_block_s = float(rows["time_s"][-1])
             self._misses += int(np.count_nonzero(rows["flags"] & UNDERFLOW))
+            self._follow_halts((rows["flags"] & NO_HEARTBEAT) > 0)
             self._follow_vibration(rows)
         return rows
+
+    def _follow_halts(self, halted: NDArray[np.bool_]) -> None:
+        """Tell once of each halt; (n,), whether it holds in each block."""
+        before = np.concatenate(([self._halted], halted[:-1]))
+        self._faults += [_HALTED] * int(np.count_nonzero(halted & ~before))
+        self._halted = bool(halted[-1])
 
     def _follow_vibration(self, rows: Rows) -> None:
         """Since when, and until when, it was felt without a pause."""
@@ -363,9 +386,10 @@ class SoundOutput:
 
     def _lose(self, why: str) -> None:
         self._faults.append(
-            f"expected the sound process to play, got: {why}; the hand felt nothing since, and "
-            "another process is started."
+            f"expected the sound process to play, got: {why}; nothing is felt until something is "
+            "presented again, by another process."
         )
+        self._halted = False
         if self._child is not None:
             self._child.kill()
             self._child = None
@@ -439,6 +463,8 @@ class SoundOutput:
             raise SoundLost(
                 f"expected a sound process that plays to the end, got: {lost}; play it again."
             ) from None
+        if self._halted:
+            raise SoundLost(_HALTED)
 
     def _number(self) -> int:
         self._presentation += 1

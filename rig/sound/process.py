@@ -23,7 +23,7 @@ import numpy as np
 from modeling.errors import InputError
 from modeling.rendering.compiled import filled, render_counters
 from rig.live.driven import settings_from_parent, tell
-from rig.live.memory import Live, compiled
+from rig.live.memory import HEARTBEAT_S, Live, compiled, now_s
 from rig.sound.devices import check_rate, find_device, portaudio
 
 STALE_S = 0.1
@@ -64,6 +64,7 @@ class Playing:
             -1 if masking is None else masking,
             settings["fullscale_per_g"],
             STALE_S,
+            HEARTBEAT_S,
             settings["masking_key"],
         )
         self._stream = self._open(device.index, rate_hz, channels, int(settings["block"]))
@@ -118,7 +119,7 @@ class Playing:
             memory = self._ffi.new("tq_real[]", reals)
             self._lib.tq_surface_start(source, texture, memory, key, number)
         self._sources[number] = _Source("surface", source, (texture, arrays, memory))
-        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+        self._want(surface=source)
 
     def _filled(self, structure: str, told: Mapping[str, Any]) -> tuple[Any, list[Any]]:
         """A structure of the kernel, and the arrays that it only points at."""
@@ -136,11 +137,16 @@ class Playing:
         number = wanted["presentation"]
         self._lib.tq_signal_start(source, held, samples.size, number)
         self._sources[number] = _Source("signal", source, (samples, held))
-        self._lib.tq_sound_want(self._sound, self._ffi.NULL, source)
+        self._want(signal=source)
 
     def silence(self) -> None:
         """Fade to silence."""
-        self._lib.tq_sound_want(self._sound, self._ffi.NULL, self._ffi.NULL)
+        self._want()
+
+    def _want(self, *, surface: Any = None, signal: Any = None) -> None:
+        """Play one of them, or none, from now on."""
+        none = self._ffi.NULL
+        self._lib.tq_sound_want(self._sound, surface or none, signal or none, now_s())
 
     def mask(self, level: float) -> None:
         """Masking noise of this RMS, in shares of full scale."""

@@ -102,12 +102,14 @@ def _measured(
         accelerometer = Accelerometer(source)
         loop_s = loop_back_s(sound, accelerometer, rate_hz=rig.sound.rate_hz, rms_g=rms_g)
         floor = accelerometer.record(0.5)
-        sound.play(probe_texture(rms_g))
         if hand:
             print(f"Stroke to and fro, about 10 cm wide and once a second, for {seconds:.0f} s.")
         with HandReader(live, settings), share_of("Trials") as tell:
+            sound.play(probe_texture(rms_g))
             seen = watched(live, accelerometer, seconds, tick=lambda share: tell(share, ""))
-        sound.silence()
+            sound.silence()
+        if faults := sound.faults():
+            raise ValueError(faults[0])
     if not hand:
         return seen, step_latencies_s(seen), loop_s
     from rig.calibration.latency import high_passed

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import InputError
 from tactileq.interruption import Interrupted
 from tactileq.options import RigPath
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from modeling.rendering.plan import RenderCounters
     from rig.monitoring.figures import Range, Snapshot
     from rig.setup.rig_file import RigFile
+    from rig.sound.output import SoundOutput
 
 _EVERY_S = 0.1
 
@@ -36,7 +38,8 @@ def rig_monitor(
     """Show a rig live: hand, level, limits, missed blocks, latency, time that the callback takes.
 
     Beside it the misses of a thread that only wakes up once per block: what it misses is the
-    machine's, not the rig's. Ctrl-C ends it with one line.
+    machine's, not the rig's. Ctrl-C ends it with one line. Where the sound process is lost another
+    one plays on; where that cannot be, one sentence says so, and the exit code is 1.
 
     Example: tactileq rig monitor models/canvas.json --rig rig.toml
     """
@@ -76,6 +79,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
                 while seconds is None or time.monotonic() - start < seconds:
                     time.sleep(_EVERY_S)
                     faults += [*hand.faults(), *sound.faults()]
+                    _play_on(sound, model, faults)
                     snapshot, missed = monitor.look(), bare.ask({})
                     screen.update(_table(snapshot, missed, faults[-3:]), refresh=True)
         except Interrupted as end:
@@ -83,11 +87,27 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
                 raise
         finally:
             bare.close()
+            for fault in faults:
+                print(f"fault: {fault}")
         counted = sound.silence()
-    for fault in faults:
-        print(f"fault: {fault}")
     limited = 0 if counted is None else _limited(counted.counters)
     print(_summary(snapshot, missed, time.monotonic() - start, limited=limited))
+
+
+def _play_on(sound: SoundOutput, model: AnyModel | None, faults: Sequence[str]) -> None:
+    """Play again by another process where the one before was lost.
+
+    Raises
+    ------
+    InputError
+        Where the vibration was halted: the last of the faults.
+    SoundLost
+        Where nothing can be played.
+    """
+    if sound.halted:
+        raise InputError(faults[-1])
+    if sound.pid is None:
+        sound.open() if model is None else sound.play(model)
 
 
 def _grid(model: AnyModel | None) -> tuple[Range, Range] | None:

@@ -29,7 +29,9 @@ Jack = Callable[..., AbstractContextManager[Any]]
 Run = Callable[..., subprocess.CompletedProcess[str]]
 TRUTH = SimulatedVibrator(height=1.001, g_per_fullscale=5.0, delay_s=0.004)
 DELAYED_MS = 4.0
-BUSY = re.compile(r"lost samples|no trace|got it .* ms before|in at least 50 trials|coherence")
+BUSY = re.compile(
+    r"lost samples|no block for|no trace|got it .* ms before|in at least 50 trials|coherence"
+)
 
 
 @pytest.fixture

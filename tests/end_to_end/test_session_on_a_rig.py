@@ -100,8 +100,8 @@ class Unlucky(Scripted):
 
 
 def hold_the_interpreter(parts: Any) -> None:
-    """For a second, no other thread of this process runs Python."""
-    ctypes.PyDLL(None).usleep(1_000_000)
+    """For longer than a rig plays unattended, no thread of this process runs Python."""
+    ctypes.PyDLL(None).usleep(1_300_000)
 
 
 def kill_the_sound(parts: Any) -> None:
@@ -146,7 +146,7 @@ def sit_down(monkeypatch: pytest.MonkeyPatch, someone: Scripted) -> Ready:
 def answered(
     main: Any, study: Path, jack_server: Any, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[Path, str]:
-    """The study after a session in which three parts fail, and what the program said."""
+    """The study after a session that stands still once and loses three parts, and what it said."""
     someone = Unlucky(
         {1: hold_the_interpreter, 2: kill_the_sound, 3: pull_the_plug, 4: kill_the_reader}
     )
@@ -154,7 +154,7 @@ def answered(
     with jack_server(block=128):
         done = main("session", *WORDS, "--rig", "rig.toml")
     assert done.returncode == 0, done.stderr
-    assert len(experimenter.called) >= 3
+    assert len(experimenter.called) >= 4
     return study, done.stdout
 
 
@@ -166,7 +166,7 @@ def test_what_fails_in_a_session_is_in_its_data_and_repeated(answered: tuple[Pat
     )
     # On a loaded machine the hand may be read too late in other trials, too.
     failed = set(answers.loc[answers["valid"] == 0, "trial"])
-    assert failed >= {2, 3, 4}
+    assert failed >= {1, 2, 3, 4}
     assert f"the rig failed in {len(failed)} trials" in said
     assert "completed: data/sourcedata/sub-01" in said
     repeated = [int(number) for number in answers["repeats"].dropna()]
@@ -190,6 +190,7 @@ def check_log(events: Any, failed: set[int]) -> None:
         if event["event"] == "fault":
             of[event["trial"]] = of.get(event["trial"], "") + event["told"]
     assert set(of) == failed
+    assert "look after what plays" in of[1]
     assert "sound process" in of[2]
     assert "unplugged" in of[3]
     assert "ended by SIGKILL" in of[4]

@@ -39,6 +39,7 @@ class NotingRig:
     notes = ("simulated hand", "force assumed")
     steps = 0
     faults = ()
+    halted = False
 
     def present_model(self, model):
         tell(asked=[model.texture, model.n_layers])

@@ -16,7 +16,7 @@ from experiments.feel import opening
 from experiments.feel.live_rig import LiveRig
 from experiments.feel.opening import NO_SOUND, demonstration, desk
 from modeling import InputError, TextureModel, compensation_for
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, Live, now_s
+from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, HEARTBEAT_S, Live, now_s
 from rig.setup.rig_file import SHIPPED_RIG_FILE
 from rig.sound.devices import SoundDevice
 from rig.sound.output import SoundLost
@@ -64,7 +64,7 @@ def louder_than_all_limits() -> TextureModel:
 def test_a_rig_file_plays_and_tells_its_level_its_limits_and_its_faults(
     rig_file: Path, jack_server: Jack
 ) -> None:
-    with jack_server(block=128), desk(rig_file) as felt:
+    with jack_server(block=128) as server, desk(rig_file) as felt:
         assert felt.notes == ("simulated hand", "simulated sound card", "level not calibrated")
         assert wait_until(lambda: abs(felt.hand().speed_mm_s) > 20)
         assert felt.hand().force_n > 0
@@ -83,11 +83,22 @@ def test_a_rig_file_plays_and_tells_its_level_its_limits_and_its_faults(
         felt.silence()
         wait_until(lambda: felt.output().rms_g == 0)
 
+        felt.present_model(planted_texture("canvas"))
         os.kill(felt._sound.pid, signal.SIGKILL)
         (told,) = wait_until(felt.take_faults)
         assert "expected the sound process to play" in told
+        wait_until(lambda: felt.output().rms_g > 0.01)  # another process plays on
+        time.sleep(HEARTBEAT_S + 0.3)
+        (told,) = wait_until(felt.take_faults)
+        assert "look after what plays" in told
+        assert felt.halted
+        wait_until(lambda: felt.output().rms_g == 0)
         felt.present_model(planted_texture("canvas"))
         wait_until(lambda: felt.output().rms_g > 0.01)
+        assert not felt.halted
+        server.kill()
+        with pytest.raises((SoundLost, InputError), match="expected"):
+            wait_until(lambda: not felt.take_faults() and False)
 
 
 def test_a_rig_is_felt_by_one_program_at_a_time(rig_file: Path, jack_server: Jack) -> None:

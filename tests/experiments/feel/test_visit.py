@@ -20,6 +20,7 @@ class NotingRig:
 
     notes: tuple[str, ...] = ()
     asked: list[object] = field(default_factory=list)
+    halted: bool = False
 
     def present_model(self, model: Layered) -> None:
         self.asked.append((model.texture, model.n_layers))
@@ -88,6 +89,19 @@ def test_stop_is_silence_until_something_is_asked_for(visit: Visit) -> None:
     assert asked(visit, "space") == [("canvas", 4)]
     assert asked(visit, "space", "3") == ["silence", ("MDF", 3)]
     assert visit.playing
+
+
+def test_what_the_rig_has_halted_does_not_play_until_it_is_asked_for(visit: Visit) -> None:
+    visit.play()
+    visit.take_faults()
+    assert visit.playing
+    visit.rig.halted = True
+    visit.take_faults()
+    assert not visit.playing
+    visit.rig.halted = False
+    visit.take_faults()
+    assert not visit.playing
+    assert asked(visit, "space") == [("canvas", 4)]
 
 
 def test_masking_noise_does_not_touch_the_texture(visit: Visit) -> None:

@@ -20,6 +20,7 @@ from rig.desk.checks import Requirements
 from rig.desk.desk_rig import DeskRig
 from rig.desk.stimuli import check_stimulus
 from rig.interface import SURFACES, TextureRig, ToneBurst
+from rig.live.memory import HEARTBEAT_S
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import planted_ar
 from tests.rig.desk.rig_files import failures, rig_file
@@ -221,6 +222,27 @@ def test_a_killed_sound_process_is_a_fault_and_the_next_presentation_plays(
         assert rig.parts.sound.pid != pid
         assert failures(rig.take_faults()) == []
         assert [record.played_s > 0.1 for record in rig.take_presentations()] == [False, True]
+
+
+def test_a_session_that_hangs_is_a_fault_and_the_next_presentation_plays(
+    server: Any, tmp_path: Path, model: TextureModel
+) -> None:
+    with DeskRig(rig_file(tmp_path)) as rig:
+        rig.present_model(model)
+        time.sleep(HEARTBEAT_S + 0.3)
+        rig.read()
+        rig.silence()
+        (told,) = failures(rig.take_faults())
+        assert "look after what plays" in told
+        # What plays next is looked after by who waits for its end, however long it is.
+        burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.5, duration_s=HEARTBEAT_S + 0.3)
+        rig.present_signal(burst)
+        rig.present_signal(replace(burst, duration_s=0.1))
+        rig.silence()
+        assert failures(rig.take_faults()) == []
+        hung, long, _ = rig.take_presentations()
+    assert 0.5 < hung.played_s < HEARTBEAT_S + 0.1
+    assert long.played_s > HEARTBEAT_S
 
 
 def test_a_dead_server_is_a_fault_of_each_presentation_and_no_exception(

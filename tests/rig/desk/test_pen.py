@@ -41,7 +41,9 @@ def test_the_pen_feels_what_was_presented(jack_server: Jack, tmp_path: Path) -> 
         with DeskRig(rig_file(tmp_path, *changes)) as rig:
             assert rig.take_acceleration() == ()
             rig.present_model(model)
-            time.sleep(1.0)
+            for _ in range(10):
+                rig.read()
+                time.sleep(0.1)
             rig.silence()
             pieces = rig.take_acceleration()
             (record,) = rig.take_presentations()

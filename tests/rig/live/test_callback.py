@@ -14,7 +14,7 @@ from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import plan_for
-from rig.live.memory import CONTACT, STALE, Live, Rows, compiled, now_s
+from rig.live.memory import CONTACT, NO_HEARTBEAT, STALE, Live, Rows, compiled, now_s
 from stimuli.planted.textures import planted_texture
 from tests.modeling.rendering.lattices import in_python, planted_ar
 
@@ -26,12 +26,13 @@ Array = np.ndarray[Any, np.dtype[Any]]
 class Callback:
     """What the sound process prepares, with the callback called here."""
 
-    def __init__(self, live: Live, *, scale: float) -> None:
+    def __init__(self, live: Live, *, scale: float, masking: int = -1) -> None:
         module = compiled()
         self._ffi, self._lib, self.live = module.ffi, module.lib, live
         self._kept: list[Any] = [self._ffi.new("char[]", self._lib.tq_sound_size())]
         self._sound = self._ffi.cast("tq_sound *", self._kept[0])
-        self._lib.tq_sound_start(self._sound, live.address, FADE, 2, 0, -1, scale, 0.1, 5)
+        self.asked_age_s = 1e6
+        self._lib.tq_sound_start(self._sound, live.address, FADE, 2, 0, masking, scale, 0.1, 1.0, 5)
 
     def texture(self, number: int, limits: Limits, gain: float = 1.0) -> None:
         made = planted_texture("MDF")
@@ -42,7 +43,7 @@ class Callback:
         texture.noise_scale *= gain
         self._kept += [texture, arrays, memory, source]
         self._lib.tq_surface_start(source, texture, memory, 1, number)
-        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+        self.want(surface=source)
 
     def lattice(self, number: int, limits: Limits, gain: float = 1.0) -> None:
         """An all-pole model."""
@@ -55,20 +56,33 @@ class Callback:
         self._kept += [texture, lattice, arrays, more, memory, source]
         key = int(stream_key(0))
         self._lib.tq_surface_start_lattice(source, texture, lattice, memory, key, number)
-        self._lib.tq_sound_want(self._sound, source, self._ffi.NULL)
+        self.want(surface=source)
 
     def signal(self, number: int, samples_g: Array) -> None:
         samples = samples_g.astype(np.float32)
         held, source = self._ffi.from_buffer("float[]", samples), self._ffi.new("tq_signal *")
         self._kept += [samples, held, source]
         self._lib.tq_signal_start(source, held, samples.size, number)
-        self._lib.tq_sound_want(self._sound, self._ffi.NULL, source)
+        self.want(signal=source)
 
     def silence(self) -> None:
-        self._lib.tq_sound_want(self._sound, self._ffi.NULL, self._ffi.NULL)
+        self.want()
+
+    def want(self, *, surface: Any = None, signal: Any = None) -> None:
+        """Asked for so long ago, without more ado, that only heartbeats count."""
+        none = self._ffi.NULL
+        asked_s = now_s() - self.asked_age_s
+        self._lib.tq_sound_want(self._sound, surface or none, signal or none, asked_s)
+
+    def mask(self, level: float) -> None:
+        self._lib.tq_sound_mask(self._sound, round(1e6 * level))
 
     def play(self, frames: int, *, speed_mm_s: float = 150.0, force_n: float = 1.5) -> Array:
-        """The next samples of the vibration, (frames,), for a hand read just before."""
+        """The next samples of the vibration, (frames,), for a hand read just before.
+
+        Whoever drives it has just looked, too.
+        """
+        self.live.heartbeat()
         self.live.write_reading(
             now_s(), 0.0, y_mm=0.0, speed_mm_s=speed_mm_s, force_n=force_n, flags=CONTACT
         )
@@ -80,7 +94,12 @@ class Callback:
         none = self._ffi.NULL
         into = self._ffi.from_buffer("float[]", out)
         self._lib.tq_sound_callback(none, into, frames, none, 0, self._sound)
+        self.masked = out[:, 1]
         return out[:, 0]
+
+    def look(self, age_s: float) -> None:
+        """Write a heartbeat of this age."""
+        self._lib.tq_heartbeat(self.live.address, now_s() - age_s)
 
     def log(self) -> Rows:
         return self.live.blocks_since(0)[1]
@@ -188,3 +207,70 @@ def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None
     # An update, 5 ms of fade, and 88 samples of the low-pass at the model's 5 kHz.
     assert not after[int((0.001 + 0.005 + 88 / 5000) * RATE_HZ) :].any()
     assert callback.log()["flags"].tolist() == [0, STALE]
+
+
+# --- The heartbeat --------------------------------------------------------------------------------
+
+
+def steady(callback: Callback, number: int) -> None:
+    callback.signal(number, np.full(48000, 0.5))
+
+
+def moving(callback: Callback, number: int) -> None:
+    callback.texture(number, Limits(peak=1.0))
+
+
+def still_loud(callback: Callback, age_s: float) -> Array:
+    """Four blocks of 256 under the hand as read last, with a last heartbeat of this age."""
+    callback.look(age_s)
+    return callback.play_on(1024)
+
+
+@pytest.mark.parametrize("begin", [steady, moving])
+def test_without_a_heartbeat_what_plays_fades_and_stays_silent_until_asked_anew(
+    live: Live, begin: Any
+) -> None:
+    callback = Callback(live, scale=1.0)
+    begin(callback, 1)
+    before = callback.play(4800)
+    assert still_loud(callback, 0.9).any()
+    faded = still_loud(callback, 1.001)
+    assert faded[: FADE - 1].any()
+    assert not faded[FADE:].any()
+    assert not callback.play(1024).any()  # the session is back: nothing resumes by itself
+    begin(callback, 2)
+    assert callback.play(1024)[FADE:].any()
+    assert np.abs(before).max() > 0
+    rows = callback.log()
+    assert rows["flags"].tolist() == [0, 0, NO_HEARTBEAT, NO_HEARTBEAT, 0]
+    assert rows["presentation"].tolist() == [1, 1, 1, 0, 2]
+
+
+def test_no_heartbeat_is_needed_where_nothing_plays(live: Live) -> None:
+    """Nor while what was asked for is as young as a heartbeat may be."""
+    callback = Callback(live, scale=1.0, masking=1)
+    callback.mask(0.1)
+    callback.asked_age_s = 0.5
+    callback.look(100.0)
+    steady(callback, 1)
+    assert callback.play_on(1024).any()
+    callback.silence()
+    callback.play_on(1024)
+    callback.asked_age_s = 1e6
+    callback.silence()
+    assert not callback.play_on(1024).any()
+    assert callback.masked.any()  # masking noise alone goes on
+    assert not np.any(callback.log()["flags"] & NO_HEARTBEAT)
+
+
+def test_masking_noise_ends_with_what_is_halted(live: Live) -> None:
+    callback = Callback(live, scale=1.0, masking=1)
+    callback.mask(0.1)
+    steady(callback, 1)
+    callback.play(1024)
+    assert callback.masked[FADE:].any()
+    still_loud(callback, 2.0)
+    assert not callback.masked[FADE:].any()
+    callback.silence()
+    callback.play(1024)
+    assert callback.masked[FADE:].all()

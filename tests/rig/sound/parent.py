@@ -1,7 +1,13 @@
-"""Plays a steady signal and waits to be killed; says which process plays."""
+"""A session that plays a steady signal and looks after it; says which process plays, and where.
+
+To a line "play" it plays anew, to "hang" it says so and hangs; faults it writes, a line each.
+"""
 
 from __future__ import annotations
 
+import json
+import select
+import sys
 import time
 
 import numpy as np
@@ -10,12 +16,23 @@ from modeling.rendering.limits import Limits
 from rig.live.memory import Live
 from rig.sound.output import SoundOutput
 
+SIGNAL_G = np.ones(60 * 48000)
+
 live = Live.create()
 limits = Limits(peak=10.0)
 sound = SoundOutput(
     live, device="system", rate_hz=48000, block=128, fullscale_per_g=0.05, limits=limits
 )
 sound.open()
-sound.play_signal(np.ones(60 * 48000))
-print(sound.pid, flush=True)
-time.sleep(60)
+sound.play_signal(SIGNAL_G)
+print(json.dumps({"sound": sound.pid, "live": str(live.path)}), flush=True)
+while True:
+    if select.select([sys.stdin], [], [], 0.05)[0]:
+        line = sys.stdin.readline().strip()
+        if line == "play":
+            sound.play_signal(SIGNAL_G)
+        elif line == "hang":
+            print("hangs", flush=True)
+            time.sleep(600)
+    for fault in sound.faults():
+        print(fault, flush=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -20,7 +21,7 @@ from scipy.signal import lfilter
 from modeling import InputError, Renderer, TextureModel
 from modeling.hand import Hand
 from modeling.rendering.limits import Limits
-from rig.live.memory import BLOCK, CONTACT, GONE, STALE, Live, now_s
+from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
 from tests.modeling.rendering.lattices import in_python, planted_ar
 from tests.rig.planted import planted_model as model
@@ -187,11 +188,15 @@ def test_an_all_pole_model_leaves_as_python_filters_it(jack_server: Jack, tmp_pa
 
 
 def wait_for_blocks(live: Live, before: int, count: int, *, of: int = 0) -> Array:
-    """All blocks since, once so many of a presentation (from this number on) are among them."""
+    """All blocks since, once so many of a presentation (from this number on) are among them.
+
+    Who waits looks after what plays.
+    """
     rows = [np.zeros(0, dtype=BLOCK)]
     end = time.monotonic() + 60
     while sum(np.count_nonzero(some["presentation"] >= of) for some in rows) < count:
         assert time.monotonic() < end
+        live.heartbeat()
         before, more = live.blocks_since(before)
         rows.append(more)
         time.sleep(0.005)
@@ -382,8 +387,8 @@ def test_a_hand_that_is_old_or_gone_fades_to_silence(server: Any, tmp_path: Path
             stroker.flags = GONE
         time.sleep(0.4)
         _, rows = live.blocks_since(before)
-        captured = recorder.recorded()[:, 0]
         assert sound.faults() == ()
+        captured = recorder.recorded()[:, 0]
     last = live_last = rows[rows["flags"] & STALE == 0][-1]
     stale = rows[rows["flags"] & STALE > 0]
     assert stale.size > 50
@@ -407,28 +412,36 @@ def test_a_parent_that_holds_its_lock_delays_nothing(server: Any) -> None:
             sound.play(model())
             wait_for_blocks(live, live.blocks_written, 10)
             before, held_s = live.blocks_written, now_s()
-            ctypes.PyDLL(None).usleep(1_000_000)  # a second with the interpreter's lock held
+            ctypes.PyDLL(None).usleep(800_000)  # with the interpreter's lock held
             freed_s = now_s()
             _, rows = live.blocks_since(before)
         finally:
             hand.kill()
             hand.wait()
     meanwhile = rows[(rows["time_s"] > held_s) & (rows["time_s"] < freed_s)]
-    assert freed_s - held_s >= 1
+    assert freed_s - held_s >= 0.8
     # Were it delayed, there would be none; a loaded machine loses some.
-    assert meanwhile.size > 0.5 * RATE_HZ / 128
+    assert meanwhile.size > 0.4 * RATE_HZ / 128
     assert np.count_nonzero(meanwhile["square_sum_g2"]) > 0.9 * meanwhile.size
 
 
-def test_a_killed_process_is_told_and_replaced(server: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "why"), [(signal.SIGKILL, "it has ended"), (signal.SIGSTOP, "no block for 0.5 s")]
+)
+def test_a_killed_or_stopped_process_is_told_and_replaced(
+    server: Any, number: signal.Signals, why: str
+) -> None:
     with Live.create() as live, stroking(live, constant), output(live) as sound:
         sound.play(model())
         first = sound.pid
         assert first is not None
-        os.kill(first, signal.SIGKILL)
-        time.sleep(0.1)
-        assert [fault for fault in sound.faults() if "it has ended" in fault]
+        os.kill(first, number)
+        told: list[str] = []
+        wait_until(lambda: bool(told.extend(sound.faults()) or told))
+        assert len(told) == 1
+        assert why in told[0]
         assert sound.faults() == ()
+        assert sound.pid is None
         assert sound.silence() is None
         before = live.blocks_written
         presented = sound.play(model())
@@ -464,6 +477,7 @@ def test_masking_of_a_killed_process_is_that_of_the_next(server: Any, tmp_path: 
         sound.masking(0.1)
         assert len(sound.faults()) == 1
         sound.play(model())
+        sound.silence()  # the recorder takes its time, for which nobody looks after what plays
         recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
         time.sleep(0.2)
         noise = recorder.recorded()[:, 1]
@@ -489,23 +503,124 @@ def test_a_dead_server_is_told_within_a_second_and_nothing_hangs(jack_server: Ja
         assert time.monotonic() < end + 20
 
 
-def test_a_dead_parent_leaves_silence_and_no_process(server: Any, tmp_path: Path) -> None:
-    parent = subprocess.Popen(
-        [sys.executable, str(HERE / "parent.py")], stdout=subprocess.PIPE, text=True
-    )
-    assert parent.stdout is not None
-    child = int(parent.stdout.readline())
+class Parent:
+    """A session in its own process, which plays a steady signal; see parent.py."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, str(HERE / "parent.py")],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        told = json.loads(self.hears())
+        self.child, self.live = int(told["sound"]), Live.attach(told["live"])
+
+    def hears(self) -> str:
+        assert self.process.stdout is not None
+        return self.process.stdout.readline()
+
+    def tell(self, line: str) -> None:
+        assert self.process.stdin is not None
+        self.process.stdin.write(line + "\n")
+        self.process.stdin.flush()
+
+    def stop(self) -> float:
+        """Stop it as Ctrl-Z or a debugger does; by when it stood."""
+        self.process.send_signal(signal.SIGSTOP)
+        state = Path(f"/proc/{self.process.pid}/stat")
+        wait_until(lambda: state.read_text().rsplit(")", 1)[1].split()[0] == "T")
+        return now_s()
+
+    def blocks_until_silent(self, before: int) -> Array:
+        """All blocks since, once the last twenty are silent."""
+        rows = [np.zeros(0, dtype=BLOCK)]
+        end = time.monotonic() + 20
+        while not rows[-1].size > 20 or rows[-1]["peak_g"][-20:].any():
+            assert time.monotonic() < end
+            time.sleep(0.1)
+            before, more = self.live.blocks_since(before)
+            rows.append(more)
+        return np.concatenate(rows)
+
+    def end(self) -> None:
+        self.process.kill()
+        self.process.communicate()
+        self.live.close()
+
+
+@pytest.fixture
+def parent(server: Any) -> Iterator[Parent]:
+    started = Parent()
+    yield started
+    started.end()
+
+
+def check_halted(rows: Array, *, by_s: float) -> None:
+    """What played until then ended a second later by a fade, and is marked since."""
+    marked = (rows["flags"] & NO_HEARTBEAT) > 0
+    first = int(np.argmax(marked))
+    assert marked[first:].all()
+    assert np.all(rows["peak_g"][:first] == 1.0)
+    assert rows["time_s"][first - 1] <= by_s + HEARTBEAT_S
+    fades = rows[first:][rows["peak_g"][first:] > 0]
+    assert fades.size <= -(-FADE // FRAMES)
+    assert not rows["peak_g"][first + fades.size :].any()
+
+
+def test_a_session_that_is_stopped_or_hangs_leaves_silence_until_it_presents_again(
+    parent: Parent,
+) -> None:
+    began_s = now_s()
+    wait_until(lambda: now_s() - began_s > 3 * HEARTBEAT_S)
+    _, rows = parent.live.blocks_since(0)
+    playing = rows[np.argmax(rows["peak_g"] > 0) :]
+    assert np.all(playing["peak_g"] == 1.0)  # polling steadily it is never halted
+    before = parent.live.blocks_written
+    stopped_s = parent.stop()
+    check_halted(parent.blocks_until_silent(before), by_s=stopped_s)
+    before = parent.live.blocks_written
+    parent.process.send_signal(signal.SIGCONT)
+    assert "look after what plays" in parent.hears()
+    rows = wait_for_blocks(parent.live, before, 20)
+    assert not rows["peak_g"].any()  # nothing resumes by itself
+    parent.tell("play")
+    wait_until(lambda: parent.live.blocks_since(before)[1]["peak_g"].any())
+    before = parent.live.blocks_written
+    parent.tell("hang")
+    assert parent.hears() == "hangs\n"
+    hangs_s = now_s()
+    check_halted(parent.blocks_until_silent(before), by_s=hangs_s)
+
+
+def test_a_signal_that_was_halted_is_told_who_waits_for_its_end(
+    server: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Live.create() as live, output(live) as sound:
+        with monkeypatch.context() as patch:
+            patch.setattr(live, "heartbeat", lambda: None)
+            with pytest.raises(SoundLost, match="look after what plays"):
+                sound.play_signal(np.ones(2 * RATE_HZ), wait=True)
+        assert sound.halted
+        assert len(sound.faults()) == 1
+        sound.play_signal(np.ones(100), wait=True)
+        assert not sound.halted
+
+
+def test_a_dead_parent_leaves_silence_and_no_process(
+    server: Any, parent: Parent, tmp_path: Path
+) -> None:
     recorder = Recorder(server, tmp_path / "captured.npy", block=FRAMES)
     time.sleep(0.2)
-    parent.kill()
-    parent.wait()
+    parent.process.kill()
+    parent.process.wait()
     wait_until(lambda: "PortAudio:out_0" not in server.ports())
     captured = recorder.recorded()[:, 0]
     assert captured.any()
     assert silent_from(captured) < captured.size
     falls = np.abs(captured[silent_from(captured) - FADE :][:FADE])
     assert falls[-24:].max() < 0.2 * np.abs(captured).max()  # it faded, it was not cut
-    wait_until(lambda: has_ended(child))
+    wait_until(lambda: has_ended(parent.child))
 
 
 def has_ended(process: int) -> bool:
