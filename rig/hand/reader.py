@@ -6,17 +6,18 @@ import json
 import queue
 import signal
 import subprocess
-import sys
+import tempfile
 import threading
 from collections import deque
 from contextlib import suppress
-from typing import Any
+from typing import IO, Any
 
 from modeling.errors import InputError
 from rig.hand.following import Follower
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
 from rig.hand.window import WindowHand
+from rig.live.child import last_complaint, started
 from rig.live.memory import Live, now_s
 
 START_S = 30.0
@@ -176,41 +177,34 @@ class HandReader:
         """Keep a process that reads, until this is closed."""
         patient = False
         while not self._closing.is_set():
-            process = self._start(patient=patient)
-            assert process.stdout is not None
-            with suppress(ValueError, OSError):  # closed under our eyes
-                for line in process.stdout:
-                    self._hear(json.loads(line))
-            self._alive_s = float("inf")
-            code = process.wait()
+            with tempfile.TemporaryFile() as complaints:
+                process = self._start(complaints, patient=patient)
+                assert process.stdout is not None
+                with suppress(ValueError, OSError):  # closed under our eyes
+                    for line in process.stdout:
+                        self._hear(json.loads(line))
+                self._alive_s = float("inf")
+                how = _how(process.wait()) + last_complaint(complaints)
             if not self._was_ready:  # `open` refuses
-                ended = (
-                    f"expected the hand's process to start, got its end {_how(code)}; try again."
-                )
+                ended = f"expected the hand's process to start, got its end {how}; try again."
                 self._first.put({"error": ended})
                 return
             if not self._closing.is_set():
                 # The process is no more and its heir not yet there: nobody else writes.
                 Follower(self._settings, rest_s=REST_S).gone(now_s()).write(self._live)
                 self._add_fault(
-                    f"the process that reads the hand ended {_how(code)} and is started again."
+                    f"the process that reads the hand ended {how} and is started again."
                 )
                 patient = True
                 self._closing.wait(_PAUSE_S)
 
-    def _start(self, *, patient: bool) -> subprocess.Popen[str]:
+    def _start(self, complaints: IO[bytes], *, patient: bool) -> subprocess.Popen[str]:
         wanted = {
             "live": str(self._live.path),
             "settings": self._settings.to_dict(),
             "patient": patient,
         }
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rig.hand.process", json.dumps(wanted)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        process = started("rig.hand.process", wanted, complaints=complaints)
         with self._lock:
             self._process = process
         if self._closing.is_set():  # closed in between

@@ -53,6 +53,25 @@ def test_a_held_hand_is_read_with_its_speed_and_force(live: Live) -> None:
     assert abs(rows["time_s"][-1] - now_s()) < 20
 
 
+def test_files_named_as_rooms_in_the_working_folder_do_no_harm(
+    live: Live, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for room in ("rig", "modeling"):
+        (tmp_path / f"{room}.py").write_text("raise ValueError('not this one')\n")
+    monkeypatch.chdir(tmp_path)
+    with HandReader(live, HOLD):
+        wait_until(lambda: moves(live))
+
+
+def test_what_the_process_says_when_it_cannot_start_is_passed_on(
+    live: Live, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numpy.py").write_text("raise ValueError('what went wrong')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(InputError, match=r"its end with code 1 \(ValueError: what went wrong\)"):
+        HandReader(live, HOLD).open()
+
+
 def test_strokes_to_and_fro_change_their_sign(live: Live) -> None:
     strokes = HandSettings(kind="scripted", speed_mm_s=200.0, force_n=1.0, strokes_per_s=4.0)
     with HandReader(live, strokes):
