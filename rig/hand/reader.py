@@ -109,7 +109,8 @@ class HandReader:
     def counts(self) -> dict[str, int]:
         """What the device sent and what of it was lost, a second old at most.
 
-        Of a serial sensor: lines, bad (damaged), missing. Of a tablet or mouse: frames, dropped (by
+        Of a serial sensor: lines, bad (damaged), missing, late (of the lines, those that were
+        dropped because they were read more than 0.1 s after they were measured). Of a tablet or mouse: frames, dropped (by
         the kernel). They begin anew where the device was opened again.
         """
         with self._lock:
@@ -228,9 +229,15 @@ class HandReader:
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""
+        looked_s, held_up_s = now_s(), float("-inf")
         while not self._closing.wait(_WATCH_S):
+            if now_s() - looked_s > SILENT_S / 2:  # the computer was held up, and the process too
+                held_up_s = now_s()
+            looked_s = now_s()
             latest = self._live.latest()
-            last_s = self._alive_s if latest is None else max(self._alive_s, latest["time_s"])
+            last_s = max(
+                self._alive_s, held_up_s, float("-inf") if latest is None else latest["time_s"]
+            )
             with self._lock:
                 process = self._process
             if process is not None and now_s() - last_s > SILENT_S:

@@ -135,6 +135,31 @@ def test_stopped_it_is_killed_and_replaced(live: Live) -> None:
         assert len(told) == 2
 
 
+def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
+    live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader = HandReader(live, HOLD)
+    moments_s = iter([0.0, 0.1, 0.2, 30.0, 30.4, 30.8, 31.0, 31.1, 31.2])
+    now, killed_s = [0.0], list[float]()
+
+    class Closing:
+        def wait(self, seconds: float) -> bool:
+            now[0] = next(moments_s, -1.0)
+            return now[0] < 0
+
+    class Process:
+        def kill(self) -> None:
+            killed_s.append(now[0])
+
+    live.write_reading(0.0, 0.0, y_mm=0.0, speed_mm_s=0.0, force_n=0.0, flags=0)
+    reader._closing = Closing()  # type: ignore[assignment]
+    reader._process = Process()  # type: ignore[assignment]
+    reader._alive_s = 0.0
+    monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
+    reader._watch()
+    assert killed_s == [31.1]  # no reading for over a second in which it looked
+
+
 def test_the_hand_is_read_on_while_this_process_holds_pythons_lock(live: Live) -> None:
     sleep_us = ctypes.PyDLL(None).usleep  # a C function that keeps the lock meanwhile
     with HandReader(live, HOLD) as reader:
