@@ -110,8 +110,8 @@ class HandReader:
         """What the device sent and what of it was lost, a second old at most.
 
         Of a serial sensor: lines, bad (damaged), missing, late (of the lines, those that were
-        dropped because they were read more than 0.1 s after they were measured). Of a tablet or mouse: frames, dropped (by
-        the kernel). They begin anew where the device was opened again.
+        dropped because they were read more than 0.1 s after they were measured). Of a tablet or
+        mouse: frames, dropped (by the kernel). They begin anew where the device was opened again.
         """
         with self._lock:
             return dict(self._counts)

@@ -36,7 +36,8 @@ class SerialSensor:
         self._lines = LineReader()
         self._clock = SensorClock()
         self._late = 0
-        self._start_waiting(now_s())
+        self._asked_s = now_s()
+        self._line_s = self._fresh_s = self._asked_s  # of the last line, of the last fresh sample
 
     @classmethod
     def open(cls, settings: HandSettings) -> SerialSensor:
@@ -85,7 +86,7 @@ class SerialSensor:
         return fresh
 
     def _start_waiting(self, since_s: float) -> None:
-        self._asked_s = self._line_s = self._fresh_s = since_s
+        self._line_s = self._fresh_s = since_s
 
     def _check_waiting(self, asked_s: float) -> None:
         if asked_s - self._line_s > LOST_S:
@@ -137,7 +138,8 @@ class SerialSensor:
                 raise InputError(
                     f"expected a sensor that stays at its port, got an end: {lost}"
                 ) from None
-        self._start_waiting(now_s())
+        self._asked_s = now_s()
+        self._start_waiting(self._asked_s)
 
     def _refused(self, baud: int) -> InputError:
         if self._lines.bad:
