@@ -24,15 +24,14 @@ from modeling.files.tables import (
     whole_number,
 )
 from modeling.files.wav import full_scale, read_wav
-from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.recordings.appending import WavSource
 from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import dft321
+from rig.importing.plausible import G_PER_UNIT, doubts_about
 from rig.importing.times import TimeColumn
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
-G_PER_UNIT = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY_M_S2, "arbitrary": 1.0}
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2
 LABEL_COLUMNS = (
@@ -60,11 +59,15 @@ class Label:
 
 @dataclass(frozen=True)
 class Imported:
-    """A recording from a file, what to be warned of, and the WAV file that holds its samples."""
+    """A recording from a file, what to be warned of, and the WAV file that holds its samples.
+
+    `doubts` says what of it cannot be meant.
+    """
 
     recording: Recording
     warnings: tuple[str, ...] = ()
     source: WavSource | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def import_wav(
@@ -89,10 +92,10 @@ def import_wav(
     Raises
     ------
     InputError
-        Naming the file that cannot be used.
+        Naming the file that cannot be used, or whose labels or scale cannot be meant.
     """
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
-    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+    return RecordingSet(_meant(read(*one)) for one in zip(paths, labels, strict=True))
 
 
 def import_wav_file(
@@ -102,7 +105,7 @@ def import_wav_file(
     g_per_fullscale: float | None = None,
     channel: int | None = None,
 ) -> Imported:
-    """One WAV file, with warnings; otherwise as `import_wav`."""
+    """One WAV file, with warnings and doubts; otherwise as `import_wav`."""
     channel = channel if label.channel is None else label.channel
     samples, rate_hz = read_wav(path, channel=channel)
     scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
@@ -116,7 +119,8 @@ def import_wav_file(
         unit="arbitrary" if scale is None else "g",
     )
     warnings = [*_beyond_full_scale(path, samples, scale), *_too_short(path, recording)]
-    return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale))
+    doubts = doubts_about(recording, path.name, g_per_fullscale=scale)
+    return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale), doubts)
 
 
 def import_csv(
@@ -145,10 +149,17 @@ def import_csv(
     Raises
     ------
     InputError
-        Naming the file and what is wrong with it.
+        Naming the file and what is wrong with it, or cannot be meant.
     """
     read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
-    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+    return RecordingSet(_meant(read(*one)) for one in zip(paths, labels, strict=True))
+
+
+def _meant(one: Imported) -> Recording:
+    """The recording; refused where something of it cannot be meant."""
+    if one.doubts:
+        raise InputError(one.doubts[0])
+    return one.recording
 
 
 def import_csv_file(
@@ -159,14 +170,14 @@ def import_csv_file(
     unit: str | None = None,
     rate_hz: float | None = None,
 ) -> Imported:
-    """One CSV file, with warnings; otherwise as `import_csv`."""
+    """One CSV file, with warnings and doubts; otherwise as `import_csv`."""
     if axis is not None and axis not in AXES:
         raise InputError(
             f"expected an axis among {', '.join(AXES)}, got {shown(axis)}; choose one."
         )
     _check_unit(unit, "--unit")
     columns, warnings = _read_columns(path)
-    rate_hz, jitter = _rate(path, columns, rate_hz)
+    rate_hz, jitter, contradiction = _rate(path, columns, rate_hz)
     axes, found_unit = _chosen_axes(path, columns, axis)
     if unit and found_unit and unit != found_unit:
         raise InputError(
@@ -184,7 +195,11 @@ def import_csv_file(
         # Combined axes no longer show their limits, so those are looked for here.
         clipped_share=float(np.any([clipped_samples(one) for one in axes], axis=0).mean()),
     )
-    return Imported(recording, (*warnings, *jitter, *_too_short(path, recording)))
+    return Imported(
+        recording,
+        (*warnings, *jitter, *_too_short(path, recording)),
+        doubts=(*contradiction, *doubts_about(recording, path.name, unit=final_unit)),
+    )
 
 
 def usable(
@@ -270,8 +285,8 @@ def _label(path: Path, row: Mapping[str, str], *, texture: str) -> Label:
 
 def _rate(
     path: Path, columns: dict[str, Floats], given_hz: float | None
-) -> tuple[float, tuple[str, ...]]:
-    """The rate, given or told by the time column, and what is to be said of uneven samples."""
+) -> tuple[float, Sequence[str], Sequence[str]]:
+    """The rate, given or told; what is to be said of uneven samples; what contradicts the rate."""
     name = _time_column(columns)
     if name is None:
         if given_hz is None:
@@ -279,13 +294,12 @@ def _rate(
                 f"expected a time column or --rate for {path.name}, got the columns "
                 f"{shortened(', '.join(columns), longest=120)}; give the sampling rate in Hz."
             )
-        return given_hz, ()
+        return given_hz, (), ()
     time = TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
-    if given_hz is not None:
-        time.check_rate(given_hz)
     rate_hz = time.rate_hz() if given_hz is None else given_hz
-    jitter = time.jitter_warning(rate_hz)
-    return rate_hz, () if jitter is None else (jitter,)
+    contradiction = None if given_hz is None else time.contradiction(given_hz)
+    jitter = None if contradiction else time.jitter_warning(rate_hz)
+    return rate_hz, [jitter] if jitter else [], [contradiction] if contradiction else []
 
 
 def _beyond_full_scale(path: Path, samples: Floats, scale: float | None) -> list[str]:
@@ -426,7 +440,7 @@ def _name_and_unit(header: str) -> tuple[str, str]:
     if bracket := re.search(r"[\[(](.*?)[\])]", text):
         unit = bracket.group(1).strip()
         text = text[: bracket.start()]
-    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|s|ms|us)", text.strip()):
+    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|s|ms|us|ns)", text.strip()):
         text, unit = suffix.groups()
     return re.sub(r"[\s_]+", "_", text.strip()).strip("_"), unit.replace("m_s2", "m/s2")
 

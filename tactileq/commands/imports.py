@@ -34,6 +34,10 @@ LabelTable = Annotated[
         help="TSV: file, speed_mm_s, force_n (texture, repeat; of WAV g_per_fullscale, channel).",
     ),
 ]
+Yes = Annotated[
+    bool,
+    typer.Option("--yes", help="Take in, with a warning, what cannot be meant by its numbers."),
+]
 # So many names of files are told; the rest are counted.
 MOST_NAMES = 5
 
@@ -52,6 +56,7 @@ def import_wav(
     channel: Annotated[
         int | None, typer.Option(min=1, help="Which channel, from 1, of files with several.")
     ] = None,
+    yes: Yes = False,
 ) -> None:
     """Add WAV recordings to a recording set; it keeps copies of the files.
 
@@ -63,7 +68,9 @@ def import_wav(
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
     records, refused = usable(read, files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
-    add_to_set(out, records, "import wav", settings=settings, files=files, left_out=refused)
+    add_to_set(
+        out, records, "import wav", settings=settings, files=files, left_out=refused, yes=yes
+    )
 
 
 @imports.command("csv")
@@ -82,6 +89,7 @@ def import_csv(
         float | None,
         typer.Option("--rate", help="Sampling rate in Hz; the time column's without it."),
     ] = None,
+    yes: Yes = False,
 ) -> None:
     """Add CSV recordings (time and one or three axes) to a recording set.
 
@@ -93,7 +101,9 @@ def import_csv(
     read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
     records, refused = usable(read, files, named)
     settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
-    add_to_set(out, records, "import csv", settings=settings, files=files, left_out=refused)
+    add_to_set(
+        out, records, "import csv", settings=settings, files=files, left_out=refused, yes=yes
+    )
 
 
 @imports.command("hatt")
@@ -107,6 +117,7 @@ def import_hatt(
     ] = None,
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 10.0,
     seed: Seed = 0,
+    yes: Yes = False,
 ) -> None:
     """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
 
@@ -117,6 +128,7 @@ def import_hatt(
     """
     from rig.importing.files import Imported
     from rig.importing.hatt import load_hatt
+    from rig.importing.plausible import doubts_about
 
     speeds = speed or [50.0 * step for step in range(1, 8)]
     forces = force or [0.5 * step for step in range(1, 8)]
@@ -130,9 +142,13 @@ def import_hatt(
                 )
             )
             advance(texture.material)
-    records = [Imported(record) for of_texture in made for record in of_texture]
+    records = [
+        Imported(record, doubts=doubts_about(record, record.describe(), unit="m/s2"))
+        for of_texture in made
+        for record in of_texture
+    ]
     settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
-    add_to_set(out, records, "import hatt", settings=settings, files=files)
+    add_to_set(out, records, "import hatt", settings=settings, files=files, yes=yes)
     for texture in textures:
         tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
 
@@ -177,16 +193,23 @@ def add_to_set(
     settings: Mapping[str, object],
     files: Sequence[Path],
     left_out: Sequence[str] = (),
+    yes: bool = False,
 ) -> None:
     """Add imported recordings to those that `out` already holds.
 
-    `left_out`: a sentence for each file that could not be used.
+    `left_out`: a sentence for each file that could not be used. What cannot be meant is refused,
+    or, where the answer is yes, told and written into the provenance.
     """
     from modeling import RecordingSet
     from modeling.files.places import locked
     from modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
     from modeling.recordings.appending import append
 
+    doubts = [doubt for one in new for doubt in one.doubts]
+    if doubts and not yes:
+        raise ValueError(several(doubts))
+    for doubt in doubts:
+        print(f"warning: taken in all the same: {doubt}", file=sys.stderr)
     records = RecordingSet(one.recording for one in new)
     for warning in clipping_warnings(records):
         print(warning, file=sys.stderr)
@@ -197,7 +220,8 @@ def add_to_set(
     provenance = out / PROVENANCE_NAME
     with locked(out):  # another import must not add to what this one is adding to
         before = imports_before(provenance)
-        origin = provenance_of(command, {**settings, "added to": before}, inputs=files)
+        taken = {"doubts": doubts} if doubts else {}
+        origin = provenance_of(command, {**settings, **taken, "added to": before}, inputs=files)
         beside = {PROVENANCE_NAME: provenance_text(origin).encode()}
         count = append(out, records, [one.source for one in new], beside=beside)
     if any(record.unit == "arbitrary" for record in records):
@@ -209,6 +233,12 @@ def add_to_set(
     if left_out:
         print(f"note: {len(left_out)} of {len(files)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
+
+
+def several(sentences: Sequence[str]) -> str:
+    """The first of some sentences, and how many more there are."""
+    more = f" ({len(sentences) - 1} more are like it)" if len(sentences) > 1 else ""
+    return f"{sentences[0].removesuffix('.')}{more}."
 
 
 def imports_before(provenance: Path) -> list[dict[str, Any]]:
