@@ -121,12 +121,11 @@ class HandLoop:
     def _tell_late(self, device: Device, late: int) -> None:
         """Once samples are fresh again, say how many were not."""
         if late > self._late:
-            self._tell(
-                {
-                    "fault": f"{late - self._late} readings of the {device.name} were read more "
-                    f"than {LOST_S:g} s late, and dropped: the computer was held up."
-                }
+            told = (
+                f"expected the readings of the {device.name} within {LOST_S:g} s, got "
+                f"{late - self._late} that came later and were dropped; close other programs."
             )
+            self._tell({"fault": told})
             self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:

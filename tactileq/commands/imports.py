@@ -237,7 +237,7 @@ def add_to_set(
 
 def several(sentences: Sequence[str]) -> str:
     """The first of some sentences, and how many more there are."""
-    more = f" ({len(sentences) - 1} more are like it)" if len(sentences) > 1 else ""
+    more = f" ({len(sentences) - 1} more like it)" if len(sentences) > 1 else ""
     return f"{sentences[0].removesuffix('.')}{more}."
 
 

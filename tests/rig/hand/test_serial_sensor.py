@@ -137,6 +137,15 @@ def test_after_it_was_held_up_a_silent_sensor_and_a_slow_clock_are_told_as_ever(
     assert sensor.counts()["lines"] > 100
 
 
+def five_at_once(number: int) -> bytes:
+    """2500 lines a second: in 0.4 s more than a pseudo-terminal has room for."""
+    lines = (
+        SensorLine(n % 2**16, n * PERIOD_US // 5, (0, 0), 1500, contact=True, button=False)
+        for n in range(5 * number, 5 * number + 5)
+    )
+    return b"".join(map(encode, lines))
+
+
 def hold_up(reader: HandReader, live: Live, *, seconds: float) -> list[str]:
     """Stop the hand's process, let it go on, and wait for readings; what was told meanwhile."""
     assert reader.pid is not None
@@ -149,17 +158,21 @@ def hold_up(reader: HandReader, live: Live, *, seconds: float) -> list[str]:
     return told
 
 
-def test_held_up_again_and_again_the_hand_is_not_lost(board: Board, live: Live) -> None:
-    board.send(at_constant_speed)
+def test_held_up_again_and_again_the_hands_process_blames_no_clock(
+    board: Board, live: Live
+) -> None:
+    board.send(five_at_once)
     with HandReader(live, settings_of(board)) as reader:
         wait_until(lambda: live.readings_written > 50)
         first = reader.pid
-        told = [hold_up(reader, live, seconds=0.4) for _ in range(3)]
-        _, rows = live.readings_since(0)
-        assert (rows["flags"] & GONE == 0).all()
+        told = [fault for _ in range(3) for fault in hold_up(reader, live, seconds=0.4)]
+        wait_until(lambda: not is_gone(live))
         assert reader.pid == first
-    late = r"\d+ readings of the serial sensor at .* more than 0.1 s late, and dropped"
-    assert all(re.match(late, fault) for faults in told for fault in faults)
+        wait_until(lambda: reader.counts()["missing"] > 0)
+    late = r"expected the readings of the serial sensor at .*, got \d+ that came later and were"
+    assert any(re.match(late, fault) for fault in told)
+    # The board's thread may be held up, too: then it was silent.
+    assert all(re.match(late, fault) or "got none for 0.1 s" in fault for fault in told)
 
 
 def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
