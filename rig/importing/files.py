@@ -1,9 +1,9 @@
-"""Recordings that other equipment made: WAV and CSV files, with labels from options or a table."""
+"""Recordings that other equipment made: WAV and CSV files."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,18 +15,12 @@ from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.errors import shortened, shown
 from modeling.files.reading import read_bytes
-from modeling.files.tables import (
-    check_columns,
-    csv_cells,
-    is_number,
-    number,
-    read_table,
-    whole_number,
-)
+from modeling.files.tables import csv_cells, is_number
 from modeling.files.wav import full_scale, read_wav
 from modeling.recordings.appending import WavSource
 from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import dft321
+from rig.importing.labels import Label
 from rig.importing.plausible import G_PER_UNIT, doubts_about
 from rig.importing.times import TimeColumn
 
@@ -34,27 +28,8 @@ Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2
-LABEL_COLUMNS = (
-    *("file", "speed_mm_s", "force_n"),
-    *("texture", "repeat", "g_per_fullscale", "channel"),
-)
 _TIME_NAMES = {"time", "t", "timestamp"}
 _AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
-
-
-@dataclass(frozen=True)
-class Label:
-    """What a file does not say of itself: surface, speed (mm/s), force (N), which repetition.
-
-    Of WAV files also the acceleration (g) of a full-scale sample, and the channel, from 1.
-    """
-
-    texture: str
-    speed_mm_s: float
-    force_n: float
-    repeat: int = 1
-    g_per_fullscale: float | None = None
-    channel: int | None = None
 
 
 @dataclass(frozen=True)
@@ -231,56 +206,6 @@ def usable(
     if refusals and not records:
         raise refusals[0]
     return records, tuple(map(str, refusals))
-
-
-def labels_from_table(
-    table: Path, paths: Sequence[Path], *, texture: str | None
-) -> tuple[list[Label], tuple[str, ...]]:
-    """Labels by file name from a TSV with file, speed_mm_s, force_n (texture, repeat, …).
-
-    Returns
-    -------
-    labels : list of Label
-        One per path.
-    unused : tuple of str
-        The files of rows that belong to no path.
-
-    Raises
-    ------
-    InputError
-        For a column that is not known, a file that the table names not once, and cells that are no
-        usable numbers.
-    """
-    rows: dict[str, dict[str, str]] = {}
-    for row in read_table(table, LABEL_COLUMNS[:3]):
-        check_columns(row, LABEL_COLUMNS, table)
-        if row["file"] in rows:
-            raise InputError(
-                f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
-            )
-        rows[row["file"]] = row
-    fallback = texture or table.parent.resolve().name
-    used, labels = set(), []
-    for path in paths:
-        if not (found := rows.get(path.name) or rows.get(str(path))):
-            raise InputError(
-                f"expected a row for {path.name} in {table}, got none; add its speed and force."
-            )
-        used.add(found["file"])
-        labels.append(_label(path, found, texture=fallback))
-    return labels, tuple(file for file in rows if file not in used)
-
-
-def _label(path: Path, row: Mapping[str, str], *, texture: str) -> Label:
-    scale, channel = row.get("g_per_fullscale"), row.get("channel")
-    return Label(
-        row.get("texture") or texture,
-        number(row["speed_mm_s"], f"speed_mm_s of {path.name}"),
-        number(row["force_n"], f"force_n of {path.name}"),
-        whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
-        full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name) if scale else None,
-        whole_number(channel, f"channel of {path.name}") if channel else None,
-    )
 
 
 def _rate(

@@ -8,6 +8,7 @@ import numpy as np
 
 from modeling import InputError
 from modeling.arrays import Floats
+from modeling.checks import HIGHEST_RATE_HZ, LARGEST_VALUE
 from modeling.errors import shown
 from modeling.recordings.spectrum import MODEL_RATE_HZ
 
@@ -16,7 +17,6 @@ LONGEST_GAP = 2.5
 # A tool's vibration needs more; a rate below this means time in another unit than supposed.
 LOWEST_RATE_HZ = 20.0
 LOWEST_RATE_WITHOUT_TIME_UNIT_HZ = 250.0
-HIGHEST_RATE_HZ = 1e6  # above it, time in another unit than supposed
 RATE_TOLERANCE = 0.005
 # Share of the power at the highest frequency of a model that jitter may turn into noise (-20 dB).
 TOLERATED_NOISE_SHARE = 0.01
@@ -57,36 +57,32 @@ class TimeColumn:
                 f"expected time in s, ms, us or ns in {self.file}, got {shown(self.unit)}; "
                 "convert it or give --rate."
             )
-        rate_hz = 1 / self._mean_step_s()
-        lowest = LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
-        if rate_hz <= lowest:
+        rate_hz, lowest_hz = 1 / self._mean_step_s(), self._lowest_hz
+        if not lowest_hz < rate_hz <= HIGHEST_RATE_HZ:
             raise InputError(
-                f"expected a rate above {lowest:g} Hz in {self.file}, got {rate_hz:.4g} Hz by its "
-                f"column {shown(self.name)}: is time in ms, us or ns? Name the unit in the "
-                "header (time_s, time_ms, time_us, time_ns) or give --rate."
+                f"expected a rate above {lowest_hz:g} Hz and up to {HIGHEST_RATE_HZ:.0f} Hz in "
+                f"{self.file}, got {rate_hz:.4g} Hz by its column {shown(self.name)}: is time in "
+                "ms, us or ns? Name the unit in the header (time_s, time_ms, time_us, time_ns) or "
+                "give --rate."
             )
         return rate_hz
 
     def contradiction(self, rate_hz: float) -> str | None:
         """A sentence where neither the mean nor the typical step agrees with a rate that was given.
 
-        A column without a unit, or of times that no vibration has in it, may be in any; one that
-        counts samples, or whose times fall, tells no rate.
+        A column of times that no vibration has in its unit may be in any; one that counts samples,
+        or whose times fall, tells no rate.
         """
         steps = np.diff(self.values)
-        if not (np.isfinite(self.values).all() and (steps >= 0).all() and steps.any()):
+        rises = np.isfinite(self.values).all() and (steps >= 0).all() and steps.any()
+        counts = not self.unit and (steps == 1).all()
+        if not rises or counts or self.unit not in SECONDS_PER_UNIT:
             return None
         # Coarse time stamps keep the mean step, lost samples the typical one.
-        typical = (float(steps.mean()), float(np.median(steps[steps > 0])))
-        if self.unit not in SECONDS_PER_UNIT or (not self.unit and (steps == 1).all()):
-            return None
-        told = self._rates_hz(typical[0])
-        units = [SECONDS_PER_UNIT[unit] for unit in told]
-        if not told or any(
-            abs(rate_hz * step * unit_s - 1) <= RATE_TOLERANCE
-            for step in typical
-            for unit_s in units
-        ):
+        mean, typical = float(steps.mean()), float(np.median(steps[steps > 0]))
+        told = self._rates_hz(mean)
+        ratios = [rate_hz / hz * part for hz in told.values() for part in (1, typical / mean)]
+        if not told or any(abs(ratio - 1) <= RATE_TOLERANCE for ratio in ratios):
             return None
         by_column = " or ".join(f"{hz:.4g} Hz (in {unit})" for unit, hz in told.items())
         return (
@@ -96,10 +92,20 @@ class TimeColumn:
         )
 
     def _rates_hz(self, step: float) -> dict[str, float]:
-        """The rate by a step in the column's unit; without one that fits, in all that do."""
-        rates = {unit: 1 / (step * second) for unit, second in SECONDS_PER_UNIT.items() if unit}
-        fitting = {unit: hz for unit, hz in rates.items() if LOWEST_RATE_HZ < hz <= HIGHEST_RATE_HZ}
-        return {self.unit: fitting[self.unit]} if self.unit in fitting else fitting
+        """The rate by a step in the column's unit, seconds without one; or in all that fit."""
+        rates = {
+            unit: 1 / max(step * second, 1 / LARGEST_VALUE)
+            for unit, second in SECONDS_PER_UNIT.items()
+            if unit
+        }
+        unit = self.unit or "s"
+        if self._lowest_hz < rates[unit] <= HIGHEST_RATE_HZ:
+            return {unit: rates[unit]}
+        return {unit: hz for unit, hz in rates.items() if LOWEST_RATE_HZ < hz <= HIGHEST_RATE_HZ}
+
+    @property
+    def _lowest_hz(self) -> float:
+        return LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
 
     def jitter_warning(self, rate_hz: float) -> str | None:
         """What uneven spacing does to samples that are taken as even, where it matters.

@@ -14,8 +14,9 @@ from tactileq.options import Out, Seed
 from tactileq.telling import clipping_warnings, progress
 
 if TYPE_CHECKING:
-    from rig.importing.files import Imported, Label
+    from rig.importing.files import Imported
     from rig.importing.hatt import HattTexture
+    from rig.importing.labels import Label
 
 imports = typer.Typer(
     no_args_is_help=True,
@@ -162,7 +163,7 @@ def labels_of(
     force: float | None,
 ) -> list[Label]:
     """Labels of the files from a table, or the same speed and force for all of them."""
-    from rig.importing.files import Label, labels_from_table
+    from rig.importing.labels import Label, labels_from_table
 
     if table is not None:
         if speed is not None or force is not None:
