@@ -2,6 +2,13 @@
 
 from typing import TYPE_CHECKING
 
+import modeling
+
+if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
+    raise ImportError(
+        f"expected the package modeling of tactileq, got {modeling}; rename that, or run python -P."
+    )
+
 from modeling.face import lazily
 
 HOMES = {

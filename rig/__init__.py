@@ -1,1 +1,8 @@
 """The rig: what presents surfaces to a hand, its simulated twin, and the import of recordings."""
+
+import modeling
+
+if not hasattr(modeling, "HOMES"):  # modeling.py beside a script that is run
+    raise ImportError(
+        f"expected the package modeling of tactileq, got {modeling}; rename that, or run python -P."
+    )

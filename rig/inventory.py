@@ -11,6 +11,7 @@ import platform
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import metadata
+from math import log10
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +23,7 @@ from rig.live.memory import compiled
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from rig.sound.devices import (
     Direction,
+    NoPortAudio,
     SoundDevice,
     check_rate,
     find_device,
@@ -33,6 +35,7 @@ State = Literal["ok", "note", "fault"]
 PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 OLD_DAYS = 90  # a study may ask for less
+_WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a fault by itself, told once
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,8 @@ def connected_sound() -> list[Finding]:
     """All sound devices: channels, usual rate."""
     try:
         devices = sound_devices()
+    except NoPortAudio:
+        return [Finding("sound", _WITHOUT_PORTAUDIO, "note")]
     except InputError as error:
         return [Finding("sound", str(error), "fault")]
     if not devices:
@@ -94,6 +99,7 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
     found = [
         Finding("rig", f"{rig.rig.name}{' (simulated)' if rig.simulated else ''}"),
         _sound(rig),
+        _limits(rig),
         _hand(rig),
         _accelerometer(rig),
         _calibration(rig, today),
@@ -147,10 +153,22 @@ def _card(
     try:
         device = find_device(name, direction, channels=channels)
         check_rate(device, direction, rate_hz=rate_hz, channels=channels)
+    except NoPortAudio:
+        return Finding(what, _WITHOUT_PORTAUDIO, "note")
     except InputError as error:
         return Finding(what, str(error), "fault")
     return Finding(
         what, f"{device.name} does {rate_hz:g} Hz with {channels} {direction} channel(s)"
+    )
+
+
+def _limits(rig: RigFile) -> Finding:
+    limits = rig.safe_limits
+    above_db = 20 * log10(limits.largest_rms(1.0) / limits.rms)
+    return Finding(
+        "limits",
+        f"{limits.peak:g} g peak; {limits.rms:g} g running RMS, exponential window of "
+        f"{limits.rms_window_s:g} s: after a silence up to {above_db:+.1f} dB over 1 s",
     )
 
 

@@ -173,7 +173,11 @@ def test_no_public_name_of_modeling_loads_what_only_some_of_it_needs() -> None:
 def test_a_face_names_what_is_there_to_readers_and_at_run_time(face) -> None:  # type: ignore[no-untyped-def]
     for_types: set[str] = set()
     tree = ast.parse(Path(face.__file__).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    (block,) = (
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
     # At the top `__getattr__` would let type checkers take every name for public.
     assert len(block.orelse) == 1
     assert "__getattr__" in ast.unparse(block.orelse[0])
@@ -199,3 +203,34 @@ def test_tests_mirror_the_rooms() -> None:
         assert tested - {"__pycache__"} <= inner, room
         for package in inner - tested:
             assert not any((ROOT / room / package).glob("[a-z]*.py")), f"{room}/{package} untested"
+
+
+def test_another_file_under_the_name_of_a_room_is_told_in_one_sentence(tmp_path: Path) -> None:
+    """The working folder comes first for `python -m` and for a script in it."""
+    other = tmp_path / "modeling.py"
+    other.write_text("fit = None\n")
+    (tmp_path / "analysis").mkdir()
+    (tmp_path / "analysis/__init__.py").touch()
+    began = subprocess.run(
+        [sys.executable, "-m", "tactileq", "--help"], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert began.returncode == 1
+    assert began.stdout == ""
+    [sentence] = began.stderr.splitlines()
+    assert sentence.startswith("error: expected the packages modeling, ")
+    assert f"got {other}, {tmp_path / 'analysis/__init__.py'} in place" in sentence
+    script = tmp_path / "script.py"
+    script.write_text(
+        "for room in ('experiments', 'rig', 'stimuli'):\n"
+        "    try:\n        __import__(room)\n"
+        "    except ImportError as error:\n        print(error)\n"
+        "import shutil; shutil.rmtree('analysis')\n"
+        "import analysis.columns\n"
+    )
+    run = subprocess.run(
+        [sys.executable, script], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    told = [*run.stdout.splitlines(), run.stderr.splitlines()[-1].removeprefix("ImportError: ")]
+    assert len(told) == 4
+    assert len(set(told)) == 1
+    assert f"from '{other}'>; rename that" in told[0]

@@ -415,8 +415,10 @@ def _turn_ns(work: Mapping[Name, Turn]) -> dict[Name, float]:
 
 def _import_s(starts: int) -> float:
     command = [sys.executable, "-c", _IMPORT]
+    rooms = Path(__file__).parents[2]  # a file modeling.py in the working folder is not ours
     runs = [
-        subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(starts)
+        subprocess.run(command, cwd=rooms, capture_output=True, text=True, check=True)
+        for _ in range(starts)
     ]
     return float(np.median([float(run.stdout) for run in runs]))
 

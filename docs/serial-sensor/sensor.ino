@@ -7,6 +7,7 @@ const float UM_PER_COUNT = 25.0;       // of the wheel, by a ruler
 const float MN_PER_STEP = 5.0;         // of the load cell, by a weight laid on
 const int REST_STEPS = 512;            // the load cell without weight
 const uint32_t PERIOD_US = 2000;       // 500 lines a second
+const uint32_t BAUD = 500000;          // a 16 MHz AVR has exactly this; baud under [hand] is the same
 
 volatile int32_t counts = 0;
 uint16_t number = 0;
@@ -18,7 +19,7 @@ void setup() {
   pinMode(2, INPUT_PULLUP);
   pinMode(3, INPUT_PULLUP);
   attachInterrupt(digitalPinToInterrupt(2), turned, CHANGE);
-  Serial.begin(460800);
+  Serial.begin(BAUD);
   next_us = micros();
 }
 

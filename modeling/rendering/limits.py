@@ -22,7 +22,7 @@ class Limits:
     rms : float
         Largest running RMS, in the model's unit: the root of the mean square weighted by
         exp(−age/`rms_window_s`). A sample that would exceed it is reduced just so far that it does
-        not. Above 0, infinite for none.
+        not. Above 0, infinite for none. What it allows over a time on end: `largest_rms`.
     rms_window_s : float
         Above 0 and finite.
     duration_s : float
@@ -63,3 +63,24 @@ class Limits:
     def mean_square(self) -> float:
         """The square of `rms`."""
         return self.rms * self.rms
+
+    def largest_rms(self, seconds: float) -> float:
+        """Largest RMS over so many seconds on end, in the model's unit: that after a long silence.
+
+        Parameters
+        ----------
+        seconds : float
+            Above 0.
+
+        Notes
+        -----
+        At its peak P from silence on, a signal brings the running mean square to its limit R² after
+        t = −w ln(1 − R²/P²), w being the window, and stays there: docs/method/rendering.md#limits.
+        """
+        if self.peak <= self.rms:
+            return self.peak
+        if np.isinf(self.peak):  # all at once
+            return float(self.rms * np.sqrt(1 + self.rms_window_s / seconds))
+        ratio = (self.rms / self.peak) ** 2
+        rise_s = min(seconds, float(-self.rms_window_s * np.log1p(-ratio)))
+        return float(self.peak * np.sqrt((rise_s + (seconds - rise_s) * ratio) / seconds))

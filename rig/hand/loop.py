@@ -11,7 +11,7 @@ from typing import Any
 
 from rig.hand.devices import open_device
 from rig.hand.following import Follower, Reading
-from rig.hand.sample import Device, DeviceLost
+from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
 from rig.live.memory import Live, now_s
@@ -60,6 +60,7 @@ class HandLoop:
         self._told = ""  # the last fault, until a sample passes
         self._counts: dict[str, int] = {}
         self._counts_s = 0.0
+        self._late = 0  # of the counts, those that were told
         self._firmware = ""
         self.unplugged = False  # on request: as if the plug were pulled
 
@@ -69,6 +70,7 @@ class HandLoop:
 
     def _take(self, device: Device) -> str:
         self._device = device
+        self._late = 0
         self._sample_s = float("-inf")
         self._follower = Follower(self._settings, rest_s=device.rest_s)
         return device.name
@@ -99,7 +101,8 @@ class HandLoop:
     def _pass_on(self, device: Device) -> None:
         if self.unplugged:
             raise DeviceLost("the device of the hand was unplugged on request.")
-        for sample in device.read():
+        samples = device.read()
+        for sample in samples:
             reading = self._follower.update(sample)
             self._told = ""
             # At once, whenever the last beat was; but of a fast device not every sample is kept.
@@ -110,7 +113,20 @@ class HandLoop:
         if device.firmware != self._firmware:
             self._firmware = device.firmware
             self._tell({"firmware": self._firmware})
-        self._report(device.counts())
+        counts = device.counts()
+        if samples:
+            self._tell_late(device, counts.get("late", 0))
+        self._report(counts)
+
+    def _tell_late(self, device: Device, late: int) -> None:
+        """Once samples are fresh again, say how many were not."""
+        if late > self._late:
+            told = (
+                f"expected the readings of the {device.name} within {LOST_S:g} s, got "
+                f"{late - self._late} that came later and were dropped; close other programs."
+            )
+            self._tell({"fault": told})
+            self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:
         if counts != self._counts and now_s() > self._counts_s + COUNTS_S:

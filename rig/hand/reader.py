@@ -6,17 +6,18 @@ import json
 import queue
 import signal
 import subprocess
-import sys
+import tempfile
 import threading
 from collections import deque
 from contextlib import suppress
-from typing import Any
+from typing import IO, Any
 
 from modeling.errors import InputError
 from rig.hand.following import Follower
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
 from rig.hand.window import WindowHand
+from rig.live.child import last_complaint, started
 from rig.live.memory import Live, now_s
 
 START_S = 30.0
@@ -108,8 +109,9 @@ class HandReader:
     def counts(self) -> dict[str, int]:
         """What the device sent and what of it was lost, a second old at most.
 
-        Of a serial sensor: lines, bad (damaged), missing. Of a tablet or mouse: frames, dropped (by
-        the kernel). They begin anew where the device was opened again.
+        Of a serial sensor: lines, bad (damaged), missing, late (of the lines, those that were
+        dropped because they were read more than 0.1 s after they were measured). Of a tablet or
+        mouse: frames, dropped (by the kernel). They begin anew where the device was opened again.
         """
         with self._lock:
             return dict(self._counts)
@@ -176,41 +178,34 @@ class HandReader:
         """Keep a process that reads, until this is closed."""
         patient = False
         while not self._closing.is_set():
-            process = self._start(patient=patient)
-            assert process.stdout is not None
-            with suppress(ValueError, OSError):  # closed under our eyes
-                for line in process.stdout:
-                    self._hear(json.loads(line))
-            self._alive_s = float("inf")
-            code = process.wait()
+            with tempfile.TemporaryFile() as complaints:
+                process = self._start(complaints, patient=patient)
+                assert process.stdout is not None
+                with suppress(ValueError, OSError):  # closed under our eyes
+                    for line in process.stdout:
+                        self._hear(json.loads(line))
+                self._alive_s = float("inf")
+                how = _how(process.wait()) + last_complaint(complaints)
             if not self._was_ready:  # `open` refuses
-                ended = (
-                    f"expected the hand's process to start, got its end {_how(code)}; try again."
-                )
+                ended = f"expected the hand's process to start, got its end {how}; try again."
                 self._first.put({"error": ended})
                 return
             if not self._closing.is_set():
                 # The process is no more and its heir not yet there: nobody else writes.
                 Follower(self._settings, rest_s=REST_S).gone(now_s()).write(self._live)
                 self._add_fault(
-                    f"the process that reads the hand ended {_how(code)} and is started again."
+                    f"the process that reads the hand ended {how} and is started again."
                 )
                 patient = True
                 self._closing.wait(_PAUSE_S)
 
-    def _start(self, *, patient: bool) -> subprocess.Popen[str]:
+    def _start(self, complaints: IO[bytes], *, patient: bool) -> subprocess.Popen[str]:
         wanted = {
             "live": str(self._live.path),
             "settings": self._settings.to_dict(),
             "patient": patient,
         }
-        process = subprocess.Popen(
-            [sys.executable, "-m", "rig.hand.process", json.dumps(wanted)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-        )
+        process = started("rig.hand.process", wanted, complaints=complaints)
         with self._lock:
             self._process = process
         if self._closing.is_set():  # closed in between
@@ -234,9 +229,15 @@ class HandReader:
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""
+        looked_s, held_up_s = now_s(), float("-inf")
         while not self._closing.wait(_WATCH_S):
+            if now_s() - looked_s > SILENT_S / 2:  # the computer was held up, and the process too
+                held_up_s = now_s()
+            looked_s = now_s()
             latest = self._live.latest()
-            last_s = self._alive_s if latest is None else max(self._alive_s, latest["time_s"])
+            last_s = max(
+                self._alive_s, held_up_s, float("-inf") if latest is None else latest["time_s"]
+            )
             with self._lock:
                 process = self._process
             if process is not None and now_s() - last_s > SILENT_S:

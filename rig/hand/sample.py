@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from math import nan
 from typing import NamedTuple, Protocol
 
+LOST_S = 0.1  # a sensor that sends always is lost after so long, and what is older is of no use
+
 
 class Sample(NamedTuple):
     """The hand at one moment, as a device measures it.
@@ -79,7 +81,10 @@ class Device(Protocol):
         """All samples since the last call, without waiting; DeviceLost where it is gone."""
 
     def counts(self) -> dict[str, int]:
-        """What was read so far and what was lost, by name; empty where nothing can be lost."""
+        """What was read so far and what was lost, by name; empty where nothing can be lost.
+
+        "late": read, but so long after it was measured that it was dropped.
+        """
 
     def close(self) -> None:
         """Give the device back."""

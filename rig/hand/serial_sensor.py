@@ -10,13 +10,12 @@ import serial
 from serial.tools import list_ports
 
 from modeling.errors import InputError, shown
-from rig.hand.sample import ConnectedDevice, DeviceLost, Sample
+from rig.hand.sample import LOST_S, ConnectedDevice, DeviceLost, Sample
 from rig.hand.serial_line import LineReader, SensorClock, SensorLine
 from rig.hand.settings import HandSettings
 from rig.live.memory import now_s
 
 FIRST_LINE_S = 3.0  # many boards start anew when their port is opened
-LOST_S = 0.1
 _POLL_S = 0.001
 
 
@@ -36,7 +35,9 @@ class SerialSensor:
         self._port = port
         self._lines = LineReader()
         self._clock = SensorClock()
-        self._last_s = now_s()
+        self._late = 0
+        self._asked_s = now_s()
+        self._line_s = self._fresh_s = self._asked_s  # of the last line, of the last fresh sample
 
     @classmethod
     def open(cls, settings: HandSettings) -> SerialSensor:
@@ -63,27 +64,42 @@ class SerialSensor:
             time.sleep(min(seconds, _POLL_S))
 
     def read(self) -> list[Sample]:
-        """The samples of all whole lines; DeviceLost where no good one came for 0.1 s.
+        """The samples of all whole lines, without those over 0.1 s old, which are counted.
 
-        Likewise where the sensor's clock has fallen so far behind.
+        DeviceLost where for 0.1 s no good line came, or none that was not so old by the sensor's
+        clock. Time in which this was not called says nothing about the sensor.
         """
+        asked_s = now_s()
+        if asked_s - self._asked_s > LOST_S:
+            self._start_waiting(asked_s)
+        self._asked_s = asked_s
         lines = self._lines.feed(self._received())
         arrived_s = now_s()
+        samples = [_sample(line, self._clock.time_s(line.time_us, arrived_s)) for line in lines]
+        fresh = [sample for sample in samples if arrived_s - sample.time_s <= LOST_S]
+        self._late += len(samples) - len(fresh)
         if lines:
-            self._last_s = arrived_s
-        elif arrived_s - self._last_s > LOST_S:
+            self._line_s = asked_s
+        if fresh:
+            self._fresh_s = asked_s
+        self._check_waiting(asked_s)
+        return fresh
+
+    def _start_waiting(self, since_s: float) -> None:
+        self._line_s = self._fresh_s = since_s
+
+    def _check_waiting(self, asked_s: float) -> None:
+        if asked_s - self._line_s > LOST_S:
             raise DeviceLost(
                 f"expected good lines from the {self.name}, got none for {LOST_S:g} s "
                 f"({self._lines.bad} were damaged so far); check its cable, its power and its baud "
                 "rate."
             )
-        samples = [_sample(line, self._clock.time_s(line.time_us, arrived_s)) for line in lines]
-        if samples and arrived_s - samples[-1].time_s > LOST_S:
+        if asked_s - self._fresh_s > LOST_S:
             raise DeviceLost(
                 f"expected a clock within {SensorClock.DRIFT:.1%} from the {self.name}, got one "
                 "that falls behind; have TIME count microseconds of a crystal."
             )
-        return samples
 
     @property
     def firmware(self) -> str:
@@ -91,8 +107,14 @@ class SerialSensor:
         return self._lines.firmware
 
     def counts(self) -> dict[str, int]:
-        """Lines that were read, were damaged, are missing."""
-        return {"lines": self._lines.good, "bad": self._lines.bad, "missing": self._lines.missing}
+        """Lines that were read, were damaged, are missing; of the first, those read too late."""
+        found = self._lines
+        return {
+            "lines": found.good,
+            "bad": found.bad,
+            "missing": found.missing,
+            "late": self._late,
+        }
 
     def close(self) -> None:
         """Give the port back."""
@@ -116,7 +138,8 @@ class SerialSensor:
                 raise InputError(
                     f"expected a sensor that stays at its port, got an end: {lost}"
                 ) from None
-        self._last_s = now_s()
+        self._asked_s = now_s()
+        self._start_waiting(self._asked_s)
 
     def _refused(self, baud: int) -> InputError:
         if self._lines.bad:
@@ -189,7 +212,7 @@ def _not_opened(path: str, baud: int, error: Exception) -> InputError:
         )
     if isinstance(error, ValueError | OverflowError) or "baud" in text:
         return InputError(
-            f"expected a baud rate that {path} can do, got {baud}; take 115200 or 460800."
+            f"expected a baud rate that {path} can do, got {baud}; take 115200 or 500000."
         )
     return InputError(f"expected a serial port at {path}, got a refusal ({text}); check the path.")
 

@@ -1,9 +1,9 @@
-"""Recordings that other equipment made: WAV and CSV files, with labels from options or a table."""
+"""Recordings that other equipment made: WAV and CSV files."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,56 +15,34 @@ from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.errors import shortened, shown
 from modeling.files.reading import read_bytes
-from modeling.files.tables import (
-    check_columns,
-    csv_cells,
-    is_number,
-    number,
-    read_table,
-    whole_number,
-)
+from modeling.files.tables import csv_cells, is_number
 from modeling.files.wav import full_scale, read_wav
-from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 from modeling.recordings.appending import WavSource
 from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import dft321
+from rig.importing.labels import Label
+from rig.importing.plausible import G_PER_UNIT, doubts_about
 from rig.importing.times import TimeColumn
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
-G_PER_UNIT = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY_M_S2, "arbitrary": 1.0}
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2
-LABEL_COLUMNS = (
-    *("file", "speed_mm_s", "force_n"),
-    *("texture", "repeat", "g_per_fullscale", "channel"),
-)
 _TIME_NAMES = {"time", "t", "timestamp"}
 _AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
 
 
 @dataclass(frozen=True)
-class Label:
-    """What a file does not say of itself: surface, speed (mm/s), force (N), which repetition.
-
-    Of WAV files also the acceleration (g) of a full-scale sample, and the channel, from 1.
-    """
-
-    texture: str
-    speed_mm_s: float
-    force_n: float
-    repeat: int = 1
-    g_per_fullscale: float | None = None
-    channel: int | None = None
-
-
-@dataclass(frozen=True)
 class Imported:
-    """A recording from a file, what to be warned of, and the WAV file that holds its samples."""
+    """A recording from a file, what to be warned of, and the WAV file that holds its samples.
+
+    `doubts` says what of it cannot be meant.
+    """
 
     recording: Recording
     warnings: tuple[str, ...] = ()
     source: WavSource | None = None
+    doubts: tuple[str, ...] = ()
 
 
 def import_wav(
@@ -89,10 +67,10 @@ def import_wav(
     Raises
     ------
     InputError
-        Naming the file that cannot be used.
+        Naming the file that cannot be used, or whose labels or scale cannot be meant.
     """
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
-    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+    return RecordingSet(_meant(read(*one)) for one in zip(paths, labels, strict=True))
 
 
 def import_wav_file(
@@ -102,7 +80,7 @@ def import_wav_file(
     g_per_fullscale: float | None = None,
     channel: int | None = None,
 ) -> Imported:
-    """One WAV file, with warnings; otherwise as `import_wav`."""
+    """One WAV file, with warnings and doubts; otherwise as `import_wav`."""
     channel = channel if label.channel is None else label.channel
     samples, rate_hz = read_wav(path, channel=channel)
     scale = g_per_fullscale if label.g_per_fullscale is None else label.g_per_fullscale
@@ -116,7 +94,8 @@ def import_wav_file(
         unit="arbitrary" if scale is None else "g",
     )
     warnings = [*_beyond_full_scale(path, samples, scale), *_too_short(path, recording)]
-    return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale))
+    doubts = doubts_about(recording, path.name, g_per_fullscale=scale)
+    return Imported(recording, tuple(warnings), WavSource(path, channel or 1, scale), doubts)
 
 
 def import_csv(
@@ -145,10 +124,17 @@ def import_csv(
     Raises
     ------
     InputError
-        Naming the file and what is wrong with it.
+        Naming the file and what is wrong with it, or cannot be meant.
     """
     read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
-    return RecordingSet(read(*one).recording for one in zip(paths, labels, strict=True))
+    return RecordingSet(_meant(read(*one)) for one in zip(paths, labels, strict=True))
+
+
+def _meant(one: Imported) -> Recording:
+    """The recording; refused where something of it cannot be meant."""
+    if one.doubts:
+        raise InputError(one.doubts[0])
+    return one.recording
 
 
 def import_csv_file(
@@ -159,14 +145,14 @@ def import_csv_file(
     unit: str | None = None,
     rate_hz: float | None = None,
 ) -> Imported:
-    """One CSV file, with warnings; otherwise as `import_csv`."""
+    """One CSV file, with warnings and doubts; otherwise as `import_csv`."""
     if axis is not None and axis not in AXES:
         raise InputError(
             f"expected an axis among {', '.join(AXES)}, got {shown(axis)}; choose one."
         )
     _check_unit(unit, "--unit")
     columns, warnings = _read_columns(path)
-    rate_hz, jitter = _rate(path, columns, rate_hz)
+    rate_hz, jitter, contradiction = _rate(path, columns, rate_hz)
     axes, found_unit = _chosen_axes(path, columns, axis)
     if unit and found_unit and unit != found_unit:
         raise InputError(
@@ -184,7 +170,11 @@ def import_csv_file(
         # Combined axes no longer show their limits, so those are looked for here.
         clipped_share=float(np.any([clipped_samples(one) for one in axes], axis=0).mean()),
     )
-    return Imported(recording, (*warnings, *jitter, *_too_short(path, recording)))
+    return Imported(
+        recording,
+        (*warnings, *jitter, *_too_short(path, recording)),
+        doubts=(*contradiction, *doubts_about(recording, path.name, unit=final_unit)),
+    )
 
 
 def usable(
@@ -218,60 +208,10 @@ def usable(
     return records, tuple(map(str, refusals))
 
 
-def labels_from_table(
-    table: Path, paths: Sequence[Path], *, texture: str | None
-) -> tuple[list[Label], tuple[str, ...]]:
-    """Labels by file name from a TSV with file, speed_mm_s, force_n (texture, repeat, …).
-
-    Returns
-    -------
-    labels : list of Label
-        One per path.
-    unused : tuple of str
-        The files of rows that belong to no path.
-
-    Raises
-    ------
-    InputError
-        For a column that is not known, a file that the table names not once, and cells that are no
-        usable numbers.
-    """
-    rows: dict[str, dict[str, str]] = {}
-    for row in read_table(table, LABEL_COLUMNS[:3]):
-        check_columns(row, LABEL_COLUMNS, table)
-        if row["file"] in rows:
-            raise InputError(
-                f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
-            )
-        rows[row["file"]] = row
-    fallback = texture or table.parent.resolve().name
-    used, labels = set(), []
-    for path in paths:
-        if not (found := rows.get(path.name) or rows.get(str(path))):
-            raise InputError(
-                f"expected a row for {path.name} in {table}, got none; add its speed and force."
-            )
-        used.add(found["file"])
-        labels.append(_label(path, found, texture=fallback))
-    return labels, tuple(file for file in rows if file not in used)
-
-
-def _label(path: Path, row: Mapping[str, str], *, texture: str) -> Label:
-    scale, channel = row.get("g_per_fullscale"), row.get("channel")
-    return Label(
-        row.get("texture") or texture,
-        number(row["speed_mm_s"], f"speed_mm_s of {path.name}"),
-        number(row["force_n"], f"force_n of {path.name}"),
-        whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
-        full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name) if scale else None,
-        whole_number(channel, f"channel of {path.name}") if channel else None,
-    )
-
-
 def _rate(
     path: Path, columns: dict[str, Floats], given_hz: float | None
-) -> tuple[float, tuple[str, ...]]:
-    """The rate, given or told by the time column, and what is to be said of uneven samples."""
+) -> tuple[float, Sequence[str], Sequence[str]]:
+    """The rate, given or told; what is to be said of uneven samples; what contradicts the rate."""
     name = _time_column(columns)
     if name is None:
         if given_hz is None:
@@ -279,13 +219,12 @@ def _rate(
                 f"expected a time column or --rate for {path.name}, got the columns "
                 f"{shortened(', '.join(columns), longest=120)}; give the sampling rate in Hz."
             )
-        return given_hz, ()
+        return given_hz, (), ()
     time = TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
-    if given_hz is not None:
-        time.check_rate(given_hz)
     rate_hz = time.rate_hz() if given_hz is None else given_hz
-    jitter = time.jitter_warning(rate_hz)
-    return rate_hz, () if jitter is None else (jitter,)
+    contradiction = None if given_hz is None else time.contradiction(given_hz)
+    jitter = None if contradiction else time.jitter_warning(rate_hz)
+    return rate_hz, [jitter] if jitter else [], [contradiction] if contradiction else []
 
 
 def _beyond_full_scale(path: Path, samples: Floats, scale: float | None) -> list[str]:
@@ -426,7 +365,7 @@ def _name_and_unit(header: str) -> tuple[str, str]:
     if bracket := re.search(r"[\[(](.*?)[\])]", text):
         unit = bracket.group(1).strip()
         text = text[: bracket.start()]
-    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|s|ms|us)", text.strip()):
+    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|s|ms|us|ns)", text.strip()):
         text, unit = suffix.groups()
     return re.sub(r"[\s_]+", "_", text.strip()).strip("_"), unit.replace("m_s2", "m/s2")
 

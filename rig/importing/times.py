@@ -8,10 +8,11 @@ import numpy as np
 
 from modeling import InputError
 from modeling.arrays import Floats
+from modeling.checks import HIGHEST_RATE_HZ, LARGEST_VALUE
 from modeling.errors import shown
 from modeling.recordings.spectrum import MODEL_RATE_HZ
 
-SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+SECONDS_PER_UNIT = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 LONGEST_GAP = 2.5
 # A tool's vibration needs more; a rate below this means time in another unit than supposed.
 LOWEST_RATE_HZ = 20.0
@@ -53,37 +54,58 @@ class TimeColumn:
         """
         if self.unit not in SECONDS_PER_UNIT:
             raise InputError(
-                f"expected time in s, ms or us in {self.file}, got {shown(self.unit)}; convert it "
-                "or give --rate."
+                f"expected time in s, ms, us or ns in {self.file}, got {shown(self.unit)}; "
+                "convert it or give --rate."
             )
-        rate_hz = 1 / self._mean_step_s()
-        lowest = LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
-        if rate_hz <= lowest:
+        rate_hz, lowest_hz = 1 / self._mean_step_s(), self._lowest_hz
+        if not lowest_hz < rate_hz <= HIGHEST_RATE_HZ:
             raise InputError(
-                f"expected a rate above {lowest:g} Hz in {self.file}, got {rate_hz:.4g} Hz by its "
-                f"column {shown(self.name)}: is time in ms or us? Name the unit in the header "
-                "(time_s, time_ms, time_us) or give --rate."
+                f"expected a rate above {lowest_hz:g} Hz and up to {HIGHEST_RATE_HZ:.0f} Hz in "
+                f"{self.file}, got {rate_hz:.4g} Hz by its column {shown(self.name)}: is time in "
+                "ms, us or ns? Name the unit in the header (time_s, time_ms, time_us, time_ns) or "
+                "give --rate."
             )
         return rate_hz
 
-    def check_rate(self, rate_hz: float) -> None:
-        """Refuse a rate that neither the mean nor the typical step agrees with.
+    def contradiction(self, rate_hz: float) -> str | None:
+        """A sentence where neither the mean nor the typical step agrees with a rate that was given.
 
-        Where the column tells no rate, any is accepted: it is given because of that.
+        A column of times that no vibration has in its unit may be in any; one that counts samples,
+        or whose times fall, tells no rate.
         """
-        try:
-            told_hz = self.rate_hz()
-        except InputError:
-            return
+        steps = np.diff(self.values)
+        rises = np.isfinite(self.values).all() and (steps >= 0).all() and steps.any()
+        counts = not self.unit and (steps == 1).all()
+        if not rises or counts or self.unit not in SECONDS_PER_UNIT:
+            return None
         # Coarse time stamps keep the mean step, lost samples the typical one.
-        steps = np.diff(self._time_s())
-        steps_s = (1 / told_hz, float(np.median(steps[steps > 0])))
-        if all(abs(rate_hz * step_s - 1) > RATE_TOLERANCE for step_s in steps_s):
-            raise InputError(
-                f"expected a --rate that agrees with the time column of {self.file}, got "
-                f"{rate_hz:g} Hz and by its column {shown(self.name)} {told_hz:.4g} Hz; leave "
-                "--rate out, or remove the column if it is wrong."
-            )
+        mean, typical = float(steps.mean()), float(np.median(steps[steps > 0]))
+        told = self._rates_hz(mean)
+        ratios = [rate_hz / hz * part for hz in told.values() for part in (1, typical / mean)]
+        if not told or any(abs(ratio - 1) <= RATE_TOLERANCE for ratio in ratios):
+            return None
+        by_column = " or ".join(f"{hz:.4g} Hz (in {unit})" for unit, hz in told.items())
+        return (
+            f"{self.file}: expected a --rate that agrees with the time column, got {rate_hz:g} Hz "
+            f"and by its column {shown(self.name)} {by_column}; leave --rate out, or give --yes "
+            "where the column is wrong."
+        )
+
+    def _rates_hz(self, step: float) -> dict[str, float]:
+        """The rate by a step in the column's unit, seconds without one; or in all that fit."""
+        rates = {
+            unit: 1 / max(step * second, 1 / LARGEST_VALUE)
+            for unit, second in SECONDS_PER_UNIT.items()
+            if unit
+        }
+        unit = self.unit or "s"
+        if self._lowest_hz < rates[unit] <= HIGHEST_RATE_HZ:
+            return {unit: rates[unit]}
+        return {unit: hz for unit, hz in rates.items() if LOWEST_RATE_HZ < hz <= HIGHEST_RATE_HZ}
+
+    @property
+    def _lowest_hz(self) -> float:
+        return LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
 
     def jitter_warning(self, rate_hz: float) -> str | None:
         """What uneven spacing does to samples that are taken as even, where it matters.

@@ -6,6 +6,7 @@ docs/method/live.md#processes
 from __future__ import annotations
 
 import json
+import os
 import queue
 import subprocess
 import sys
@@ -13,7 +14,8 @@ import tempfile
 import threading
 from collections.abc import Mapping
 from contextlib import suppress
-from typing import Any
+from pathlib import Path
+from typing import IO, Any
 
 from modeling.errors import InputError
 
@@ -26,8 +28,36 @@ class ChildLost(RuntimeError):
     """The process has ended, or does not answer; the message is a part of a sentence."""
 
 
+def started(
+    module: str, settings: Mapping[str, Any], *, complaints: IO[bytes]
+) -> subprocess.Popen[str]:
+    """`python -P -m MODULE SETTINGS`, with pipes; its standard error goes to `complaints`.
+
+    Its rooms are those of this process, installed or not. Without -P a file `rig.py` in the working
+    folder would be imported in place of the room.
+    """
+    rooms = str(Path(__file__).resolve().parents[2])
+    others = [path for path in (os.environ.get("PYTHONPATH"),) if path]
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", module, json.dumps(settings)],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([rooms, *others])},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=complaints,
+        text=True,
+    )
+
+
+def last_complaint(complaints: IO[bytes]) -> str:
+    """The last line that a process wrote to its standard error, in brackets; empty for none."""
+    complaints.seek(0)
+    lines = complaints.read().decode(errors="replace").split("\n")
+    last = [line.strip() for line in lines if line.strip()][-1:]
+    return f" ({last[0]})" if last else ""
+
+
 class Child:
-    """`python -m MODULE SETTINGS`, which answers one line for each line that it gets.
+    """A process of `started`, which answers one line for each line that it gets.
 
     Parameters
     ----------
@@ -45,13 +75,7 @@ class Child:
 
     def __init__(self, module: str, settings: Mapping[str, Any]) -> None:
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as this)
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", module, json.dumps(settings)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._complaints,
-            text=True,
-        )
+        self._process = started(module, settings, complaints=self._complaints)
         self._answers: queue.Queue[str] = queue.Queue()
         threading.Thread(target=self._listen, daemon=True).start()
         try:
@@ -85,7 +109,7 @@ class Child:
             self._process.stdin.write(json.dumps(wanted) + "\n")
             self._process.stdin.flush()
         except (OSError, ValueError):
-            raise ChildLost(f"it has ended{self._last_complaint()}") from None
+            raise ChildLost(f"it has ended{last_complaint(self._complaints)}") from None
         return self._answer(within_s)
 
     def close(self) -> None:
@@ -114,13 +138,6 @@ class Child:
                 self._answers.put(line)
         self._answers.put("")
 
-    def _last_complaint(self) -> str:
-        """The last line that it has written to its standard error."""
-        self._complaints.seek(0)
-        lines = self._complaints.read().decode(errors="replace").split("\n")
-        last = [line.strip() for line in lines if line.strip()][-1:]
-        return f" ({last[0]})" if last else ""
-
     def _answer(self, within_s: float) -> dict[str, Any]:
         try:
             line = self._answers.get(timeout=within_s)
@@ -128,7 +145,7 @@ class Child:
             raise ChildLost(f"it has not answered for {within_s:g} s") from None
         if not line:
             self._answers.put("")  # for who asks next
-            raise ChildLost(f"it has ended{self._last_complaint()}")
+            raise ChildLost(f"it has ended{last_complaint(self._complaints)}")
         answer: dict[str, Any] = json.loads(line)
         if "error" in answer:
             raise InputError(answer["error"])

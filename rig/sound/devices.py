@@ -12,6 +12,10 @@ USUAL_RATES_HZ = (8000, 16000, 22050, 32000, 44100, 48000, 88200, 96000, 176400,
 PORTAUDIO_HINT = "install libportaudio2 (sudo apt-get install libportaudio2)"
 
 
+class NoPortAudio(InputError):
+    """The library that knows all sound devices is missing."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class SoundDevice:
     """A sound device as PortAudio knows it.
@@ -50,13 +54,13 @@ def portaudio() -> Any:
 
     Raises
     ------
-    InputError
-        Where PortAudio is missing.
+    NoPortAudio
+        Where it is missing.
     """
     try:
         import sounddevice
     except OSError:
-        raise InputError(
+        raise NoPortAudio(
             f"expected the sound library PortAudio, got none; {PORTAUDIO_HINT}."
         ) from None
     return sounddevice

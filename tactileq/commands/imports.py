@@ -14,8 +14,9 @@ from tactileq.options import Out, Seed
 from tactileq.telling import clipping_warnings, progress
 
 if TYPE_CHECKING:
-    from rig.importing.files import Imported, Label
+    from rig.importing.files import Imported
     from rig.importing.hatt import HattTexture
+    from rig.importing.labels import Label
 
 imports = typer.Typer(
     no_args_is_help=True,
@@ -33,6 +34,10 @@ LabelTable = Annotated[
         "--labels",
         help="TSV: file, speed_mm_s, force_n (texture, repeat; of WAV g_per_fullscale, channel).",
     ),
+]
+Yes = Annotated[
+    bool,
+    typer.Option("--yes", help="Take in, with a warning, what cannot be meant by its numbers."),
 ]
 # So many names of files are told; the rest are counted.
 MOST_NAMES = 5
@@ -52,6 +57,7 @@ def import_wav(
     channel: Annotated[
         int | None, typer.Option(min=1, help="Which channel, from 1, of files with several.")
     ] = None,
+    yes: Yes = False,
 ) -> None:
     """Add WAV recordings to a recording set; it keeps copies of the files.
 
@@ -65,7 +71,9 @@ def import_wav(
     read = partial(import_wav_file, g_per_fullscale=g_per_fullscale, channel=channel)
     records, refused = usable(read, files, named)
     settings = {"g_per_fullscale": g_per_fullscale, "channel": channel, "labels": str(labels)}
-    add_to_set(out, records, "import wav", settings=settings, inputs=inputs, left_out=refused)
+    add_to_set(
+        out, records, "import wav", settings=settings, inputs=inputs, left_out=refused, yes=yes
+    )
 
 
 @imports.command("csv")
@@ -84,6 +92,7 @@ def import_csv(
         float | None,
         typer.Option("--rate", help="Sampling rate in Hz; the time column's without it."),
     ] = None,
+    yes: Yes = False,
 ) -> None:
     """Add CSV recordings (time and one or three axes) to a recording set.
 
@@ -97,7 +106,9 @@ def import_csv(
     read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
     records, refused = usable(read, files, named)
     settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
-    add_to_set(out, records, "import csv", settings=settings, inputs=inputs, left_out=refused)
+    add_to_set(
+        out, records, "import csv", settings=settings, inputs=inputs, left_out=refused, yes=yes
+    )
 
 
 @imports.command("hatt")
@@ -111,6 +122,7 @@ def import_hatt(
     ] = None,
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 10.0,
     seed: Seed = 0,
+    yes: Yes = False,
 ) -> None:
     """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
 
@@ -122,6 +134,7 @@ def import_hatt(
     from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import Imported
     from rig.importing.hatt import load_hatt
+    from rig.importing.plausible import doubts_about
 
     inputs = sha256_of_paths(files)
     speeds = speed or [50.0 * step for step in range(1, 8)]
@@ -136,9 +149,13 @@ def import_hatt(
                 )
             )
             advance(texture.material)
-    records = [Imported(record) for of_texture in made for record in of_texture]
+    records = [
+        Imported(record, doubts=doubts_about(record, record.describe(), unit="m/s2"))
+        for of_texture in made
+        for record in of_texture
+    ]
     settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
-    add_to_set(out, records, "import hatt", settings=settings, inputs=inputs)
+    add_to_set(out, records, "import hatt", settings=settings, inputs=inputs, yes=yes)
     for texture in textures:
         tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
 
@@ -152,7 +169,7 @@ def labels_of(
     force: float | None,
 ) -> list[Label]:
     """Labels of the files from a table, or the same speed and force for all of them."""
-    from rig.importing.files import Label, labels_from_table
+    from rig.importing.labels import Label, labels_from_table
 
     if table is not None:
         if speed is not None or force is not None:
@@ -183,17 +200,24 @@ def add_to_set(
     settings: Mapping[str, object],
     inputs: Mapping[str, str],
     left_out: Sequence[str] = (),
+    yes: bool = False,
 ) -> None:
     """Add imported recordings to those that `out` already holds.
 
     `inputs`: the hashes of the files that were read. `left_out`: a sentence for each file that
-    could not be used.
+    could not be used. What cannot be meant is refused, or, where the answer is yes, told and
+    written into the provenance.
     """
     from modeling import RecordingSet
     from modeling.files.places import locked
     from modeling.files.provenance import PROVENANCE_NAME, provenance_of, provenance_text
     from modeling.recordings.appending import staged
 
+    doubts = [doubt for one in new for doubt in one.doubts]
+    if doubts and not yes:
+        raise ValueError(several(doubts))
+    for doubt in doubts:
+        print(f"warning: taken in all the same: {doubt}", file=sys.stderr)
     records = RecordingSet(one.recording for one in new)
     for warning in clipping_warnings(records):
         print(warning, file=sys.stderr)
@@ -202,7 +226,8 @@ def add_to_set(
     for sentence in left_out:
         print(f"warning: left out: {sentence}", file=sys.stderr)
     provenance = out / PROVENANCE_NAME
-    origin = provenance_of(command, settings, inputs=inputs)
+    taken = {"doubts": doubts} if doubts else {}
+    origin = provenance_of(command, {**settings, **taken}, inputs=inputs)
     # Only what is quick is done while another import cannot add to what this one adds to.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):
         origin["settings"]["added to"] = imports_before(provenance)
@@ -216,6 +241,12 @@ def add_to_set(
     if left_out:
         print(f"note: {len(left_out)} of {len(inputs)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
+
+
+def several(sentences: Sequence[str]) -> str:
+    """The first of some sentences, and how many more there are."""
+    more = f" ({len(sentences) - 1} more like it)" if len(sentences) > 1 else ""
+    return f"{sentences[0].removesuffix('.')}{more}."
 
 
 def imports_before(provenance: Path) -> list[dict[str, Any]]:

@@ -68,7 +68,8 @@ def _show(console: Console, title: str, findings: Sequence[Finding]) -> None:
         style = _STYLES[finding.state]
         table.add_row(
             Text(finding.name),
-            Text(finding.told, style=style),
+            # Faults are told below, where they stand in full.
+            Text("" if finding.state == "fault" else finding.told, style=style),
             Text(_MARKS[finding.state], style=style),
         )
     if not findings:

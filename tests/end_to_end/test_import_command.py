@@ -21,20 +21,20 @@ def test_a_set_keeps_wav_files_and_tells_of_its_imports_side_by_side(main, tmp_p
     assert "with --channel" in refused.stderr
     assert not (tmp_path / "set").exists()
     sizes = []
-    for speed in range(10, 90, 10):
+    for speed in range(10, 60, 10):
         options = ["--speed", speed, "--channel", 2, "--g-per-fullscale", 4]
         added = main("import", "wav", "a.wav", *options, *labels)
         assert added.returncode == 0, added.stderr
         sizes.append((tmp_path / "set/provenance.json").stat().st_size)
-    assert added.stdout.splitlines()[-1] == "1 recordings added at 10000 Hz, 8 in set"
+    assert added.stdout.splitlines()[-1] == "1 recordings added at 10000 Hz, 5 in set"
     records = RecordingSet.load(tmp_path / "set").recordings
-    assert len(records) == 8
+    assert len(records) == 5
     assert all(np.array_equal(record.samples, 4 * NOISE[:, 1].astype(float)) for record in records)
-    assert (tmp_path / "set/0008.wav").read_bytes() == (tmp_path / "a.wav").read_bytes()
+    assert (tmp_path / "set/0005.wav").read_bytes() == (tmp_path / "a.wav").read_bytes()
     # Every import adds as much to the provenance as the one before it.
     assert np.unique(np.diff(sizes[1:])).size == 1
     told = json.loads((tmp_path / "set/provenance.json").read_text())
-    assert [one["settings"].get("added to") for one in told["settings"]["added to"]] == [None] * 7
+    assert [one["settings"].get("added to") for one in told["settings"]["added to"]] == [None] * 4
     assert all(one["command"] == "tactileq import wav" for one in told["settings"]["added to"])
 
 
@@ -42,12 +42,12 @@ def test_provenance_within_provenance_is_kept_side_by_side(main, tmp_path: Path)
     """As sets of before have it."""
     wavfile.write(tmp_path / "a.wav", 10_000, NOISE[:, 0])
     options = ["--force", 1, "--texture", "oak", "--out", "set"]
-    assert main("import", "wav", "a.wav", "--speed", 1, *options).returncode == 0
+    assert main("import", "wav", "a.wav", "--speed", 10, *options).returncode == 0
     first = {"command": "tactileq record", "settings": {"texture": "oak"}}
     second = {"command": "tactileq import csv", "settings": {"unit": "g", "added to": first}}
     third = {"command": "tactileq import wav", "settings": {"added to": second}}
     (tmp_path / "set/provenance.json").write_text(json.dumps(third))
-    assert main("import", "wav", "a.wav", "--speed", 2, *options).returncode == 0
+    assert main("import", "wav", "a.wav", "--speed", 20, *options).returncode == 0
     told = json.loads((tmp_path / "set/provenance.json").read_text())["settings"]["added to"]
     assert [one["command"].split(maxsplit=1)[1] for one in told] == [
         *("record", "import csv", "import wav")
@@ -80,3 +80,23 @@ def test_a_rate_that_contradicts_the_time_column_is_refused(main, tmp_path: Path
     added = main("import", "csv", "a.csv", *labels, "--rate", 3200)
     assert added.returncode == 0
     assert "warning: a.csv: has no line end after its last row" in added.stderr
+
+
+def test_what_cannot_be_meant_is_refused_and_taken_where_it_is(main, tmp_path: Path) -> None:
+    wavfile.write(tmp_path / "a.wav", 10_000, NOISE[:, 0])
+    wavfile.write(tmp_path / "b.wav", 10_000, NOISE[:, 1])
+    (tmp_path / "labels.tsv").write_text(
+        "file\tspeed_mm_s\tforce_n\na.wav\t1.5\t160\nb.wav\t3.5\t100\n"
+    )
+    words = ["import", "wav", "a.wav", "b.wav", "--labels", "labels.tsv", "--out", "set"]
+    refused = main(*words, "--g-per-fullscale", 4)
+    assert refused.returncode == 1
+    assert "got 1.5 mm/s and 160 N, or 160 mm/s and 1.5 N with the columns" in refused.stderr
+    assert refused.stderr.endswith("or give --yes where it is meant (1 more like it).\n")
+    assert not (tmp_path / "set").exists()
+    taken = main(*words, "--g-per-fullscale", 4, "--yes")
+    assert taken.returncode == 0
+    assert taken.stderr.count("warning: taken in all the same: ") == 2
+    told = json.loads((tmp_path / "set/provenance.json").read_text())["settings"]["doubts"]
+    assert [doubt.split(":")[0] for doubt in told] == ["a.wav", "b.wav"]
+    assert len(RecordingSet.load(tmp_path / "set").recordings) == 2

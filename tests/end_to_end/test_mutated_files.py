@@ -47,8 +47,9 @@ from rig.capture.grid import StrokeGrid
 from rig.capture.pieces import PieceStore, Plan
 from rig.desk.parts import hand_settings
 from rig.hand.scripted import Trajectory
-from rig.importing.files import Label, import_csv, import_wav, labels_from_table
+from rig.importing.files import import_csv, import_wav
 from rig.importing.hatt import load_hatt
+from rig.importing.labels import Label, labels_from_table
 from rig.setup.rig_file import SHIPPED_RIG_FILE, Figure, RigFile
 from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
 from rig.sound.signals import stimuli_of_surfaces

@@ -158,6 +158,10 @@ def check_within(signal: Floats, unlimited: Floats, limits: Limits) -> None:
     assert np.abs(signal).max() <= limits.peak
     if np.isfinite(limits.rms):
         assert mean_squares(signal, limits.rms_window_s).max() <= limits.rms**2 * (1 + 1e-9)
+        sums = np.cumsum(np.concatenate([[0.0], signal**2]))
+        for count in {1, min(7, signal.size), signal.size}:  # samples on end
+            most = limits.largest_rms(count / MODEL_RATE_HZ) ** 2 * count
+            assert (sums[count:] - sums[:-count]).max() <= most * (1 + 1e-9)
     if np.isfinite(limits.duration_s):
         pause = max(1, round(limits.pause_s * MODEL_RATE_HZ))
         longest = max(1, round(limits.duration_s * MODEL_RATE_HZ))

@@ -53,6 +53,25 @@ def test_a_held_hand_is_read_with_its_speed_and_force(live: Live) -> None:
     assert abs(rows["time_s"][-1] - now_s()) < 20
 
 
+def test_files_named_as_rooms_in_the_working_folder_do_no_harm(
+    live: Live, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for room in ("rig", "modeling"):
+        (tmp_path / f"{room}.py").write_text("raise ValueError('not this one')\n")
+    monkeypatch.chdir(tmp_path)
+    with HandReader(live, HOLD):
+        wait_until(lambda: moves(live))
+
+
+def test_what_the_process_says_when_it_cannot_start_is_passed_on(
+    live: Live, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numpy.py").write_text("raise ValueError('what went wrong')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    with pytest.raises(InputError, match=r"its end with code 1 \(ValueError: what went wrong\)"):
+        HandReader(live, HOLD).open()
+
+
 def test_strokes_to_and_fro_change_their_sign(live: Live) -> None:
     strokes = HandSettings(kind="scripted", speed_mm_s=200.0, force_n=1.0, strokes_per_s=4.0)
     with HandReader(live, strokes):
@@ -114,6 +133,31 @@ def test_stopped_it_is_killed_and_replaced(live: Live) -> None:
         told = reader.faults()
         assert told[0] == "the process that reads the hand has not written for 1 s and is killed."
         assert len(told) == 2
+
+
+def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
+    live: Live, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reader = HandReader(live, HOLD)
+    moments_s = iter([0.0, 0.1, 0.2, 30.0, 30.4, 30.8, 31.0, 31.1, 31.2])
+    now, killed_s = [0.0], list[float]()
+
+    class Closing:
+        def wait(self, seconds: float) -> bool:
+            now[0] = next(moments_s, -1.0)
+            return now[0] < 0
+
+    class Process:
+        def kill(self) -> None:
+            killed_s.append(now[0])
+
+    live.write_reading(0.0, 0.0, y_mm=0.0, speed_mm_s=0.0, force_n=0.0, flags=0)
+    reader._closing = Closing()  # type: ignore[assignment]
+    reader._process = Process()  # type: ignore[assignment]
+    reader._alive_s = 0.0
+    monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
+    reader._watch()
+    assert killed_s == [31.1]  # no reading for over a second in which it looked
 
 
 def test_the_hand_is_read_on_while_this_process_holds_pythons_lock(live: Live) -> None:

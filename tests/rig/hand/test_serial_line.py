@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.hand.serial_line import (
+    CLOCK_US,
     LONGEST_LINE,
     LineReader,
     SensorClock,
@@ -141,6 +142,25 @@ def test_the_sketch_for_arduino_compiles(tmp_path: Path) -> None:
     command = ["g++", "-std=c++11", "-fsyntax-only", "-Wall", "-Wno-unused-function", "-Werror"]
     command += ["-include", str(tmp_path / "Arduino.h"), "-x", "c++"]
     subprocess.run([*command, str(ROOT / "docs/serial-sensor/sensor.ino")], check=True)
+
+
+def test_an_uno_has_the_sketchs_baud_rate_and_it_carries_the_lines() -> None:
+    sketch = (ROOT / "docs/serial-sensor/sensor.ino").read_text(encoding="utf-8")
+    page = (ROOT / "docs/serial-sensor.md").read_text(encoding="utf-8")
+    baud, period_us = (
+        int(re.search(rf"{name} = (\d+);", sketch)[1])  # type: ignore[index]
+        for name in ("BAUD", "PERIOD_US")
+    )
+    assert f"\n    baud = {baud}\n" in page
+    # ATmega328P data sheet, table 19-1 (U2X): clock / (8 (UBRR + 1)); UBRR as Arduino rounds it.
+    ubrr = (16_000_000 // 4 // baud - 1) // 2
+    assert 16e6 / (8 * (ubrr + 1)) == pytest.approx(baud, rel=0.02)
+    # A position of 2 m with all else at its longest; a version, twice a second, in addition.
+    longest = encode(SensorLine(65535, CLOCK_US - 1, (-2_000_000, 0), -50_000, True, True))
+    one_bit_us = 1e6 / baud
+    assert (len(longest) + len(firmware_line(b"wheel and load cell 1.0"))) * 10 * one_bit_us < (
+        period_us
+    )
 
 
 def test_the_examples_of_the_page_are_lines() -> None:

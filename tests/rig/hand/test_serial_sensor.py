@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import re
+import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -39,22 +42,137 @@ def settings_of(board: Board, **others: float) -> HandSettings:
     return HandSettings.from_dict({"kind": "serial", "device": board.path, **others})
 
 
-def test_a_clock_that_falls_behind_is_told_instead_of_a_hand_that_is_late(board: Board) -> None:
-    def at_four_fifths(number: int) -> bytes:
-        time_us = number * PERIOD_US * 4 // 5
-        return encode(SensorLine(number % 2**16, time_us, (0, 0), 1500, contact=True, button=False))
+def at_four_fifths(number: int) -> bytes:
+    """Of a clock that is slow by a fifth."""
+    time_us = number * PERIOD_US * 4 // 5
+    return encode(SensorLine(number % 2**16, time_us, (0, 0), 1500, contact=True, button=False))
 
-    def read_on(sensor: SerialSensor) -> None:
-        end = time.monotonic() + 20
-        while time.monotonic() < end:
-            sensor.wait(0.002)
-            sensor.read()
 
-    board.send(at_four_fifths)
-    sensor = SerialSensor.open(settings_of(board))
+class ScriptedPort:
+    """A port whose other end sends a line every 2 ms; its clock goes on where the test says so."""
+
+    port = "scripted"
+    ROOM = 4096  # what nobody has read beyond it is lost
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, line: Callable[[int], bytes]) -> None:
+        self.now_s, self.sent, self.speaks = 0.0, 0, True
+        self._line, self._waits, self._whole_s = line, b"", list[float]()
+        self.whole = self.late = self.torn = 0  # lines that were read, that were over 0.1 s old
+        monkeypatch.setattr(serial_sensor, "now_s", lambda: self.now_s)
+
+    def read(self, size: int) -> bytes:
+        waited, self._waits = self._waits, b""
+        self.whole += len(self._whole_s)
+        self.late += sum(self.now_s - sent_s > 0.1 for sent_s in self._whole_s)
+        self._whole_s = []
+        return waited
+
+    def pass_by(self, seconds: float) -> None:
+        """Time in which nobody reads."""
+        self.now_s += seconds
+        while (sent_s := self.sent * PERIOD_US * 1e-6) <= self.now_s:
+            line = self._line(self.sent) if self.speaks else b""
+            fits = line[: self.ROOM - len(self._waits)]
+            if fits and fits == line:
+                self._whole_s.append(sent_s)
+            self.torn += 0 < len(fits) < len(line)
+            self._waits += fits
+            self.sent += 1
+
+
+def read_for(sensor: SerialSensor, port: ScriptedPort, seconds: float) -> list[tuple[float, float]]:
+    """Ages of the samples when they are read (s), and how far their positions are off (mm)."""
+    found, end_s = [], port.now_s + seconds
+    while port.now_s < end_s:
+        port.pass_by(0.002)
+        for sample in sensor.read():
+            found.append((port.now_s - sample.time_s, sample.x_mm - 100 * sample.time_s))
+    return found
+
+
+def test_what_waited_while_the_computer_was_held_up_is_dropped_and_counted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    port = ScriptedPort(monkeypatch, at_constant_speed)
+    sensor = SerialSensor(port)  # type: ignore[arg-type]
+    found = read_for(sensor, port, 1.0)
+    for stall_s in (*[0.4] * 7, 3.0, *np.random.default_rng(3).uniform(0.01, 1.0, 20)):
+        port.pass_by(stall_s)
+        found += read_for(sensor, port, 0.05)
+        # The clock is let grow by 0.5 % of what waited: a line more or less of each time.
+        assert sensor.counts()["late"] == pytest.approx(port.late, rel=0.01)
+    ages_s, off_mm = np.transpose(found)
+    assert 0 <= ages_s.min() <= ages_s.max() <= 0.1
+    assert np.abs(off_mm).max() < 0.3  # 2 ms between two reads, and 0.5 % of what waited
+    told = sensor.counts()
+    assert told["late"] > 1000
+    assert told["lines"] == port.whole
+    assert told["lines"] + told["missing"] == port.sent
+    assert port.torn > 20
+    assert told["bad"] <= port.torn  # none where the next line's $ follows
+
+
+def test_after_it_was_held_up_a_silent_sensor_and_a_slow_clock_are_told_as_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    port = ScriptedPort(monkeypatch, at_constant_speed)
+    sensor = SerialSensor(port)  # type: ignore[arg-type]
+    read_for(sensor, port, 0.5)
+    port.speaks = False
+    port.pass_by(0.4)
+    began_s = port.now_s
+    with pytest.raises(DeviceLost, match="got none for 0.1 s"):
+        read_for(sensor, port, 1.0)
+    assert port.now_s - began_s == pytest.approx(0.1, abs=0.005)
+    port = ScriptedPort(monkeypatch, at_four_fifths)
+    sensor = SerialSensor(port)  # type: ignore[arg-type]
+
+    def read_with_stalls() -> None:
+        for _ in range(10):
+            read_for(sensor, port, 0.3)
+            port.pass_by(0.4)
+
     with pytest.raises(DeviceLost, match="expected a clock within 0.5%"):
-        read_on(sensor)
-    sensor.close()
+        read_with_stalls()
+    assert sensor.counts()["lines"] > 100
+
+
+def five_at_once(number: int) -> bytes:
+    """2500 lines a second: in 0.4 s more than a pseudo-terminal has room for."""
+    lines = (
+        SensorLine(n % 2**16, n * PERIOD_US // 5, (0, 0), 1500, contact=True, button=False)
+        for n in range(5 * number, 5 * number + 5)
+    )
+    return b"".join(map(encode, lines))
+
+
+def hold_up(reader: HandReader, live: Live, *, seconds: float) -> list[str]:
+    """Stop the hand's process, let it go on, and wait for readings; what was told meanwhile."""
+    assert reader.pid is not None
+    os.kill(reader.pid, signal.SIGSTOP)
+    time.sleep(seconds)
+    written, told = live.readings_written, list[str]()
+    os.kill(reader.pid, signal.SIGCONT)
+    wait_until(lambda: bool(told.extend(reader.faults()) or told))
+    wait_until(lambda: live.readings_written > written + 50)
+    return told
+
+
+def test_held_up_again_and_again_the_hands_process_blames_no_clock(
+    board: Board, live: Live
+) -> None:
+    board.send(five_at_once)
+    with HandReader(live, settings_of(board)) as reader:
+        wait_until(lambda: live.readings_written > 50)
+        first = reader.pid
+        told = [fault for _ in range(3) for fault in hold_up(reader, live, seconds=0.4)]
+        wait_until(lambda: not is_gone(live))
+        assert reader.pid == first
+        wait_until(lambda: reader.counts()["missing"] > 0)
+    late = r"expected the readings of the serial sensor at .*, got \d+ that came later and were"
+    assert any(re.match(late, fault) for fault in told)
+    # The board's thread may be held up, too: then it was silent.
+    assert all(re.match(late, fault) or "got none for 0.1 s" in fault for fault in told)
 
 
 def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(

@@ -18,7 +18,7 @@ TABLET = HandSettings(kind="tablet", pressure_points=((0.0, 0.0), (0.5, 1.0), (1
     [
         TABLET,
         HandSettings(kind="mouse", counts_per_mm=40, assumed_force_n=1.0, grab=True),
-        HandSettings(kind="serial", device="/dev/ttyACM0", baud=460800),
+        HandSettings(kind="serial", device="/dev/ttyACM0", baud=500000),
         HandSettings(kind="scripted", script="hold", speed_mm_s=-80),
     ],
 )

@@ -12,14 +12,13 @@ from scipy.io import wavfile
 
 from modeling import InputError, RecordingSet
 from rig.importing.files import (
-    Label,
     import_csv,
     import_csv_file,
     import_wav,
     import_wav_file,
-    labels_from_table,
     usable,
 )
+from rig.importing.labels import Label, labels_from_table
 
 LABEL = Label("oak", 100.0, 1.0)
 RATE_HZ = 3200.0
@@ -172,7 +171,9 @@ def test_lost_samples_are_noticed(tmp_path: Path, axes: NDArray[np.float64]) -> 
     typical = "a gap of .* among steps of typically 0.0003125 s; samples are missing"
     with pytest.raises(InputError, match=typical):
         import_csv([path], [LABEL])
-    assert import_csv([path], [LABEL], rate_hz=3000).recordings[0].rate_hz == 3000
+    assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
+    with pytest.raises(InputError, match=r"3000 Hz and by its column 'time' 2880 Hz \(in s\)"):
+        import_csv([path], [LABEL], rate_hz=3000)
 
 
 def test_falling_times_are_refused(tmp_path: Path, axes: NDArray[np.float64]) -> None:
@@ -192,7 +193,7 @@ def test_time_in_another_unit_is_noticed(
 ) -> None:
     columns = np.vstack([np.arange(2000) / rate_hz * factor, axes[0]])
     path = write_csv(tmp_path / "a.csv", f"{header},x", columns)
-    with pytest.raises(InputError, match="is time in ms or us"):
+    with pytest.raises(InputError, match="is time in ms, us or ns"):
         import_csv([path], [LABEL])
     given = import_csv([path], [LABEL], rate_hz=rate_hz).recordings[0]
     assert given.rate_hz == rate_hz
@@ -363,14 +364,52 @@ def test_one_broken_file_of_many_is_named_and_left_out(
         usable(import_csv_file, paths[1:2], labels[1:2])
 
 
-@pytest.mark.parametrize("rate_hz", [5000.0, 3100.0, 1000.0])
+@pytest.mark.parametrize("header", ["time_s", "time"])
+@pytest.mark.parametrize("rate_hz", [5000.0, 3100.0, 1000.0, 3.2e6])
 def test_a_rate_must_not_contradict_the_time_column(
-    tmp_path: Path, axes: NDArray[np.float64], rate_hz: float
+    tmp_path: Path, axes: NDArray[np.float64], rate_hz: float, header: str
 ) -> None:
-    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1]))
-    with pytest.raises(InputError, match=rf"got {rate_hz:g} Hz and by its column 'time_s' 3200 Hz"):
+    path = write_csv(tmp_path / "a.csv", f"{header},x_g", with_time(axes[:1]))
+    with pytest.raises(InputError, match=rf"got .* Hz and by its column '{header}' 3200 Hz .in s."):
         import_csv([path], [LABEL], rate_hz=rate_hz)
     assert import_csv([path], [LABEL], rate_hz=3201.0).recordings[0].rate_hz == 3201.0
+
+
+@pytest.mark.parametrize("header", ["time_ns", "Time (ns)", "time", "timestamp_s", "time_ms"])
+def test_a_rate_must_not_contradict_a_column_of_nanoseconds(
+    tmp_path: Path, axes: NDArray[np.float64], header: str
+) -> None:
+    """Whether it says so or not: in no other unit is this a vibration's rate."""
+    columns = with_time(axes[:1], scale=1e9) + np.array([[1.6e18], [0.0]])
+    path = write_csv(tmp_path / "a.csv", f"{header},x_g", columns)
+    with pytest.raises(InputError, match=rf"got 1000 Hz .* '{re.escape(header)}' 3200 Hz .in ns.;"):
+        import_csv([path], [LABEL], rate_hz=1000.0)
+    assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
+    told = import_csv_file(path, LABEL, rate_hz=1000.0)
+    assert (told.recording.rate_hz, len(told.doubts)) == (1000.0, 1)
+    if "ns" in header:
+        assert import_csv([path], [LABEL]).recordings[0].rate_hz == pytest.approx(RATE_HZ)
+
+
+def test_a_column_that_counts_samples_or_falls_tells_no_rate(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    for times in (np.arange(2000.0), np.arange(2000.0) % 100, 1e-320 * np.arange(2000.0)):
+        path = write_csv(tmp_path / "a.csv", "t,x_g", np.vstack([times, axes[0]]))
+        assert import_csv([path], [LABEL], rate_hz=5000.0).recordings[0].rate_hz == 5000
+
+
+def test_what_cannot_be_meant_is_refused(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+    exchanged = Label("oak", 1.5, 160.0)
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1] + 9.81))
+    with pytest.raises(InputError, match=r"a\.csv: .* 160 mm/s and 1\.5 N with the columns exch"):
+        import_csv([path], [exchanged])
+    with pytest.raises(InputError, match=r"a\.csv: .* or 1 g with them in m/s²"):
+        import_csv([path], [LABEL])
+    assert len(import_csv_file(path, exchanged).doubts) == 2
+    wav = write_wav(tmp_path / "a.wav", axes[0] / 3)
+    with pytest.raises(InputError, match=r"a\.wav: expected 0\.1 to 2000 g per full scale"):
+        import_wav([wav], [LABEL], g_per_fullscale=1e6)
 
 
 def test_coarse_time_stamps_and_lost_samples_do_not_contradict_the_rate(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -12,6 +14,8 @@ import pytest
 from modeling import InputError
 from rig.live import child
 from rig.live.child import Child, ChildLost
+
+ROOT = Path(__file__).parents[3]
 
 PROGRAM = """
 import json, sys, time
@@ -90,3 +94,33 @@ def test_one_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> Non
     process.close()
     assert not process.runs
     assert time.monotonic() - began < 30
+
+
+def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files_have_their_names(
+    tmp_path: Path,
+) -> None:
+    """A copy of the rooms, found by the parent's path alone; the working folder has a rig.py."""
+    house, work = tmp_path / "house", tmp_path / "work"
+    for room in ("modeling", "rig/live"):
+        kept_out = shutil.ignore_patterns("__pycache__", "[a-z]*")  # but __init__.py
+        shutil.copytree(ROOT / room, house / room, ignore=kept_out)
+    for file in ("rig/__init__.py", "rig/live/child.py", "modeling/face.py", "modeling/errors.py"):
+        shutil.copy(ROOT / file, house / file)
+    (house / "rig/telling.py").write_text(
+        "import json, modeling.errors\nprint(json.dumps({'told': modeling.errors.__file__}))\n"
+    )
+    work.mkdir()
+    for room in ("rig", "modeling"):
+        (work / f"{room}.py").write_text("raise SystemExit('not this one')\n")
+    program = (
+        f"import sys; sys.path.insert(0, {str(house)!r}); from rig.live.child import Child; "
+        "child = Child('rig.telling', {}); print(child.ready['told']); child.close()"
+    )
+    told = subprocess.run(
+        [sys.executable, "-P", "-c", program],
+        cwd=work,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+    )
+    assert told.stdout.strip() == str(house / "modeling/errors.py"), told.stderr
