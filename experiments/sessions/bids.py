@@ -75,7 +75,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
         _write(session_files(own)[0])
     root = Path(data_folder)
     held, damaged = held_sessions(root)
-    _write(_people(root, held, damaged))
+    _write(_people(root, held, damaged=damaged))
     with suppress(InputError):  # the next session is refused for it
         _write(_readme(root))
 
@@ -106,7 +106,7 @@ def export_all(data_folder: str | Path) -> Exported:
         made, rows = session_files(one)
         told += [f"{one.files.stem}: {row}" for row in rows]
         _write(made, new=new, changed=changed)
-    _write(_people(root, held, damaged), new=new, changed=changed)
+    _write(_people(root, held, damaged=damaged), new=new, changed=changed)
     try:
         _write(_readme(root), new=new, changed=changed)
     except InputError as error:
@@ -160,7 +160,7 @@ def require_tables(
     if task is None and subject is None and any(one.files.answers.is_file() for one in held):
         # Of who has a session running they are those of before.
         kept = {*without, *participants_of(one for one in held if one.running)}
-        wrong += _differing(_people(root, held, damaged, kept=kept))
+        wrong += _differing(_people(root, held, damaged=damaged, kept=kept))
     if wrong:
         others = len(wrong) - 1
         more = f" (and {others} more file{'s' * (others > 1)})" if others else ""
@@ -178,7 +178,7 @@ def _to_be_shown(held: Held) -> bool:
 
 
 def _people(
-    root: Path, held: list[Held], damaged: list[Damaged], *, kept: Collection[str] = frozenset()
+    root: Path, held: list[Held], *, damaged: list[Damaged], kept: Collection[str] = ()
 ) -> Made:
     """The tables about people of all sessions that are shown; `kept` are people left alone.
 
