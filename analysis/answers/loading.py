@@ -423,7 +423,9 @@ def _load_task(
     for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
         told_before = len(warnings)
         try:
-            sessions.append(_load_session(path, task, origin, gathered, unordered=unordered))
+            sessions.append(
+                _load_session(path, task, origin=origin, gathered=gathered, unordered=unordered)
+            )
         except InputError:
             participant, session = path.parts[-4], path.parts[-3]
             if participant not in gathered.leaving_out:
@@ -431,16 +433,16 @@ def _load_task(
             del warnings[told_before:]
             unread = {"participant_id": participant, "session": session}
             gathered.unread.setdefault(task, []).append(unread)
-    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered)]
+    warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered=gathered)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
 
 
 def _load_session(
     path: Path,
     task: str,
+    *,
     origin: Mapping[str, object],
     gathered: _Gathered,
-    *,
     unordered: list[str],
 ) -> pd.DataFrame:
     """The answers of one session; `unordered` takes its name where it has no manifest."""
@@ -548,7 +550,7 @@ def _damaged(sidecar: Mapping[str, object], what: str) -> list[str]:
     ]
 
 
-def _unanswered(folder: Path, task: str, gathered: _Gathered) -> list[str]:
+def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
     """A sentence for each session that was begun but whose answers are not there."""
     told = []
     for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):

@@ -5,7 +5,7 @@ All of it can be made again at any time, with the same bytes (docs/method/protoc
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,7 +75,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
         _write(session_files(own)[0])
     root = Path(data_folder)
     held, damaged = held_sessions(root)
-    _write(_people(root, held, damaged))
+    _write(_people(root, held, damaged=damaged))
     with suppress(InputError):  # the next session is refused for it
         _write(_readme(root))
 
@@ -106,7 +106,7 @@ def export_all(data_folder: str | Path) -> Exported:
         made, rows = session_files(one)
         told += [f"{one.files.stem}: {row}" for row in rows]
         _write(made, new=new, changed=changed)
-    _write(_people(root, held, damaged), new=new, changed=changed)
+    _write(_people(root, held, damaged=damaged), new=new, changed=changed)
     try:
         _write(_readme(root), new=new, changed=changed)
     except InputError as error:
@@ -131,7 +131,7 @@ def require_tables(
     ----------
     data_folder : path
     task, subject : str, int, optional
-        Which sessions are to be read; all without them.
+        Which sessions are to be read; all, and the tables about people, without them.
     without : collection of str
         Participants of whom none is.
     otherwise : str
@@ -155,7 +155,12 @@ def require_tables(
         if read(one.files):
             advice = otherwise.format(who=one.files.participant)
             raise InputError(f"{one.told.removesuffix('.')}, or {advice}.")
-    wrong = [path for made in _tables(root, held, damaged, read) for path in _differing(made)]
+    ended = (one for one in held if _to_be_shown(one) and read(one.files))
+    wrong = [path for one in ended for path in _differing(session_files(one)[0])]
+    if task is None and subject is None and any(one.files.answers.is_file() for one in held):
+        # Of who has a session running they are those of before.
+        kept = {*without, *participants_of(one for one in held if one.running)}
+        wrong += _differing(_people(root, held, damaged=damaged, kept=kept))
     if wrong:
         others = len(wrong) - 1
         more = f" (and {others} more file{'s' * (others > 1)})" if others else ""
@@ -167,48 +172,35 @@ def require_tables(
         )
 
 
-def _tables(
-    root: Path, held: list[Held], damaged: list[Damaged], read: Callable[[SessionFiles], bool]
-) -> Iterator[Made]:
-    for one in filter(_to_be_shown, held):
-        if read(one.files):
-            yield session_files(one)[0]
-    # Of who has a session running the table about sessions is that of before.
-    unsettled = participants_of(one for one in held if one.running)
-    unread = participants_of(one for one in held if not read(one.files))
-    if any(one.files.answers.is_file() for one in held):
-        yield _people(root, held, damaged, kept=unsettled | unread)
-
-
 def _to_be_shown(held: Held) -> bool:
     """Whether a session has ended, and had begun."""
     return bool(held.state.events) and not held.running
 
 
 def _people(
-    root: Path, held: list[Held], damaged: list[Damaged], *, kept: Collection[str] = frozenset()
+    root: Path, held: list[Held], *, damaged: list[Damaged], kept: Collection[str] = ()
 ) -> Made:
     """The tables about people of all sessions that are shown; `kept` are people left alone.
 
     Nothing of a data set that also holds people without source data, as one that was published.
     """
-    shown_ = [one for one in held if one.files.answers.is_file()]
-    if (damaged and not shown_) or not (held or (root / "participants.tsv").exists()):
+    visible = [one for one in held if one.files.answers.is_file()]
+    if (damaged and not visible) or not (held or (root / "participants.tsv").exists()):
         return {}
     # What is shown of a session whose log or manifest cannot be read stays as it is.
     lost = participants_of(damaged)
-    known = participants_of(shown_) | lost
+    known = participants_of(visible) | lost
     there = {path.name for path in root.glob("sub-*") if path.is_dir()}
     if not there <= known:
         return {}
     roster = Roster(root).listed()
     kept = {*lost, *_without_source(root, [*held, *damaged]), *kept}
     made = people_files(
-        root, shown_, roster.entries, rows_kept=there if roster.damaged else kept, kept=kept
+        root, visible, roster.entries, rows_kept=there if roster.damaged else kept, kept=kept
     )
     description = root / DESCRIPTION_NAME
-    if shown_ and not description.is_file():
-        first = min(shown_, key=lambda one: one.state.begun_utc)
+    if visible and not description.is_file():
+        first = min(visible, key=lambda one: one.state.begun_utc)
         made[description] = json_bytes(describe_data_set(first.manifest))
     return made
 

@@ -47,8 +47,8 @@ class AnswerColumn:
             return not self.required
         if self.limits is not None:
             return is_number(value) and self.limits[0] <= value <= self.limits[1]
-        text = str(value).lower() if isinstance(value, bool) else value
-        return isinstance(text, str) and (not self.levels or text in self.levels)
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        return not self.levels or text in self.levels
 
     def sidecar(self) -> dict[str, Any]:
         """The column as a BIDS sidecar describes it."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +67,12 @@ def answers_of(folder: Path, *people: str, exclude: tuple[str, ...] = ()) -> pd.
     return found[found["participant_id"].isin(people)].reset_index(drop=True)
 
 
+@cache
+def good_answers(folder: Path) -> pd.DataFrame:
+    """Those of the others before anything was damaged."""
+    return answers_of(folder, "sub-02", "sub-03")
+
+
 def complaint(error: Exception, what: str) -> str:
     if isinstance(error, InputError) and str(error).count("\n") == 0:
         return ""
@@ -96,7 +103,7 @@ class Trial:
         self.tries("status", lambda: study_status(data=folder))
         told = " ".join(capsys.readouterr().out.split())
         others = self.tries("analysis of the others", self.others)
-        if others is not None and not others.equals(answers_of(self.good, "sub-02", "sub-03")):
+        if others is not None and not others.equals(good_answers(self.good)):
             self.wrong.append("other answers of the others")
         every = self.tries("analysis", lambda: answers_of(folder, DAMAGED), must=roster)
         second = self.tries("a session", self.second_session, must=not roster)
