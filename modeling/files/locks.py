@@ -76,8 +76,10 @@ class Lock:
         lock = FileLock(
             self.path, mode=0o666, thread_local=False, poll_interval=_POLL_S, on_acquired=_sign
         )
+        self._lock, self._file = lock, None
         try:
             lock.acquire(timeout=wait_s)
+            self._file = _identity(self.path)
         except Timeout:
             raise HeldError(_holder(self.path)) from None
         except OSError as error:
@@ -90,8 +92,9 @@ class Lock:
                     f"expected a file that can be locked at {self.path}, got {got}; have its owner "
                     "remove it."
                 ) from None
-            return
-        self._lock, self._file = lock, _identity(self.path)
+        except BaseException:  # a signal, whose handler may raise when the lock is held already
+            self.release()
+            raise
 
     def release(self) -> None:
         """Let others hold it, and remove the file; harmless where it is not held."""
@@ -99,7 +102,7 @@ class Lock:
             return
         # While it is held: who opened it before finds it gone, and makes another. Not another
         # one's, where the folder was renamed. Windows refuses here, and removes it by itself.
-        if _identity(self.path) == self._file:
+        if self._file in (None, _identity(self.path)):
             with suppress(OSError):
                 self.path.unlink()
         self._lock.release()

@@ -13,7 +13,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from modeling.errors import InputError
@@ -91,18 +91,19 @@ def unfinished_folder(target: Path) -> Iterator[Path]:
 
     A folder NAME.old that still lies in it beside NAME goes back to where NAME is missing.
     """
-    with locked(target):
-        made = Path(tempfile.mkdtemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING))
-        lock, key = Lock(made / LOCK_NAME), _key(made)
-        lock.acquire(WAIT_S)
-        _held.locks[key] = lock  # what is written right into it must not wait for this lock
-    try:
-        yield made
-    finally:
-        with suppress(OSError):
-            _remove(made)
-        _held.locks.pop(key, None)
-        _give_back(lock)
+    with ExitStack() as stack:
+        with locked(target):
+            made = Path(tempfile.mkdtemp(dir=target.parent, prefix=_prefix(target), suffix=ENDING))
+            lock, key = Lock(made / LOCK_NAME), _key(made)
+            stack.callback(_give_back, lock)
+            lock.acquire(WAIT_S)
+            _held.locks[key] = lock  # what is written right into it must not wait for this lock
+            stack.callback(_held.locks.pop, key)
+        try:
+            yield made
+        finally:
+            with suppress(OSError):
+                _remove(made)
 
 
 @contextmanager
@@ -137,16 +138,15 @@ def _folder_locked(folder: Path) -> Iterator[None]:
     lock = Lock(folder / LOCK_NAME)
     try:
         lock.acquire(WAIT_S)
+        _held.locks[key] = lock
+        if lock.is_held:
+            _clear(folder)
+        yield
     except HeldError as holder:
         raise InputError(
             f"expected to write in {folder}, got its lock, which {holder} has held for "
             f"{WAIT_S:g} s; end that process if it hangs, or wait for it, then try again."
         ) from None
-    _held.locks[key] = lock
-    try:
-        if lock.is_held:
-            _clear(folder)
-        yield
     finally:
         _held.locks.pop(key, None)
         lock.release()

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from modeling.errors import InputError
 from modeling.files.folders import check_replaceable, replace_folder
-from modeling.files.places import behind_links, is_hidden, unfinished_folder
+from modeling.files.places import behind_links, is_hidden, locked, unfinished_folder
 from modeling.files.reading import reason_of
 from modeling.files.syncing import sync_file, sync_folder
 from modeling.files.tables import number, read_table, table_text, whole_number
@@ -58,7 +58,7 @@ def append(
     beside: Mapping[str, bytes] | None = None,
 ) -> int:
     """Add recordings to a folder's at once: `staged`, then `Staged.add`; how many it holds now."""
-    with staged(folder, recordings, sources) as ready:
+    with staged(folder, recordings, sources) as ready, locked(folder):
         return ready.add(beside or {})
 
 

@@ -6,6 +6,7 @@ docs/method/strokes.md#files
 from __future__ import annotations
 
 import io
+import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -390,7 +391,7 @@ def _check_name(name: str) -> None:
 
 
 def _is_piece(name: str) -> bool:
-    return name.endswith(".wav") and name.removesuffix(".wav").isdecimal()
+    return re.fullmatch(r"[0-9]{1,9}\.wav", name) is not None
 
 
 def _condition(row: Mapping[str, str]) -> Condition:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
@@ -14,6 +16,7 @@ from hypothesis import strategies as st
 from experiments.sessions.roster import Roster
 from experiments.sessions.writer import StoreError
 from modeling import InputError
+from modeling.files import places
 from tests.experiments.sessions.enrolling import enrolled
 
 
@@ -126,6 +129,24 @@ def test_many_consoles_at_once_enroll_different_people(tmp_path: Path) -> None:
     assert sorted(p.subject for p in people) == list(range(1, 25))
     assert sorted(p.slot for p in people) == list(range(1, 25))
     assert len({p.code for p in people}) == 24
+
+
+def test_behind_a_console_that_was_stopped_one_is_told_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(places, "WAIT_S", 0.2)
+    stopped = os.fork()
+    if not stopped:
+        with Roster(tmp_path).enrolling(1, 3):
+            os.kill(os.getpid(), signal.SIGSTOP)
+        os._exit(0)
+    os.waitpid(stopped, os.WUNTRACED)
+    with pytest.raises(InputError, match=rf"process {stopped} has held .* end that process"):
+        enrolled(Roster(tmp_path), 2, 3)
+    os.kill(stopped, signal.SIGCONT)
+    os.waitpid(stopped, 0)
+    assert not enrolled(Roster(tmp_path), 2, 3).known
+    assert sorted(Roster(tmp_path).subjects()) == [1, 2]
 
 
 def test_a_half_written_line_enrolled_nobody(tmp_path: Path) -> None:

@@ -195,12 +195,12 @@ def test_files_of_two_folders_are_written_in_any_order_by_two_processes(tmp_path
     places_of_both = [tmp_path / "a/file", tmp_path / "b/file"]
 
     def write(order: list[Path]) -> None:
-        for _ in range(20):
+        for _ in range(10):
             write_files(dict.fromkeys(order, b"x"))
 
     processes = [fork.Process(target=write, args=(places_of_both[::k],)) for k in (1, -1)]
     for process in processes:
         process.start()
     for process in processes:
-        process.join(20)
+        process.join(60)
     assert [process.exitcode for process in processes] == [0, 0]

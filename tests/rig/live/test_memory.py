@@ -55,9 +55,9 @@ def test_the_memory_of_a_killed_maker_goes_with_the_next_one() -> None:
             for _ in range(2)
         ]
         living, killed = (Path(maker.stdout.readline().strip()) for maker in makers)
+        assert killed.exists()
         makers[1].kill()
         makers[1].wait()
-        assert killed.exists()
         with Live.create() as live:
             assert not list(killed.parent.glob(f"{killed.name}*"))
             assert living.exists()
