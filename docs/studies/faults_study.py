@@ -289,7 +289,7 @@ def main() -> None:
         listen(given.listen)
         return
     table = study(given.repeats)
-    table.to_csv(given.out, sep="\t", index=False, float_format="%.0f")
+    table.to_csv(given.out, sep="\t", index=False, float_format="%.0f", na_rep="n/a")
     print(table.to_string(index=False, float_format=lambda value: f"{value:.0f}"))
 
 
