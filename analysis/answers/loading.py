@@ -91,6 +91,9 @@ class Responses:
         Of the study that was run; empty where the data do not say.
     planned : mapping of task to PlannedTask
         How many are to take part, where the data set's description tells.
+    under_way : mapping of task to frozenset of str
+        Participants with a session that lacks answers and may still go on: it runs, or was killed
+        and they have not dropped out.
     warnings : tuple of str
         What was dropped on reading and why, and which sessions ended early, one sentence each.
     """
@@ -107,6 +110,7 @@ class Responses:
     plan: AnalysisPlan = field(default_factory=lambda: AnalysisPlan(claims=()))
     study_sha256: str = ""
     planned: Mapping[str, PlannedTask] = field(default_factory=dict)
+    under_way: Mapping[str, frozenset[str]] = field(default_factory=dict)
     warnings: tuple[str, ...] = field(default=())
 
     def identical(self, pair: tuple[str, str] = MODELS) -> frozenset[str]:
@@ -145,7 +149,7 @@ class Responses:
 
     @property
     def unfinished(self) -> tuple[str, ...]:
-        """Tasks that were begun, with fewer participants or sessions than planned.
+        """Tasks that were begun, with fewer participants or sessions than planned or under way.
 
         Those who were left out by hand have taken part.
         """
@@ -154,7 +158,7 @@ class Responses:
             here = self.answers[task]
             done = _done(pd.concat([here, self.left_out.get(task, here[:0])]))
             fewer = done.participants < planned.participants or done.sessions < planned.sessions
-            if done.participants and fewer:
+            if done.participants and (fewer or self.under_way.get(task)):
                 short.append(task)
         return tuple(short)
 
@@ -200,7 +204,7 @@ def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()
     origin = {**simulated, **{key: description[key] for key in _MAY_DIFFER if key in description}}
     gathered = _Gathered(models, frozenset(leaving_out))
     participants = simulated["SimulatedParticipant"]
-    _check_participants(folder / "participants.tsv", participants)
+    dropped = _dropped_out(folder / "participants.tsv", simulated=participants)
     tables = {
         task: _load_task(folder, task, origin=origin, gathered=gathered) for task in ANSWER_TABLES
     }
@@ -223,6 +227,7 @@ def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()
         plan=_plan(description, gathered.plans, path=folder / "dataset_description.json"),
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
+        under_way={task: frozenset(who) - dropped for task, who in gathered.under_way.items()},
         warnings=tuple(gathered.warnings),
     )
 
@@ -275,6 +280,7 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
             )
             for task, table in responses.answers.items()
         },
+        under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
         warnings=(*responses.warnings, *told),
     )
 
@@ -326,6 +332,7 @@ class _Gathered:
         self.leaving_out = leaving_out
         # Sessions of those who are left out that cannot be read, by task.
         self.unread: dict[str, list[dict[str, str]]] = {}
+        self.under_way: dict[str, set[str]] = {}
         self._whose: dict[str, str] = {}
 
     def add(self, sidecar: Mapping[str, object]) -> None:
@@ -382,12 +389,15 @@ def _json_object(path: Path) -> Mapping[str, object]:
     return read_json_object(path, advice="restore the file")
 
 
-def _check_participants(path: Path, simulated: bool) -> None:
+def _dropped_out(path: Path, *, simulated: bool) -> frozenset[str]:
+    """Who will not come again, by the list of participants, which is checked."""
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
     table = _read_lines(path)
     _require_columns(table, ("participant_id", "simulated"), path=path)
     _check_simulated(table, simulated, path=path)
+    status = table.get("status", pd.Series(index=table.index, dtype=str))
+    return frozenset(table["participant_id"][status == "dropped"])
 
 
 def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[str, str]]:
@@ -459,10 +469,11 @@ def _load_session(
     _check_known(table, gathered, path=path)
     gathered.check_once(table, what, path=path)
     planned = _planned_of(path, (participant, session, task), sidecar=sidecar)
+    owed = None if planned is None else told_of_open(table, planned)
     if planned is None:
         unordered.append(what)
-    elif told := told_of_open(table, planned):
-        warnings.append(f"{what} {told}")
+    elif owed:
+        warnings.append(f"{what} {owed}")
     check_order(table, planned, path=path)
     gathered.add(sidecar)
     table = _valid(table, what, warnings=warnings)
@@ -472,6 +483,8 @@ def _load_session(
             table = table[~pilot].reset_index(drop=True)
             told += " and are left out"
         warnings.append(f"{what} was a pilot; {told}.")
+    if owed and len(table) and sidecar.get("Status") in ("running", "crashed"):
+        gathered.under_way.setdefault(task, set()).add(participant)
     table.insert(0, "participant_id", participant)
     table.insert(1, "session", session)
     return table

@@ -56,6 +56,14 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
         left_out=_joined({name: one.left_out for name, one in setups.items()}),
         equal=groups,
         planned=planned,
+        under_way={
+            task: frozenset(
+                f"{name}{BETWEEN}{who}"
+                for name, one in setups.items()
+                for who in one.under_way.get(task, ())
+            )
+            for task in first.answers
+        },
         plan=replace(first.plan, sha256=tuple(hashes)),
         warnings=tuple(f"{name}: {told}" for name, one in setups.items() for told in one.warnings),
     )

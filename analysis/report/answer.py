@@ -63,9 +63,12 @@ def unfinished_tasks(responses: Responses) -> list[str]:
     told = []
     for task in responses.unfinished:
         done, planned = responses.done(task), responses.planned[task]
+        under_way = ", ".join(sorted(responses.under_way.get(task, ())))
         told.append(
             f"{TASKS[task]}: {done.participants} of {planned.participants} planned participants, "
             f"{done.sessions} of {planned.sessions} planned sessions"
+            + f", of {under_way} under way"
+            * bool(under_way)
         )
     return told
 

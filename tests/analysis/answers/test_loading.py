@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from analysis.answers.loading import PlannedTask, load_responses
+from analysis.answers.loading import PlannedTask, Responses, leave_out, load_responses
+from analysis.answers.setups import pool_setups
 from modeling import InputError
 from tests.analysis.conftest import TEXTURES
 
@@ -230,6 +232,41 @@ def test_a_session_that_ended_early_is_named(study_folder, write_task, write_ord
         "sub-03 relative ses-01 answered 0 of 7 main trials (ended early).",
     )
     assert len(responses.relative) == 11
+
+
+@pytest.mark.parametrize(
+    ("status", "person", "under_way"),
+    [
+        ("running", "enrolled", {"sub-02"}),
+        ("crashed", "enrolled", {"sub-02"}),
+        ("crashed", "dropped", set()),
+        ("aborted", "enrolled", set()),
+    ],
+)
+def test_a_session_that_may_go_on_is_not_finished(
+    study_folder, write_task, write_order, relative_rows, status, person, under_way
+):
+    people = ("participant_id\tsimulated\tstatus", "sub-01\tfalse\tenrolled")
+    listed = "\n".join([*people, f"sub-02\tfalse\t{person}\n"])
+    (study_folder / "participants.tsv").write_text(listed)
+    design = {"participants": 2, "schedule": "interleaved"}
+    describe(study_folder, StudyDesign={"name": "Seven surfaces", "relative": design})
+    write_task("relative", relative_rows).with_suffix(".json").write_text('{"Status": "crashed"}')
+    path = write_task("relative", relative_rows[:4], participant="sub-02")
+    path.with_suffix(".json").write_text(json.dumps({"Status": status}))
+    write_order("relative", relative_rows, participant="sub-02")
+    responses = load_responses(study_folder)
+    assert responses.under_way.get("relative", frozenset()) == under_way
+    assert responses.unfinished == (("relative",) if under_way else ())
+    both = pool_setups({"here": responses, "there": replace_times(responses)})
+    assert both.unfinished == responses.unfinished
+    assert leave_out(responses, {"sub-02": "moved away"}).unfinished == ()
+
+
+def replace_times(responses: Responses) -> Responses:
+    """The same answers, given faster, as of another set-up."""
+    faster = {t: table.assign(response_time_s=1.0) for t, table in responses.answers.items()}
+    return replace(responses, answers=faster)
 
 
 def test_answers_without_a_manifest_are_told(study_folder, write_task, absolute_rows):
