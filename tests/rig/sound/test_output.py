@@ -577,6 +577,7 @@ def test_a_session_that_is_stopped_or_hangs_leaves_silence_until_it_presents_aga
     playing = rows[np.argmax(rows["peak_g"] > 0) :]
     assert np.all(playing["peak_g"] == 1.0)  # polling steadily it is never halted
     before = parent.live.blocks_written
+    os.kill(parent.child, signal.SIGTSTP)  # of Ctrl-Z, which is not the sound's to follow
     stopped_s = parent.stop()
     check_halted(parent.blocks_until_silent(before), by_s=stopped_s)
     before = parent.live.blocks_written
