@@ -9,6 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from modeling.files.places import is_hidden
+
 
 def sha256_of(text: str) -> str:
     """SHA-256 of a text (UTF-8), 64 hexadecimal digits."""
@@ -25,7 +27,7 @@ def sha256_of_paths(paths: Iterable[Path]) -> dict[str, str]:
 
     What is no file or folder, or a file that cannot be read, is left out: who reads it says so.
     That of a file is its bytes'. That of a folder is the one of a list with a line for each file
-    below it, in order: its path in the folder, a null character (which no path can hold) and the
+    below it but locks and what is not finished, in order: its path in the folder, a null character (which no path can hold) and the
     SHA-256 of its bytes. So what moves from a name to the bytes, or to another file, changes it.
     """
     hashes = {}
@@ -39,7 +41,12 @@ def sha256_of_paths(paths: Iterable[Path]) -> dict[str, str]:
 
 
 def _sha256_of_folder(path: Path) -> str:
-    names = {file.relative_to(path).as_posix(): file for file in path.rglob("*") if file.is_file()}
+    files = {file.relative_to(path): file for file in path.rglob("*") if file.is_file()}
+    names = {
+        place.as_posix(): file
+        for place, file in files.items()
+        if not any(map(is_hidden, place.parts))
+    }
     lines = (f"{name}\0{sha256_of_file(names[name])}\n" for name in sorted(names))
     return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 

@@ -22,6 +22,7 @@ from modeling.files.syncing import make_folder
 
 ENDING = ".unfinished"
 LOCK_NAME = ".tactileq.lock"
+_LOCK = re.compile(r"\..*\.lock")
 _UNFINISHED = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(ENDING))
 _NAME_LENGTH = 40  # characters of a place's name in a hidden one, which must not become too long
 
@@ -51,7 +52,7 @@ def behind_links(path: str | Path) -> Path:
 
 def is_hidden(name: str) -> bool:
     """Whether a file or folder of this name is a lock, or what a process has not finished."""
-    return name == LOCK_NAME or _UNFINISHED.fullmatch(name) is not None
+    return bool(_LOCK.fullmatch(name) or _UNFINISHED.fullmatch(name))
 
 
 @contextmanager

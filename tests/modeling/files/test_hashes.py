@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from modeling.files.hashes import sha256_of_paths
+from modeling.files.places import locked, unfinished_folder
 
 
 def folder_of(place: Path, files: Mapping[str, bytes]) -> str:
@@ -33,6 +34,10 @@ def test_no_two_folders_have_the_same_hash(tmp_path: Path) -> None:
     assert len(set(hashes)) == len(folders)
     shutil.copytree(tmp_path / "2", tmp_path / "copy")
     assert folder_of(tmp_path / "copy", {}) == hashes[2]
+    with locked(tmp_path / "copy" / "a"), unfinished_folder(tmp_path / "copy" / "a") as begun:
+        (begun / "a").write_text("what another process has not finished")
+        assert len(list((tmp_path / "copy").rglob("*"))) > 3
+        assert folder_of(tmp_path / "copy", {}) == hashes[2]
 
 
 def test_that_of_a_file_is_its_bytes_and_what_is_none_is_left_to_who_reads_it(
