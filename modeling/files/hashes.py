@@ -27,8 +27,9 @@ def sha256_of_paths(paths: Iterable[Path]) -> dict[str, str]:
 
     What is no file or folder, or a file that cannot be read, is left out: who reads it says so.
     That of a file is its bytes'. That of a folder is the one of a list with a line for each file
-    below it but locks and what is not finished, in order: its path in the folder, a null character (which no path can hold) and the
-    SHA-256 of its bytes. So what moves from a name to the bytes, or to another file, changes it.
+    below it but locks and what is not finished, in order: its path in the folder, a null character
+    (which no path can hold) and the SHA-256 of its bytes. So what moves from a name to the bytes,
+    or to another file, changes it.
     """
     hashes = {}
     for path in paths:
