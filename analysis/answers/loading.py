@@ -78,7 +78,7 @@ class Responses:
         the real one's, same columns; no statistic of the models uses them.
     left_out : mapping of task to DataFrame
         The main trials of participants who were left out by hand (`leave_out`); of a session of
-        theirs that cannot be read one row with nothing but participant and session.
+        theirs that cannot be read, or has no answer, one row with participant and session alone.
     name : str
         The study's name.
     models : mapping of texture to mapping of set to SHA-256
@@ -330,7 +330,7 @@ class _Gathered:
         self.plans: dict[str, None] = {}  # in the order of the sessions
         self.warnings: list[str] = []
         self.leaving_out = leaving_out
-        # Sessions of those who are left out that cannot be read, by task.
+        # Sessions of those who are left out that cannot be read, or have no answer, by task.
         self.unread: dict[str, list[dict[str, str]]] = {}
         self.under_way: dict[str, set[str]] = {}
         self._whose: dict[str, str] = {}
@@ -343,6 +343,11 @@ class _Gathered:
         for texture, groups in stated.items() if isinstance(stated, Mapping) else ():
             known = self.equal.setdefault(str(texture), [])
             known += [tuple(group) for group in groups if tuple(group) not in known]
+
+    def add_unread(self, task: str, participant: str, *, session: str) -> None:
+        """A session of somebody who is left out, of which nothing more is known."""
+        unread = {"participant_id": participant, "session": session}
+        self.unread.setdefault(task, []).append(unread)
 
     def check_once(self, table: pd.DataFrame, what: str, *, path: Path) -> None:
         """Refuse answers that are those of another session to the last digit of every time."""
@@ -431,18 +436,18 @@ def _load_task(
     sessions, warnings = [], gathered.warnings
     unordered: list[str] = []
     for path in sorted(folder.glob(f"sub-*/ses-*/beh/*_task-{task}_beh.tsv")):
-        told_before = len(warnings)
+        participant, session = path.parts[-4], path.parts[-3]
+        left_out, told_before = participant in gathered.leaving_out, len(warnings)
+        table = None
         try:
-            sessions.append(
-                _load_session(path, task, origin=origin, gathered=gathered, unordered=unordered)
-            )
+            table = _load_session(path, task, origin=origin, gathered=gathered, unordered=unordered)
+            sessions.append(table)
         except InputError:
-            participant, session = path.parts[-4], path.parts[-3]
-            if participant not in gathered.leaving_out:
+            if not left_out:
                 raise
             del warnings[told_before:]
-            unread = {"participant_id": participant, "session": session}
-            gathered.unread.setdefault(task, []).append(unread)
+        if left_out and (table is None or table.empty):
+            gathered.add_unread(task, participant, session=session)
     warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered=gathered)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
 
@@ -572,8 +577,7 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
         if (folder / participant / session / "beh" / f"{stem}beh.tsv").is_file():
             continue
         if participant in gathered.leaving_out:
-            unread = {"participant_id": participant, "session": session}
-            gathered.unread.setdefault(task, []).append(unread)
+            gathered.add_unread(task, participant, session=session)
         else:
             told.append(
                 f"{participant} {task} {session} was begun, but has no table of answers; it is "

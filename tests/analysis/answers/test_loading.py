@@ -736,3 +736,17 @@ def describe(folder: Path, **more: object) -> None:
     """Add to the description of the data set."""
     path = folder / "dataset_description.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | more))
+
+
+@pytest.mark.parametrize("left", ["header", "nothing"])
+def test_of_who_is_left_out_nothing_need_be_readable(study_folder, write_task, absolute_rows, left):
+    for participant in ("sub-02", "sub-01"):
+        write_task("absolute", absolute_rows, participant=participant)
+    paths = sorted(study_folder.glob("sub-01/ses-*/beh/*_beh.tsv"))
+    others = load_responses(study_folder).absolute.query("participant_id != 'sub-01'")
+    for path in paths:
+        path.write_bytes(path.read_bytes().split(b"\n")[0] + b"\n" if left == "header" else b"")
+    responses = load_responses(study_folder, leaving_out=["sub-01"])
+    found = leave_out(responses, {"sub-01": "a stick that failed"})
+    assert found.absolute.equals(others.reset_index(drop=True))
+    assert set(found.left_out["absolute"]["participant_id"]) == {"sub-01"}
