@@ -92,7 +92,8 @@ def figure_chart(chart: Chart, kind: Kind) -> Figure:
     figure.supxlabel(
         f"{count} {KINDS[kind]}; markers: medians as rendered by default (updates each ms, FFT by "
         "blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black line: "
-        "the front, which no variant beats in both; numbers: layers, orders",
+        "the front, which no variant beats in both; numbers: layers, orders;\noperations of "
+        "autoregressive filters hold coefficients made at every update, ours come from a table",
         fontsize=8.5,
         color=GREY,
     )

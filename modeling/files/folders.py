@@ -54,7 +54,7 @@ def contents_of(folder: Path) -> Contents:
     Returns
     -------
     dict
-        Path below the folder → number, size and time of change of a file; of a folder nothing.
+        Path below the folder → size and time of change of a file; of a folder nothing.
     """
     if folder.is_file():
         return {".": _stamp(folder)}
@@ -71,7 +71,7 @@ def contents_of(folder: Path) -> Contents:
 
 def _stamp(path: Path) -> tuple[int, ...]:
     status = path.lstat()
-    return status.st_ino, status.st_size, status.st_mtime_ns
+    return status.st_size, status.st_mtime_ns
 
 
 @contextmanager
@@ -111,6 +111,7 @@ def replace_folder(path: str | Path, seen: Contents | None = None) -> Iterator[P
                     _swap(fresh, target, before)
             except InputError as error:
                 raise InputError(f"{error} What was made is in {_kept(fresh, target)}.") from None
+        _delete(_old(fresh), target)
 
 
 @contextmanager
@@ -127,15 +128,20 @@ def _named(target: Path, fresh: Path) -> Iterator[None]:
         raise
 
 
-def _swap(fresh: Path, target: Path, before: Contents) -> None:
-    """Put `fresh` at `target`; what was there is deleted only once that has worked.
+def _old(fresh: Path) -> Path:
+    """Where what `fresh` takes the place of is, until it is deleted."""
+    return fresh.with_name(fresh.name + ".old")
 
-    What cannot be deleted then is no reason to fail: the new folder is in its place. A process that
-    is killed between the two steps leaves the old folder to `clear_unfinished`.
+
+def _swap(fresh: Path, target: Path, before: Contents) -> None:
+    """Put `fresh` at `target`, and what was there beside it.
+
+    A process that is killed between the two steps leaves the old folder to `clear_unfinished`.
     """
-    old = fresh.with_name(fresh.name + ".old")
+    old = _old(fresh)
     try:
         if target.exists():
+            clear_unfinished(target)  # who writes into it now ends first, and is seen
             target.rename(old)
             # Only now, when nobody finds it any more, can nothing be added to it.
             _check_same(contents_of(old), before, target)
@@ -149,6 +155,10 @@ def _swap(fresh: Path, target: Path, before: Contents) -> None:
         if old.exists():
             _put_back(old, target)
         raise
+
+
+def _delete(old: Path, target: Path) -> None:
+    """What cannot be deleted is no reason to fail: the new folder is in its place."""
     shutil.rmtree(old, ignore_errors=True)
     if old.exists():
         warnings.warn(

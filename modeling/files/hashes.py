@@ -48,7 +48,12 @@ def _sha256_of_folder(path: Path) -> str:
         for place, file in files.items()
         if not any(map(is_hidden, place.parts))
     }
-    lines = (f"{name}\0{sha256_of_file(names[name])}\n" for name in sorted(names))
+    lines = []
+    for name in sorted(names):
+        sha256 = "not readable"
+        with suppress(OSError):
+            sha256 = sha256_of_file(names[name])
+        lines.append(f"{name}\0{sha256}\n")
     return hashlib.sha256("".join(lines).encode("utf-8", "surrogateescape")).hexdigest()
 
 

@@ -22,7 +22,7 @@ from modeling.files.syncing import make_folder
 
 ENDING = ".unfinished"
 LOCK_NAME = ".tactileq.lock"
-_LOCK = re.compile(r"\..*\.lock")
+_LOCK = re.compile(r"\.(tactileq|sub-.*_log)\.lock")  # of a folder, of a session
 _UNFINISHED = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(ENDING))
 _NAME_LENGTH = 40  # characters of a place's name in a hidden one, which must not become too long
 
@@ -138,19 +138,25 @@ def _folder_locked(folder: Path) -> Iterator[None]:
         return
     lock = Lock(folder / LOCK_NAME)
     try:
-        lock.acquire(WAIT_S)
+        _acquire(lock)
+        key = _key(folder)  # another one may have taken its place meanwhile
         _held.locks[key] = lock
         if lock.is_held:
             _clear(folder)
         yield
-    except HeldError as holder:
-        raise InputError(
-            f"expected to write in {folder}, got its lock, which {holder} has held for "
-            f"{WAIT_S:g} s; end that process if it hangs, or wait for it, then try again."
-        ) from None
     finally:
         _held.locks.pop(key, None)
         lock.release()
+
+
+def _acquire(lock: Lock) -> None:
+    try:
+        lock.acquire(WAIT_S)
+    except HeldError as holder:
+        raise InputError(
+            f"expected to write in {lock.path.parent}, got its lock, which {holder} has held for "
+            f"{WAIT_S:g} s; end that process if it hangs, or wait for it, then try again."
+        ) from None
 
 
 def _key(folder: Path) -> tuple[int, int]:

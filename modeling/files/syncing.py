@@ -9,7 +9,8 @@ from pathlib import Path
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those that it is in, forced to disk."""
-    if folder.is_dir():
+    # A drive that is not there has no folder above it: making what lies on it tells so.
+    if folder.is_dir() or folder.parent == folder:
         return
     make_folder(folder.parent)
     folder.mkdir(exist_ok=True)

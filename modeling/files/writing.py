@@ -58,6 +58,8 @@ def write_files(contents: Mapping[Path, bytes]) -> None:
             raise
         except BaseException:
             # Interrupted between two of them: some new beside some old would be worse than all new.
+            if ready and not ready[0][0].exists():  # moved, but not yet from the list
+                ready.pop(0)
             _put(ready)
             raise
 
@@ -69,9 +71,8 @@ def _put(ready: list[tuple[Path, Path]]) -> None:
         hidden, target = ready[0]
         if len(ready) == 1:
             _sync(moved)
-        if hidden.exists():
-            with _named(target):
-                os.replace(hidden, target)
+        with _named(target):
+            os.replace(hidden, target)
         moved.add(target.parent)
         ready.pop(0)
     _sync(moved)

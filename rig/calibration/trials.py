@@ -105,6 +105,7 @@ def watched(
         readings.append(rows)
         block, rows = live.blocks_since(block)
         blocks.append(rows)
+    live.heartbeat()  # what follows may take a while
     return Watched(accelerometer.stretches(), np.concatenate(readings), np.concatenate(blocks))
 
 

@@ -120,8 +120,9 @@ def _of_scale(g: float) -> str:
 
 def _of_level(recording: Recording, unit: str, g_per_fullscale: float | None) -> str:
     level_g = float(np.std(recording.samples))
-    # Without contact a sensor may be as silent as it likes.
-    if LEVELS_G.holds(level_g) or (recording.force_n == 0 and level_g < LOWEST_LEVEL_G):
+    # At rest, or without contact, a sensor may be as silent as it likes.
+    is_at_rest = 0 in (recording.speed_mm_s, recording.force_n)
+    if LEVELS_G.holds(level_g) or (is_at_rest and level_g < LOWEST_LEVEL_G):
         return ""
     what = "its numbers" if g_per_fullscale is None else "g per full scale"
     fitting = [

@@ -10,6 +10,7 @@ import os
 import queue
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import threading
 from collections.abc import Mapping
@@ -38,9 +39,13 @@ def started(
     """
     rooms = str(Path(__file__).resolve().parents[2])
     others = [path for path in (os.environ.get("PYTHONPATH"),) if path]
+    # Installed ones are found without, and PYTHONPATH would put their neighbours, such as an old
+    # copy of a module of the standard library, before the standard library.
+    if rooms not in (sysconfig.get_path("purelib"), sysconfig.get_path("platlib")):
+        others.insert(0, rooms)
     return subprocess.Popen(
         [sys.executable, "-P", "-m", module, json.dumps(settings)],
-        env={**os.environ, "PYTHONPATH": os.pathsep.join([rooms, *others])},
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(others)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=complaints,

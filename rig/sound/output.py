@@ -389,7 +389,6 @@ class SoundOutput:
             f"expected the sound process to play, got: {why}; nothing is felt until something is "
             "presented again, by another process."
         )
-        self._halted = False
         if self._child is not None:
             self._child.kill()
             self._child = None

@@ -239,7 +239,7 @@ def add_to_set(
         )
     rates = sorted({f"{record.rate_hz:g}" for record in records})
     if left_out:
-        print(f"note: {len(left_out)} of {len(inputs)} files left out")
+        print(f"note: {len(left_out)} of {len(new) + len(left_out)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
 
 

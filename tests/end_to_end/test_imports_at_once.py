@@ -20,7 +20,7 @@ def test_six_imports_at_once_all_arrive(tmp_path: Path) -> None:
     def add(number: int) -> None:
         new = [Imported(Recording(samples, 5000.0, 100.0 + number, 1.0, "oak"))]
         ready.wait()
-        add_to_set(out, new, "import csv", settings={}, files=[])
+        add_to_set(out, new, "import csv", settings={}, inputs={})
 
     processes = [fork.Process(target=add, args=(number,)) for number in range(6)]
     for process in processes:

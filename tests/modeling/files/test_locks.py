@@ -204,3 +204,36 @@ def test_files_of_two_folders_are_written_in_any_order_by_two_processes(tmp_path
     for process in processes:
         process.join(60)
     assert [process.exitcode for process in processes] == [0, 0]
+
+
+def test_a_folder_that_took_the_place_of_the_one_waited_for_is_held_under_its_own_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    lock = taken(folder / LOCK_NAME)
+    wrote = threading.Event()
+
+    def write() -> None:
+        with locked(folder / "a"):
+            write_text(folder / "a", "b")  # waits for itself where it does not know its lock
+            wrote.set()
+
+    monkeypatch.setattr(places, "WAIT_S", 5.0)
+    waits = threading.Event()
+    real = Lock.acquire
+
+    def acquire(self: Lock, wait_s: float) -> None:
+        waits.set()
+        real(self, wait_s)
+
+    monkeypatch.setattr(Lock, "acquire", acquire)
+    writer = threading.Thread(target=write)
+    writer.start()
+    assert waits.wait(5)
+    folder.rename(tmp_path / "old")
+    folder.mkdir()
+    lock.release()
+    writer.join()
+    assert wrote.is_set()
+    assert (folder / "a").read_text() == "b"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 from modeling import InputError
 from modeling.files import folders, places
 from modeling.files.folders import contents_of, folder_behind, replace_folder
-from modeling.files.locks import Lock
+from modeling.files.locks import Lock, is_held
+from modeling.files.places import LOCK_NAME, locked
 from modeling.files.writing import write_files
 from tests.power_cut import Files, laid_out, watched
 
@@ -156,3 +158,54 @@ def test_without_power_files_of_a_group_are_whole_and_the_last_names_the_first(
         assert found in (old, {**old, "a": b"new"}, {"a": b"new", "index": b"a"})
         if told or found["index"]:
             assert found == {"a": b"new", "index": b"a"}
+
+
+def test_who_writes_into_it_meanwhile_ends_first_and_is_seen(target: Path) -> None:
+    holds, goes_on = threading.Event(), threading.Event()
+
+    def write() -> None:
+        with locked(target / "mine"):
+            holds.set()
+            assert goes_on.wait(30)
+            (target / "mine").write_bytes(b"mine")
+
+    def replace() -> None:
+        with replace_folder(target) as fresh:
+            (fresh / "a").write_bytes(b"new")
+            writer.start()
+            assert holds.wait(30)
+            threading.Timer(0.1, goes_on.set).start()
+
+    writer = threading.Thread(target=write)
+    with pytest.raises(InputError, match="mine"):
+        replace()
+    writer.join()
+    assert files_in(target.parent) == {
+        **{name: data for name, data in OLD.items() if name},
+        "set/mine": b"mine",
+        "set-2": None,
+        "set-2/a": b"new",
+    }
+
+
+def test_what_was_there_is_deleted_once_others_may_go_on(
+    target: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held: dict[str, bool] = {}
+    real = shutil.rmtree
+
+    def slow(path: Path, **options: bool) -> None:
+        held[Path(path).name] = is_held(target.parent / LOCK_NAME)
+        real(path, **options)
+
+    monkeypatch.setattr(shutil, "rmtree", slow)
+    with replace_folder(target) as fresh:
+        (fresh / "a").write_bytes(b"new")
+    assert held["set.old"] is False
+    assert files_in(target.parent) == NEW
+
+
+def test_a_dot_file_that_is_no_lock_of_ours_is_somebody_elses(target: Path) -> None:
+    for name in (".renv.lock", ".mine"):
+        (target / name).write_bytes(b"mine")
+    assert {".renv.lock", ".mine"} < contents_of(target).keys()

@@ -159,7 +159,7 @@ def test_own_table_in_both_columns(
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "frequency_hz"),
+        ("", "empty file"),
         ("frequency_hz\tlevel\n10\t1\n20\t2\n", "acceleration_g or displacement_um"),
         ("acceleration_g\n1\n", "frequency_hz"),
         ("frequency_hz\tacceleration_g\n", "expected"),

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -41,19 +42,15 @@ def test_the_second_is_told_who_holds_the_rig_until_that_one_is_gone(tmp_path: P
         pass
 
 
-def lock_of(name: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the lock of a rig lies, if this is the folder for temporary files."""
-    monkeypatch.setattr("tempfile.tempdir", str(folder))
-    with rig_locked(name):
-        (path,) = folder.iterdir()
-    assert not path.exists()
-    return path
-
-
 def test_a_link_in_its_place_is_not_followed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path, precious = lock_of("rig", tmp_path, monkeypatch), tmp_path / "precious"
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with rig_locked("rig"):
+        (folder,) = tmp_path.iterdir()
+        (path,) = folder.iterdir()
+    assert not path.exists()
+    precious = tmp_path / "precious"
     for contents in ("x", None):
         if contents:
             precious.write_text(contents)
@@ -63,16 +60,21 @@ def test_a_link_in_its_place_is_not_followed(
         assert (precious.read_text() if contents else precious.exists()) == (contents or False)
         path.unlink()
         precious.unlink(missing_ok=True)
+    folder.rename(precious)
+    folder.symlink_to(precious)
+    with pytest.raises(InputError, match="got a link; have its owner"), rig_locked("rig"):
+        raise AssertionError
+    assert not list(precious.iterdir())
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="expected root, to run as two users")
 def test_two_users_of_a_machine_exclude_each_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    path = lock_of("rig", tmp_path, monkeypatch)
-    for folder in (tmp_path, *tmp_path.parents[:2]):
-        folder.chmod(0o755)
-    tmp_path.chmod(0o1777)
+    # Not in a folder of pytest's, which other users may not enter.
+    shared = tempfile.TemporaryDirectory()
+    monkeypatch.setattr("tempfile.tempdir", shared.name)
+    Path(shared.name).chmod(0o1777)
 
     def told(uid: int, end: str) -> str:
         """What another user is told, who then leaves or is killed."""
@@ -92,11 +94,10 @@ def test_two_users_of_a_machine_exclude_each_other(
         with os.fdopen(reading) as pipe:
             return pipe.read()
 
-    with rig_locked("rig"):
-        assert f"in use by process {os.getpid()}" in told(12345, "left")
-    assert told(12345, "left") == "held"
-    assert told(12345, "killed") == "held"
-    assert path.exists()
-    assert "have its owner remove it" in told(12346, "left")
-    assert told(12345, "left") == "held"
-    assert told(12346, "left") == "held"
+    with shared:
+        with rig_locked("rig"):
+            assert f"in use by process {os.getpid()}" in told(12345, "left")
+        for uid, end in ((12345, "left"), (12345, "killed"), (12346, "killed"), (12345, "left")):
+            assert told(uid, end) == "held"
+        with rig_locked("rig"):
+            pass

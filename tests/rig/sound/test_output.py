@@ -604,6 +604,10 @@ def test_a_signal_that_was_halted_is_told_who_waits_for_its_end(
                 sound.play_signal(np.ones(2 * RATE_HZ), wait=True)
         assert sound.halted
         assert len(sound.faults()) == 1
+        assert sound.pid is not None
+        os.kill(sound.pid, signal.SIGKILL)
+        wait_until(lambda: sound.pid is None or sound.faults())
+        assert sound.halted  # a process that is lost, too, is no reason to play on
         sound.play_signal(np.ones(100), wait=True)
         assert not sound.halted
 
