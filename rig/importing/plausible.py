@@ -51,7 +51,7 @@ _SCALES_IN_G = {
     "per count of 16 bits": 2.0**15,
     "per count of 24 bits": 2.0**23,
 }
-GO_ON = "or give --yes where it is meant"
+GO_ON = "or give --yes where it is meant (in Python take import_wav_file or import_csv_file)"
 
 
 def doubts_about(
