@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from analysis.answers.order import (
     told_of_unordered,
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
+from analysis.answers.responses import PlannedTask, Responses
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
@@ -35,137 +35,6 @@ _MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot
 # Times to the millisecond: nobody has as many of them in common with somebody else by chance.
 FEWEST_TIMES = 3
 _DERIVE = "delete it, and tactileq study status makes it again from the session's log"
-
-
-@dataclass(frozen=True)
-class PlannedTask:
-    """What a study plans of a task.
-
-    Parameters
-    ----------
-    participants : int
-    sessions : int
-        Of all participants.
-    models : tuple of str
-        The sets of models that it compares, the reference first.
-    repeats : int
-        Answers to each texture with each model; in the oddity task to each texture.
-    """
-
-    participants: int
-    sessions: int
-    models: tuple[str, ...] = MODELS
-    repeats: int = 1
-
-
-@dataclass(frozen=True, eq=False)
-class Responses:
-    """Every answer of one study, checked.
-
-    Parameters
-    ----------
-    answers : mapping of task to DataFrame
-        Main trials of each task that `modeling.files.answer_tables` declares, one row each:
-        participant_id, session, and the task's columns (numbers NaN where not answered).
-    simulated_participants : bool
-        True where no person took part.
-    simulated_rig : bool
-        True where no real rig was used, so that nobody felt a real surface.
-    training : mapping of task to DataFrame
-        The training trials, same columns; no statistic uses them.
-    anchors : mapping of task to DataFrame
-        Of tasks that have them the main trials whose virtual surface modelled another texture than
-        the real one's, same columns; no statistic of the models uses them.
-    left_out : mapping of task to DataFrame
-        The main trials of participants who were left out by hand (`leave_out`); of a session of
-        theirs that cannot be read, or has no answer, one row with participant and session alone.
-    name : str
-        The study's name.
-    models : mapping of texture to mapping of set to SHA-256
-        The models that were presented; empty where the data do not say.
-    equal : mapping of texture to sequence of sequence of str
-        Sets whose models of a texture are equal, group by group, as the sessions say.
-    plan : AnalysisPlan
-        What was claimed before the first answer.
-    study_sha256 : str
-        Of the study that was run; empty where the data do not say.
-    planned : mapping of task to PlannedTask
-        How many are to take part, where the data set's description tells.
-    under_way : mapping of task to frozenset of str
-        Participants with a session that lacks answers and may still go on: it runs, or was killed
-        and they have not dropped out.
-    warnings : tuple of str
-        What was dropped on reading and why, and which sessions ended early, one sentence each.
-    """
-
-    answers: Mapping[str, pd.DataFrame]
-    simulated_participants: bool
-    simulated_rig: bool
-    training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
-    anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
-    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
-    name: str = ""
-    models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    equal: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
-    plan: AnalysisPlan = field(default_factory=lambda: AnalysisPlan(claims=()))
-    study_sha256: str = ""
-    planned: Mapping[str, PlannedTask] = field(default_factory=dict)
-    under_way: Mapping[str, frozenset[str]] = field(default_factory=dict)
-    warnings: tuple[str, ...] = field(default=())
-
-    def identical(self, pair: tuple[str, str] = MODELS) -> frozenset[str]:
-        """Textures whose models are the same in both sets: nothing to compare."""
-        same = {
-            texture
-            for texture, sets in self.models.items()
-            if all(name in sets for name in pair) and sets[pair[0]] == sets[pair[1]]
-        }
-        stated = {
-            texture
-            for texture, groups in self.equal.items()
-            if any(set(pair) <= set(group) for group in groups)
-        }
-        return frozenset(same | stated)
-
-    @property
-    def absolute(self) -> pd.DataFrame:
-        """Main trials of the absolute evaluation."""
-        return self.answers["absolute"]
-
-    @property
-    def relative(self) -> pd.DataFrame:
-        """Main trials of the seven-alternative forced choice."""
-        return self.answers["relative"]
-
-    @property
-    def textures(self) -> tuple[str, ...]:
-        """Textures that were asked about, in the order of the answers."""
-        asked = (t for table in self.answers.values() for t in table["texture"].dropna())
-        return tuple(dict.fromkeys(asked))
-
-    def done(self, task: str) -> PlannedTask:
-        """How many participants and sessions have answered main trials of a task so far."""
-        return _done(self.answers[task])
-
-    @property
-    def unfinished(self) -> tuple[str, ...]:
-        """Tasks that were begun, with fewer participants or sessions than planned or under way.
-
-        Those who were left out by hand have taken part.
-        """
-        short = []
-        for task, planned in self.planned.items():
-            here = self.answers[task]
-            done = _done(pd.concat([here, self.left_out.get(task, here[:0])]))
-            fewer = done.participants < planned.participants or done.sessions < planned.sessions
-            if done.participants and (fewer or self.under_way.get(task)):
-                short.append(task)
-        return tuple(short)
-
-    @property
-    def simulated(self) -> bool:
-        """True where participants or rig were simulated."""
-        return self.simulated_participants or self.simulated_rig
 
 
 def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()) -> Responses:
@@ -228,60 +97,8 @@ def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()
         study_sha256=str(description.get("StudySHA256", "")),
         planned=_planned(description, folder / "dataset_description.json"),
         under_way={task: frozenset(who) - dropped for task, who in gathered.under_way.items()},
+        dropped_out=dropped,
         warnings=tuple(gathered.warnings),
-    )
-
-
-def _done(answers: pd.DataFrame) -> PlannedTask:
-    sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
-    return PlannedTask(answers["participant_id"].nunique(), len(sessions))
-
-
-def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
-    """The answers without those of some participants, which `warnings` tell with the reasons.
-
-    Parameters
-    ----------
-    responses : Responses
-    reasons : mapping of participant to reason
-        Participants as in the data, such as sub-05.
-
-    Raises
-    ------
-    InputError
-        For a participant who gave no answers, or an empty reason.
-    """
-    tables = (responses.answers, responses.training, responses.anchors)
-    every = [*tables, responses.left_out]
-    known = {who for kind in every for t in kind.values() for who in t["participant_id"]}
-    for who, why in reasons.items():
-        if who not in known or not why.strip():
-            raise InputError(
-                f"expected a participant with answers and a reason to leave them out, got "
-                f"{shown(who)} with {shown(why)}; name one as the data do, such as "
-                f"{min(known, default='sub-01')}."
-            )
-    answers, training, anchors = (
-        {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
-        for kind in tables
-    )
-    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
-    return replace(
-        responses,
-        answers={task: table.reset_index(drop=True) for task, table in answers.items()},
-        training=training,
-        anchors=anchors,
-        left_out={
-            task: pd.concat(
-                [
-                    table[table["participant_id"].isin(list(reasons))],
-                    responses.left_out.get(task, table[:0]),
-                ]
-            )
-            for task, table in responses.answers.items()
-        },
-        under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
-        warnings=(*responses.warnings, *told),
     )
 
 
@@ -333,6 +150,7 @@ class _Gathered:
         # Sessions of those who are left out that cannot be read, or have no answer, by task.
         self.unread: dict[str, list[dict[str, str]]] = {}
         self.under_way: dict[str, set[str]] = {}
+        self.pilots: set[tuple[str, str, str]] = set()
         self._whose: dict[str, str] = {}
 
     def add(self, sidecar: Mapping[str, object]) -> None:
@@ -446,7 +264,8 @@ def _load_task(
             if not left_out:
                 raise
             del warnings[told_before:]
-        if left_out and (table is None or table.empty):
+        is_pilot = (task, participant, session) in gathered.pilots
+        if left_out and not is_pilot and (table is None or "main" not in set(table["phase"])):
             gathered.add_unread(task, participant, session=session)
     warnings += [*told_of_unordered(unordered), *_unanswered(folder, task, gathered=gathered)]
     return pd.concat(sessions, ignore_index=True) if sessions else None
@@ -486,9 +305,12 @@ def _load_session(
         told = "its answers are no data of the study"
         if not origin.get("Pilot", False):
             table = table[~pilot].reset_index(drop=True)
+            gathered.pilots.add((task, participant, session))
             told += " and are left out"
         warnings.append(f"{what} was a pilot; {told}.")
-    if owed and len(table) and sidecar.get("Status") in ("running", "crashed"):
+    # Where the order is not there, as in data that were published, the sidecar alone tells.
+    is_whole = not owed if planned else sidecar.get("Status", "complete") == "complete"
+    if len(table) and not is_whole:
         gathered.under_way.setdefault(task, set()).add(participant)
     table.insert(0, "participant_id", participant)
     table.insert(1, "session", session)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import pandas as pd
 
-from analysis.answers.loading import Responses
+from analysis.answers.responses import BETWEEN, Responses
 from modeling import InputError
 from modeling.errors import shown
-
-BETWEEN = "/"  # a set-up's name and a participant's: leipzig/sub-01
 
 
 def pool_setups(setups: Mapping[str, Responses]) -> Responses:
@@ -57,16 +55,19 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
         equal=groups,
         planned=planned,
         under_way={
-            task: frozenset(
-                f"{name}{BETWEEN}{who}"
-                for name, one in setups.items()
-                for who in one.under_way.get(task, ())
-            )
+            task: _named({name: one.under_way.get(task, ()) for name, one in setups.items()})
             for task in first.answers
         },
+        dropped_out=_named({name: one.dropped_out for name, one in setups.items()}),
+        setups=len(setups),
         plan=replace(first.plan, sha256=tuple(hashes)),
         warnings=tuple(f"{name}: {told}" for name, one in setups.items() for told in one.warnings),
     )
+
+
+def _named(people: Mapping[str, Iterable[str]]) -> frozenset[str]:
+    """Participants of all set-ups, named after theirs."""
+    return frozenset(f"{setup}{BETWEEN}{who}" for setup, all_ in people.items() for who in all_)
 
 
 def named_after(setup: str, table: pd.DataFrame) -> pd.DataFrame:
@@ -86,12 +87,6 @@ def answers_at(setup: str, tables: Mapping[str, pd.DataFrame]) -> dict[str, pd.D
         task: table.assign(participant_id=table["participant_id"].str.removeprefix(before))
         for task, table in own.items()
     }
-
-
-def setup_of(participants: pd.Series) -> pd.Series:
-    """The set-up before each participant's name; empty where there is only one."""
-    parts = participants.str.split(BETWEEN, n=1)
-    return parts.map(lambda found: found[0] if len(found) > 1 else "")
 
 
 def _check_alike(first: Responses, other: Responses, name: str) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.answers.loading import Responses
+from analysis.answers.responses import Responses
 from analysis.labels import MEASURES, TASKS
 from analysis.report.claim_sentences import (
     NO_TEST,
@@ -67,8 +67,7 @@ def unfinished_tasks(responses: Responses) -> list[str]:
         told.append(
             f"{TASKS[task]}: {done.participants} of {planned.participants} planned participants, "
             f"{done.sessions} of {planned.sessions} planned sessions"
-            + f", of {under_way} under way"
-            * bool(under_way)
+            + (f"; answers are missing in sessions of {under_way}" if under_way else "")
         )
     return told
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from analysis.answers.loading import Responses
 from analysis.answers.plan import EQUIVALENCE, Claim
+from analysis.answers.responses import Responses
 from analysis.columns import shortened_hash
 from analysis.labels import MEASURES, TASKS
 from analysis.statistics.verdicts import ClaimFound, incomplete

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.answers.loading import Responses
+from analysis.answers.responses import Responses
 from analysis.figures.saving import missing_fonts, png_of, svg_of
 from analysis.labels import MODELS
 from analysis.report.answer import answer, unfinished_tasks
@@ -241,7 +241,13 @@ def _answer_sections(
     asked = {one.claim.task for one in shown}
     tasks = {task: answers for task, answers in responses.answers.items() if task in asked}
     sections.append(
-        reliability_section(tasks, chances=_chances(tasks), simulated=simulated, rng=rng)
+        # Who answers at chance is told by a test of the share of right answers: an effect.
+        reliability_section(
+            tasks,
+            chances=_chances({task: t for task, t in tasks.items() if task in finished}),
+            simulated=simulated,
+            rng=rng,
+        )
     )
     sections.append(of_pairs(hands))
     return [section for section in sections if section is not None]
@@ -249,7 +255,7 @@ def _answer_sections(
 
 def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
     """Rates of guessing participants in the tasks with right answers."""
-    chances = {"oddity": ODDITY_CHANCE}
+    chances = {"oddity": ODDITY_CHANCE} if "oddity" in tasks else {}
     if "relative" in tasks:
         chances["relative"] = chance_of(tasks["relative"])
     return chances

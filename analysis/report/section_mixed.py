@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.answers.loading import Responses
+from analysis.answers.responses import Responses
 from analysis.columns import Column, names, p_value
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Table

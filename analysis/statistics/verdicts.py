@@ -12,9 +12,8 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.answers.loading import Responses
 from analysis.answers.plan import DIFFERENCE, Claim
-from analysis.answers.setups import setup_of
+from analysis.answers.responses import Responses, setup_of
 from analysis.columns import TEXTURE, Column, names
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
 from analysis.statistics.claims import (

@@ -19,8 +19,8 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.loading import Responses
     from analysis.answers.plan import AnalysisPlan
+    from analysis.answers.responses import Responses
     from analysis.textures.results import TextureResult
     from modeling import Simplification, TextureModel
 
@@ -217,8 +217,9 @@ def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Response
         Where a session is damaged, or tables are not what its log says, of those who are not left
         out, or the answers cannot be used.
     """
-    from analysis.answers.loading import leave_out, load_responses
-    from analysis.answers.setups import BETWEEN, pool_setups
+    from analysis.answers.loading import load_responses
+    from analysis.answers.responses import BETWEEN, leave_out
+    from analysis.answers.setups import pool_setups
     from experiments.sessions.bids import require_tables
 
     reasons = dict(map(_with_reason, exclude))

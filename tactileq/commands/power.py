@@ -28,7 +28,7 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.answers.loading import PlannedTask, Responses
+    from analysis.answers.responses import PlannedTask, Responses
     from analysis.statistics.power import Verdict
     from experiments.observers.in_memory import Row
     from experiments.observers.percepts import Perception
@@ -347,8 +347,8 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
     """The answers of the first n participants as if they had been loaded."""
     import pandas as pd
 
-    from analysis.answers.loading import Responses
     from analysis.answers.plan import plan_from
+    from analysis.answers.responses import Responses
 
     answers, anchors = {}, {}
     for task, of_task in rows.items():
@@ -371,7 +371,7 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
 
 
 def _planned(people: People, *, n: int) -> dict[str, PlannedTask]:
-    from analysis.answers.loading import PlannedTask
+    from analysis.answers.responses import PlannedTask
 
     study = people.study
     return {

@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import Responses
 from analysis.answers.plan import AnalysisPlan, Claim
+from analysis.answers.responses import Responses
 from analysis.labels import SCALES
 from analysis.statistics.verdicts import ClaimFound, claims_found
 from analysis.textures.results import TextureResult

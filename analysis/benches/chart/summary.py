@@ -180,7 +180,7 @@ class Comparison:
     @property
     def is_counted_alike(self) -> bool:
         """Whether the rival's operations are counted as ours are."""
-        return METHODS[self.rival].family != COUNTED_OTHERWISE
+        return _is_counted_alike(self.rival)
 
     @property
     def verdict(self) -> str:
@@ -211,6 +211,10 @@ class Comparison:
         return f"{farther}, for {counted}{self.numbers.text()} times the numbers; {self.verdict}."
 
 
+def _is_counted_alike(rival: str) -> bool:
+    return METHODS[rival].family != COUNTED_OTHERWISE
+
+
 def comparisons(rows: pd.DataFrame) -> list[Comparison]:
     """Our default against every rival, surface by surface, for each kind of surface."""
     found = []
@@ -235,7 +239,7 @@ def _comparison(
     pair = _paired(other, mine)
     operations = Ratio(np.nan, np.nan, np.nan)
     dominated_by = dominates_by = None
-    if METHODS[rival].family != COUNTED_OTHERWISE:
+    if _is_counted_alike(rival):
         operations = _ratio("operations", *pair)
         dominated_by = _dominating(of_kind[of_kind["family"].isin(OUR_FAMILIES)], other)
         dominates_by = _dominating(of_kind[of_kind["method"] == rival], mine)

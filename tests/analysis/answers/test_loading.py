@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses, leave_out, load_responses
+from analysis.answers.loading import load_responses
+from analysis.answers.responses import PlannedTask, Responses, leave_out
 from analysis.answers.setups import pool_setups
 from modeling import InputError
 from tests.analysis.conftest import TEXTURES
@@ -234,33 +236,59 @@ def test_a_session_that_ended_early_is_named(study_folder, write_task, write_ord
     assert len(responses.relative) == 11
 
 
+@pytest.mark.parametrize("with_order", [True, False])
 @pytest.mark.parametrize(
-    ("status", "person", "under_way"),
+    ("status", "person", "planned", "unfinished"),
     [
-        ("running", "enrolled", {"sub-02"}),
-        ("crashed", "enrolled", {"sub-02"}),
-        ("crashed", "dropped", set()),
-        ("aborted", "enrolled", set()),
+        ("running", "enrolled", 2, True),
+        ("crashed", "enrolled", 2, True),
+        ("aborted", "enrolled", 2, True),
+        ("crashed", "dropped", 2, True),  # nobody has come in the place
+        ("crashed", "dropped", 1, False),
     ],
 )
 def test_a_session_that_may_go_on_is_not_finished(
-    study_folder, write_task, write_order, relative_rows, status, person, under_way
+    study_folder,
+    write_task,
+    write_order,
+    relative_rows,
+    status,
+    person,
+    planned,
+    unfinished,
+    with_order,
 ):
     people = ("participant_id\tsimulated\tstatus", "sub-01\tfalse\tenrolled")
     listed = "\n".join([*people, f"sub-02\tfalse\t{person}\n"])
     (study_folder / "participants.tsv").write_text(listed)
-    design = {"participants": 2, "schedule": "interleaved"}
+    design = {"participants": planned, "schedule": "interleaved"}
     describe(study_folder, StudyDesign={"name": "Seven surfaces", "relative": design})
-    write_task("relative", relative_rows).with_suffix(".json").write_text('{"Status": "crashed"}')
+    write_task("relative", relative_rows).with_suffix(".json").write_text('{"Status": "complete"}')
     path = write_task("relative", relative_rows[:4], participant="sub-02")
     path.with_suffix(".json").write_text(json.dumps({"Status": status}))
     write_order("relative", relative_rows, participant="sub-02")
+    if not with_order:
+        shutil.rmtree(study_folder / "sourcedata")
     responses = load_responses(study_folder)
-    assert responses.under_way.get("relative", frozenset()) == under_way
-    assert responses.unfinished == (("relative",) if under_way else ())
+    assert responses.unfinished == ("relative",) * unfinished
     both = pool_setups({"here": responses, "there": replace_times(responses)})
     assert both.unfinished == responses.unfinished
     assert leave_out(responses, {"sub-02": "moved away"}).unfinished == ()
+
+
+def test_who_stopped_in_training_and_is_left_out_has_taken_part(
+    study_folder, write_task, write_order, relative_rows
+):
+    design = {"participants": 2, "schedule": "interleaved"}
+    describe(study_folder, StudyDesign={"name": "Seven surfaces", "relative": design})
+    training = [["1", "training", *relative_rows[0][2:]]]
+    write_task("relative", relative_rows)
+    write_task("relative", training, participant="sub-02")
+    main = [[str(int(row[0]) + 1), *row[1:]] for row in relative_rows]
+    write_order("relative", [*training, *main], participant="sub-02")
+    assert load_responses(study_folder).unfinished == ("relative",)
+    responses = load_responses(study_folder, leaving_out=["sub-02"])
+    assert leave_out(responses, {"sub-02": "went home"}).unfinished == ()
 
 
 def replace_times(responses: Responses) -> Responses:

@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses, leave_out
-from analysis.answers.setups import answers_at, pool_setups, setup_of
+from analysis.answers.responses import PlannedTask, Responses, leave_out, setup_of
+from analysis.answers.setups import answers_at, pool_setups
 from analysis.statistics.verdicts import claims_found, differences_by_setup
 from modeling import InputError
 
@@ -37,6 +37,16 @@ def nara(leipzig) -> Responses:
     plan = replace(leipzig.plan, sha256=("0b",))
     chosen = leipzig.relative.assign(correct=1.0)
     return replace(leipzig, answers={"absolute": rated, "relative": chosen}, plan=plan)
+
+
+def test_the_surplus_of_one_set_up_fills_no_gap_of_another(leipzig, nara):
+    few = [f"sub-{number:02d}" for number in range(1, 9)]
+    answers = {t: a[a["participant_id"].isin(few)] for t, a in nara.answers.items()}
+    planned = {task: PlannedTask(12, 12) for task in leipzig.planned}
+    fewer = replace(nara, answers=answers, planned=planned)
+    both = pool_setups({"leipzig": replace(leipzig, planned=planned), "nara": fewer})
+    assert both.done("absolute").participants == 24 == both.planned["absolute"].participants
+    assert both.unfinished == fewer.unfinished != ()
 
 
 def test_people_of_one_number_at_two_set_ups_are_two(leipzig, nara):

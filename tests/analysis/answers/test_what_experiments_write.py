@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses, load_responses
+from analysis.answers.loading import load_responses
+from analysis.answers.responses import PlannedTask, Responses
 from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.verdicts import claims_found, incomplete
 from experiments.observers.whole_study import simulate_study

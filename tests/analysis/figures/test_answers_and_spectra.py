@@ -11,7 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.answers.loading import Responses
+from analysis.answers.responses import Responses
 from analysis.figures.answers import (
     BAR_WIDTH,
     ROLE_COLOURS,

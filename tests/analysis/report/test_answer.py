@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses
 from analysis.answers.plan import AnalysisPlan
+from analysis.answers.responses import PlannedTask, Responses
 from analysis.labels import ALL_TEXTURES
 from analysis.report.answer import NOBODY_ASKED, answer, unfinished_tasks
 from analysis.report.claim_sentences import claim_outcomes, difference, overall_row

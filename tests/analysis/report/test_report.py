@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses
+from analysis.answers.responses import PlannedTask, Responses
 from analysis.figures import saving
 from analysis.report.report import write_report
 from analysis.textures.results import TextureResult

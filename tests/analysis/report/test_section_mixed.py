@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import Responses
 from analysis.answers.plan import AnalysisPlan
+from analysis.answers.responses import Responses
 from analysis.report.page import Table, table_html
 from analysis.report.section_mixed import mixed_section
 from analysis.report.sections import Section

@@ -14,7 +14,7 @@ import pytest
 
 import analysis.report.page
 from analysis.answers.hand import HAND_COLUMNS
-from analysis.answers.loading import Responses
+from analysis.answers.responses import Responses
 from analysis.benches.atlas import hands
 from analysis.benches.atlas.edges import examine
 from analysis.benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.answers.loading import PlannedTask, Responses, leave_out
 from analysis.answers.plan import AnalysisPlan
+from analysis.answers.responses import PlannedTask, Responses, leave_out
 from analysis.labels import ALL_TEXTURES
 from analysis.report.answer import answer
 from analysis.report.claim_sentences import claim_outcomes

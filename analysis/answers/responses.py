@@ -1,0 +1,222 @@
+"""The answers of a study as all else sees them: what is there, what is missing, who is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import pandas as pd
+
+from analysis.answers.plan import AnalysisPlan
+from analysis.labels import MODELS
+from modeling.errors import InputError, shown
+
+BETWEEN = "/"  # a set-up's name and a participant's: leipzig/sub-01
+
+
+@dataclass(frozen=True)
+class PlannedTask:
+    """What a study plans of a task.
+
+    Parameters
+    ----------
+    participants : int
+    sessions : int
+        Of all participants.
+    models : tuple of str
+        The sets of models that it compares, the reference first.
+    repeats : int
+        Answers to each texture with each model; in the oddity task to each texture.
+    """
+
+    participants: int
+    sessions: int
+    models: tuple[str, ...] = MODELS
+    repeats: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class Responses:
+    """Every answer of one study, checked.
+
+    Parameters
+    ----------
+    answers : mapping of task to DataFrame
+        Main trials of each task that `modeling.files.answer_tables` declares, one row each:
+        participant_id, session, and the task's columns (numbers NaN where not answered).
+    simulated_participants : bool
+        True where no person took part.
+    simulated_rig : bool
+        True where no real rig was used, so that nobody felt a real surface.
+    training : mapping of task to DataFrame
+        The training trials, same columns; no statistic uses them.
+    anchors : mapping of task to DataFrame
+        Of tasks that have them the main trials whose virtual surface modelled another texture than
+        the real one's, same columns; no statistic of the models uses them.
+    left_out : mapping of task to DataFrame
+        The main trials of participants who were left out by hand (`leave_out`); of a session of
+        theirs that cannot be read, or has no answer, one row with participant and session alone.
+    name : str
+        The study's name.
+    models : mapping of texture to mapping of set to SHA-256
+        The models that were presented; empty where the data do not say.
+    equal : mapping of texture to sequence of sequence of str
+        Sets whose models of a texture are equal, group by group, as the sessions say.
+    plan : AnalysisPlan
+        What was claimed before the first answer.
+    study_sha256 : str
+        Of the study that was run; empty where the data do not say.
+    planned : mapping of task to PlannedTask
+        How many are to take part, where the data set's description tells.
+    under_way : mapping of task to frozenset of str
+        Participants with a session that lacks answers and may go on, as they have not dropped out.
+    dropped_out : frozenset of str
+        Participants who will not come again, and whose places others take.
+    setups : int
+        How many ran the study, each as it was planned, all with the planned numbers together.
+    warnings : tuple of str
+        What was dropped on reading and why, and which sessions ended early, one sentence each.
+    """
+
+    answers: Mapping[str, pd.DataFrame]
+    simulated_participants: bool
+    simulated_rig: bool
+    training: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    anchors: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    left_out: Mapping[str, pd.DataFrame] = field(default_factory=dict)
+    name: str = ""
+    models: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    equal: Mapping[str, Sequence[Sequence[str]]] = field(default_factory=dict)
+    plan: AnalysisPlan = field(default_factory=lambda: AnalysisPlan(claims=()))
+    study_sha256: str = ""
+    planned: Mapping[str, PlannedTask] = field(default_factory=dict)
+    under_way: Mapping[str, frozenset[str]] = field(default_factory=dict)
+    dropped_out: frozenset[str] = frozenset()
+    setups: int = 1
+    warnings: tuple[str, ...] = field(default=())
+
+    def identical(self, pair: tuple[str, str] = MODELS) -> frozenset[str]:
+        """Textures whose models are the same in both sets: nothing to compare."""
+        same = {
+            texture
+            for texture, sets in self.models.items()
+            if all(name in sets for name in pair) and sets[pair[0]] == sets[pair[1]]
+        }
+        stated = {
+            texture
+            for texture, groups in self.equal.items()
+            if any(set(pair) <= set(group) for group in groups)
+        }
+        return frozenset(same | stated)
+
+    @property
+    def absolute(self) -> pd.DataFrame:
+        """Main trials of the absolute evaluation."""
+        return self.answers["absolute"]
+
+    @property
+    def relative(self) -> pd.DataFrame:
+        """Main trials of the seven-alternative forced choice."""
+        return self.answers["relative"]
+
+    @property
+    def textures(self) -> tuple[str, ...]:
+        """Textures that were asked about, in the order of the answers."""
+        asked = (t for table in self.answers.values() for t in table["texture"].dropna())
+        return tuple(dict.fromkeys(asked))
+
+    def done(self, task: str) -> PlannedTask:
+        """How many participants and sessions have answered main trials of a task so far.
+
+        Without those who dropped out, since others take their places.
+        """
+        return _done(self._kept(task))
+
+    def _kept(self, task: str) -> pd.DataFrame:
+        here = self.answers[task]
+        return here[~here["participant_id"].isin(list(self.dropped_out))]
+
+    @property
+    def unfinished(self) -> tuple[str, ...]:
+        """Tasks that were begun, with fewer participants or sessions than planned or under way.
+
+        Those who were left out by hand have taken part, those who dropped out have not. Each set-up
+        counts by itself.
+        """
+        return tuple(task for task in self.planned if self._is_unfinished(task))
+
+    def _is_unfinished(self, task: str) -> bool:
+        here, planned = self._kept(task), self.planned[task]
+        here = pd.concat([here, self.left_out.get(task, here[:0])])
+        done = [_done(rows) for _, rows in here.groupby(setup_of(here["participant_id"]))]
+        begun = len(done) > 0 or len(self.answers[task]) > 0
+        fewer = len(done) < self.setups or any(
+            one.participants * self.setups < planned.participants
+            or one.sessions * self.setups < planned.sessions
+            for one in done
+        )
+        return begun and (fewer or bool(self.under_way.get(task)))
+
+    @property
+    def simulated(self) -> bool:
+        """True where participants or rig were simulated."""
+        return self.simulated_participants or self.simulated_rig
+
+
+def _done(answers: pd.DataFrame) -> PlannedTask:
+    sessions = answers.reindex(columns=["participant_id", "session"]).drop_duplicates()
+    return PlannedTask(answers["participant_id"].nunique(), len(sessions))
+
+
+def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
+    """The answers without those of some participants, which `warnings` tell with the reasons.
+
+    Parameters
+    ----------
+    responses : Responses
+    reasons : mapping of participant to reason
+        Participants as in the data, such as sub-05.
+
+    Raises
+    ------
+    InputError
+        For a participant who gave no answers, or an empty reason.
+    """
+    tables = (responses.answers, responses.training, responses.anchors)
+    every = [*tables, responses.left_out]
+    known = {who for kind in every for t in kind.values() for who in t["participant_id"]}
+    for who, why in reasons.items():
+        if who not in known or not why.strip():
+            raise InputError(
+                f"expected a participant with answers and a reason to leave them out, got "
+                f"{shown(who)} with {shown(why)}; name one as the data do, such as "
+                f"{min(known, default='sub-01')}."
+            )
+    answers, training, anchors = (
+        {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
+        for kind in tables
+    )
+    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
+    return replace(
+        responses,
+        answers={task: table.reset_index(drop=True) for task, table in answers.items()},
+        training=training,
+        anchors=anchors,
+        left_out={
+            task: pd.concat(
+                [
+                    table[table["participant_id"].isin(list(reasons))],
+                    responses.left_out.get(task, table[:0]),
+                ]
+            )
+            for task, table in responses.answers.items()
+        },
+        under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
+        warnings=(*responses.warnings, *told),
+    )
+
+
+def setup_of(participants: pd.Series) -> pd.Series:
+    """The set-up before each participant's name; empty where there is only one."""
+    parts = participants.str.split(BETWEEN, n=1)
+    return parts.map(lambda found: found[0] if len(found) > 1 else "")
