@@ -181,13 +181,6 @@ class RenderingBench:
         return pd.DataFrame(rows)
 
     @property
-    def ar_cheaper_from(self) -> int | None:
-        """The fewest layers of the sweep from which on AR(20) costs less than the kernel."""
-        dearer = self.sweep["ns_per_sample"] > self.sweep["ar_ns_per_sample"]
-        from_here_on = dearer[::-1].cummin()[::-1].astype(bool)
-        return int(self.sweep["layers"][from_here_on].min()) if from_here_on.any() else None
-
-    @property
     def python_ns(self) -> float:
         """ns per sample where nothing was compiled, at 3 layers."""
         return float(self.times.loc[self.times["filter"] == PYTHON, "ns_per_sample"].iloc[0])
@@ -211,11 +204,6 @@ class RenderingBench:
             )
             for name in FORMS
             for at, row in _places(table, "update_samples")
-        ]
-        rows += [
-            _aim(f"{AR} / kernel, {ONE_CALL}", at, row[f"{AR} / kernel"], least=1.0)
-            for at, row in _places(self.throughput, "update_samples")
-            if row["layers"] == 3
         ]
         for at, row in _places(self.blocks, "block_samples"):
             least = {32: 100.0, 1024: 5.0}[row["block_samples"]]

@@ -145,8 +145,9 @@ def write_report(
     undrawn = missing_fonts("".join(sorted(files.lacking)))
     overview = _overview(sections, responses, found=found, models=bool(textures), undrawn=undrawn)
     methods = ""
-    if responses is not None and found:
-        text = methods_paragraph(responses, found)
+    judged = [one for one in found if not one.standing.unfinished]
+    if responses is not None and judged:
+        text = methods_paragraph(responses, judged)
         methods = paragraph("Statistical methods, for a paper", text)
     html = page(
         title=title,

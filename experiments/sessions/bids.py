@@ -5,7 +5,7 @@ All of it can be made again at any time, with the same bytes (docs/method/protoc
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -190,7 +190,7 @@ def _people(
     # What is shown of a session whose log or manifest cannot be read stays as it is.
     lost = participants_of(damaged)
     known = participants_of(visible) | lost
-    there = {path.name for path in root.glob("sub-*") if path.is_dir()}
+    there = {path.parts[-4] for path in _answer_tables(root)}
     if not there <= known:
         return {}
     roster = Roster(root).listed()
@@ -208,7 +208,14 @@ def _people(
 def _without_source(root: Path, sessions: Iterable[Held | Damaged]) -> set[str]:
     """People with a table of answers from which nothing is there that it was made from."""
     read = {one.files.answers for one in sessions}
-    return {path.parts[-4] for path in root.glob("sub-*/ses-*/beh/*_beh.tsv") if path not in read}
+    return {path.parts[-4] for path in _answer_tables(root) if path not in read}
+
+
+def _answer_tables(root: Path) -> Iterator[Path]:
+    """All tables of answers under the name of their participant; other folders are somebody's."""
+    for path in root.glob("sub-*/ses-*/beh/*_beh.tsv"):
+        if path.name.startswith(f"{path.parts[-4]}_"):
+            yield path
 
 
 def _readme(root: Path) -> Made:

@@ -441,6 +441,18 @@ def test_a_data_set_without_source_data_is_left_alone(study_on_disk):
     assert contents(study_on_disk) == before
 
 
+def test_a_folder_of_somebodys_does_not_stop_the_tables_about_people(study_on_disk):
+    table = study_on_disk / "participants.tsv"
+    before = table.read_bytes()
+    shutil.copytree(study_on_disk / "sub-01", study_on_disk / "sub-01_copy")
+    (study_on_disk / "sub-99").mkdir()
+    table.write_bytes(before[: before.rindex(b"\n", 0, -1) + 1])
+    with pytest.raises(InputError, match=r"participants\.tsv"):
+        require_tables(study_on_disk, otherwise="")
+    export_all(study_on_disk)
+    assert table.read_bytes() == before
+
+
 def test_what_is_no_manifest_is_refused(tmp_path, write_session):
     files = write_session()
     for path in (files.log, tmp_path / "nothing_manifest.json"):
