@@ -15,6 +15,7 @@ import pytest
 from analysis.answers.responses import PlannedTask, Responses
 from analysis.figures import saving
 from analysis.report.report import write_report
+from analysis.report.section_reliability import careless_signs
 from analysis.textures.results import TextureResult
 from modeling import InputError, RecordingSet, Threshold, simplify
 
@@ -192,6 +193,11 @@ def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choic
 
 def test_nothing_of_an_unfinished_task_compares_models(tmp_path, ratings, choices):
     """Neither on the page nor in a file: not of claims, and not beside them."""
+    guesses = choices["participant_id"] == "sub-03"
+    choices = choices.assign(correct=choices["correct"].where(~guesses, 0.0))
+    chances, rng = {"relative": 1 / 7}, np.random.default_rng(0)
+    asked = {"relative": choices}
+    assert "right answers at chance" in set(careless_signs(asked, chances=chances, rng=rng)["sign"])
     begun = replace(
         responses_of(ratings, choices, simulated=False),
         planned={"absolute": PlannedTask(20, 20), "relative": PlannedTask(24, 48)},
@@ -212,6 +218,7 @@ def test_nothing_of_an_unfinished_task_compares_models(tmp_path, ratings, choice
         assert (told["n"] == 16).all()
         numbers = told.drop(columns="n").select_dtypes("number").dropna(axis=1, how="all")
         assert set(numbers) <= {"share_at_ends"}
+    assert "right answers at chance" not in set(tables["careless"]["sign"])
     assert not list(tmp_path.glob("figures/*"))
     assert "16 of 20planned participants, absolute evaluation" in shown.text
 
