@@ -10,6 +10,7 @@ from pathlib import Path
 
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.places import LOCK_NAME
 from modeling.files.writing import write_bytes
 
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
@@ -99,7 +100,7 @@ class SessionFiles:
 
 def lock_of(log: Path) -> Path:
     """The lock file of the session with this log; hidden, since it is none of its data."""
-    return log.with_name(f".{log.stem}.lock")
+    return log.with_name(f".{log.stem}{LOCK_NAME}")
 
 
 def sessions_in(data_folder: str | Path) -> tuple[SessionFiles, ...]:

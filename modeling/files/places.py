@@ -21,8 +21,7 @@ from modeling.files.locks import WAIT_S, HeldError, Lock
 from modeling.files.syncing import make_folder
 
 ENDING = ".unfinished"
-LOCK_NAME = ".tactileq.lock"
-_LOCK = re.compile(r"\.(tactileq|sub-.*_log)\.lock")  # of a folder, of a session
+LOCK_NAME = ".tactileq.lock"  # of a folder; that of a file beside it has this ending
 _UNFINISHED = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(ENDING))
 _NAME_LENGTH = 40  # characters of a place's name in a hidden one, which must not become too long
 
@@ -52,7 +51,8 @@ def behind_links(path: str | Path) -> Path:
 
 def is_hidden(name: str) -> bool:
     """Whether a file or folder of this name is a lock, or what a process has not finished."""
-    return bool(_LOCK.fullmatch(name) or _UNFINISHED.fullmatch(name))
+    is_lock = name.startswith(".") and name.endswith(LOCK_NAME)
+    return is_lock or _UNFINISHED.fullmatch(name) is not None
 
 
 @contextmanager

@@ -206,6 +206,8 @@ def test_what_was_there_is_deleted_once_others_may_go_on(
 
 
 def test_a_dot_file_that_is_no_lock_of_ours_is_somebody_elses(target: Path) -> None:
-    for name in (".renv.lock", ".mine"):
+    for name in (".renv.lock", ".mine", "tactileq.lock", f".log{LOCK_NAME}"):
         (target / name).write_bytes(b"mine")
-    assert {".renv.lock", ".mine"} < contents_of(target).keys()
+    seen = contents_of(target).keys()
+    assert {".renv.lock", ".mine", "tactileq.lock"} < seen
+    assert f".log{LOCK_NAME}" not in seen
