@@ -1,4 +1,4 @@
-"""What a refusal must name, whatever its sentence: the file or option, what was expected, what came.
+"""What a refusal must name, whatever its sentence: file or option, what was expected, what came.
 
 The house's form is "expected …, got …; what to do." A fact is a name, a number or a unit that must
 stand in its part of the sentence as a word of its own; the words around it are free to change.
@@ -31,7 +31,7 @@ def refused(
 @contextmanager
 def warned(*, names: object = (), expected: object = (), got: object = ()) -> Iterator[None]:
     """The same of a warning; others may come beside it."""
-    with pytest.warns(UserWarning) as caught:
+    with pytest.warns(UserWarning) as caught:  # noqa: PT030 - checked below
         yield
     for warning in caught:
         try:

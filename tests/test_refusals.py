@@ -44,10 +44,13 @@ def test_an_error_is_looked_at_where_it_is_raised() -> None:
         raise ValueError(SENTENCE)
 
 
+def warn_twice() -> None:
+    warnings.warn("another", stacklevel=1)
+    warnings.warn(SENTENCE, stacklevel=1)
+
+
 def test_one_warning_of_several_has_to_tell_all() -> None:
     with warned(names="rig.toml", got=21.5):
-        warnings.warn("another", stacklevel=1)
-        warnings.warn(SENTENCE, stacklevel=1)
+        warn_twice()
     with pytest.raises(AssertionError), warned(names="rig.toml", got="another"):
-        warnings.warn("another", stacklevel=1)
-        warnings.warn(SENTENCE, stacklevel=1)
+        warn_twice()
