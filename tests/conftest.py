@@ -187,6 +187,12 @@ class JackServer:
         )
         return run.stdout
 
+    def answers(self) -> bool:
+        """Whether it takes clients."""
+        words = ["jack_wait", "-s", self.name, "-c"]
+        run = subprocess.run(words, env=self.environment, capture_output=True, timeout=20)
+        return b"not running" not in run.stdout
+
     def ports(self) -> list[str]:
         """Names of all ports."""
         return self._tool("jack_lsp").split()
@@ -218,7 +224,7 @@ class JackServer:
         """End it so that it leaves nothing behind: there is room for eight on a machine."""
         self.process.terminate()
         try:
-            self.process.wait(timeout=1)
+            self.process.wait(timeout=0.5)
         except subprocess.TimeoutExpired:
             self.kill()
 
@@ -299,9 +305,11 @@ def _running(server: JackServer, told: IO[bytes]) -> Iterator[None]:
     before = {key: os.environ.get(key) for key in ("JACK_DEFAULT_SERVER", "JACK_NO_START_SERVER")}
     os.environ.update({key: server.environment[key] for key in before})
     try:
-        words = ["jack_wait", "-s", server.name, "-w", "-t", "20"]
-        if subprocess.run(words, capture_output=True, timeout=30).returncode:
-            raise AssertionError(f"expected an audio server within 20 s: {_text(told)}")
+        end = time.monotonic() + 20
+        while not server.answers():  # jack_wait would ask once a second
+            if time.monotonic() > end:
+                raise AssertionError(f"expected an audio server within 20 s: {_text(told)}")
+            time.sleep(0.02)
         yield
     finally:
         for key, value in before.items():
