@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import subprocess
-import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +15,11 @@ from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
-
-
-def run(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "tactileq", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
-
-
-def study(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return run(folder, "study", *arguments)
+Main = Callable[..., subprocess.CompletedProcess[str]]
 
 
 @pytest.fixture
-def place(tmp_path: Path) -> Path:
+def place(tmp_path: Path, main: Main) -> Path:
     """The shipped study of small planted models, of which MDF's two are equal."""
     for folder in ("models", "simplified"):
         (tmp_path / folder).mkdir()
@@ -36,19 +28,21 @@ def place(tmp_path: Path) -> Path:
         fewer = simplify(full, Threshold.shipped("codec")).model
         full.save(tmp_path / f"models/{number}.json")
         (full if name == "MDF" else fewer).save(tmp_path / f"simplified/{number}.json")
-    assert study(tmp_path, "init", "study.toml").returncode == 0
+    assert main("study", "init", "study.toml").returncode == 0
     return tmp_path
 
 
-def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(tmp_path: Path) -> None:
+def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(
+    tmp_path: Path, main: Main
+) -> None:
     for name in ("a.toml", "b.toml"):
-        assert study(tmp_path, "init", name).returncode == 0
+        assert main("study", "init", name).returncode == 0
     first, second = Study.load(tmp_path / "a.toml"), Study.load(tmp_path / "b.toml")
     assert first.seed != second.seed
     lines = SHIPPED_STUDY.read_text(encoding="utf-8").splitlines()
     made = (tmp_path / "a.toml").read_text(encoding="utf-8").splitlines()
     assert [line for line in made if line not in lines] == [made[2]]
-    refused = study(tmp_path, "init", "a.toml")
+    refused = main("study", "init", "a.toml")
     assert refused.returncode == 1
     assert refused.stderr == (
         "error: expected a new file at a.toml, got one that is there already; choose another "
@@ -57,8 +51,8 @@ def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(tmp_path: Pa
     assert Study.load(tmp_path / "a.toml") == first
 
 
-def test_a_study_is_checked_with_its_models_design_and_balance(place: Path) -> None:
-    done = study(place, "check", "study.toml")
+def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main: Main) -> None:
+    done = main("study", "check", "study.toml")
     assert done.returncode == 0, done.stderr
     for told in (
         "full and simplified are identical for MDF",
@@ -75,12 +69,12 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path) -> N
     assert "warning" not in done.stdout
 
 
-def test_the_same_models_twice_are_refused(place: Path) -> None:
+def test_the_same_models_twice_are_refused(place: Path, main: Main) -> None:
     text = (place / "study.toml").read_text(encoding="utf-8")
     (place / "study.toml").write_text(
         text.replace('simplified = "simplified"', 'simplified = "models"'), encoding="utf-8"
     )
-    refused = study(place, "check", "study.toml")
+    refused = main("study", "check", "study.toml")
     assert refused.returncode == 1
     assert "got identical ones for all, so that there is nothing to compare" in refused.stderr
 
@@ -123,15 +117,16 @@ training_trials = 1
 """
 
 
-def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path) -> None:
+@pytest.mark.usefixtures("undrawn")
+def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path, main: Main) -> None:
     (place / "recipe.toml").write_text(RECIPE)
     (place / "two.toml").write_text(TWO)
-    made = run(place, "stimuli", "recipe.toml", "--out", "set")
+    made = main("stimuli", "recipe.toml", "--out", "set")
     assert made.returncode == 0, made.stderr
-    checked = study(place, "check", "two.toml")
+    checked = main("study", "check", "two.toml")
     assert checked.returncode == 0, checked.stderr
     assert "note: full and simplified are identical for MDF: a control" in checked.stdout
-    simulated = run(place, "simulate", "--study", "two.toml", "--data", "data")
+    simulated = main("simulate", "--study", "two.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr
     tables = [
         read_table(path, ["model_sha256", "surface", "outside_share"])
@@ -150,18 +145,18 @@ def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path) -> None
     for path in (place / "data").glob("sub-*/ses-*/beh/*_task-absolute_beh.tsv"):
         phases = [row["phase"] for row in read_table(path, ["phase"])]
         assert phases == ["training"] + ["main"] * 4
-    analyzed = run(place, "analyze", "data", "--out", "results")
+    analyzed = main("analyze", "data", "--out", "results")
     assert analyzed.returncode == 0, analyzed.stderr
     wav = next((place / "set").glob("canvas_full*.wav"))
     wav.write_bytes(wav.read_bytes()[:-4] + bytes(4))
-    refused = study(place, "check", "two.toml")
+    refused = main("study", "check", "two.toml")
     assert refused.returncode == 1
     assert refused.stderr.startswith("error: models full: expected set/canvas_full_200mms_1.5N.wav")
 
 
-def test_models_made_from_others_are_warned_of(place: Path) -> None:
+def test_models_made_from_others_are_warned_of(place: Path, main: Main) -> None:
     planted_texture("canvas", **SMALL).at_rate(8000.0).save(place / "models/1.json")
-    done = study(place, "check", "study.toml")
+    done = main("study", "check", "study.toml")
     assert done.returncode == 0, done.stderr
     assert "warning: the simplified model of canvas was made from a model that is in none" in (
         done.stdout
@@ -169,7 +164,7 @@ def test_models_made_from_others_are_warned_of(place: Path) -> None:
 
 
 def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
-    place: Path,
+    place: Path, main: Main
 ) -> None:
     file = place / "study.toml"
     whole = file.read_text(encoding="utf-8")
@@ -182,12 +177,11 @@ def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
         whole.replace('"right", "left", "both"', '"right", "left", "neither"'): "expected the "
         'question "handedness" in the language "en", got none for neither',
     }
-    session = [sys.executable, "-m", "tactileq", "session", "--task", "absolute", "--study"]
     for text, sentence in wrong.items():
         file.write_text(text, encoding="utf-8")
         refused = (
-            study(place, "check", "study.toml"),
-            subprocess.run([*session, "study.toml"], cwd=place, capture_output=True, text=True),
+            main("study", "check", "study.toml"),
+            main("session", "--task", "absolute", "--study", "study.toml"),
         )
         for done in refused:
             assert done.returncode == 1
@@ -196,12 +190,12 @@ def test_a_missing_translation_is_refused_by_check_and_session_in_one_sentence(
     assert not (place / "data").exists()
 
 
-def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -> None:
+def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path, main: Main) -> None:
     (place / "models").rename(place / "other")
     (place / "simplified").rename(place / "models")
     (place / "other").rename(place / "simplified")
     for words in (("check",), ("plan", "--out", "plan.md")):
-        refused = study(place, words[0], "study.toml", *words[1:])
+        refused = main("study", words[0], "study.toml", *words[1:])
         assert refused.returncode == 1
         assert refused.stderr.startswith(
             "error: expected models to be made from those of a set that is"
@@ -209,22 +203,22 @@ def test_exchanged_and_missing_models_are_refused_in_one_sentence(place: Path) -
         assert refused.stderr.count("\n") == 1
     assert not (place / "plan.md").exists()
     (place / "models/1.json").unlink()
-    refused = study(place, "check", "study.toml")
+    refused = main("study", "check", "study.toml")
     assert "expected a full model of each texture of the study, got none of canvas" in (
         refused.stderr
     )
 
 
-def test_the_page_is_written_again_but_nothing_else_is_replaced(place: Path) -> None:
-    done = study(place, "plan", "study.toml")
+def test_the_page_is_written_again_but_nothing_else_is_replaced(place: Path, main: Main) -> None:
+    done = main("study", "plan", "study.toml")
     assert done.returncode == 0, done.stderr
     page = (place / "plan.md").read_text(encoding="utf-8")
     assert page.startswith("# Simplified texture models: plan before the first answer\n")
-    assert study(place, "plan", "study.toml").returncode == 0
+    assert main("study", "plan", "study.toml").returncode == 0
     assert (place / "plan.md").read_text(encoding="utf-8") == page
     (place / "mine.md").write_text("mine")
-    refused = study(place, "plan", "study.toml", "--out", "mine.md")
+    refused = main("study", "plan", "study.toml", "--out", "mine.md")
     assert refused.returncode == 1
     assert (place / "mine.md").read_text() == "mine"
-    refused = study(place, "plan", "study.toml", "--out", "plan.txt")
+    refused = main("study", "plan", "study.toml", "--out", "plan.txt")
     assert refused.stderr == "error: expected a name that ends in .md, got plan.txt; rename it.\n"
