@@ -8,7 +8,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from distributed import LocalCluster
 
 from stimuli.planted.drawn import draw_surface
 
@@ -37,15 +36,17 @@ def oak(tmp_path: Path) -> Path:
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """The address of a Dask scheduler with two workers."""
+    from distributed import LocalCluster  # late: collecting the tests needs no Dask
+
     with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
         yield cluster.scheduler_address
 
 
 def test_bench_chart_of_recordings_writes_tables_pictures_and_a_page(
-    run, oak: Path, tmp_path: Path
+    main, oak: Path, tmp_path: Path
 ) -> None:
     arguments = ("bench", "chart", "--recordings", oak, *METHODS, "--out", "chart")
-    done = run(*arguments)
+    done = main(*arguments)
     assert done.returncode == 0, done.stderr
     out = tmp_path / "chart"
     assert {path.name for path in out.iterdir()} == CONTENTS
@@ -61,7 +62,7 @@ def test_bench_chart_of_recordings_writes_tables_pictures_and_a_page(
     assert provenance["command"] == "tactileq bench chart"
     assert provenance["settings"]["surfaces"] == ["recorded: drawn 0"]
 
-    again = run(*arguments)
+    again = main(*arguments)
     assert again.returncode == 0, again.stderr
     assert {path.name for path in out.iterdir()} == CONTENTS
 
@@ -96,8 +97,14 @@ BAD_INPUT = [
 
 @pytest.mark.parametrize(("arguments", "sentence"), BAD_INPUT)
 def test_bad_input_is_one_sentence(
-    main, oak: Path, tmp_path: Path, arguments: tuple[str, ...], sentence: str
+    main,
+    oak: Path,
+    tmp_path: Path,
+    arguments: tuple[str, ...],
+    sentence: str,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr("tactileq.workers.ANSWER_S", 0.2)
     done = main("bench", "chart", *arguments)
     assert done.returncode == 1
     assert done.stderr.startswith(sentence)

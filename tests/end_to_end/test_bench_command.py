@@ -17,8 +17,8 @@ CONTENTS = {
 }
 
 
-def test_bench_render_prints_and_writes_its_tables(run, tmp_path: Path) -> None:
-    done = run("bench", "render", "--quick", "--plot", "--out", "bench")
+def test_bench_render_prints_and_writes_its_tables(main, tmp_path: Path) -> None:
+    done = main("bench", "render", "--quick", "--plot", "--out", "bench")
     assert done.returncode == 0, done.stderr
     out = tmp_path / "bench"
     assert {path.name for path in out.iterdir()} == CONTENTS
@@ -36,15 +36,15 @@ def test_bench_render_prints_and_writes_its_tables(run, tmp_path: Path) -> None:
     assert provenance["command"] == "tactileq bench render"
     assert provenance["settings"]["quick"] is True
 
-    again = run("bench", "render", "--quick", "--out", "bench")
+    again = main("bench", "render", "--quick", "--out", "bench")
     assert again.returncode == 0, again.stderr
     assert {path.name for path in out.iterdir()} == CONTENTS - {"rendering.png"}
 
 
-def test_bench_render_replaces_nothing_of_others(run, tmp_path: Path) -> None:
+def test_bench_render_replaces_nothing_of_others(main, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("years of work")
-    done = run("bench", "render", "--quick", "--out", "mine")
+    done = main("bench", "render", "--quick", "--out", "mine")
     assert done.returncode == 1
     assert done.stderr.startswith("error: expected a new folder or earlier results")
     assert "Traceback" not in done.stderr

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pandas as pd
 import pytest
-from distributed import LocalCluster
 
 from modeling import Threshold, simplify
 from stimuli.planted.textures import planted_texture
@@ -50,6 +49,8 @@ def test_power_writes_its_table_and_chart(main, place: Path) -> None:
 
 
 def test_dask_workers_give_the_same_table(main, place: Path) -> None:
+    from distributed import LocalCluster  # late: collecting the tests needs no Dask
+
     words = ("power", "study.toml", "--simulations", 10, "--subjects", "[2,4]")
     many = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
     with LocalCluster(processes=False, **many) as cluster:
