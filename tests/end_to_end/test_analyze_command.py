@@ -23,6 +23,13 @@ from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tactileq.commands.analyze import read_answers
 
+
+@pytest.fixture(autouse=True)
+def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Reports without pictures, and with fewer simulated tables, of which no test here is."""
+    monkeypatch.setattr("analysis.statistics.similarity_choice.SIMULATIONS", 9)
+
+
 TEXTURES = ("leather", "MDF", "PVC")
 LATER = """
 name = "Three surfaces"
@@ -101,12 +108,11 @@ def test_claims_are_those_of_the_study_and_others_exploratory(
         (data / "README").write_text("edited while it was read\n")
         return responses
 
-    monkeypatch.setattr(loading, "load_responses", edited_meanwhile)
-    assert main("analyze", "data", "--out", "first").returncode == 0
+    with monkeypatch.context() as meanwhile:
+        meanwhile.setattr(loading, "load_responses", edited_meanwhile)
+        assert main("analyze", "data", "--out", "first").returncode == 0
     note = json.loads((data.parent / "first/provenance.json").read_text())
     assert note["inputs_sha256"] == {"data": before}
-    monkeypatch.undo()
-    monkeypatch.chdir(data.parent)
     tests = claims(data.parent / "first")
     planned = tests.groupby("claim")["planned"].first().to_dict()
     assert planned == {

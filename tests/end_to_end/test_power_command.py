@@ -73,6 +73,7 @@ def test_power_refuses_in_one_sentence_and_replaces_nothing(main, place: Path) -
     assert (place / "power/mine.txt").read_text() == "mine"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from analysis.statistics import validation
 

@@ -38,22 +38,22 @@ force_n = 1.0
 """
 
 
-def made_set(run: Run, folder: Path, *, rate: int = 48000, more: str = "") -> Path:
+def made_set(main: Run, folder: Path, *, rate: int = 48000, more: str = "") -> Path:
     """A set of one file; the file."""
     planted_texture("canvas").save(folder / "canvas.json")
     planted_vibrator().save(folder / "vibrator.json")
     (folder / "recipe.toml").write_text(RECIPE.format(rate=rate, more=more))
-    done = run("stimuli", "recipe.toml", "--out", "set")
+    done = main("stimuli", "recipe.toml", "--out", "set")
     assert done.returncode == 0, done.stderr
     (file,) = (folder / "set").glob("*.wav")
     return file
 
 
 def test_a_tone_and_a_file_leave_at_their_level(
-    jack_server: Jack, run: Run, tmp_path: Path
+    jack_server: Jack, main: Run, run: Run, tmp_path: Path
 ) -> None:
     rig_file(tmp_path)
-    file = made_set(run, tmp_path)
+    file = made_set(main, tmp_path)
     with jack_server(block=128) as server:
         words = [sys.executable, str(RECORDER), str(tmp_path / "out.npy"), "48000", "128"]
         recorder = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
@@ -91,25 +91,25 @@ def test_a_tone_and_a_file_leave_at_their_level(
     ],
 )
 def test_what_cannot_be_played_is_refused(
-    run: Run, tmp_path: Path, words: tuple[str, ...], sentence: str
+    main: Run, tmp_path: Path, words: tuple[str, ...], sentence: str
 ) -> None:
     rig_file(tmp_path)
-    done = run("rig", "play", "--rig", "rig.toml", *words)
+    done = main("rig", "play", "--rig", "rig.toml", *words)
     assert done.returncode == 1
     assert sentence in done.stderr
     assert "Traceback" not in done.stderr
 
 
-def test_a_file_of_another_rate_or_vibrator_is_refused(run: Run, tmp_path: Path) -> None:
+def test_a_file_of_another_rate_or_vibrator_is_refused(main: Run, tmp_path: Path) -> None:
     rig_file(tmp_path)
-    file = made_set(run, tmp_path, rate=5000)
-    done = run("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
+    file = made_set(main, tmp_path, rate=5000)
+    done = main("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
     assert "expected a file at 48000 Hz, the rate of the card" in done.stderr
     other = tmp_path / "other"
     other.mkdir()
     (tmp_path / "set").rename(other / "set")
-    file = made_set(run, tmp_path, more='vibrator = "vibrator.json"')
-    done = run("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
+    file = made_set(main, tmp_path, more='vibrator = "vibrator.json"')
+    done = main("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
     assert "which is compensated for another one" in done.stderr
 
 
