@@ -60,7 +60,7 @@ def press_until(done: Callable[[], bool], display: str) -> None:
         subprocess.run(
             ["xdotool", "key", "Tab", "Return"], env={**os.environ, "DISPLAY": display}, check=True
         )
-        time.sleep(0.5)
+        time.sleep(0.1)
         return False
 
     wait_until(pressed, seconds=SECONDS)
