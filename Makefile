@@ -41,7 +41,7 @@ lint: install
 
 test: lint
 	@sh tools/system-packages
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist loadfile --no-loadscope-reorder $(PYTEST_FLAGS)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist worksteal $(PYTEST_FLAGS)
 
 bench: install
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds

@@ -53,6 +53,8 @@ _BARE = BareProcess()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    # First, so that one worker has all of them and no two compete for the time of a block.
+    items.sort(key=needs_time, reverse=True)
     repeat_where_the_machine_stood_still(items, _BARE)
 
 
