@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import pickle
 import resource
 import shutil
 import signal
@@ -14,10 +15,11 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
@@ -67,6 +69,27 @@ def pytest_runtest_setup(item: pytest.Item) -> Iterator[None]:
 
 def pytest_unconfigure() -> None:
     _BARE.close()
+
+
+@pytest.fixture(scope="session")
+def once_per_run(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Any]:
+    """`once_per_run("name", make)`: what `make(folder)` returns, made by the first worker that asks
+    for that name and read by all others; it and the files of its folder may not be changed."""
+    shared = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        shared = shared.parent
+
+    def once(name: str, make: Callable[[Path], Any]) -> Any:
+        kept = shared / f"{name}.pickle"
+        with FileLock(shared / f"{name}.lock"):
+            if not kept.exists():
+                (folder := shared / name).mkdir(exist_ok=True)
+                made = make(folder)
+                kept.write_bytes(pickle.dumps(made))
+                return made
+        return pickle.loads(kept.read_bytes())
+
+    return once
 
 
 @pytest.fixture
