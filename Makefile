@@ -1,5 +1,6 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules and every test
+# make quick ROOM=modeling/fitting   the tests of one room alone
 # make bench   time the modeling beside its rivals
 # make install what both begin with: .venv/ from requirements.lock
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
@@ -13,7 +14,7 @@ PYTEST_FLAGS ?=
 # libraries anew; .venv/ and the project keep theirs, whatever the machine is set to.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test bench lint lock clean
+.PHONY: install demo test quick bench lint lock clean
 
 install: .venv/installed
 
@@ -39,9 +40,15 @@ lint: install
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+PYTEST := OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist worksteal
+
 test: lint
 	@sh tools/system-packages
-	OPENBLAS_NUM_THREADS=1 $(BIN)/pytest -n auto --dist worksteal $(PYTEST_FLAGS)
+	$(PYTEST) $(PYTEST_FLAGS)
+
+quick: install
+	@test -d "tests/$(ROOM)" && test -n "$(ROOM)" || { echo "error: expected a room with tests, got ROOM=$(ROOM); for instance make quick ROOM=modeling/fitting." >&2; exit 1; }
+	$(PYTEST) $(PYTEST_FLAGS) tests/$(ROOM)
 
 bench: install
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds
