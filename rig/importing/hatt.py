@@ -392,7 +392,7 @@ def _checked_frequencies(file: _Reader, element: ElementTree.Element, part: str)
         file.refuse(
             f"{frequencies.size + 1} values in {part}coeff, the first one 1, beside "
             f"{frequencies.size} in {part}lsf",
-            f"{coefficients.size} values",
+            f"{coefficients.size} values that begin with {shown(coefficients[:1].tolist())}",
             "download it again",
         )
     check_line_spectral(frequencies, f"{part}lsf of {file.name}")
