@@ -12,6 +12,7 @@ import pytest
 
 from modeling import InputError, Recording, RecordingSet
 from stimuli.planted.textures import planted_texture
+from tests.refusals import refused
 
 NOISE = np.random.default_rng(3).normal(0, 0.1, 3000)
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
@@ -308,5 +309,5 @@ def test_a_set_names_no_file_outside_its_folder(tmp_path: Path, way: str) -> Non
     make_set(tmp_path / "set", lambda folder: (folder / "0002.csv").rename(tmp_path / "loud.csv"))
     named = {"absolute": str(tmp_path / "loud.csv")}.get(way, way)
     edit("recordings.tsv", "0002.csv", named)(tmp_path / "set")
-    with pytest.raises(InputError, match="which lies outside; copy the file into the folder"):
+    with refused(InputError, expected=[tmp_path / "set", "recordings.tsv"], got="loud.csv"):
         RecordingSet.load(tmp_path / "set")
