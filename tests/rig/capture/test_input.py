@@ -181,27 +181,23 @@ def scripted_portaudio():
 
 
 @pytest.mark.parametrize(
-    ("settings", "sentences"),
+    ("settings", "expected", "got"),
     [
-        (
-            {"device": "Tablet"},
-            ("'Tablet', got none; connected are: USB Audio, ALSA; USB Acceler",),
-        ),
-        ({"device": "usb"}, ("'usb', got USB Audio, ALSA; USB Accelerometer, ALSA",)),
-        ({"device": "HDMI"}, ("'HDMI', got none",)),
-        ({"rate_hz": 22704}, ("expected a rate that 'USB Audio' does", "it does 44100, 48000.")),
-        ({"channel": 3}, ("with 3 input channels, got 'USB Audio' with 2; choose another",)),
-        ({}, ("to record from 'USB Audio', got the refusal Device unavailable; close",)),
+        ({"device": "Tablet"}, "'Tablet'", ["none", "USB Audio, ALSA", "USB Accelerometer, ALSA"]),
+        ({"device": "usb"}, "'usb'", ["USB Audio, ALSA", "USB Accelerometer, ALSA"]),
+        ({"device": "HDMI"}, "'HDMI'", "none"),
+        ({"rate_hz": 22704}, "'USB Audio'", ["22704 Hz", 44100, 48000]),
+        ({"channel": 3}, [3, "input"], ["'USB Audio'", 2]),
+        ({}, "'USB Audio'", "Device unavailable"),
     ],
 )
 def test_what_cannot_be_opened_is_refused_in_one_sentence(
-    monkeypatch: pytest.MonkeyPatch, settings, sentences
+    monkeypatch: pytest.MonkeyPatch, settings, expected, got
 ) -> None:
     for module in (audio, devices):
         monkeypatch.setattr(module, "portaudio", scripted_portaudio)
-    with pytest.raises(InputError) as refused:
+    with refused(InputError, expected=expected, got=got):
         AudioInput(InputSettings(g_per_fullscale=1.0, **settings)).open()
-    assert all(sentence in str(refused.value) for sentence in sentences)
 
 
 @pytest.mark.parametrize(
