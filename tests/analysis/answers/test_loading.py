@@ -517,17 +517,19 @@ def test_a_changed_manifest_or_design_is_refused(
     sidecar.write_text(json.dumps({"DerivedFrom": {"manifest": digest}}))
     assert load_responses(study_folder).warnings == ()
     write_task("absolute", absolute_rows[:-2])
-    with refused(InputError, names="manifest") as caught:
+    changed = hashlib.sha256(manifest.read_bytes()).hexdigest()
+    facts = {"expected": ["manifest", digest[:8]], "got": changed[:8]}
+    with refused(InputError, **facts) as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, manifest)
     manifest.write_text(json.dumps(json.loads(manifest.read_text()) | {"study_sha256": "ff"}))
     sidecar.write_text(json.dumps({"StudySHA256": "00"}))
     _describe(study_folder, StudySHA256="00")
-    with refused(InputError, names="study") as caught:
+    with refused(InputError, expected=["study", "00…"], got="ff…") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, manifest)
     described = _describe(study_folder, StudyDesign={"repeats": 3})
-    with refused(InputError, names=["StudyDesign", "StudySHA256"]) as caught:
+    with refused(InputError, expected=["StudyDesign", "StudySHA256", "00…"], got="…") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, described)
 
