@@ -127,10 +127,10 @@ def _description(folder: Path) -> Mapping[str, object]:
             f'exactly where "Simulated" is, got {parts[0]} and {parts[1]}; say what was simulated.'
         )
     design, stated = description.get("StudyDesign"), description.get("StudySHA256")
-    if isinstance(design, dict) and stated not in (None, sha256_of_values(design)):
+    if isinstance(design, dict) and stated not in (None, found := sha256_of_values(design)):
         raise InputError(
             f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
-            "got another design; restore the file."
+            f"{str(stated)[:8]}…, got {found[:8]}…; restore the file."
         )
     return description
 

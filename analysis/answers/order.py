@@ -73,18 +73,25 @@ def check_manifest(
     InputError
     """
     study = sidecar.get("StudySHA256")
-    if study is not None and manifest.get("study_sha256", study) != study:
+    if study is not None and (found := manifest.get("study_sha256", study)) != study:
         raise InputError(
-            f"expected the study of the session's answers in {path}, found another; restore the "
-            "file."
+            f"expected the study {_begun(study)} of the session's answers in {path}, got "
+            f"{_begun(found)}; restore the file."
         )
     sources = sidecar.get("DerivedFrom")
     named = sources.get("manifest") if isinstance(sources, Mapping) else None
-    if named is not None and named != sha256_of(read_text(path, "the manifest of a session")):
+    if named is not None and named != (
+        found := sha256_of(read_text(path, "the manifest of a session"))
+    ):
         raise InputError(
-            f"expected the manifest in {path} as it was stored before the session, found a changed "
-            "one; restore the file."
+            f"expected the manifest {_begun(named)} in {path}, as it was stored before the "
+            f"session, got {_begun(found)}; restore the file."
         )
+
+
+def _begun(sha256: object) -> str:
+    """As much of a SHA-256 as tells two apart."""
+    return f"{str(sha256)[:8]}…"
 
 
 def _numbered(key: str, number: object) -> str:

@@ -52,8 +52,9 @@ def transferred_information(counts: ArrayLike) -> TransferredInformation:
             f"{matrices.shape}; few trials of one person read as information at pure chance, so "
             "pool several people."
         )
-    if not (np.isfinite(matrices).all() and (matrices >= 0).all()):
-        raise InputError("expected counts of at least 0, got others; count answers.")
+    wrong = matrices[~(np.isfinite(matrices) & (matrices >= 0))]
+    if wrong.size:
+        raise InputError(f"expected counts of at least 0, got {wrong[0]:g}; count answers.")
     if not (matrices.sum(axis=(1, 2)) > 0).all():
         raise InputError(
             "expected answers of every participant, got a matrix without any; leave it out."

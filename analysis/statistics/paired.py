@@ -70,9 +70,11 @@ def paired_test(reference: ArrayLike, other: ArrayLike, *, rng: np.random.Genera
     """
     before, after = np.asarray(reference, dtype=float), np.asarray(other, dtype=float)
     if before.shape != after.shape or before.ndim != 1 or not np.isfinite(before + after).all():
+        alike = before.shape == after.shape and before.ndim == 1
+        what = "NaN or inf" if alike else f"shapes {before.shape} and {after.shape}"
         raise InputError(
-            f"expected two lists of finite values of one length, got shapes {before.shape} and "
-            f"{after.shape}; leave participants out of both where one value is missing."
+            f"expected two lists of finite values of one length, got {what}; leave participants "
+            "out of both where one value is missing."
         )
     differences = without_rounding_noise(after - before)
     undefined = why_undefined(differences)

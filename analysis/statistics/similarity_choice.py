@@ -74,8 +74,9 @@ def similarity_choice(counts: ArrayLike, *, rng: np.random.Generator) -> Similar
             f"expected a square matrix of {FEWEST_CLASSES} to {MOST_CLASSES} classes, got the "
             f"shape {table.shape}; count rows presented against columns answered."
         )
-    if not (np.isfinite(table) & (table >= 0)).all():
-        raise InputError("expected counts of at least 0, got others; count answers.")
+    wrong = table[~(np.isfinite(table) & (table >= 0))]
+    if wrong.size:
+        raise InputError(f"expected counts of at least 0, got {wrong[0]:g}; count answers.")
     similarities, biases = np.full((k, k), np.nan), np.full(k, np.nan)
     known = np.flatnonzero(np.diag(table) > 0)
     if known.size < 2:

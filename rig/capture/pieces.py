@@ -23,6 +23,7 @@ from modeling.errors import InputError, shown
 from modeling.files.folders import folder_behind
 from modeling.files.places import clear_unfinished, locked
 from modeling.files.provenance import PROVENANCE_NAME, provenance_text
+from modeling.files.reading import read_text
 from modeling.files.tables import number, read_table, table_text, whole_number, write_table
 from modeling.files.wav import read_wav
 from modeling.files.writing import write_files
@@ -347,9 +348,9 @@ def _rows(table: Path) -> list[dict[str, str]]:
     if not table.is_file():
         return []
     rows = read_table(table, _NEEDED)
-    if not table.read_bytes().endswith(b"\n"):
+    if last := read_text(table, "a table").rpartition("\n")[2]:
         raise InputError(
-            f"expected {table} to end with a whole line, got {shown(rows[-1:])} at its end; the "
+            f"expected {table} to end with a whole line, got {shown(last)} at its end; the "
             "table is truncated, restore it from a copy, or remove that line."
         )
     for row in rows:

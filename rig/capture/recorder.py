@@ -249,8 +249,8 @@ def check_assumed_force(grid: StrokeGrid, force_n: float) -> None:
         )
     if grid.cells(grid.speeds_mm_s[:1], [force_n])[0] == NOWHERE:
         raise InputError(
-            f"expected the assumed force of {force_n:g} N in the cell of {grid.forces_n[0]:g} N, "
-            "got another one; correct the grid or what is assumed."
+            f"expected an assumed force within the grid's cell of {grid.forces_n[0]:g} N, got "
+            f"{force_n:g} N; correct the grid or what is assumed."
         )
 
 

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.errors import InputError, shown
 from modeling.files.tables import number, read_table
 from rig.hand.sample import Sample
 from rig.hand.settings import SCRIPTS, HandSettings
@@ -66,11 +66,16 @@ class Trajectory:
 
     def __init__(self, time_s: Floats, x_mm: Floats, *, y_mm: Floats, force_n: Floats) -> None:
         rows = np.array([time_s, x_mm, y_mm, force_n], dtype=float)
-        inside = (np.abs(rows) <= _LARGEST).all()  # not so of NaN
-        if rows.shape[1] < 2 or not inside or (np.diff(rows[0]) <= 0).any():
+        outside = rows[~(np.abs(rows) <= _LARGEST)]  # so is NaN
+        if outside.size:
             raise InputError(
-                "expected two or more moments of rising time in a trajectory, all numbers within "
-                f"±{_LARGEST:g}, got others; correct its table."
+                f"expected numbers within ±{_LARGEST:g} in a trajectory, got {outside[0]:g}; "
+                "correct its table."
+            )
+        if rows.shape[1] < 2 or (np.diff(rows[0]) <= 0).any():
+            raise InputError(
+                "expected two or more moments of rising time in a trajectory, got "
+                f"{shown(rows[0].tolist())}; correct its table."
             )
         self._rows = rows
 

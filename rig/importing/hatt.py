@@ -246,14 +246,7 @@ def load_hatt(path: str | Path) -> HattTexture:
         file.refuse(
             f"a SampleRate above 0 and up to {HIGHEST_RATE_HZ:.0f} Hz", f"{rate_hz:g}", "correct it"
         )
-    speeds, forces = file.values(root, "speedList"), file.values(root, "forceList")
-    if speeds.size != forces.size or not speeds.size or min(speeds.min(), forces.min()) < 0:
-        file.refuse(
-            "as many speeds as forces, all of at least 0",
-            f"{speeds.size} in speedList and {forces.size} in forceList",
-            "download it again",
-        )
-    conditions = np.stack([speeds, forces], axis=-1)
+    conditions = _conditions(file, root)
     models = _models_of(file, root, conditions)
     return HattTexture(
         material=file.text(root, "material"),
@@ -265,6 +258,20 @@ def load_hatt(path: str | Path) -> HattTexture:
         variances=np.array([m.variance for m in models]),
         gains=np.array([m.gain for m in models]),
     )
+
+
+def _conditions(file: _Reader, root: ElementTree.Element) -> Floats:
+    """Speed and force of each model, (models, 2)."""
+    speeds, forces = file.values(root, "speedList"), file.values(root, "forceList")
+    if speeds.size != forces.size or not speeds.size:
+        file.refuse(
+            "as many speeds as forces",
+            f"{speeds.size} in speedList and {forces.size} in forceList",
+            "download it again",
+        )
+    if (lowest := min(speeds.min(), forces.min())) < 0:
+        file.refuse("speeds and forces of at least 0", f"{lowest:g}", "download it again")
+    return np.stack([speeds, forces], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -385,7 +392,7 @@ def _checked_frequencies(file: _Reader, element: ElementTree.Element, part: str)
         file.refuse(
             f"{frequencies.size + 1} values in {part}coeff, the first one 1, beside "
             f"{frequencies.size} in {part}lsf",
-            f"{coefficients.size} values",
+            f"{coefficients.size} values that begin with {shown(coefficients[:1].tolist())}",
             "download it again",
         )
     check_line_spectral(frequencies, f"{part}lsf of {file.name}")

@@ -494,10 +494,8 @@ def check_signal(samples: Floats, plan: RenderPlan) -> None:
     before.
     """
     if samples.ndim != 1 or not samples.size or not np.isfinite(samples).all():
-        raise InputError(
-            f"expected a signal as (n,) finite numbers in g, got shape {samples.shape} or values "
-            "that are not finite; correct it."
-        )
+        what = "NaN or inf" if samples.ndim == 1 and samples.size else f"shape {samples.shape}"
+        raise InputError(f"expected a signal as (n,) finite numbers in g, got {what}; correct it.")
     limits = plan.limits
     peak = float(np.abs(samples).max())
     if peak > limits.peak:

@@ -360,10 +360,11 @@ class _FileMaker:
 def _check_finite(samples: Floats, file: str, sample_format: SampleFormat) -> None:
     """Refuse samples that are not finite in their format; 24-bit ones are checked for clipping."""
     largest = np.finfo(np.float32 if sample_format == "float32" else np.float64).max
-    if not (np.abs(samples) <= largest).all():
+    beyond = samples[~(np.abs(samples) <= largest)]  # so is NaN
+    if beyond.size:
         raise InputError(
             f"expected samples of at most {largest:.2g} in {file}, as the format {sample_format} "
-            "holds them, got larger ones or NaN; correct the gains of the model."
+            f"holds them, got {beyond[0]:.2g}; correct the gains of the model."
         )
 
 

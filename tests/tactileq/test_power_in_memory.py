@@ -35,6 +35,7 @@ from tactileq.commands.power import (
     sizes_of,
 )
 from tactileq.workers import working
+from tests.refusals import refused
 
 TEXTURES = ("canvas", "PVC")
 RATED = Claim(
@@ -176,7 +177,7 @@ def test_sizes_are_a_range_or_a_list(text: str, sizes: tuple[int, ...]):
 
 @pytest.mark.parametrize("text", ["", "8,24", "8;24;8", "1,9,2", "8,24,0", "24,8,4", "[]", "[8,a]"])
 def test_other_sizes_are_refused(text: str):
-    with pytest.raises(ValueError, match="correct --subjects"):
+    with refused(ValueError, expected=["participants", 2, 9999], got=[repr(text), "--subjects"]):
         sizes_of(text)
 
 
@@ -192,19 +193,21 @@ def test_effects_are_planted_in_one_texture_or_in_all():
     "text", ["choice", "choice=", "choice=far", "loudness=3", "silk:choice=3", "=3", "PVC=3"]
 )
 def test_other_effects_are_refused(text: str):
-    with pytest.raises(ValueError, match="for --effect, with a texture of the study"):
+    with refused(
+        ValueError, expected=["--effect", *TEXTURES, "magnitude_similarity"], got=repr(text)
+    ):
         planted_effects([text], TEXTURES)
 
 
 def test_what_cannot_be_planned_is_refused(study: Study, models: ModelSets):
-    with pytest.raises(ValueError, match="expected claims under"):
+    with refused(ValueError, expected=["claims", "[[plan.claims]]"], got="none"):
         planned_for(replace(study, plan=Plan()), [4])
     by_day = {**study.tasks, "absolute": TaskPlan(participants=4, schedule="by-day")}
-    with pytest.raises(InputError, match="even number of participants"):
+    with refused(InputError, expected=["even", "by-day", "[absolute]"], got=7):
         planned_for(replace(study, tasks=by_day), [4, 7])
-    with pytest.raises(InputError, match="planted for canvas"):
+    with refused(InputError, expected=["magnitude_similarity", "canvas"], got=200.0):
         people(study, models, most=4, points=200.0)
     trays = {"silk": "A", "PVC": "B"}
     silk = replace(study, textures=tuple(trays), trays=trays, tasks={}, plan=Plan())
-    with pytest.raises(ValueError, match="expected a study of the planted textures"):
+    with refused(ValueError, expected=["planted", "aluminum", "wall paper"], got="silk"):
         people_of(silk, models, threshold="codec", planted={})

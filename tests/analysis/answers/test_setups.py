@@ -12,6 +12,7 @@ from analysis.answers.responses import PlannedTask, Responses, leave_out, setup_
 from analysis.answers.setups import answers_at, pool_setups
 from analysis.statistics.verdicts import claims_found, differences_by_setup
 from modeling import InputError
+from tests.refusals import refused
 
 
 @pytest.fixture
@@ -83,9 +84,9 @@ def test_set_ups_that_are_not_alike_are_refused(leipzig, nara):
         (replace(nara, simulated_participants=True), "simulated participants"),
         (replace(nara, simulated_rig=True), "simulated rig"),
     ):
-        with pytest.raises(InputError, match=f"got another {what} at 'nara'"):
+        with refused(InputError, got=[what, "'nara'"]):
             pool_setups({"leipzig": leipzig, "nara": other})
-    with pytest.raises(InputError, match="expected answers of its own at the set-up 'nara'"):
+    with refused(InputError, names=["answers", "'nara'"]):
         pool_setups({"leipzig": leipzig, "nara": replace(leipzig)})
-    with pytest.raises(InputError, match="expected a name without"):
+    with refused(InputError, expected="/", got="'leipzig/2'"):
         pool_setups({"leipzig/2": leipzig, "nara": nara})

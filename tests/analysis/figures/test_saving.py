@@ -66,7 +66,7 @@ def only_matplotlibs_font(monkeypatch):
 @pytest.mark.usefixtures("only_matplotlibs_font")
 def test_what_no_font_has_is_told_once_in_one_sentence(tmp_path: Path):
     assert png_of(figure_of("oak", "木木"), dpi=80)[1] == "木"
-    with pytest.warns(UserWarning, match="expected fonts") as told:
+    with pytest.warns(UserWarning, match="fonts-noto-cjk") as told:
         save_figure(figure_of("木", "材木"), tmp_path / "x.png", dpi=80)
     assert [str(warning.message) for warning in told] == [missing_fonts("木材")]
     assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")

@@ -1,11 +1,11 @@
 """Models swapped within participants, on planted answers."""
 
 import numpy as np
-import pytest
 from scipy import stats
 
 from analysis.statistics.confusion_change import confusion_change_p
 from modeling import InputError
+from tests.refusals import refused
 
 SHARES = np.array([[0.6, 0.3, 0.1], [0.2, 0.6, 0.2], [0.1, 0.3, 0.6]])
 OTHER = np.array([[0.6, 0.1, 0.3], [0.3, 0.6, 0.1], [0.3, 0.1, 0.6]])
@@ -38,5 +38,5 @@ def test_equal_matrices_and_one_person_tell_nothing():
 
 
 def test_different_people_are_refused():
-    with pytest.raises(InputError, match="same participants"):
+    with refused(InputError, expected="participants", got=["(2, 3, 3)", "(3, 3, 3)"]):
         confusion_change_p(np.ones((2, 3, 3)), np.ones((3, 3, 3)), rng=np.random.default_rng(4))

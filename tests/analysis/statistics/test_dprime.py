@@ -21,6 +21,7 @@ from analysis.statistics.dprime import (
     same_different_differencing_d_prime,
 )
 from modeling import InputError
+from tests.refusals import refused
 
 
 @pytest.mark.parametrize("share", [0.5, 0.6, 0.76, 0.9, 0.99, 0.3])
@@ -77,14 +78,14 @@ def test_simulated_observers_are_right_as_often():
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])
 def test_no_share_is_refused(share):
-    with pytest.raises(InputError, match="from 0 to 1"):
+    with refused(InputError, expected=[0, 1], got=share):
         m_afc_d_prime(share, alternatives=3)
-    with pytest.raises(InputError, match="from 0 to 1"):
+    with refused(InputError, expected=[0, 1], got=share):
         oddity_d_prime(share)
 
 
 def test_one_alternative_is_refused():
-    with pytest.raises(InputError, match="two alternatives"):
+    with refused(InputError, expected="two", got=1):
         m_afc_share(1.0, alternatives=1)
 
 
@@ -130,7 +131,8 @@ def test_the_ends_of_same_or_different():
         assert d_prime(1.0, 0.3) == d_prime(0.3, 0.0) == d_prime(1.0, 0.0) == math.inf
         assert d_prime(1.0, 1.0) == d_prime(0.0, 0.0) == d_prime(0.0, 1.0) == 0.0
         for hits, false_alarms in ((1.1, 0.2), (0.5, -0.1), (math.nan, 0.2), (0.2, math.nan)):
-            with pytest.raises(InputError, match="from 0 to 1"):
+            [wrong] = [share for share in (hits, false_alarms) if not 0 <= share <= 1]
+            with refused(InputError, expected=[0, 1], got=wrong):
                 d_prime(hits, false_alarms)
 
 

@@ -9,6 +9,7 @@ from analysis.statistics.information import (
     transferred_information,
 )
 from modeling import InputError
+from tests.refusals import refused
 
 
 @pytest.mark.parametrize("k", [3, 7, 16])
@@ -60,14 +61,19 @@ def test_a_class_never_answered_or_presented_changes_nothing():
 
 
 @pytest.mark.parametrize(
-    "counts",
-    [np.eye(3), [np.eye(3)], np.zeros((0, 3, 3)), [np.eye(3), np.zeros((3, 3))]],
+    ("counts", "expected", "got"),
+    [
+        (np.eye(3), "two participants", "(3, 3)"),
+        ([np.eye(3)], "two participants", "(1, 3, 3)"),
+        (np.zeros((0, 3, 3)), "two participants", "(0, 3, 3)"),
+        ([np.eye(3), np.zeros((3, 3))], "answers", "matrix"),
+    ],
 )
-def test_single_people_and_empty_matrices_are_refused(counts):
-    with pytest.raises(InputError, match="expected"):
+def test_single_people_and_empty_matrices_are_refused(counts, expected, got):
+    with refused(InputError, expected=expected, got=got):
         transferred_information(counts)
 
 
 def test_nan_is_refused():
-    with pytest.raises(InputError, match="counts"):
+    with refused(InputError, expected=["counts", 0], got="nan"):
         transferred_information([np.eye(3), np.eye(3) * np.nan])

@@ -11,6 +11,7 @@ from scipy import stats
 
 from analysis.statistics.similarity_choice import similarity_choice
 from modeling import InputError
+from tests.refusals import refused
 
 
 def rng() -> np.random.Generator:
@@ -97,7 +98,15 @@ def test_all_right_leaves_nothing_to_test():
     assert np.isnan(found.biases).all()
 
 
-@pytest.mark.parametrize("wrong", [np.eye(2), np.ones((3, 4)), np.eye(17), -np.eye(4)])
-def test_other_tables_are_refused(wrong):
-    with pytest.raises(InputError, match="expected"):
+@pytest.mark.parametrize(
+    ("wrong", "expected", "got"),
+    [
+        (np.eye(2), "3 to 16", "(2, 2)"),
+        (np.ones((3, 4)), "square", "(3, 4)"),
+        (np.eye(17), "3 to 16", "(17, 17)"),
+        (-np.eye(4), ["counts", 0], -1),
+    ],
+)
+def test_other_tables_are_refused(wrong, expected, got):
+    with refused(InputError, expected=expected, got=got):
         similarity_choice(wrong, rng=rng())

@@ -19,6 +19,7 @@ from analysis.textures.recovery import (
     planted_truth_table,
 )
 from modeling import InputError, TextureModel
+from tests.refusals import refused
 
 
 def shifted(
@@ -150,9 +151,9 @@ def test_an_estimate_without_layers_finds_nothing(truth):
 
 
 def test_other_grids_and_empty_truths_are_refused(truth):
-    with pytest.raises(InputError, match="planted grid"):
+    with refused(InputError, expected="grid", got="[1.0, 2.0] N"):
         planted_truth_table(truth, [replace(truth, forces_n=np.array([1.0, 2.0]))])
-    with pytest.raises(InputError, match="got none"):
+    with refused(InputError, expected="layers", got="none"):
         planted_truth_table(truth.with_layers([]), [truth])
 
 

@@ -21,6 +21,7 @@ from rig.calibration.trials import (
 )
 from rig.hand.scripted import Trajectory
 from rig.live.memory import BLOCK, READING
+from tests.refusals import refused
 
 RATE_HZ = 8000.0
 NO_BLOCKS = np.zeros(0, dtype=BLOCK)
@@ -117,7 +118,7 @@ def test_strokes_tell_the_delay() -> None:
 def test_a_hand_at_rest_is_refused() -> None:
     seen = stroking(delay_s=0.018)
     seen.readings["speed_mm_s"] = 0.0
-    with pytest.raises(InputError, match="expected a hand that strokes to and fro, got none"):
+    with refused(InputError, expected="strokes", got="none"):
         stroke_latencies_s(seen, floor_g2=9e-6)
 
 

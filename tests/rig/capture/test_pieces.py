@@ -21,6 +21,7 @@ from rig.capture.cutting import Piece
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined
 from rig.capture.pieces import PieceStore, Plan
+from tests.refusals import refused
 
 RATE_HZ = 2000.0
 GRID = StrokeGrid([80.0, 160.0], [0.6])
@@ -131,16 +132,16 @@ def test_it_adds_to_another_recording_set(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("spoil", "sentence"),
+    "spoil",
     [
-        (lambda f: (f / "other.txt").write_text("x"), "expected a new folder, or one of recordi"),
-        (lambda f: f.rmdir() or f.write_text("x"), "which is something else; choose another name"),
+        lambda folder: (folder / "other.txt").write_text("x"),
+        lambda folder: folder.rmdir() or folder.write_text("x"),
     ],
 )
-def test_other_folders_are_refused(tmp_path: Path, spoil, sentence) -> None:
+def test_other_folders_are_refused(tmp_path: Path, spoil) -> None:
     (tmp_path / "oak").mkdir()
     spoil(tmp_path / "oak")
-    with pytest.raises(InputError, match=sentence):
+    with refused(InputError, expected=["folder", "recordings"], got=tmp_path / "oak"):
         PieceStore(tmp_path / "oak", plan())
 
 
@@ -149,12 +150,12 @@ def test_another_rate_and_a_damaged_table_are_refused_and_a_changed_piece_does_n
 ) -> None:
     store = PieceStore(tmp_path / "oak", plan())
     store.add(piece())
-    with pytest.raises(InputError, match=r"pieces of 4000 Hz in .*, got some of 2000 Hz; go on"):
+    with refused(InputError, expected=["4000 Hz", tmp_path / "oak"], got=["2000 Hz", "--rate"]):
         PieceStore(tmp_path / "oak", plan(rate_hz=4000.0))
     table = tmp_path / "oak/pieces/pieces.tsv"
     good = table.read_text()
     table.write_text(good.replace("00001.wav", "../../1.wav"))
-    with pytest.raises(InputError, match="expected a file such as 00001.wav in pieces/pieces.tsv"):
+    with refused(InputError, expected=["00001.wav", "pieces/pieces.tsv"], got="'../../1.wav'"):
         PieceStore(tmp_path / "oak", plan())
     table.write_text(good.replace("\t400\t", "\t401\t"))
     store = PieceStore(tmp_path / "oak", plan())
@@ -163,9 +164,9 @@ def test_another_rate_and_a_damaged_table_are_refused_and_a_changed_piece_does_n
 
 
 def test_plans_out_of_range_are_refused() -> None:
-    with pytest.raises(InputError, match=r"at least 0.2 s of each condition, got 0.1 s; record lo"):
+    with refused(InputError, expected="0.2 s", got="0.1 s"):
         plan(wanted_s=0.1)
-    with pytest.raises(InputError, match="texture name"):
+    with refused(InputError, expected="texture", got="''"):
         plan(texture="")
 
 

@@ -11,6 +11,7 @@ from modeling import InputError
 from modeling.files.tables import write_table
 from rig.hand.scripted import ScriptedHand, Steady, Strokes, Trajectory, script_of
 from rig.hand.settings import HandSettings
+from tests.refusals import refused
 
 
 def test_strokes_have_the_stated_peak_speed_and_force_and_begin_at_rest() -> None:
@@ -48,8 +49,19 @@ def test_arrays_are_played_as_a_table() -> None:
     assert samples[0][1:] == (0.0, 0.0, None, 1.0, True, False)
 
 
-@pytest.mark.parametrize("times", [[0.0], [0.0, 0.0], [1.0, 0.0], [0.0, np.nan]])
-def test_a_trajectory_of_times_that_do_not_rise_is_refused(times: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("times", "expected", "got"),
+    [
+        ([0.0], "two", "[0.0]"),
+        ([0.0, 0.0], "rising", "[0.0, 0.0]"),
+        ([1.0, 0.0], "rising", "[1.0, 0.0]"),
+        ([0.0, np.nan], "±1e+06", "nan"),
+        ([0.0, 2e6], "±1e+06", "2e+06"),
+    ],
+)
+def test_a_trajectory_of_times_that_do_not_rise_is_refused(
+    times: list[float], expected: str, got: str
+) -> None:
     time_s = np.array(times)
-    with pytest.raises(InputError, match="two or more moments of rising time"):
+    with refused(InputError, names="trajectory", expected=expected, got=got):
         Trajectory(time_s, time_s, y_mm=time_s, force_n=time_s)

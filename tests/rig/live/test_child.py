@@ -14,6 +14,7 @@ import pytest
 from modeling import InputError
 from rig.live import child
 from rig.live.child import Child, ChildLost
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 
@@ -59,29 +60,29 @@ def test_its_refusals_are_its_own_sentences() -> None:
     with pytest.raises(InputError, match=r"^expected another setting, got this; change it\.$"):
         Child("driven", {"refuses": True})
     process = Child("driven", {})
-    with pytest.raises(InputError, match="expected sense"):
+    with refused(InputError, expected="sense", got="none"):
         process.ask({"do": "err"})
     assert process.ask({"go": "on"}) == {"go": "on"}
     process.close()
 
 
 def test_what_it_says_when_it_fails_is_passed_on() -> None:
-    with pytest.raises(ChildLost, match=r"it has ended \(ValueError: what went wrong\)"):
+    with refused(ChildLost, names=["ended", "ValueError: what went wrong"]):
         Child("driven", {"fails": True})
 
 
 def test_one_that_has_ended_is_lost() -> None:
     process = Child("driven", {})
-    with pytest.raises(ChildLost, match="it has ended"):
+    with refused(ChildLost, names="ended"):
         process.ask({"do": "end"})
-    with pytest.raises(ChildLost, match="it has ended"):
+    with refused(ChildLost, names="ended"):
         process.ask({"more": 1})
     process.close()
 
 
 def test_one_that_does_not_answer_is_lost_and_can_be_killed() -> None:
     process = Child("driven", {})
-    with pytest.raises(ChildLost, match=r"it has not answered for 0\.1 s"):
+    with refused(ChildLost, names="0.1 s"):
         process.ask({"do": "sleep"}, within_s=0.1)
     process.kill()
     assert not process.runs

@@ -13,8 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modeling import InputError
+from modeling.errors import shown
 from rig.live import memory
 from rig.live.memory import BLOCK, CONTACT, READING, Live, now_s
+from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 RING = 16384
@@ -146,7 +148,7 @@ def test_another_file_is_refused(tmp_path: Path, size: int | None) -> None:
     with Live.create() as live:
         length = live.path.stat().st_size if size is None else size
     path.write_bytes(bytes(length))
-    with pytest.raises(InputError, match="expected the shared memory of a rig of this version"):
+    with refused(InputError, expected=["memory", shown(str(path))]):
         Live.attach(path)
 
 
@@ -159,5 +161,5 @@ def test_the_clock_is_the_same_in_every_process() -> None:
 
 def test_without_compiled_parts_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "_live", None)
-    with pytest.raises(InputError, match="install a C compiler"):
+    with refused(InputError, expected="compiled", got=["none", "C compiler"]):
         Live.create()

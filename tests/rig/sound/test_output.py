@@ -24,6 +24,7 @@ from modeling.rendering.limits import Limits
 from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
 from tests.modeling.rendering.lattices import in_python, planted_ar
+from tests.refusals import refused
 from tests.rig.planted import planted_model as model
 from tests.rig.waiting import wait_until
 
@@ -464,7 +465,7 @@ def test_a_process_that_is_killed_in_a_signal_is_told_who_waits_for_its_end(serv
     with Live.create() as live, output(live) as sound:
         assert sound.pid is not None
         threading.Timer(0.3, os.kill, (sound.pid, signal.SIGKILL)).start()
-        with pytest.raises(SoundLost, match="expected a sound process that plays to the end"):
+        with refused(SoundLost, names="sound process"):
             sound.play_signal(np.ones(10 * RATE_HZ), wait=True)
         assert len(sound.faults()) == 1
         sound.play_signal(np.ones(100), wait=True)
@@ -497,7 +498,7 @@ def test_a_dead_server_is_told_within_a_second_and_nothing_hangs(jack_server: Ja
             told = sound.faults()
             time.sleep(0.01)
         assert len(told) == 1
-        with pytest.raises(SoundLost, match="expected"):
+        with refused(SoundLost, expected="sound device", got="none"):
             sound.play(model())
         sound.close()
         assert time.monotonic() < end + 20
@@ -600,7 +601,7 @@ def test_a_signal_that_was_halted_is_told_who_waits_for_its_end(
     with Live.create() as live, output(live) as sound:
         with monkeypatch.context() as patch:
             patch.setattr(live, "heartbeat", lambda: None)
-            with pytest.raises(SoundLost, match="look after what plays"):
+            with refused(SoundLost, expected="1 s"):
                 sound.play_signal(np.ones(2 * RATE_HZ), wait=True)
         assert sound.halted
         assert len(sound.faults()) == 1
@@ -640,67 +641,67 @@ def has_ended(process: int) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("settings", "sentence"),
+    ("settings", "expected", "got"),
     [
-        ({"device": "another"}, "expected one sound device for output that is 'another', got none"),
-        ({"channels": 9}, "expected a sound device with 9 output channels, got 'system' with 2"),
+        ({"device": "another"}, ["output", "'another'"], "none"),
+        ({"channels": 9}, [9, "output"], ["'system'", 2]),
     ],
 )
 def test_a_device_that_is_not_there_is_refused(
-    server: Any, settings: dict[str, Any], sentence: str
+    server: Any, settings: dict[str, Any], expected: object, got: object
 ) -> None:
-    with Live.create() as live, pytest.raises(InputError, match=sentence):
+    with Live.create() as live, refused(InputError, expected=expected, got=got):
         output(live, **settings).open()
 
 
 def test_a_rate_that_the_card_does_not_do_is_refused_with_those_it_does(server: Any) -> None:
-    with Live.create() as live, pytest.raises(InputError, match=r"44100 Hz; it does 48000"):
+    with Live.create() as live, refused(InputError, expected="system", got=["44100 Hz", 48000]):
         SoundOutput(
             live, device="system", rate_hz=44100, block=128, fullscale_per_g=SCALE, limits=LIMITS
         ).open()
 
 
 @pytest.mark.parametrize(
-    ("settings", "sentence"),
+    ("settings", "expected", "got"),
     [
-        ({"limits": Limits()}, "expected a peak limit of at most 20 g"),
-        ({"fullscale_per_g": 0.2}, "expected a peak limit of at most 5 g"),
-        ({"fullscale_per_g": 0.0}, "expected full scale per g above 0"),
-        ({"masking_channel": 0}, "expected different channels from 0 to 1"),
-        ({"vibration_channel": 2}, "expected different channels from 0 to 1"),
-        ({"block": 8}, "expected a block of 16 to 4096 samples"),
+        ({"limits": Limits()}, ["peak limit", "20 g"], "inf g"),
+        ({"fullscale_per_g": 0.2}, ["peak limit", "5 g"], "10 g"),
+        ({"fullscale_per_g": 0.0}, ["full scale per g", 0], 0.0),
+        ({"masking_channel": 0}, ["channels", 0, 1, "masking"], "0 and 0"),
+        ({"vibration_channel": 2}, ["channels", 0, 1, "vibration"], 2),
+        ({"block": 8}, ["block", 16, 4096], 8),
     ],
 )
 def test_settings_are_checked_before_anything_starts(
-    settings: dict[str, Any], sentence: str
+    settings: dict[str, Any], expected: object, got: object
 ) -> None:
-    with Live.create() as live, pytest.raises(InputError, match=sentence):
+    with Live.create() as live, refused(InputError, expected=expected, got=got):
         output(live, **settings)
 
 
 @pytest.mark.parametrize(
-    ("samples", "sentence"),
+    ("samples", "expected", "got"),
     [
-        ([], "expected a signal as"),
-        ([[1.0]], "expected a signal as"),
-        ([np.nan], "expected a signal as"),
-        ([11.0], "expected a signal of at most 10 g"),
-        (np.full(RATE_HZ, 6.0), "expected a signal with a running RMS of at most 5 g"),
-        (np.full(3 * RATE_HZ, 1.0), "expected a signal of at most 2 s without a pause"),
+        ([], "(n,)", "(0,)"),
+        ([[1.0]], "(n,)", "(1, 1)"),
+        ([np.nan], "finite", "NaN"),
+        ([11.0], "10 g", "11 g"),
+        (np.full(RATE_HZ, 6.0), ["RMS", "5 g"], "5.653 g"),
+        (np.full(3 * RATE_HZ, 1.0), "2 s", "3 s"),
     ],
 )
-def test_signals_beyond_the_limits_are_refused(samples: Any, sentence: str) -> None:
+def test_signals_beyond_the_limits_are_refused(samples: Any, expected: object, got: object) -> None:
     limits = Limits(peak=10.0, rms=5.0, duration_s=2.0)
-    with Live.create() as live, pytest.raises(InputError, match=sentence):
+    with Live.create() as live, refused(InputError, expected=expected, got=got):
         output(live, limits=limits).play_signal(samples)
 
 
 @pytest.mark.parametrize("level", [-0.1, 0.6, np.nan])
 def test_masking_out_of_range_is_refused(level: float) -> None:
-    with Live.create() as live, pytest.raises(InputError, match="expected a masking noise of 0"):
+    with Live.create() as live, refused(InputError, expected=[0, 0.5], got=level):
         output(live, masking_channel=1).masking(level)
 
 
 def test_masking_without_a_channel_is_refused() -> None:
-    with Live.create() as live, pytest.raises(InputError, match="expected a channel for"):
+    with Live.create() as live, refused(InputError, names="masking_channel", got="none"):
         output(live).masking(0.1)

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from stimuli.planted.vibrators import SimulatedVibrator
+from tests.refusals import refused
 
 
 def test_it_rolls_off_as_method_9_says() -> None:
@@ -42,14 +43,14 @@ def test_a_sensor_reports_the_response_and_its_own_noise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "sentence"),
+    ("values", "expected", "got"),
     [
-        ((2500.0, 5.0, 5000.0), "expected a resonance within 1…2450 Hz, got 2500"),
-        ((float("nan"), 5.0, 5000.0), "expected a resonance within 1…2450 Hz, got nan"),
-        ((80.0, 0.0, 5000.0), "expected a quality above 0, got 0"),
-        ((80.0, 5.0, -1.0), "expected a rate above 0 Hz"),
+        ((2500.0, 5.0, 5000.0), ["resonance", "1…2450 Hz"], 2500),
+        ((float("nan"), 5.0, 5000.0), ["resonance", "1…2450 Hz"], "nan"),
+        ((80.0, 0.0, 5000.0), ["quality", 0], 0),
+        ((80.0, 5.0, -1.0), ["rate", "0 Hz"], -1.0),
     ],
 )
-def test_impossible_vibrators_are_refused(values, sentence) -> None:
-    with pytest.raises(InputError, match=sentence):
+def test_impossible_vibrators_are_refused(values, expected, got) -> None:
+    with refused(InputError, expected=expected, got=got):
         SimulatedVibrator(*values)

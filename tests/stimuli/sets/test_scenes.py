@@ -15,6 +15,7 @@ from stimuli.planted.textures import planted_texture
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.sources import files_behind, load_sources
 from stimuli.sets.writing import write_set
+from tests.refusals import refused
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 SCENE = """
@@ -87,19 +88,19 @@ def test_a_recipe_rests_on_what_its_scenes_name(place: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "expected", "got"),
     [
-        ('models = "models", ', "", "for the scene light touch, got none; name it as models"),
-        ('"MDF"', '"silk"', "each texture of the scene light touch, got none of silk"),
-        ("[100, 300]", "[10, 300]", "where MDF was recorded"),
+        ('models = "models", ', "", ["models", "light touch"], ["none", "[scene]", "--models"]),
+        ('"MDF"', '"silk"', ["texture", "light touch"], "silk"),
+        ("[100, 300]", "[10, 300]", ["speeds", "100…300 mm/s", "MDF"], "10…300 mm/s"),
     ],
 )
 def test_scenes_that_cannot_be_compiled_are_refused(
-    place: Path, old: str, new: str, told: str
+    place: Path, old: str, new: str, expected: object, got: object
 ) -> None:
     (place / "light.toml").write_text(SCENE.replace(old, new))
     recipe = Recipe.load(place / "set.toml")
-    with pytest.raises(InputError, match=told):
+    with refused(InputError, expected=expected, got=got):
         load_sources(recipe)
 
 
@@ -111,7 +112,7 @@ def test_a_name_too_long_for_a_file_is_refused_in_one_sentence(
     (place / "set.toml").write_text(
         RECIPE.replace('scene = "light.toml"', f'{key} = "{"y" * 9999}"\n{label}')
     )
-    with pytest.raises(InputError, match="yyy") as refusal:
+    with refused(InputError, expected=f"{place}/", got="name") as refusal:
         load_sources(Recipe.load(place / "set.toml"))
     assert len(str(refusal.value)) < 400 + len(str(place))
 
@@ -119,5 +120,5 @@ def test_a_name_too_long_for_a_file_is_refused_in_one_sentence(
 def test_two_models_of_a_texture_under_one_label_are_refused(place: Path) -> None:
     text = RECIPE.replace('"light.toml"', '"light.toml"\nlabel = "models"')
     (place / "set.toml").write_text(text)
-    with pytest.raises(InputError, match=r"got two of MDF \(models\)"):
+    with refused(InputError, expected="label", got=["MDF", "models"]):
         load_sources(Recipe.load(place / "set.toml"))

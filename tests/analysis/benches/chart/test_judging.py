@@ -28,6 +28,7 @@ from analysis.benches.chart.surfaces import (
 )
 from modeling import InputError, RecordingSet, fit_ar
 from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, draw_surface
+from tests.refusals import refused
 
 
 @pytest.fixture
@@ -84,7 +85,7 @@ def test_fitting_takes_time(rows: pd.DataFrame) -> None:
 
 
 def test_recordings_have_no_truth_to_be_a_method() -> None:
-    with pytest.raises(InputError, match="expected a surface whose truth is known, got recordings"):
+    with refused(InputError, expected="truth", got="recordings"):
         fit_method("truth", Subject([]))
 
 
@@ -115,7 +116,7 @@ def test_names_of_methods() -> None:
     assert chosen_methods([], full=True) == tuple(METHODS)
     assert set(METHODS) - set(chosen_methods([], full=False)) == set(LEFT_TO_FULL)
     assert chosen_methods(["truth", "AR(6)"], full=False) == ("AR(6)", "truth")
-    with pytest.raises(InputError, match=r"expected methods among joint; .*, got 'AR\(7\)'"):
+    with refused(InputError, expected=["joint", "AR(6)"], got="'AR(7)'"):
         chosen_methods(["AR(7)"], full=True)
 
 
@@ -181,7 +182,7 @@ def test_a_texture_without_the_model_asked_for_is_refused(recorded: Path, tmp_pa
     folder = tmp_path / "models"
     folder.mkdir()
     fit_ar(draw_surface(6).record([50.0, 150.0], [0.5, 1.5]), order=6).save(folder / "elm.json")
-    with pytest.raises(InputError, match="expected a model of 'drawn 5' in .*, got models of"):
+    with refused(InputError, expected=["'drawn 5'", folder], got="'drawn 6'"):
         recorded_sources([recorded], [folder], both_halves=False)
 
 
@@ -189,7 +190,7 @@ def test_recordings_too_few_to_hold_any_out_are_refused(tmp_path: Path) -> None:
     folder = tmp_path / "few"
     draw_surface(5).record([50.0, 150.0], [0.5, 1.5]).save(folder)
     [source] = recorded_sources([folder], [], both_halves=False)
-    with pytest.raises(InputError, match=r"expected recordings at 3 speeds × 3 forces .*got 2 × 2"):
+    with refused(InputError, expected="3 speeds × 3 forces", got="2 × 2"):
         judge(source, methods=METHODS_FOR_RECORDS)
 
 
