@@ -1,6 +1,7 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules and every test
 # make bench   time the modeling beside its rivals
+# make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install what both begin with: .venv/ from requirements.lock
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
@@ -13,7 +14,7 @@ PYTEST_FLAGS ?=
 # libraries anew; .venv/ and the project keep theirs, whatever the machine is set to.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test bench lint lock clean
+.PHONY: install demo test bench plant lint lock clean
 
 install: .venv/installed
 
@@ -45,6 +46,10 @@ test: lint
 
 bench: install
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds
+
+# All of them, or BUG=name, or ROOM=name.
+plant: install
+	nice -n 5 $(BIN)/python tools/plant_bugs/plant.py --bug "$(BUG)" --room "$(ROOM)"
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
