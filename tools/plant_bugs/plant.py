@@ -26,7 +26,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 LEAST_CAUGHT = 38
 REASON = "Survives: "
-SECONDS_PER_TEST = 120
+SECONDS_PER_TEST = 60
 NOT_COPIED = (".git", ".venv", ".*_cache", ".hypothesis", "build", "demo", "*.egg-info")
 
 
