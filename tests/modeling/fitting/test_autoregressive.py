@@ -175,6 +175,16 @@ def test_repeats_are_averaged_in_power() -> None:
     assert together.level_sd_db == pytest.approx(alone.level_sd_db / np.sqrt(2), rel=1e-3)
 
 
+def test_a_longer_repeat_weighs_more() -> None:
+    """Power 1 for 1 s and power 4 for 3 s: 3.25 over all of it."""
+    rng = np.random.default_rng(3)
+    noises = (rng.standard_normal(count) for count in (5000, 15000))
+    levels = [rms * noise / noise.std() for rms, noise in zip((1.0, 2.0), noises, strict=True)]
+    fitted = fit_filter([spectrum_of_samples(one, RATE_HZ) for one in levels], order=1)
+    # White noise is predicted by nothing, but for what two samples correlate by chance.
+    assert fitted.gain**2 == pytest.approx(3.25, rel=1e-3)
+
+
 def test_holes_are_filled_and_marked() -> None:
     nine = [(speed, force) for speed in (100.0, 200.0, 300.0) for force in (1.0, 2.0, 3.0)]
     hole = (200.0, 2.0)

@@ -69,6 +69,20 @@ def test_resampling_keeps_a_sines_amplitude(
     assert amplitude == pytest.approx(0.3, rel=0.02)
 
 
+@pytest.mark.parametrize("frequency_hz", [60.0, 440.3, 1000.5])
+def test_a_pure_tone_is_fitted_as_a_band_of_its_power(
+    make_recording: RecordingMaker, frequency_hz: float
+) -> None:
+    """Of a signal of power P the squared magnitudes sum to 2nP/π (Parseval)."""
+    n = 10000
+    sine = 0.3 * np.sin(2 * np.pi * frequency_hz * np.arange(n) / 5000)
+    noise = 0.01 * np.random.default_rng(4).standard_normal(n)
+    found = spectrum(make_recording(sine + noise))
+    assert len(found.notes) == 1
+    power = np.sum(found.without_leakage**2) * np.pi / (2 * n)
+    assert power == pytest.approx(0.3**2 / 2 + 0.01**2, rel=0.01)
+
+
 def test_high_pass_is_3_db_down_at_10_hz(make_recording: RecordingMaker) -> None:
     """Two opposite impulses: no mean, known spectrum 1 − e^(−iω·250) with 2 at 10 Hz."""
     impulses = np.zeros(10000)
