@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
+from modeling.files.answer_tables import ANSWER_TABLES
+
 # The sets of models that the statistics compare, the reference first.
 MODELS = ("full", "simplified")
-TASKS = {
-    "absolute": "absolute evaluation",
-    "relative": "forced choice",
-    "oddity": "oddity task",
-    "threshold": "detection threshold",
-}
-SCALES = {
-    "magnitude_similarity": "vibration magnitude",
-    "frequency_similarity": "frequency pattern",
-}
+TASKS = {task: table.title for task, table in ANSWER_TABLES.items()}
+SCALES = {c.name: c.scale for table in ANSWER_TABLES.values() for c in table.columns if c.scale}
 # What claims can be about: columns of tables of answers, in words.
 MEASURES = {
     **{column: f"rated similarity of {scale}" for column, scale in SCALES.items()},

@@ -33,6 +33,7 @@ WORDS = {
     INTERIM: "no verdict before the study is complete on",
     NO_TEST: "it cannot be told yet, for want of complete answers, in",
 }
+NOTHING_TO_CLAIM = "Nothing is compared: no answers were asked for that claims can be about."
 NO_BOUNDS = "no difference was shown, and without bounds no equality can be, in"
 
 
@@ -47,8 +48,10 @@ def answer(found: Sequence[ClaimFound], responses: Responses | None) -> str:
     responses : Responses, optional
         Who answered, and where.
     """
-    if responses is None or not responses.textures:
+    if responses is None or all(table.empty for table in responses.answers.values()):
         return NOBODY_ASKED
+    if not found:
+        return NOTHING_TO_CLAIM
     asked = [one for one in found if one.claim.planned] or list(found)
     parts = _parts(asked)
     if not parts:

@@ -372,14 +372,14 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
 
 def _planned(people: People, *, n: int) -> dict[str, PlannedTask]:
     from analysis.answers.responses import PlannedTask
+    from experiments.tasks.durations import trials_of_session
 
-    study = people.study
-    return {
-        task: PlannedTask(
-            n, n * study.sessions(task), study.plan_of(task).models, study.plan_of(task).repeats
-        )
-        for task in people.tasks
-    }
+    study, planned = people.study, {}
+    for task in people.tasks:
+        plan, sessions = study.plan_of(task), n * study.sessions(task)
+        _, trials = trials_of_session(study, task)
+        planned[task] = PlannedTask(n, sessions, plan.models, plan.repeats, sessions * trials)
+    return planned
 
 
 def _write(

@@ -743,11 +743,11 @@ def _relative_columns() -> tuple[str, ...]:
 @pytest.mark.parametrize(
     ("design", "planned"),
     [
-        ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48)),
-        ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20)),
+        ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48, trials=48 * 7)),
+        ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20, trials=20 * 7)),
         (
             {"participants": 3, "schedule": "by-day", "models": ["full", "paper", "AR"]},
-            PlannedTask(3, 9, ("full", "paper", "AR")),
+            PlannedTask(3, 9, ("full", "paper", "AR"), trials=9 * 7),
         ),
     ],
 )

@@ -215,7 +215,7 @@ def test_equality_of_guesses_is_none(answers):
     blind = replace(answers, answers={"relative": guessed})
     standing = claim_standing(blind, answers.plan.claims[2], rng=rng())
     assert standing.sensitivity == "answers on full models were not above chance"
-    assert chance_of(guessed) == 1 / 7
+    assert chance_of("relative", guessed) == 1 / 7
     wide = replace(answers.plan.claims[2], bounds=(-0.3, 0.3))
     (one,) = claims_found(replace(blind, plan=AnalysisPlan(claims=(wide,))), rng=rng())
     assert one.tests["verdict"].iloc[0] == WITHHELD

@@ -151,7 +151,7 @@ def test_every_answer_stands_in_its_table(write_session):
     files = write_session(invalid=[4])
     export_session(files.root, files.manifest)
     found = table(beh(files, "beh.tsv"))
-    assert list(found) == [column.name for column in ANSWER_TABLES["absolute"]]
+    assert list(found) == [column.name for column in ANSWER_TABLES["absolute"].columns]
     planned = json.loads(files.manifest.read_text())["trials"]
     assert found["texture"].tolist() == [trial["texture"] for trial in planned]
     assert found["virtual_texture"].tolist() == [trial["virtual_texture"] for trial in planned]

@@ -12,6 +12,7 @@ from experiments.study.questions import Question
 from experiments.study.study import SHIPPED_STUDY, Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
 
 
 def edited(folder: Path, old: str, new: str) -> Path:
@@ -252,3 +253,19 @@ def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected a study file"):
         Study.load(tmp_path / "none.toml")
+
+
+def test_no_claim_about_a_task_without_ratings_or_right_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    about = {"title": "pair comparison", "texture": "", "model": ""}
+    monkeypatch.setitem(ANSWER_TABLES, "pair", answer_table(RESPONSE_TIME, **about))
+    with pytest.raises(InputError, match="ratings or right answers in the claim alike, got pair"):
+        Claim(
+            name="alike",
+            task="pair",
+            measure="response_time_s",
+            models=("full", "simplified"),
+            bounds=(-1.0, 1.0),
+            test="difference",
+        )
