@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -14,8 +12,8 @@ from typing import Any
 import pytest
 
 from experiments.console.languages import Texts
+from tests.experiments.driven import Driven
 
-ROOT = Path(__file__).parents[3]
 DRIVER = Path(__file__).with_name("console_session.py")
 ALL_PARTS = ("new", "training", "wait", "absolute", "rest", "relative", "oddity", "closing")
 Seated = Callable[..., AbstractContextManager["Participant"]]
@@ -74,51 +72,28 @@ class Participant:
         return [news for news in self.heard if news.get("noted") == event]
 
 
-class Consoles:
-    """A process that shows one session after another, begun again where a test left one open."""
-
-    def __init__(self, display: str) -> None:
-        self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
-        self._session: subprocess.Popen[str] | None = None
-
-    @contextmanager
-    def asked(self, **order: object) -> Iterator[Participant]:
-        if self._session is None:
-            self._session = subprocess.Popen(
-                [sys.executable, str(DRIVER)],
-                env=self._environment,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                text=True,
-            )
-        person = Participant(self._session, self._environment)
-        person.say(json.dumps(order))
-        try:
-            yield person
-        finally:
-            if not any("result" in news for news in person.heard):
-                self.close()
-
-    def close(self) -> None:
-        if self._session is not None:
-            self._session.kill()
-            self._session.communicate(timeout=10)
-        self._session = None
-
-
 @pytest.fixture(scope="module")
-def consoles(x_server: Callable[..., AbstractContextManager[str]]) -> Iterator[Consoles]:
+def consoles(x_server: Callable[..., AbstractContextManager[str]]) -> Iterator[Driven]:
     """On small screens, which software draws sooner."""
     with x_server(screens=2, size=(1280, 800)) as display:
-        shown = Consoles(display)
+        shown = Driven(DRIVER, display=display)
         yield shown
         shown.close()
 
 
+@contextmanager
+def asked(consoles: Driven, **order: object) -> Iterator[Participant]:
+    """The person at a console; the block is left with the result."""
+    with consoles.window(json.dumps(order)) as session:
+        person = Participant(session, consoles.environment)
+        yield person
+        assert "result" in person.heard[-1]
+
+
 @pytest.fixture
-def seated(consoles: Consoles) -> Seated:
+def seated(consoles: Driven) -> Seated:
     def seat(language: str, *parts: str) -> AbstractContextManager[Participant]:
-        return consoles.asked(language=language, parts=parts)
+        return asked(consoles, language=language, parts=parts)
 
     return seat
 
@@ -324,8 +299,8 @@ def test_who_is_known_is_asked_for_the_code_alone(seated: Seated) -> None:
         assert person.wait_for("result") == ["the rig is broken", "experimenter"]
 
 
-def test_a_screen_that_is_not_there_is_refused(consoles: Consoles) -> None:
-    with consoles.asked(screens=[2, -1, 0]) as session:
+def test_a_screen_that_is_not_there_is_refused(consoles: Driven) -> None:
+    with asked(consoles, screens=[2, -1, 0]) as session:
         too_high, too_low, there = session.wait_for("result")
     for refusal, number in ((too_high, 2), (too_low, -1)):
         assert refusal == (
