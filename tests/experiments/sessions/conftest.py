@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -194,12 +193,6 @@ def session_on_disk(
         if status is not None:
             store.finish(status, reason, by="participant")
     return manifest.files(folder)
-
-
-@pytest.fixture
-def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No wait for the disk: what a killed process wrote is there, unless the power fails too."""
-    monkeypatch.setattr(os, "fsync", lambda handle: None)
 
 
 @pytest.fixture
