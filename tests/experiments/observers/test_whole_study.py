@@ -30,6 +30,7 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
     )
 
 
+@pytest.mark.usefixtures("unsynced")
 def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: Any) -> None:
     study = Study.load()
     truths = {texture: planted_texture(texture) for texture in study.textures}
