@@ -41,6 +41,10 @@ def engine(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+# Levels and spectra of long signals: one engine tells, since both give the same bits
+# (test_kernel.py).
+once = pytest.mark.parametrize("engine", ["python" if Call is None else "compiled"], indirect=True)
+
 ModelMaker = Callable[..., TextureModel]
 FallingMaker = Callable[..., RegressedModel]
 
@@ -162,6 +166,7 @@ def mean_spectrum(signal: np.ndarray, size: int) -> np.ndarray:
     return np.abs(np.fft.rfft(pieces, axis=1)).mean(axis=0) / (np.sqrt(np.pi * size) / 2)
 
 
+@once
 def test_mean_spectrum_is_the_response(make_model: ModelMaker) -> None:
     model = make_model(0.05, LAYERS)
     signal = Renderer(model, seed=2).render(200.0, 2.0, samples=305_000)[5000:]
@@ -172,6 +177,7 @@ def test_mean_spectrum_is_the_response(make_model: ModelMaker) -> None:
     assert np.mean(measured / expected) == pytest.approx(1, abs=0.005)
 
 
+@once
 @pytest.mark.parametrize("rate_hz", [44100.0, 48000.0])
 def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: float) -> None:
     model = make_model(0.05, LAYERS)
@@ -210,6 +216,7 @@ def test_density_does_not_depend_on_the_rate(make_model: ModelMaker, rate_hz: fl
     assert level_db(3000, 10000, here) < -10
 
 
+@once
 def test_how_far_third_octaves_at_48_khz_are_from_the_models_own() -> None:
     """What the docstring of `Renderer` says, calculated at the planted textures' corners.
 
@@ -232,6 +239,7 @@ def test_how_far_third_octaves_at_48_khz_are_from_the_models_own() -> None:
     assert 0.1 < 10 * np.log10(max(within_band)) <= 0.15
 
 
+@once
 @pytest.mark.parametrize("rate_hz", [5000.0, 44100.0, 48000.0])
 def test_noise_alone_keeps_its_rms_at_any_rate(make_model: ModelMaker, rate_hz: float) -> None:
     signal = Renderer(make_model(0.1, []), rate_hz=rate_hz).render(
@@ -240,6 +248,7 @@ def test_noise_alone_keeps_its_rms_at_any_rate(make_model: ModelMaker, rate_hz: 
     assert np.sqrt(np.mean(signal**2)) == pytest.approx(0.1, rel=0.02)
 
 
+@once
 def test_band_level_is_right_while_parameters_jump() -> None:
     """20 ↔ 1500 Hz each millisecond: still G²·k/(1+k), where plain filters gain 10 to 33 dB."""
     model = TextureModel(
@@ -432,6 +441,7 @@ def test_an_overflow_does_not_stay_in_the_compensation() -> None:
     assert not after[-100:].any()
 
 
+@once
 def test_noise_of_the_readings_is_not_carried_on() -> None:
     """2 mm/s of it, read at every update or 125 times a second; against the clean stroke."""
     time_s = np.arange(10_000) / 5000
@@ -452,6 +462,7 @@ def test_noise_of_the_readings_is_not_carried_on() -> None:
     assert error_db(held, update_samples=40) < error_db(held) - 5
 
 
+@once
 def test_a_steady_hand_with_noise_is_as_loud_as_without() -> None:
     speed = 150 + np.random.default_rng(2).normal(0, 5, 50_000)
     force = np.full(speed.size, 1.5)
@@ -581,6 +592,7 @@ def test_models_of_both_kinds_are_driven_by_the_same_noise() -> None:
     )
 
 
+@once
 def test_ar_level_is_right_while_poles_jump() -> None:
     """20 ↔ 2300 Hz each millisecond: a direct form explodes, the lattice keeps its level."""
     model, count = jumping_ar_model(), 100_000
