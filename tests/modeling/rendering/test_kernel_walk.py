@@ -1,4 +1,4 @@
-"""The kernel, compiled by gcc in double and single precision, on four million arbitrary samples."""
+"""The kernel, compiled by gcc in double and single precision, on ten million arbitrary samples."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import modeling.rendering
 
 HERE = Path(__file__).parent
 KERNEL_FOLDER = Path(modeling.rendering.__file__).parent
-SAMPLES = 4_000_000
+SAMPLES = 10_000_000
 PRECISIONS = ("double", "float")
 # Each coefficient is right to a few units in the last place of numbers up to 2, and counts twice in
 # a square; a new state is the sum of four terms.
