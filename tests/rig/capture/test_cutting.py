@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
@@ -71,6 +71,7 @@ def cut(samples, rows, *, blocks=(), longest_s=1.0, speed_delay_s=0.0, grid=GRID
     st.sampled_from([0.2, 0.5, 1.0]),
     st.sampled_from([0.0, 0.015, 0.1]),
 )
+@example(1, [0.0546875], 0.2, 0.015)  # ends where time + delay is rounded past the last reading
 @settings(max_examples=30)
 def test_pieces_never_overlap_never_leave_their_cell_and_do_not_depend_on_blocks(
     readings_of, stroking, seed, blocks, longest_s, speed_delay_s
