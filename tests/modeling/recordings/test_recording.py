@@ -54,7 +54,7 @@ def test_unusable_samples_are_refused(
         ({"force_n": -0.1}, ["force_n", "0 N", 10000], -0.1),
         ({"force_n": np.inf}, ["force_n", "0 N", 10000], "inf"),
         ({"unit": "m/s2"}, ["unit", "g", "arbitrary"], "'m/s2'"),
-        ({"texture": "  "}, "texture name", "'  '"),
+        ({"texture": "  "}, "texture name", "' '"),
         ({"texture": "a\tb"}, "texture name", r"'a\tb'"),
         ({"texture": "a\nb"}, "texture name", r"'a\nb'"),
         ({"repeat": 0}, ["repeat", 1], 0),
