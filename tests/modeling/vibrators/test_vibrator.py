@@ -386,6 +386,16 @@ def test_rates_that_show_no_vibrator_are_refused(white, rate_hz) -> None:
         identify_vibrator(white, white, rate_hz=rate_hz)
 
 
+def test_a_click_after_the_last_segment_is_no_drive(white) -> None:
+    drive = np.zeros(2000)
+    drive[1951] = 1.0
+    with (
+        np.errstate(all="raise", under="ignore"),
+        refused(InputError, expected=["coherence", 0.8], got="0.00"),
+    ):
+        identify_vibrator(drive, white[:2000], rate_hz=200.0)
+
+
 @settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_any_records_end_in_a_vibrator_or_in_one_sentence(data) -> None:
