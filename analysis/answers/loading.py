@@ -19,6 +19,7 @@ from analysis.answers.order import (
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.answers.responses import PlannedTask, Responses
+from analysis.columns import shortened_hash
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
@@ -132,7 +133,7 @@ def _description(folder: Path) -> Mapping[str, object]:
     if isinstance(design, dict) and stated not in (None, found := sha256_of_values(design)):
         raise InputError(
             f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
-            f"{str(stated)[:8]}…, got {found[:8]}…; restore the file."
+            f"{shortened_hash(str(stated))}, got {shortened_hash(found)}; restore the file."
         )
     return description
 

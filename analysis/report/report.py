@@ -52,6 +52,7 @@ from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.writing import write_text
 
 LEAD = "Surfaces recorded, modelled, simplified by what can be felt, and judged."
@@ -262,7 +263,7 @@ def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
     chances = {
         task: chance_of(task, answers)
         for task, answers in tasks.items()
-        if "correct" in answers and len(answers)
+        if "correct" in ANSWER_TABLES[task].measures and len(answers)
     }
     return {task: chance for task, chance in chances.items() if not np.isnan(chance)}
 

@@ -11,7 +11,7 @@ from analysis.answers.responses import Responses
 from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
-from analysis.labels import ALL_TEXTURES, MODELS, TASKS
+from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
@@ -251,10 +251,10 @@ def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]
     who += " at the simulated rig" if responses.simulated_rig else ""
     trials = f"{len(responses.answers[task])} trials (training left out)"
     if planned is None:
-        return f"{where.capitalize()}: {people} {who}, {trials}.", (people, f"{who}, {where}")
+        return f"{sentence_case(where)}: {people} {who}, {trials}.", (people, f"{who}, {where}")
     people += f" of {planned.participants}"
     sentence = (
-        f"{where.capitalize()}: {people} planned {who}, {done.sessions} of {planned.sessions} "
+        f"{sentence_case(where)}: {people} planned {who}, {done.sessions} of {planned.sessions} "
         f"planned sessions, {trials}."
     )
     return sentence, (people, f"planned {who}, {where}")

@@ -12,7 +12,7 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.columns import Column, chosen, names
-from analysis.labels import TASKS
+from analysis.labels import TASKS, sentence_case
 from analysis.report.outcomes import Outcome
 from analysis.report.page import Item, Table
 from analysis.report.section_answers import rates_picture, rates_table, who_took_part
@@ -68,7 +68,7 @@ def task_section(
         items += shown
     return Section(
         f"task-{task}",
-        TASKS[task].capitalize(),
+        sentence_case(TASKS[task]),
         tuple(items),
         outcomes=tuple(outcomes),
         done=(done,),

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, TASKS
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, TASKS, sentence_case
 from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 from analysis.statistics.rates import UNKNOWN_CHANCE
@@ -25,7 +25,7 @@ def rate_outcomes(rates: pd.DataFrame, task: str, *, chance: float) -> list[Outc
     return [
         Outcome(
             Weight.DESCRIPTIVE if np.isnan(chance) else Weight.SECONDARY,
-            f"{TASKS[task].capitalize()}, {model} model: {compared(of_model)}.",
+            f"{sentence_case(TASKS[task])}, {model} model: {compared(of_model)}.",
         )
         for model, of_model in rates.groupby("model", sort=False)
     ]
@@ -211,6 +211,8 @@ def _described_rate(rates: pd.DataFrame) -> str:
 def _overall_rate(rates: pd.DataFrame) -> str:
     """Of how many answers over all textures were right; its bracket is left open."""
     overall = rates[rates["texture"] == ALL_TEXTURES].iloc[0]
+    if not overall["participants"]:
+        return "no participant has answered all textures (no share over all of them"
     interval = "no interval, for want of variation between participants"
     if np.isfinite(overall["ci_low"]):
         interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"

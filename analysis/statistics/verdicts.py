@@ -100,7 +100,7 @@ def all_claims(responses: Responses) -> tuple[Claim, ...]:
             planned=False,
         )
         for task in begun
-        for measure in measures_of(task)
+        for measure in ANSWER_TABLES[task].measures
         for pair in pairs_of(responses, task)
         if (task, measure, pair) not in known
     ]
@@ -112,17 +112,11 @@ def _exploratory_name(
 ) -> str:
     """The measure, with the model unless it is the usual one, and the task unless it is the first.
 
-    The first of those who have the measure, so that a task more renames no claim about another.
+    The first of those that have the measure, so that adding a task renames no claim.
     """
-    first = next(other for other in begun if measure in measures_of(other))
+    first = next(other for other in begun if measure in ANSWER_TABLES[other].measures)
     words = [MEASURES[measure], *pair[1:] * (pair != MODELS)]
     return " ".join([*words, *[f"of the {TASKS[task]}"] * (task != first)])
-
-
-def measures_of(task: str) -> tuple[str, ...]:
-    """Columns that claims about a task can be about; none of one that compares no models."""
-    table = ANSWER_TABLES[task]
-    return table.measures if table.of_surfaces else ()
 
 
 def pairs_of(responses: Responses, task: str) -> list[tuple[str, str]]:
@@ -170,13 +164,13 @@ def answers_about(responses: Responses, claim: Claim) -> pd.DataFrame:
 
 
 def holding_both(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFrame:
-    """Of a task whose trials hold both models: those of this pair, by the layout if there is one.
+    """Of a task whose trials hold both models: all, or none where it compares another pair.
 
-    Without a layout all are, as such a task compares two models.
+    Such a task compares two sets of models, as a study's check sees to.
     """
-    if "layout" not in answers:
+    if answers.empty or set(answers["model"].dropna()) <= set(models):
         return answers
-    return answers[[set(held.split("|")) == set(models) for held in answers["layout"]]]
+    return answers.iloc[:0]
 
 
 def repeats_of(responses: Responses, task: str) -> int:
@@ -223,23 +217,39 @@ def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator
 
 
 def chance_of(task: str, answers: pd.DataFrame) -> float:
-    """Share of right answers of who guesses, as the task's table declares it; NaN where it doesn't.
+    """Proportion correct of a participant who guesses, as the task's table declares it.
 
     Parameters
     ----------
     task : str
     answers : DataFrame
-        Of the task, one at least where chance follows from the number of alternatives.
+        Of the task.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; NaN where it is not declared, or no alternatives are listed.
+
+    Raises
+    ------
+    InputError
+        Where trials differ in the number of alternatives, so that no one chance holds.
     """
     table = ANSWER_TABLES[task]
-    if table.alternatives:
-        return 1 / max(len(listed.split("|")) for listed in answers[table.alternatives].dropna())
-    return table.chance
+    if not table.alternatives:
+        return table.chance
+    numbers = {len(listed.split("|")) for listed in answers[table.alternatives].dropna()}
+    if len(numbers) > 1:
+        raise InputError(
+            f"expected as many alternatives in every trial of the {table.title}, got "
+            f"{' and '.join(map(str, sorted(numbers)))}; declare its chance instead."
+        )
+    return 1 / numbers.pop() if numbers else float("nan")
 
 
 def has_rates(task: str) -> bool:
     """Whether shares of right answers with either model can be told: each trial has one of them."""
-    return "correct" in measures_of(task) and not ANSWER_TABLES[task].both_models
+    return "correct" in ANSWER_TABLES[task].measures and not ANSWER_TABLES[task].both_models
 
 
 def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:

@@ -72,8 +72,8 @@ class Claim:
         require_label("the name of a claim", self.name)
         if not measures_of(self.task):
             raise InputError(
-                f"expected a task with ratings or right answers in the claim {self.name}, got "
-                f"{self.task}, which has neither; leave the claim out."
+                f"expected a task with ratings or right answers about models in the claim "
+                f"{self.name}, got {self.task}, which compares no models; leave the claim out."
             )
         check_choice(f"the measure of {self.name}", self.measure, measures_of(self.task))
         check_choice(f"the test of {self.name}", self.test, TESTS)

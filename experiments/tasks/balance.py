@@ -137,10 +137,12 @@ def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
         within += [right[button] for button in range(len(trials[0].layout))]  # type: ignore[attr-defined]
     yield "trials of a session in which a button is right", within, len(sessions[0])
     trials_in_all = sum(map(len, sessions))
-    yield "trials of all in which a button is right", list(over.values()), trials_in_all
+    buttons = range(len(sessions[0][0].layout))  # type: ignore[attr-defined]
+    yield "trials of all in which a button is right", [over[b] for b in buttons], trials_in_all
 
 
 def _right(trial: Trial) -> int | None:
     layout: tuple[str, ...] = getattr(trial, "layout", ())
-    places = (layout.index(what) for what in (trial.texture, trial.model, "tone") if what in layout)
+    named = (trial.texture, trial.model, "tone")
+    places = (layout.index(what) for what in named if layout.count(what) == 1)
     return next(places, None)

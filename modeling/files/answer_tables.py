@@ -88,10 +88,11 @@ class AnswerTable:
         Whether every trial holds both models, so that the share of right answers is compared with
         chance, not that of one model with that of the other.
     chance : float
-        Share of right answers of who guesses, between 0 and 1; NaN where it is not known.
+        Proportion correct of a participant who guesses, between 0 and 1; NaN where it is not
+        known.
     alternatives : str
-        The column that lists what could be answered, separated by |, where chance is one over
-        their number.
+        The column that lists what could be answered, separated by |, as many in each trial;
+        chance is one over their number.
     """
 
     title: str
@@ -102,8 +103,23 @@ class AnswerTable:
     alternatives: str = ""
 
     def __post_init__(self) -> None:
+        names = [column.name for column in self.columns]
         if not (isnan(self.chance) or 0 < self.chance < 1):
             raise ValueError(f"expected a chance between 0 and 1, got {self.chance}; correct it.")
+        if self.alternatives and self.alternatives not in names:
+            raise ValueError(
+                f"expected a column of the {self.title} as its alternatives, got "
+                f"{self.alternatives!r}; name one of {', '.join(names)}."
+            )
+        if self.alternatives and not isnan(self.chance):
+            raise ValueError(
+                f"expected a chance or alternatives in the {self.title}, got both; keep one."
+            )
+        if (self.alternatives or not isnan(self.chance)) and "correct" not in names:
+            raise ValueError(
+                f"expected right answers in the {self.title}, whose chance is declared, got no "
+                "column correct; declare it."
+            )
         if self.both_models and (isnan(self.chance) or self.measures != ("correct",)):
             raise ValueError(
                 f"expected right answers and their chance in the {self.title}, whose trials hold "
@@ -112,7 +128,12 @@ class AnswerTable:
 
     @property
     def measures(self) -> tuple[str, ...]:
-        """The columns that claims can be about: ratings, and whether the answer is right."""
+        """The columns that claims can be about: ratings, and whether the answer is right.
+
+        None where nothing compares models.
+        """
+        if not self.of_surfaces:
+            return ()
         return tuple(c.name for c in self.columns if c.scale or c.name == "correct")
 
 

@@ -60,42 +60,52 @@ class Copy:
         self.folder = folder
         shutil.copytree(ROOT, folder, ignore=shutil.ignore_patterns(*NOT_COPIED))
         # Before the installed project, in every process that a test starts.
-        paths = {"PYTHONPATH": str(folder), "OPENBLAS_NUM_THREADS": "1"}
-        self._environment = {**os.environ, **paths}
+        own = {"PYTHONPATH": str(folder), "OPENBLAS_NUM_THREADS": "1"}
+        # Else git applies a patch to the repository around the copy, if there is one.
+        own["GIT_CEILING_DIRECTORIES"] = str(folder.parent)
+        self._environment = {**os.environ, **own}
         self._require_own_modules()
 
     def plant(self, bug: Bug, *, take_out: bool = False) -> None:
         """Apply a patch, or take it out again."""
         words = ["git", "apply", *["--reverse"] * take_out, str(bug.patch)]
-        self._run(*words, check=True)
+        self._run(*words)
         if bug.is_in_c:
             os.utime(self.folder / bug.file)
-            self._run(sys.executable, "setup.py", "-q", "build_ext", "--inplace", check=True)
+            self._run(sys.executable, "setup.py", "-q", "build_ext", "--inplace")
 
     def first_failure(self, place: str | Path, *, without: list[str | Path]) -> str:
-        """The first test that fails there; "" where none does."""
+        """The first test that fails there, or how pytest crashed; "" where none does."""
         failed = self.folder / ".pytest_cache" / "v" / "cache" / "lastfailed"
         failed.unlink(missing_ok=True)
         left_out = [f"--{'ignore' if isinstance(w, Path) else 'deselect'}={w}" for w in without]
         pytest = [sys.executable, "-m", "pytest", "-q", "-x", f"--timeout={SECONDS_PER_TEST}"]
-        self._run(*pytest, *left_out, str(place))
-        return next(iter(json.loads(failed.read_text())), "") if failed.exists() else ""
+        ended = self._ran(*pytest, *left_out, str(place))
+        if ended.returncode < 0:  # a planted bug in C can take Python with it
+            return str(place)
+        if ended.returncode not in (0, 1, 5):  # 5: every test there is left out
+            sys.exit(f"{' '.join(pytest)} {place}: {ended.stdout}{ended.stderr}")
+        return next(iter(json.loads(failed.read_text()))) if ended.returncode == 1 else ""
 
     def _require_own_modules(self) -> None:
         """Refuse a copy whose tests would run the installed project."""
         modules = ("modeling.rendering._kernel", "rig.live._live", "tactileq.app", "tests.conftest")
         told = "; ".join(f"import {name} as m; print(m.__file__)" for name in modules)
-        for file in self._run(sys.executable, "-c", told, check=True).split():
+        for file in self._run(sys.executable, "-c", told).split():
             if not Path(file).is_relative_to(self.folder):
                 sys.exit(f"expected modules of {self.folder}, got {file}; run make install.")
 
-    def _run(self, *words: str, check: bool = False) -> str:
-        ran = subprocess.run(
-            words, cwd=self.folder, env=self._environment, capture_output=True, text=True
-        )
-        if check and ran.returncode:
+    def _run(self, *words: str) -> str:
+        """What it printed; it has to succeed."""
+        ran = self._ran(*words)
+        if ran.returncode:
             sys.exit(f"{' '.join(words)}: {ran.stdout}{ran.stderr}")
         return ran.stdout
+
+    def _ran(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            words, cwd=self.folder, env=self._environment, capture_output=True, text=True
+        )
 
 
 def caught_by(bug: Bug, copy: Copy) -> str:

@@ -203,12 +203,14 @@ def test_a_task_without_ratings_or_right_answers_is_counted(tmp_path, declare, a
     assert tables["careless"].empty
 
 
+@pytest.mark.parametrize("layout", [None, "texture|another", np.nan])
 def test_where_trials_hold_both_models_right_answers_are_compared_with_chance(
-    declare, alone, pairs
+    declare, alone, pairs, layout
 ):
     declare(CORRECT, both_models=True, chance=1 / 2)
     planned = {"pair": PlannedTask(18, 18, repeats=6)}
-    held = replace(alone, answers={"pair": pairs.drop(columns="layout")}, planned=planned)
+    pairs = pairs.drop(columns="layout") if layout is None else pairs.assign(layout=layout)
+    held = replace(alone, answers={"pair": pairs}, planned=planned)
     tables = tables_of(section_of(held))
     assert "correct_rates_pair" not in tables  # of either model there is none
     row = tables["claims_pair"].set_index("texture").loc[ALL_TEXTURES]

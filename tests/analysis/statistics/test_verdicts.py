@@ -221,6 +221,15 @@ def test_equality_of_guesses_is_none(answers):
     assert one.tests["verdict"].iloc[0] == WITHHELD
 
 
+def test_chance_is_one_over_the_alternatives_that_every_trial_has(answers):
+    of_three = answers.relative.assign(layout="a|b|c")
+    assert chance_of("relative", of_three) == 1 / 3
+    assert np.isnan(chance_of("relative", of_three.assign(layout=np.nan)))
+    of_three.loc[of_three.index[0], "layout"] = "a|b"
+    with refused(InputError, expected="forced choice", got=[2, 3]):
+        chance_of("relative", of_three)
+
+
 def test_everybody_right_is_above_chance_and_equal(answers):
     always = replace(answers, answers={"relative": answers.relative.assign(correct=1.0)})
     (one,) = claims_found(always, rng=rng())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from modeling.files.answer_tables import (
@@ -11,6 +13,7 @@ from modeling.files.answer_tables import (
     AnswerColumn,
     answer_table,
 )
+from tests.refusals import refused
 
 ABOUT = {"title": "dummy", "texture": "", "model": ""}
 
@@ -21,7 +24,7 @@ def test_claims_can_be_about_ratings_and_right_answers() -> None:
         "absolute": ("magnitude_similarity", "frequency_similarity"),
         "relative": ("correct",),
         "oddity": ("correct",),
-        "threshold": ("correct",),
+        "threshold": (),  # which compares no models
     }
     assert answer_table(RESPONSE_TIME, **ABOUT).measures == ()
 
@@ -40,6 +43,22 @@ def test_trials_of_both_models_need_right_answers_and_their_chance(
     chance = {} if own == (CORRECT,) else {"chance": 0.5}
     with pytest.raises(ValueError, match="right answers and their chance"):
         answer_table(*own, both_models=True, **chance, **ABOUT)
+
+
+@pytest.mark.parametrize(
+    ("own", "declared", "named"),
+    [
+        ((CORRECT,), {"alternatives": "layouts"}, "layouts"),
+        ((CORRECT, RESPONSE_TIME), {"alternatives": RESPONSE_TIME.name, "chance": 0.5}, "both"),
+        ((RESPONSE_TIME,), {"chance": 0.5}, "correct"),
+        ((RESPONSE_TIME,), {"alternatives": RESPONSE_TIME.name}, "correct"),
+    ],
+)
+def test_a_chance_that_cannot_be_told_is_refused_before_any_study(
+    own: tuple[AnswerColumn, ...], declared: dict[str, Any], named: str
+) -> None:
+    with refused(ValueError, expected="dummy", got=named):
+        answer_table(*own, **declared, **ABOUT)
 
 
 @pytest.mark.parametrize("chance", [0.0, 1.0, 50.0])
