@@ -6,7 +6,7 @@ docs/method/protocols.md#admission
 from __future__ import annotations
 
 from dataclasses import replace
-from datetime import datetime
+from datetime import date, datetime
 
 from experiments.sessions.data_set import claim_data_set
 from experiments.sessions.files import SessionFiles
@@ -78,14 +78,16 @@ def _require_day_before(
             f"expected {before.stem} complete before session {manifest.session}, got {got}; "
             "complete that one first",
         )
-    if state.last_utc and not manifest.simulated_participant and _is_today(state.last_utc):
+    if not state.last_utc or manifest.simulated_participant:
+        return
+    ended, today = _local_date(datetime.fromisoformat(state.last_utc)), _local_date(now_utc())
+    if ended >= today:
         overrides.allow(
             "same date",
-            f"expected session {manifest.session} on a later date than {before.stem}, got the same "
-            "one; let the participant come on another day",
+            f"expected session {manifest.session} on a later date than {before.stem}, which ended "
+            f"on {ended}, got {today}; let the participant come on another day",
         )
 
 
-def _is_today(utc: str) -> bool:
-    """Whether this moment, or a later one, is of the local date of now."""
-    return datetime.fromisoformat(utc).astimezone().date() >= now_utc().astimezone().date()
+def _local_date(moment: datetime) -> date:
+    return moment.astimezone().date()

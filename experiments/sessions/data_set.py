@@ -93,14 +93,14 @@ def _check(
 
 def _told(key: str, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     if key == "StudySHA256":
-        return f"study, got another {_differing(found, wanted, 'StudyDesign')}"
+        return f"study, got another {differing(found.get('StudyDesign'), wanted['StudyDesign'])}"
     if key == "ModelsSHA256":
-        return f"set of models, got another {_differing(found, wanted, key)}"
+        return f"set of models, got another {differing(found.get(key), wanted[key])}"
     return f"kind (pilot {wanted[key]}), got {shown(found.get(key))}"
 
 
-def _differing(found: Mapping[str, Any], wanted: Mapping[str, Any], key: str) -> str:
-    there, here = found.get(key), wanted[key]
+def differing(there: object, here: Mapping[str, Any]) -> str:
+    """The names whose values differ; what is there, where that has no names."""
     if not isinstance(there, dict):
         return shown(there)
     names = sorted(k for k in there.keys() | here if there.get(k) != here.get(k))

@@ -59,7 +59,8 @@ def held_session(files: SessionFiles) -> Held:
     manifest = SessionManifest.load(files.manifest)
     _check_place(manifest, files)
     _check_logged(state.events, files)
-    _check_named(state.events, files)
+    stored = read_bytes(files.manifest, "the manifest of a session")
+    check_named(state.events, files, sha256=hashlib.sha256(stored).hexdigest())
     _check_rows(state.events, files)
     return Held(files=files, manifest=manifest, state=state)
 
@@ -89,13 +90,12 @@ def _check_logged(events: Sequence[Event], files: SessionFiles) -> None:
         )
 
 
-def _check_named(events: Sequence[Event], files: SessionFiles) -> None:
-    """Refuse a manifest that is not the one with which the log began."""
-    stored = hashlib.sha256(read_bytes(files.manifest, "the manifest of a session")).hexdigest()
-    if events and events[0]["manifest_sha256"] != stored:
+def check_named(events: Sequence[Event], files: SessionFiles, *, sha256: str) -> None:
+    """Refuse a manifest of this hash where the log did not begin with it."""
+    if events and (named := events[0]["manifest_sha256"]) != sha256:
         raise InputError(
-            f"expected the manifest that {files.log} names, got a changed {files.manifest}; "
-            "restore that file from a copy."
+            f"expected the manifest {named[:8]}… that {files.log} names, got {sha256[:8]}… in "
+            f"{files.manifest}; restore that file from a copy."
         )
 
 

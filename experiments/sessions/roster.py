@@ -121,7 +121,7 @@ class Roster:
             entries = listed.entries
             number = subject if subject is not None else _first_free(entries)
             if number in entries:
-                _require_own_slot(number, entries)
+                _require_own_slot(number, entries, path=self.path)
                 yield self._known(entries[number], participants, simulated=simulated)
                 return
             self._require_whole(listed)
@@ -304,16 +304,17 @@ def _enter(event: Mapping[str, Any], entries: dict[int, dict[str, Any]]) -> None
 _KINDS = {"subject": int, "slot": int, "code": str, "utc": str, "simulated": bool, "pilot": bool}
 
 
-def _require_own_slot(subject: int, entries: Mapping[int, Mapping[str, Any]]) -> None:
+def _require_own_slot(
+    subject: int, entries: Mapping[int, Mapping[str, Any]], *, path: Path
+) -> None:
     """Refuse whose slot somebody has who came later: the line that freed it was lost."""
     later = list(entries.values())[list(entries).index(subject) + 1 :]
     slot = entries[subject]["slot"]
-    if not entries[subject]["left"] and any(
-        one["slot"] == slot and not one["left"] for one in later
-    ):
+    others = [one["subject"] for one in later if one["slot"] == slot and not one["left"]]
+    if others and not entries[subject]["left"]:
         raise InputError(
-            f"expected slot {slot} to be that of subject {subject} alone, got one more who was "
-            "enrolled later in its place; note that the subject dropped out, or restore the roster."
+            f"expected slot {slot} to be that of subject {subject} alone, got subject {others[0]} "
+            f"enrolled in it later; note that subject {subject} dropped out, or restore {path}."
         )
 
 

@@ -115,7 +115,7 @@ def study_progress(
     held, damaged = held_sessions(root)
     if study is None and not held:
         raise InputError(
-            f"expected sessions below {root / 'sourcedata'}, found none"
+            f"expected sessions below {root / 'sourcedata'}, got none"
             f"{' that can be read' if damaged else ''}; name the study's file with --study."
         )
     design = study.to_dict() if study is not None else held[0].manifest.study

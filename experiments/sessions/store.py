@@ -16,11 +16,13 @@ from types import TracebackType
 from typing import Any, Protocol, Self
 
 from experiments.sessions.admission import admit, refuse_begun
+from experiments.sessions.data_set import differing
 from experiments.sessions.files import (
     SessionFiles,
     open_file,
     write_new,
 )
+from experiments.sessions.held import check_named
 from experiments.sessions.log import ENDINGS, OWN_FIELDS, read_log, utc_text
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
@@ -463,12 +465,7 @@ def _check_open(state: SessionState, stored: SessionManifest, *, files: SessionF
             f"expected a session to go on with, got {files.stem}, which is complete; choose "
             "another subject or session."
         )
-    named = state.events[0].get("manifest_sha256") if state.events else stored.sha256
-    if named != stored.sha256:
-        raise InputError(
-            f"expected the manifest that {files.log} names, got a changed {files.manifest}; "
-            "restore that file from a copy."
-        )
+    check_named(state.events, files, sha256=stored.sha256)
 
 
 def _check_unchanged(
@@ -480,12 +477,15 @@ def _check_unchanged(
                 f"expected {name} {getattr(stored, name)}, as {files.stem} began, got "
                 f"{getattr(now, name)}; go on as it began."
             )
-    for what, name in (("study", "study_sha256"), ("models", "models_sha256")):
+    for what, name, told in (
+        ("study", "study_sha256", "study"),
+        ("models", "models_sha256", "models_sha256"),
+    ):
         if stored.values[name] != now.values[name]:
             overrides.allow(
                 what,
-                f"expected the {what} that {files.stem} began with, got changed ones; restore what "
-                "was there",
+                f"expected the {what} that {files.stem} began with, got another "
+                f"{differing(stored.values[told], now.values[told])}; restore what was there",
             )
 
 

@@ -53,10 +53,10 @@ class Rating:
     response_time_s: float
 
     def __post_init__(self) -> None:
-        for value in (self.magnitude_similarity, self.frequency_similarity):
-            if not 0.0 <= value <= HIGHEST_RATING:
+        for name in ("magnitude_similarity", "frequency_similarity"):
+            if not 0.0 <= (value := getattr(self, name)) <= HIGHEST_RATING:
                 raise InputError(
-                    f"expected a similarity from 0 to {HIGHEST_RATING:g}, got {value}; rate again."
+                    f"expected {name} from 0 to {HIGHEST_RATING:g}, got {value}; rate again."
                 )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from experiments.sessions.files import open_file, write_all
 from experiments.sessions.writer import store_error
 from modeling import InputError
+from modeling.errors import shown
 
 MISSING = "n/a"
 
@@ -50,8 +51,8 @@ class GrowingTable:
         header = "\t".join(self._columns).encode() + b"\n"
         if whole and not whole.startswith(header):
             raise InputError(
-                f"expected the columns {', '.join(self._columns)} in {self.path}, got others; "
-                "move that file away."
+                f"expected the columns {', '.join(self._columns)} in {self.path}, got "
+                f"{shown(whole.splitlines()[0].decode('utf-8', 'replace'))}; move that file away."
             )
         if len(whole) < len(there):
             os.ftruncate(self._handle, len(whole))

@@ -312,7 +312,7 @@ class _Running:
         answer = self._task.ask(self._respondent, trial, surfaces)
         rig.silence()
         if not surfaces.started:
-            raise RuntimeError("the respondent answered without having started the trial")
+            raise RuntimeError(f"expected trial {trial.trial} to be started, got an answer before.")
         return answer
 
     def _mount(self, trial: Trial) -> None:

@@ -219,7 +219,7 @@ def estimate(answers: Sequence[Answer], frequency_hz: float) -> Estimate:
     """
     own = [answer for answer in answers if answer.frequency_hz == frequency_hz]
     if not own:
-        raise InputError("expected answers at this frequency, got none; run the session.")
+        raise InputError(f"expected answers at {frequency_hz:g} Hz, got none; run the session.")
     weights = posterior(answers, frequency_hz)
     threshold_db, slope, lapse_rate = _parameters()
     point_db = threshold_db + POINT_DB / slope

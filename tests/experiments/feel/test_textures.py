@@ -10,6 +10,7 @@ import pytest
 from experiments.feel.textures import Texture, load_textures
 from modeling import InputError, Threshold, fit_ar, regressed, simplify
 from stimuli.planted.textures import planted_texture, record_texture
+from tests.refusals import refused
 
 
 def test_files_and_folders_give_textures_in_their_order(tmp_path: Path) -> None:
@@ -41,9 +42,9 @@ def test_what_cannot_be_felt_is_refused_in_one_sentence(tmp_path: Path) -> None:
     planted_texture("PVC").save(fewer / "PVC.json")
 
     def refusal(*named: str, simplified: Path | None = None) -> str:
-        with pytest.raises(InputError) as refused:
+        with pytest.raises(InputError) as told:
             load_textures([tmp_path / name for name in named], simplified)
-        return str(refused.value)
+        return str(told.value)
 
     assert refusal("nothing.json").startswith("expected a model file at ")
     assert "got an autoregressive one" in refusal("ar.json")
@@ -52,5 +53,5 @@ def test_what_cannot_be_felt_is_refused_in_one_sentence(tmp_path: Path) -> None:
     told = refusal("a.json", simplified=fewer)
     assert told.startswith("expected a simplified model of canvas in ")
     assert told.endswith("got PVC; simplify the models that are to be felt.")
-    with pytest.raises(InputError, match="of one rate, got 5000 and 8000 Hz"):
+    with refused(InputError, names="canvas", got=[5000, "8000 Hz"]):
         Texture(full=canvas, simplified=canvas.at_rate(8000.0))

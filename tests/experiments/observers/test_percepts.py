@@ -23,6 +23,7 @@ from experiments.study.study import Study
 from modeling import InputError, TextureModel, Threshold
 from modeling.models.ar_model import ARModel
 from tests.experiments.observers.planted_models import flat_threshold, texture_model
+from tests.refusals import refused
 from tests.rig.planted import planted_stimulus
 
 PERCEPTS = arrays(np.float64, (3, 9), elements=st.floats(0.0, 80.0))
@@ -104,7 +105,7 @@ def test_nothing_is_felt_where_no_threshold_is_known() -> None:
 
 def test_models_in_arbitrary_units_are_refused() -> None:
     model = replace(texture_model(0.5), unit="arbitrary")
-    with pytest.raises(InputError, match="expected a model in g"):
+    with refused(InputError, expected="g", got=[model.texture, "'arbitrary'"]):
         sensation_levels(model, flat_threshold(0.001))
 
 
@@ -178,5 +179,5 @@ def test_a_real_surface_without_truth_is_refused(
     study: Study, models: ModelSets, threshold: Threshold
 ) -> None:
     truth = {"PVC": models.of("PVC", "full")}
-    with pytest.raises(InputError, match="got none for canvas, MDF"):
+    with refused(InputError, got=["canvas", "MDF"]):
         Perception(study, real=truth, models=models, threshold=threshold)

@@ -7,8 +7,6 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from experiments import Study, simulate_study
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.percepts import Perception
@@ -17,6 +15,7 @@ from experiments.study.models import ModelSets
 from modeling import InputError, TextureModel, Threshold, simplify
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
+from tests.refusals import refused
 
 
 def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more: Any) -> Any:
@@ -132,5 +131,5 @@ def test_a_study_is_not_simulated_twice_into_one_folder(
     threshold: Threshold,
 ) -> None:
     simulate(study, tmp_path, truths, models, threshold=threshold)
-    with pytest.raises(InputError, match="expected a session that has not been run"):
+    with refused(InputError, expected="session", got="complete"):
         simulate(study, tmp_path, truths, models, threshold=threshold)

@@ -15,6 +15,7 @@ import pytest
 from experiments.sessions import program
 from experiments.sessions.manifest import SessionManifest
 from modeling import InputError
+from tests.refusals import refused
 
 ManifestOf = Callable[..., SessionManifest]
 
@@ -117,10 +118,10 @@ def test_what_is_no_manifest_is_refused(
 
 def test_a_cut_or_missing_manifest_is_refused(tmp_path: Path, manifest_of: ManifestOf) -> None:
     path = tmp_path / "manifest.json"
-    with pytest.raises(InputError, match="the manifest of a session"):
+    with refused(InputError, names=["manifest", path]):
         SessionManifest.load(path)
     path.write_text(manifest_of().text[:200])
-    with pytest.raises(InputError, match="expected JSON in .*restore the file from a copy"):
+    with refused(InputError, expected=["JSON", path]):
         SessionManifest.load(path)
     values = json.loads(manifest_of().text)
     del values["slot"]

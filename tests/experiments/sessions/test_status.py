@@ -12,6 +12,7 @@ from experiments.sessions.status import TaskProgress, study_progress
 from experiments.sessions.store import SessionStore
 from experiments.sessions.withdrawing import drop_out, withdraw
 from modeling import InputError
+from tests.refusals import refused
 
 TODAY = datetime.now().astimezone().date()
 
@@ -96,7 +97,7 @@ def test_no_name_of_a_condition_is_told(write_session):
 
 
 def test_a_folder_without_sessions_is_refused(tmp_path):
-    with pytest.raises(InputError, match="expected sessions below"):
+    with refused(InputError, expected=["sessions", tmp_path / "sourcedata"], got="--study"):
         study_progress(tmp_path)
-    with pytest.raises(InputError, match="expected the data folder of a study, got none at"):
+    with refused(InputError, expected="folder", got=["elsewhere", "--data"]):
         study_progress(tmp_path / "elsewhere")

@@ -22,6 +22,7 @@ from modeling import InputError
 from rig.interface import Acceleration, Fault, ToneBurst
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready, Scripted
+from tests.refusals import refused
 
 
 @dataclass
@@ -185,7 +186,7 @@ def test_an_answer_without_a_presentation_is_a_mistake_of_the_program(
         def rate(self, trial: Any, surfaces: Surfaces) -> Rating:
             return Rating(magnitude_similarity=1, frequency_similarity=1, response_time_s=0.0)
 
-    with pytest.raises(RuntimeError, match="without having started"):
+    with refused(RuntimeError, expected="trial 1"):
         run(Hasty())
 
 
@@ -265,7 +266,7 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
     assert rig.notes[-1] == ("virtual", several[2])
     assert (surfaces.selected, surfaces.presses, surfaces.switches) == (2, 2, 3)
     assert surfaces.felt == {2}
-    with pytest.raises(InputError, match="button from 0 to 2"):
+    with refused(InputError, expected=["button", 0, 2], got=3):
         surfaces.present_virtual(3)
 
 
@@ -306,7 +307,7 @@ def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
 
 @pytest.mark.parametrize("value", [-0.1, 100.1, float("nan")])
 def test_impossible_ratings_are_refused(value: float) -> None:
-    with pytest.raises(InputError, match="from 0 to 100"):
+    with refused(InputError, expected=["magnitude_similarity", 0, 100], got=value):
         Rating(magnitude_similarity=value, frequency_similarity=50.0, response_time_s=1.0)
 
 

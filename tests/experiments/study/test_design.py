@@ -28,6 +28,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from modeling import InputError
+from tests.refusals import refused
 
 SEEDS = range(200)
 THREE = {"full": "models", "paper": "paper", "simplified": "simplified"}
@@ -485,20 +486,20 @@ def test_blocks_share_their_numbers_and_deal_each_place_once() -> None:
 
 
 @pytest.mark.parametrize(
-    ("task", "subject", "session", "slot", "told"),
+    ("task", "subject", "session", "slot", "expected", "got"),
     [
-        ("absolute", 0, 1, 1, "for subject, got 0"),
-        ("absolute", 10_000, 1, 1, "for subject, got 10000"),
-        ("absolute", 21, 1, None, "from 1 to 20 for slot, got 21"),
-        ("absolute", 1, 1, 0, "for slot, got 0"),
-        ("absolute", 1, 2, 1, "from 1 to 1 for session, got 2"),
-        ("relative", 1, 3, 1, "from 1 to 2 for session, got 3"),
+        ("absolute", 0, 1, 1, "subject", 0),
+        ("absolute", 10_000, 1, 1, "subject", 10000),
+        ("absolute", 21, 1, None, ["slot", 1, 20], 21),
+        ("absolute", 1, 1, 0, "slot", 0),
+        ("absolute", 1, 2, 1, ["session", 1], 2),
+        ("relative", 1, 3, 1, ["session", 1, 2], 3),
     ],
 )
 def test_sessions_that_the_study_has_not_are_refused(
-    task: str, subject: int, session: int, slot: int | None, told: str
+    task: str, subject: int, session: int, slot: int | None, expected: object, got: int
 ) -> None:
-    with pytest.raises(InputError, match=told):
+    with refused(InputError, expected=expected, got=got):
         plan_session(shipped(), task=task, subject=subject, session=session, slot=slot)
 
 

@@ -13,6 +13,7 @@ from experiments.study.study import SHIPPED_STUDY, Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
+from tests.refusals import refused
 
 
 def edited(folder: Path, old: str, new: str) -> Path:
@@ -78,7 +79,7 @@ def test_models_of_a_task_stand_in_the_studys_order_and_are_the_first_two_by_def
     assert study.models_of("oddity") == study.models_of("relative") == ("full", "AR")
     assert [study.sessions(task) for task in study.tasks] == [3, 2, 1]
     assert list(study.tasks) == ["absolute", "relative", "oddity"]
-    with pytest.raises(InputError, match="expected the task absolute or relative, got 'oddity'"):
+    with refused(InputError, expected=["absolute", "relative"], got="'oddity'"):
         Study.load().plan_of("oddity")
 
 
@@ -244,14 +245,14 @@ def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
     three = {"full": "a", "paper": "b", "simplified": "c"}
     plan = TaskPlan(participants=20, schedule="by-day", models=tuple(three))
     shipped = replace(Study.load(), plan=Plan())
-    with pytest.raises(InputError, match="a multiple of 3 of participants"):
+    with refused(InputError, expected=[3, "participants"], got=20):
         replace(shipped, models=three, tasks={"absolute": plan})
     study = replace(shipped, models=three, tasks={"absolute": replace(plan, participants=21)})
     assert study.sessions("absolute") == 3
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="expected a study file"):
+    with refused(InputError, expected=["study", tmp_path / "none.toml"]):
         Study.load(tmp_path / "none.toml")
 
 
@@ -260,12 +261,7 @@ def test_no_claim_about_a_task_without_ratings_or_right_answers(
 ) -> None:
     about = {"title": "pair comparison", "texture": "", "model": ""}
     monkeypatch.setitem(ANSWER_TABLES, "pair", answer_table(RESPONSE_TIME, **about))
-    with pytest.raises(InputError, match="ratings or right answers in the claim alike, got pair"):
-        Claim(
-            name="alike",
-            task="pair",
-            measure="response_time_s",
-            models=("full", "simplified"),
-            bounds=(-1.0, 1.0),
-            test="difference",
-        )
+    claim = {"name": "alike", "models": ("full", "simplified"), "test": "difference"}
+    for task, measure in (("pair", "response_time_s"), ("threshold", "correct")):
+        with refused(InputError, expected="alike", got=task):
+            Claim(**claim, task=task, measure=measure, bounds=(-0.1, 0.1))

@@ -21,6 +21,7 @@ from experiments.tasks.durations import minutes_of_session, trials_of_session
 from experiments.tasks.page import plan_page, proof_of_sensitivity
 from modeling import InputError, TextureModel, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES
+from tests.refusals import refused
 
 
 def test_the_papers_study_is_balanced() -> None:
@@ -213,5 +214,5 @@ def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: Mode
 
 
 def test_what_is_not_planned_has_no_balance(study: Study) -> None:
-    with pytest.raises(InputError, match="expected the task absolute or relative, got 'oddity'"):
+    with refused(InputError, expected=["absolute", "relative"], got="'oddity'"):
         balance_of(study, "oddity")

@@ -29,6 +29,7 @@ from rig.interface import ToneBurst
 from rig.twin import SimulatedRig
 from tests.experiments.scripted import Ready
 from tests.experiments.tasks.planted_threshold import Feeling
+from tests.refusals import refused
 
 PLANTED_DB = (-35.0, -33.0, -37.0, -42.0, -44.0, -31.0, -18.0, -6.0)
 
@@ -108,7 +109,7 @@ def test_the_layout_says_where_the_tone_is() -> None:
 
 def test_by_day_is_refused(study: Study) -> None:
     plan = replace(study.plan_of("threshold"), schedule="by-day")
-    with pytest.raises(InputError, match=r"expected the schedule interleaved in \[threshold\]"):
+    with refused(InputError, expected=["interleaved", "threshold"], got="by-day"):
         replace(study, tasks={**study.tasks, "threshold": plan})
 
 

@@ -29,6 +29,7 @@ from experiments.tasks.threshold_posterior import (
 from modeling import InputError
 from modeling.arrays import Floats
 from tests.experiments.tasks.planted_threshold import HIGHEST_DB, asked, rows_of, weibull
+from tests.refusals import refused
 
 
 def answer(level_db: float, correct: bool, *, highest_db: float = HIGHEST_DB) -> Answer:
@@ -127,7 +128,7 @@ def test_no_level_is_beyond_what_the_rig_may_present(highest_db: float, right: l
 
 
 def test_a_rig_that_presents_nothing_is_refused() -> None:
-    with pytest.raises(InputError, match="expected a rig that presents -70 dB re 1 g, got -70.5"):
+    with refused(InputError, expected=["rig", "-70 dB"], got="-70.5 dB"):
         level([], -70.5)
 
 
@@ -248,5 +249,5 @@ def test_damaged_rows_are_refused(column: str, value: object, sentence: str) -> 
 
 
 def test_no_answer_gives_no_estimate() -> None:
-    with pytest.raises(InputError, match="expected answers at this frequency, got none"):
+    with refused(InputError, expected=["answers", "250 Hz"]):
         estimate([], 250.0)

@@ -16,6 +16,7 @@ from experiments.tasks.threshold_table import (
 from modeling import InputError, Threshold
 from modeling.files.tables import read_table
 from tests.experiments.tasks.planted_threshold import rows_of, write_answers
+from tests.refusals import refused
 
 
 def found(frequency_hz: float, level_db: float, **of: object) -> Estimate:
@@ -78,7 +79,7 @@ def test_where_somebody_feels_nothing_the_mean_is_a_bound() -> None:
 
 
 def test_one_frequency_is_no_table() -> None:
-    with pytest.raises(InputError, match="two frequencies or more for a table of thresholds, got"):
+    with refused(InputError, expected="frequencies", got=1):
         mean_thresholds({"sub-01": {20.0: found(20.0, -30.0)}})
 
 
@@ -134,14 +135,14 @@ def test_pilots_and_training_are_no_data(tmp_path: Path) -> None:
     write_answers(tmp_path, 1, session(-30, -40, pilot="true"))
     write_answers(tmp_path, 2, session(-30, -40, phase="training"))
     for subject in (None, 1, 2, 3):
-        with pytest.raises(InputError, match="to main trials of the threshold task in .* got none"):
+        with refused(InputError, expected=["threshold", tmp_path], got="tactileq session"):
             read_answers(tmp_path, subject=subject)
 
 
 def test_people_and_simulated_ones_are_not_averaged(tmp_path: Path) -> None:
     write_answers(tmp_path, 1, session(-30, -40))
     write_answers(tmp_path, 2, session(-30, -40, simulated="false"))
-    with pytest.raises(InputError, match="expected answers of people or of simulated ones in"):
+    with refused(InputError, expected=["simulated", tmp_path], got="--subject"):
         read_answers(tmp_path)
     assert not read_answers(tmp_path, subject=2).simulated
 
