@@ -88,7 +88,7 @@ def speed_accuracy_section(
         items += tables
         items.append(_details(relative, "relative", models, simulated=simulated, rng=rng))
     oddity = answers.get("oddity", pd.DataFrame(columns=["layout"]))
-    oddity = holding_both(oddity, models).assign(model=BOTH)
+    oddity = holding_both("oddity", oddity, models).assign(model=BOTH)
     if len(oddity) and len(participant_scores(oddity, models=(BOTH,))):
         chance = chance_of("oddity", oddity)
         items += _pictures(oddity, "oddity", (BOTH,), chance=chance, simulated=simulated)

@@ -159,18 +159,16 @@ def answers_about(responses: Responses, claim: Claim) -> pd.DataFrame:
     """The main trials in which one of the claim's models was presented; both, where trials do."""
     answers = responses.answers[claim.task]
     if ANSWER_TABLES[claim.task].both_models:
-        return holding_both(answers, claim.models)
+        return holding_both(claim.task, answers, claim.models)
     return answers[answers["model"].isin(claim.models)]
 
 
-def holding_both(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFrame:
-    """Of a task whose trials hold both models: all, or none where it compares another pair.
-
-    Such a task compares two sets of models, as a study's check sees to.
-    """
-    if answers.empty or set(answers["model"].dropna()) <= set(models):
+def holding_both(task: str, answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFrame:
+    """Of a task whose trials hold both models: those of this pair, where its table lists them."""
+    listed = ANSWER_TABLES[task].models_in
+    if not listed:
         return answers
-    return answers.iloc[:0]
+    return answers[[set(str(held).split("|")) == set(models) for held in answers[listed]]]
 
 
 def repeats_of(responses: Responses, task: str) -> int:

@@ -93,6 +93,9 @@ class AnswerTable:
     alternatives : str
         The column that lists what could be answered, separated by |, as many in each trial;
         chance is one over their number.
+    models_in : str
+        The column that lists the models of a trial that holds both, separated by |; without it
+        all trials hold the two that the task compares.
     """
 
     title: str
@@ -101,21 +104,23 @@ class AnswerTable:
     both_models: bool = False
     chance: float = nan
     alternatives: str = ""
+    models_in: str = ""
 
     def __post_init__(self) -> None:
         names = [column.name for column in self.columns]
         if not (isnan(self.chance) or 0 < self.chance < 1):
             raise ValueError(f"expected a chance between 0 and 1, got {self.chance}; correct it.")
-        if self.alternatives and self.alternatives not in names:
-            raise ValueError(
-                f"expected a column of the {self.title} as its alternatives, got "
-                f"{self.alternatives!r}; name one of {', '.join(names)}."
-            )
+        for listed in (self.alternatives, self.models_in):
+            if listed and listed not in names:
+                raise ValueError(
+                    f"expected a column of the {self.title} that lists what a trial holds, got "
+                    f"{listed!r}; name one of {', '.join(names)}."
+                )
         if self.alternatives and not isnan(self.chance):
             raise ValueError(
                 f"expected a chance or alternatives in the {self.title}, got both; keep one."
             )
-        if (self.alternatives or not isnan(self.chance)) and "correct" not in names:
+        if not self.both_models and self._has_chance and "correct" not in names:
             raise ValueError(
                 f"expected right answers in the {self.title}, whose chance is declared, got no "
                 "column correct; declare it."
@@ -125,6 +130,10 @@ class AnswerTable:
                 f"expected right answers and their chance in the {self.title}, whose trials hold "
                 "both models, so that nothing else can be claimed; declare them."
             )
+
+    @property
+    def _has_chance(self) -> bool:
+        return bool(self.alternatives) or not isnan(self.chance)
 
     @property
     def measures(self) -> tuple[str, ...]:
@@ -146,6 +155,7 @@ def answer_table(
     both_models: bool = False,
     chance: float = nan,
     alternatives: str = "",
+    models_in: str = "",
 ) -> AnswerTable:
     """The table of a task: the columns of every task, with its own among them.
 
@@ -155,7 +165,7 @@ def answer_table(
         What only this task has.
     texture, model : str
         What these two columns mean in it.
-    title, of_surfaces, both_models, chance, alternatives
+    title, of_surfaces, both_models, chance, alternatives, models_in
         As in `AnswerTable`.
     """
     return AnswerTable(
@@ -165,6 +175,7 @@ def answer_table(
         both_models=both_models,
         chance=chance,
         alternatives=alternatives,
+        models_in=models_in,
     )
 
 
@@ -327,6 +338,7 @@ ANSWER_TABLES = {
         model="Model of the odd one",
         both_models=True,
         chance=1 / 3,
+        models_in="layout",
     ),
     "threshold": answer_table(
         AnswerColumn(

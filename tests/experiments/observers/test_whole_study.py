@@ -7,6 +7,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from experiments import Study, simulate_study
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.percepts import Perception
