@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -268,9 +269,13 @@ def _result(name: str, texture: str) -> TextureResult:
 
 
 @pytest.fixture(scope="session")
-def results() -> tuple[TextureResult, ...]:
+def results(once_per_run: Callable[..., Any]) -> tuple[TextureResult, ...]:
     """Two textures over 2 × 2 conditions, one of them named like a piece of HTML."""
-    return (_result("leather", "leather"), _result("PVC", "<b>bold</b> & co"))
+    named = (("leather", "leather"), ("PVC", "<b>bold</b> & co"))
+    made: tuple[TextureResult, ...] = once_per_run(
+        "results", lambda folder: tuple(_result(*names) for names in named)
+    )
+    return made
 
 
 @pytest.fixture(scope="session")

@@ -56,8 +56,12 @@ def data(simulated: Path, tmp_path: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def simulated(once_per_run: Any) -> Path:
     """A simulated study with one claim."""
+    return once_per_run("analyzed-study", simulated_in)
+
+
+def simulated_in(folder: Path) -> Path:
     truths = {texture: planted_texture(texture) for texture in TEXTURES}
     threshold = Threshold.shipped("codec")
     fewer = {name: simplify(truth, threshold).model for name, truth in truths.items()}
@@ -80,17 +84,16 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
         },
         plan=Plan(claims=(claim,), exclusions=("Whoever presses nothing.",)),
     )
-    folder = tmp_path_factory.mktemp("study") / "data"
     simulate_study(
         study,
         real=truths,
         models=ModelSets(sets={"full": truths, "simplified": fewer}),
         rig=SimulatedRig(seed=1),
-        data_folder=folder,
+        data_folder=folder / "data",
         seed=7,
         threshold=threshold,
     )
-    return folder
+    return folder / "data"
 
 
 def claims(folder: Path) -> pd.DataFrame:

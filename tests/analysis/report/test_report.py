@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from dataclasses import replace
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -69,9 +70,13 @@ def of_six(answers: pd.DataFrame) -> pd.DataFrame:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, results, ratings, choices) -> Path:
+def folder(once_per_run, results, ratings, choices) -> Path:
     """One report of everything, shared by the tests that only read it."""
-    folder = tmp_path_factory.mktemp("report")
+    return once_per_run("report", partial(reported, of=(results, ratings, choices)))
+
+
+def reported(folder: Path, *, of) -> Path:
+    results, ratings, choices = of
     told: list[tuple[float, str]] = []
     path = write_report(
         folder / "report.html",

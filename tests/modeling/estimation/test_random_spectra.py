@@ -64,8 +64,10 @@ def scores_of_kind(kind: TruthKind) -> list[dict[str, object]]:
 
 
 @pytest.fixture(scope="module")
-def scores() -> pd.DataFrame:
-    return pd.DataFrame([row for kind in KINDS for row in scores_of_kind(kind)])
+def scores(once_per_run) -> pd.DataFrame:
+    return once_per_run(
+        "scores", lambda folder: pd.DataFrame(row for kind in KINDS for row in scores_of_kind(kind))
+    )
 
 
 def of(scores: pd.DataFrame, estimator: str, kind: str | None = None) -> pd.DataFrame:

@@ -139,8 +139,12 @@ def random_texture(rng: np.random.Generator) -> Truth:
 
 
 @pytest.fixture(scope="module")
-def judged() -> Mapping[tuple[str, bool], list[Names]]:
+def judged(once_per_run) -> Mapping[tuple[str, bool], list[Names]]:
     """Both ways to name layers, on the same random grids, by estimator and kind of truth."""
+    return once_per_run("names", lambda folder: names_on_random_grids())
+
+
+def names_on_random_grids() -> Mapping[tuple[str, bool], list[Names]]:
     scores: dict[tuple[str, bool], list[Names]] = {}
     for independent in (False, True):
         for seed in range(6):
