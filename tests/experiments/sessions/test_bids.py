@@ -457,7 +457,7 @@ def test_a_folder_of_somebodys_does_not_stop_the_tables_about_people(study_on_di
 def test_what_is_no_manifest_is_refused(tmp_path, write_session):
     files = write_session()
     for path in (files.log, tmp_path / "nothing_manifest.json"):
-        with refused(InputError, expected=["manifest", files.root / "sourcedata"], got=path.name):
+        with refused(InputError, expected=["manifest", files.root / "sourcedata"], got=path):
             export_session(files.root, path)
 
 
