@@ -2,6 +2,7 @@
 # make test    style, types, import rules and every test
 # make quick ROOM=modeling/fitting   the tests of one room alone
 # make bench   time the modeling beside its rivals
+# make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install what both begin with: .venv/ from requirements.lock
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
@@ -14,7 +15,7 @@ PYTEST_FLAGS ?=
 # libraries anew; .venv/ and the project keep theirs, whatever the machine is set to.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test quick bench lint lock clean
+.PHONY: install demo test quick bench plant lint lock clean
 
 install: .venv/installed
 
@@ -52,6 +53,10 @@ quick: install
 
 bench: install
 	$(BIN)/pytest tests/benchmarks --benchmark-enable --benchmark-columns=min,median,iqr,rounds
+
+# All of them, or BUG=name, or ROOM=name.
+plant: install
+	nice -n 5 $(BIN)/python tools/plant_bugs/plant.py --bug "$(BUG)" --room "$(ROOM)"
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from modeling.files.answer_tables import ANSWER_TABLES
+
 # The sets of models that the statistics compare, the reference first.
 MODELS = ("full", "simplified")
-TASKS = {
-    "absolute": "absolute evaluation",
-    "relative": "forced choice",
-    "oddity": "oddity task",
-    "threshold": "detection threshold",
-}
-SCALES = {
-    "magnitude_similarity": "vibration magnitude",
-    "frequency_similarity": "frequency pattern",
-}
+TASKS = {task: table.title for task, table in ANSWER_TABLES.items()}
+SCALES: dict[str, str] = {}
+for _column in (column for table in ANSWER_TABLES.values() for column in table.columns):
+    if _column.scale and SCALES.setdefault(_column.name, _column.scale) != _column.scale:
+        raise ValueError(
+            f"expected the scale {SCALES[_column.name]!r} in every column {_column.name}, got "
+            f"{_column.scale!r}; give the column another name."
+        )
 # What claims can be about: columns of tables of answers, in words.
 MEASURES = {
     **{column: f"rated similarity of {scale}" for column, scale in SCALES.items()},
     "correct": "correct rate",
 }
+
+
+def sentence_case(words: str) -> str:
+    """Words at the beginning of a sentence; unlike `str.capitalize` it leaves the others alone."""
+    return words[:1].upper() + words[1:]
+
 
 ALL_TEXTURES = "all textures"
 

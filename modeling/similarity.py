@@ -87,9 +87,9 @@ def gfc(a: ArrayLike, b: ArrayLike) -> float:
 def log_spectral_distance_db(a: ArrayLike, b: ArrayLike) -> float:
     """RMS of 20·log10 of the ratio of two (n,) magnitude spectra > 0, in dB."""
     first, second = _pair(a, b)
-    if (first <= 0).any() or (second <= 0).any():
+    if (lowest := min(first.min(), second.min())) <= 0:
         raise InputError(
-            "expected magnitudes above 0 for a log-spectral distance, got 0 or less; smooth the "
+            f"expected magnitudes above 0 for a log-spectral distance, got {lowest:g}; smooth the "
             "spectra or choose a band that holds signal."
         )
     return float(np.sqrt(np.mean((20 * np.log10(first / second)) ** 2)))
@@ -276,11 +276,13 @@ def _filter_at(recording: Recording | Spectrum, model: PEQModel | ARModel) -> Sp
 def _pair(a: ArrayLike, b: ArrayLike) -> tuple[Floats, Floats]:
     first = np.asarray(a, dtype=np.float64)
     second = np.asarray(b, dtype=np.float64)
-    good = first.ndim == 1 and first.shape == second.shape and first.size > 0
-    good = good and bool(np.isfinite(first).all() and np.isfinite(second).all())
-    if not (good and first.any() and second.any()):
+    if not (first.ndim == 1 and first.shape == second.shape and first.size > 0):
         raise InputError(
-            "expected two finite spectra of one length that are not all zero, got shapes "
-            f"{first.shape} and {second.shape}; compare spectra on the same frequencies."
+            f"expected two spectra of one length, got shapes {first.shape} and {second.shape}; "
+            "compare spectra on the same frequencies."
         )
+    for magnitude in (first, second):
+        if not np.isfinite(magnitude).all() or not magnitude.any():
+            what = "only 0" if np.isfinite(magnitude).all() else "NaN or inf"
+            raise InputError(f"expected finite spectra that hold signal, got {what}; correct them.")
     return first, second

@@ -55,9 +55,19 @@ _BARE = BareProcess()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    # First, so that one worker has all of them and no two compete for the time of a block.
+    # First, so that one worker has them and the other does not wait for its turn.
     items.sort(key=needs_time, reverse=True)
     repeat_where_the_machine_stood_still(items, _BARE)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
+    if not needs_time(item):
+        return (yield)
+    # However many workers there are, and whatever they steal from each other.
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
+    with FileLock(Path(tempfile.gettempdir()) / f"tactileq-real-time-{run}.lock"):
+        return (yield)
 
 
 @pytest.hookimpl(wrapper=True)

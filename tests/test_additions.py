@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -77,13 +78,15 @@ TASK = Task(
     ask=_ask,
 )
 '''
-TABLE = """    "pair": answer_columns(
+TABLE = """    "pair": answer_table(
         AnswerColumn(name="layout", description="Texture behind each button"),
         AnswerColumn(name="answer", description="Texture that was chosen"),
         AnswerColumn(name="correct", description="Whether it is right", limits=(0, 1)),
         RESPONSE_TIME,
+        title="pair comparison",
         texture="Real surface",
         model="Model behind both virtual surfaces",
+        chance=1 / 2,
     ),
 }
 """
@@ -101,10 +104,17 @@ schedule = "interleaved"
 participants = 2
 schedule = "by-day"
 [pair]
-participants = 2
+participants = 4
 schedule = "interleaved"
 repeats = 3
 training_trials = 1
+[[plan.claims]]
+name = "pairs are told alike"
+task = "pair"
+measure = "correct"
+models = ["full", "simplified"]
+bounds = [-0.2, 0.2]
+test = "equivalence"
 """
 MODELS = """
 from modeling import Threshold, simplify
@@ -120,9 +130,18 @@ found = load_responses("data")
 pairs = found.answers["pair"]
 assert not found.warnings, found.warnings
 assert set(pairs["model"]) == {"full", "simplified"}
-assert pairs.groupby(["participant_id", "texture", "model"]).size().tolist() == [3] * 8
-assert len(found.training["pair"]) == 2
+assert pairs.groupby(["participant_id", "texture", "model"]).size().tolist() == [3] * 16
+assert len(found.training["pair"]) == 4
 assert {len(layout.split("|")) for layout in pairs["layout"]} == {2}
+"""
+# Pictures take most of the time of a report; other tests draw them.
+ANALYZE = """
+from analysis.report import report
+from tactileq.app import app
+report.png_of = lambda figure, *, dpi: (b"", "")
+report.svg_of = lambda figure: (b"", "")
+for data in ("data", "without"):
+    app(["analyze", data, "--out", f"of-{data}"], standalone_mode=False)
 """
 
 
@@ -142,6 +161,13 @@ def run(house: Path, *arguments: str, folder: Path | None = None) -> subprocess.
         capture_output=True,
         text=True,
     )
+
+
+def succeed(house: Path, *arguments: str, folder: Path) -> str:
+    """What a program printed that had to succeed."""
+    done = run(house, *arguments, folder=folder)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def touched(house: Path) -> dict[str, int]:
@@ -171,22 +197,89 @@ def test_a_command_costs_one_file_and_one_line(house: Path) -> None:
     assert refused.stderr == "error: expected a name of letters, got '4711'; spell it.\n"
 
 
-def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, tmp_path: Path) -> None:
-    """It can be planned, done at the console, simulated, stored and loaded."""
+@pytest.fixture
+def work(tmp_path: Path) -> Path:
+    """A folder with the study that plans the added task, and room for its models."""
+    work = tmp_path / "work"
+    for folder in ("models", "simplified"):
+        (work / folder).mkdir(parents=True)
+    (work / "study.toml").write_text(STUDY)
+    return work
+
+
+def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, work: Path) -> None:
+    """It can be planned, done at the console, simulated, stored, loaded and reported."""
     (house / "experiments/tasks/pair.py").write_text(TASK, encoding="utf-8")
-    tables = house / "modeling/files/answer_tables.py"
-    tables.write_text(tables.read_text(encoding="utf-8").removesuffix("}\n") + TABLE)
+    declared = house / "modeling/files/answer_tables.py"
+    declared.write_text(declared.read_text(encoding="utf-8").removesuffix("}\n") + TABLE)
     assert set(touched(house)) == {
         "experiments/tasks/pair.py",
         "modeling/files/answer_tables.py",
     }
     assert "|pair>" in run(house, "-m", "tactileq", "session", "--help").stdout
-    work = tmp_path / "work"
-    for folder in ("models", "simplified"):
-        (work / folder).mkdir(parents=True)
-    (work / "study.toml").write_text(STUDY)
-    assert run(house, "-c", MODELS, folder=work).returncode == 0
-    done = run(house, "-m", "tactileq", "simulate", "--study", "study.toml", folder=work)
-    assert done.returncode == 0, done.stderr
-    loaded = run(house, "-c", ANSWERS, folder=work)
-    assert loaded.returncode == 0, loaded.stderr
+    succeed(house, "-c", MODELS, folder=work)
+    checked = succeed(house, "-m", "tactileq", "study", "check", "study.toml", folder=work)
+    assert "pair: 4 participants, 1 session each, 1 + 12 trials" in checked
+    assert "pairs are told alike: No equality in any case" in checked
+    succeed(house, "-m", "tactileq", "simulate", "--study", "study.toml", folder=work)
+    succeed(house, "-c", ANSWERS, folder=work)
+    # As it would be published, without what sessions wrote, and without the added task.
+    left_out = shutil.ignore_patterns("sourcedata", "*_task-pair_*")
+    shutil.copytree(work / "data", work / "without", ignore=left_out)
+    succeed(house, "-c", ANALYZE, folder=work)
+    reported, before = tables(work / "of-data"), tables(work / "of-without")
+    page = (work / "of-data/report.html").read_text(encoding="utf-8")
+    assert "<h2>Pair comparison</h2>" in page
+    assert "Correct rates of the pair comparison, full and simplified models (SIMULATED)" in page
+    assert_pairs_are_reported(reported, own_answers(work / "data"))
+    assert_others_are_reported_as_before(reported, before)
+
+
+def assert_pairs_are_reported(reported: dict[str, pd.DataFrame], answers: pd.DataFrame) -> None:
+    asked = reported["asked_pair"].set_index("what")
+    assert asked[["done", "planned"]].to_numpy().tolist() == [["4", "4"], ["4", "4"], ["48", "48"]]
+    rates = reported["correct_rates_pair"].set_index(["model", "texture"])
+    assert set(rates["simulated"]) == {"true"}
+    cells = {model: own for model, own in answers.groupby("model")}
+    assert cells.keys() == {"full", "simplified"}
+    for model, own in cells.items():
+        shares = {"all textures": own["correct"].mean()}  # every cell has three answers
+        shares |= own.groupby("texture")["correct"].mean().to_dict()
+        for texture, share in shares.items():
+            assert float(rates.loc[(model, texture), "mean"]) == pytest.approx(share)
+    claims = reported["claims_pair"].set_index("texture")
+    difference = cells["simplified"]["correct"].mean() - cells["full"]["correct"].mean()
+    assert float(claims.loc["all textures", "mean_difference"]) == pytest.approx(difference)
+    verdicts = reported["claims"]
+    verdicts = verdicts[verdicts["claim"] == "pairs are told alike"].set_index("texture")["verdict"]
+    assert verdicts.equals(claims["verdict"])
+    assert set(verdicts) <= {"different", "inconclusive", "equivalence withheld"}
+
+
+def assert_others_are_reported_as_before(
+    reported: dict[str, pd.DataFrame], before: dict[str, pd.DataFrame]
+) -> None:
+    assert reported.keys() - before.keys() == {"asked_pair", "claims_pair", "correct_rates_pair"}
+    assert set(before["claims"]["claim"]) == {
+        "rated similarity of vibration magnitude",
+        "rated similarity of frequency pattern",
+        "correct rate",
+    }
+    for name in before.keys() - {"provenance"}:
+        table = reported[name]
+        if "claim" in table:
+            table = table[table["claim"] != "pairs are told alike"].reset_index(drop=True)
+        pd.testing.assert_frame_equal(table, before[name], obj=name)
+
+
+def tables(folder: Path) -> dict[str, pd.DataFrame]:
+    """The tables beside a report, every cell as it stands there."""
+    files = (folder / "tables").glob("*.tsv")
+    return {path.stem: pd.read_csv(path, sep="\t", dtype=str) for path in files}
+
+
+def own_answers(data: Path) -> pd.DataFrame:
+    """The main trials of the added task as they were stored, of all participants."""
+    files = sorted(data.glob("sub-*/ses-*/beh/*_task-pair_beh.tsv"))
+    table = pd.concat([pd.read_csv(path, sep="\t") for path in files])
+    return table[table["phase"] == "main"]

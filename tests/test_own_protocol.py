@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 import re
+from dataclasses import fields
 from pathlib import Path
 
+import numpy as np
+
+from analysis.answers.responses import Responses
+from analysis.report.page import Table
+from analysis.report.section_task import task_section
+from analysis.statistics.rates import UNKNOWN_CHANCE
+from analysis.statistics.verdicts import claims_found
 from experiments.study.study import Study
+from modeling.files.answer_tables import AnswerTable
+from tests.analysis.conftest import choice_table
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs/own-protocol.md").read_text(encoding="utf-8")
@@ -38,3 +48,20 @@ def test_the_table_of_the_page_plans_the_task(tmp_path: Path) -> None:
     study = Study.load(path)
     assert study.plan_of("oddity").repeats == 6
     assert shipped.textures == study.textures
+
+
+def test_the_last_step_tells_all_that_a_table_declares() -> None:
+    _, _, step = PAGE.partition("## 7. In the report\n")
+    declared = {field.name for field in fields(AnswerTable)} - {"columns"}
+    rows = set(re.findall(r"^\| `(\w+)`", step, flags=re.MULTILINE))
+    assert rows == declared | {"scale"}
+    assert UNKNOWN_CHANCE in step
+
+
+def test_the_last_step_names_the_tables_of_a_task() -> None:
+    answers = {"relative": choice_table(np.random.default_rng(1), people=2, repeats=1)}
+    responses = Responses(answers, simulated_participants=True, simulated_rig=True)
+    found = claims_found(responses, rng=np.random.default_rng(2))
+    section = task_section(responses, "relative", found, rng=np.random.default_rng(3))
+    tables = [item.name for item in section.items if isinstance(item, Table)]
+    assert tables == [f"{name}_relative" for name in re.findall(r"`tables/(\w+)_TASK\.tsv`", PAGE)]

@@ -18,11 +18,10 @@ import pandas as pd
 from analysis.columns import MODEL, TEXTURE, Column, names
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.documents import read_json_object
 from modeling.files.reading import read_bytes
 
-# In the other tasks a trial has no texture, or virtual surfaces of several models.
-TASKS_OF_ONE_MODEL = ("absolute", "relative")
 MEASURES = ("speed_mm_s", "force_n", "contact_s", "presentations")
 HAND_COLUMNS = (
     Column("task", is_name=True),
@@ -60,11 +59,11 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
     Returns
     -------
     DataFrame
-        `HAND_COLUMNS`, a row per task (rating and forced choice), participant, texture and model
-        with means over its trials: of the speed (without its sign) and the measured force while
-        touching a virtual surface, of the time in contact, and of the number of presentations of
-        virtual surfaces. NaN where nothing measured it or the session stored none of it; no rows
-        where no session stored any.
+        `HAND_COLUMNS`, a row per task whose trials have virtual surfaces of one model alone,
+        participant, texture and model with means over its trials: of the speed (without its sign)
+        and the measured force while touching a virtual surface, of the time in contact, and of the
+        number of presentations of virtual surfaces. NaN where nothing measured it or the session
+        stored none of it; no rows where no session stored any.
 
     Raises
     ------
@@ -72,9 +71,9 @@ def load_hand(data_folder: str | Path, answers: Mapping[str, pd.DataFrame]) -> p
         For a file that cannot be read.
     """
     trials = []
-    for task in TASKS_OF_ONE_MODEL:
-        table = answers.get(task, pd.DataFrame())
-        if table.empty:
+    for task, table in answers.items():
+        declared = ANSWER_TABLES[task]
+        if table.empty or declared.both_models or not declared.of_surfaces:
             continue
         for _, own in table.groupby(["participant_id", "session"], sort=False):
             participant, session = own[["participant_id", "session"]].iloc[0]

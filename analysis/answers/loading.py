@@ -19,6 +19,7 @@ from analysis.answers.order import (
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.answers.responses import PlannedTask, Responses
+from analysis.columns import shortened_hash
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
@@ -95,7 +96,9 @@ def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()
         equal=gathered.equal,
         plan=_plan(description, gathered.plans, path=folder / "dataset_description.json"),
         study_sha256=str(description.get("StudySHA256", "")),
-        planned=_planned(description, folder / "dataset_description.json"),
+        planned=_planned(
+            description, folder / "dataset_description.json", trials=gathered.main_trials
+        ),
         under_way={task: frozenset(who) - dropped for task, who in gathered.under_way.items()},
         dropped_out=dropped,
         warnings=tuple(gathered.warnings),
@@ -130,7 +133,7 @@ def _description(folder: Path) -> Mapping[str, object]:
     if isinstance(design, dict) and stated not in (None, found := sha256_of_values(design)):
         raise InputError(
             f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
-            f"{str(stated)[:8]}…, got {found[:8]}…; restore the file."
+            f"{shortened_hash(str(stated))}, got {shortened_hash(found)}; restore the file."
         )
     return description
 
@@ -150,6 +153,8 @@ class _Gathered:
         # Sessions of those who are left out that cannot be read, or have no answer, by task.
         self.unread: dict[str, list[dict[str, str]]] = {}
         self.under_way: dict[str, set[str]] = {}
+        # Numbers of main trials that sessions of a task were planned with.
+        self.main_trials: dict[str, set[int]] = {}
         self.pilots: set[tuple[str, str, str]] = set()
         self._whose: dict[str, str] = {}
 
@@ -166,6 +171,11 @@ class _Gathered:
         """A session of somebody who is left out, of which nothing more is known."""
         unread = {"participant_id": participant, "session": session}
         self.unread.setdefault(task, []).append(unread)
+
+    def add_order(self, task: str, planned: Sequence[Planned]) -> None:
+        """How many main trials a session was planned with."""
+        main = sum(trial["phase"] == "main" for trial in planned)
+        self.main_trials.setdefault(task, set()).add(main)
 
     def check_once(self, table: pd.DataFrame, what: str, *, path: Path) -> None:
         """Refuse answers that are those of another session to the last digit of every time."""
@@ -187,8 +197,14 @@ def _plan(description: Mapping[str, object], hashes: Iterable[str], *, path: Pat
     return plan_from(stated, sha256=tuple(hashes), path=path)
 
 
-def _planned(description: Mapping[str, object], path: Path) -> dict[str, PlannedTask]:
-    """Participants and sessions of each task in the study's design; none where it is not told."""
+def _planned(
+    description: Mapping[str, object], path: Path, *, trials: Mapping[str, Collection[int]]
+) -> dict[str, PlannedTask]:
+    """Participants and sessions of each task in the study's design; none where it is not told.
+
+    `trials` are the numbers of main trials of sessions that were begun; where they have one number,
+    all others have it, too.
+    """
     design = description.get("StudyDesign")
     plans = design if isinstance(design, dict) else {}
     planned = {}
@@ -202,8 +218,13 @@ def _planned(description: Mapping[str, object], path: Path) -> dict[str, Planned
             )
         models = plan.get("models", MODELS)
         days = len(models) if plan.get("schedule") == "by-day" else 1
+        numbers = trials.get(task, ())
         planned[task] = PlannedTask(
-            participants, participants * days, tuple(models), int(plan.get("repeats", 1))
+            participants,
+            participants * days,
+            tuple(models),
+            int(plan.get("repeats", 1)),
+            participants * days * max(numbers) if len(numbers) == 1 else 0,
         )
     return planned
 
@@ -296,7 +317,9 @@ def _load_session(
     owed = None if planned is None else told_of_open(table, planned)
     if planned is None:
         unordered.append(what)
-    elif owed:
+    else:
+        gathered.add_order(task, planned)
+    if owed:
         warnings.append(f"{what} {owed}")
     check_order(table, planned, path=path)
     gathered.add(sidecar)
@@ -410,7 +433,7 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
-    columns = ANSWER_TABLES[task]
+    columns = ANSWER_TABLES[task].columns
     _require_columns(table, tuple(column.name for column in columns), path=path)
     for column in columns:
         found = table[column.name]
@@ -532,7 +555,8 @@ def _split(
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame | None]:
     """Main trials, training and anchors (None of a task without); or tables without rows."""
     if table is None:
-        kinds = {c.name: object if c.limits is None else float for c in ANSWER_TABLES[task]}
+        columns = ANSWER_TABLES[task].columns
+        kinds = {c.name: object if c.limits is None else float for c in columns}
         kinds = {"participant_id": object, "session": object} | kinds
         table = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
     main = table["phase"] == "main"

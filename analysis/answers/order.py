@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from analysis.columns import shortened_hash
 from modeling import InputError
 from modeling.files.hashes import sha256_of
 from modeling.files.reading import read_text
@@ -75,8 +76,8 @@ def check_manifest(
     study = sidecar.get("StudySHA256")
     if study is not None and (found := manifest.get("study_sha256", study)) != study:
         raise InputError(
-            f"expected the study {_begun(study)} of the session's answers in {path}, got "
-            f"{_begun(found)}; restore the file."
+            f"expected the study {shortened_hash(str(study))} of the session's answers in {path}, "
+            f"got {shortened_hash(str(found))}; restore the file."
         )
     sources = sidecar.get("DerivedFrom")
     named = sources.get("manifest") if isinstance(sources, Mapping) else None
@@ -84,14 +85,9 @@ def check_manifest(
         found := sha256_of(read_text(path, "the manifest of a session"))
     ):
         raise InputError(
-            f"expected the manifest {_begun(named)} in {path}, as it was stored before the "
-            f"session, got {_begun(found)}; restore the file."
+            f"expected the manifest {shortened_hash(str(named))} in {path}, as it was stored "
+            f"before the session, got {shortened_hash(str(found))}; restore the file."
         )
-
-
-def _begun(sha256: object) -> str:
-    """As much of a SHA-256 as tells two apart."""
-    return f"{str(sha256)[:8]}…"
 
 
 def _numbered(key: str, number: object) -> str:

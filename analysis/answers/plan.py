@@ -20,10 +20,10 @@ class Claim:
     Parameters
     ----------
     name, task, measure : str
-        `measure` is a column of the task's table of answers.
+        `measure` is one of the measures of the task's table of answers.
     models : (str, str)
-        The reference, and the one whose difference from it is claimed about; of the oddity task
-        the difference is that of the share of right answers from chance.
+        The reference, and the one whose difference from it is claimed about; of a task whose
+        trials hold both the difference is that of the share of right answers from chance.
     bounds : (float, float), optional
         In points of the scale, or shares of right answers; below and above 0. Without them
         nothing is called equivalent.
@@ -102,7 +102,7 @@ def _claim(values: Mapping[str, Any]) -> Claim:
     task, measure, test = (str(values[name]) for name in ("task", "measure", "test"))
     if not low < 0 < high or test not in (EQUIVALENCE, DIFFERENCE):
         raise ValueError(f"bounds {low:g} and {high:g}, test {test}")
-    if measure not in {column.name for column in ANSWER_TABLES[task]}:
+    if measure not in ANSWER_TABLES[task].measures:
         raise ValueError(f"measure {measure}")
     return Claim(
         name=str(values["name"]),

@@ -26,13 +26,16 @@ class PlannedTask:
     models : tuple of str
         The sets of models that it compares, the reference first.
     repeats : int
-        Answers to each texture with each model; in the oddity task to each texture.
+        Answers to each texture with each model; to each texture where trials hold both models.
+    trials : int
+        Main trials of all sessions together; 0 where the data do not say.
     """
 
     participants: int
     sessions: int
     models: tuple[str, ...] = MODELS
     repeats: int = 1
+    trials: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,9 +135,16 @@ class Responses:
         """
         return _done(self._kept(task))
 
+    def trials_done(self, task: str) -> int:
+        """How many main trials, anchors included, those of `done` have answered so far."""
+        anchors = self.anchors.get(task, self.answers[task][:0])
+        return len(self._kept(task)) + len(self._without_dropouts(anchors))
+
     def _kept(self, task: str) -> pd.DataFrame:
-        here = self.answers[task]
-        return here[~here["participant_id"].isin(list(self.dropped_out))]
+        return self._without_dropouts(self.answers[task])
+
+    def _without_dropouts(self, table: pd.DataFrame) -> pd.DataFrame:
+        return table[~table["participant_id"].isin(list(self.dropped_out))]
 
     @property
     def unfinished(self) -> tuple[str, ...]:

@@ -42,6 +42,7 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
             plan,
             participants=plan.participants * len(setups),
             sessions=plan.sessions * len(setups),
+            trials=plan.trials * len(setups),
         )
         for task, plan in first.planned.items()
     }

@@ -69,15 +69,17 @@ def figure_correct_rates(found: ClaimFound, *, chance: float, simulated: bool) -
     ----------
     found : ClaimFound
     chance : float
-        Rate of a guessing participant, drawn as a line.
+        Rate of a guessing participant, drawn as a line; NaN for none.
     simulated : bool
         Written into the figure.
     """
     figure = Figure(figsize=(9.5, 5), layout="constrained")
     ax = figure.subplots()
     plot_paired_bars(found, simulated=simulated, ax=ax)
-    ax.axhline(chance, color=BLACK, ls="--", lw=1)
-    ax.text(1.0, chance, f" chance\n {chance:.1%}", transform=ax.get_yaxis_transform(), va="center")
+    if np.isfinite(chance):
+        ax.axhline(chance, color=BLACK, ls="--", lw=1)
+        text = f" chance\n {chance:.1%}"
+        ax.text(1.0, chance, text, transform=ax.get_yaxis_transform(), va="center")
     ax.set_ylabel("correct rate (share of trials, 0–1)")
     ax.set_ylim(0, 1.15)
     ax.set_yticks(np.arange(0, 1.01, 0.2))

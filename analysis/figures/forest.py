@@ -25,6 +25,7 @@ from analysis.figures.drawing import (
 from analysis.statistics.claims import BOUNDS_WITHHELD, CONTROL, WITHHELD
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.verdicts import ClaimFound
+from modeling.files.answer_tables import ANSWER_TABLES
 
 # Told apart by shape as well as by colour.
 MARKS = {
@@ -89,7 +90,9 @@ def plot_forest(found: ClaimFound, *, simulated: bool, ax: Axes) -> Axes:
     ax.set_yticks(range(len(tests)), [_label(row) for row in tests.to_dict("records")])
     ax.get_yticklabels()[0].set_fontweight("bold")
     ax.set_ylim(len(tests) - 0.5, -0.5)
-    reference, other = ("chance", "share") if claim.task == "oddity" else claim.models
+    reference, other = claim.models
+    if ANSWER_TABLES[claim.task].both_models:
+        reference, other = "chance", "share"
     unit = "percentage points" if claim.measure == "correct" else "points of the scale"
     ax.set_xlabel(f"{other} − {reference} ({unit})")
     name = claim.name if claim.planned else f"{claim.name} (exploratory)"

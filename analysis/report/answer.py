@@ -33,6 +33,9 @@ WORDS = {
     INTERIM: "no verdict before the study is complete on",
     NO_TEST: "it cannot be told yet, for want of complete answers, in",
 }
+NOTHING_TO_CLAIM = "No models are compared: no task asked for ratings or right answers."
+NOTHING_ANSWERED = "Nothing to compare: no answers are there that the claims are about."
+IDENTICAL = "Nothing to compare: the models of all textures are identical."
 NO_BOUNDS = "no difference was shown, and without bounds no equality can be, in"
 
 
@@ -47,12 +50,14 @@ def answer(found: Sequence[ClaimFound], responses: Responses | None) -> str:
     responses : Responses, optional
         Who answered, and where.
     """
-    if responses is None or not responses.textures:
+    if responses is None or all(table.empty for table in responses.answers.values()):
         return NOBODY_ASKED
+    if not found:
+        return NOTHING_TO_CLAIM
     asked = [one for one in found if one.claim.planned] or list(found)
     parts = _parts(asked)
     if not parts:
-        return "Nothing to compare: the models of all textures are identical."
+        return IDENTICAL if all(one.standing.identical for one in asked) else NOTHING_ANSWERED
     differing = _differing_textures(asked)
     told = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
     return f"{told[0].upper()}{told[1:]}"

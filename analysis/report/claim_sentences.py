@@ -19,6 +19,7 @@ from analysis.statistics.claims import (
     all_equivalent,
 )
 from analysis.statistics.verdicts import ClaimFound
+from modeling.files.answer_tables import ANSWER_TABLES
 
 Row = Mapping[Hashable, Any]
 NO_TEST = "no test"
@@ -79,7 +80,7 @@ def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
 def comparison(found: ClaimFound) -> str:
     """What is subtracted from what."""
     reference, other = found.claim.models
-    if found.claim.task == "oddity":
+    if ANSWER_TABLES[found.claim.task].both_models:
         return f"right answers on {other} among {reference} and vice versa, from chance"
     return f"{other} − {reference}"
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.answers.responses import Responses
 from analysis.columns import shortened_hash
 from analysis.labels import MEASURES, TASKS
-from analysis.statistics.verdicts import ClaimFound, incomplete
+from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, incomplete
 
 MOST_NAMED = 12
 
@@ -42,12 +44,16 @@ def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
         "signed-rank test and a permutation test that flips signs stand beside; the latter takes "
         "the place of t where differences do not vary between participants."
     )
-    if any(claim.task == "relative" for claim in claims):
+    if any(_has_tested_rates(responses, claim.task) for claim in claims):
         sentences.append(
             "Correct rates were compared with chance by one-sample t-tests over participants; "
             "their intervals are bias-corrected and accelerated bootstraps over participants."
         )
     return " ".join(sentences)
+
+
+def _has_tested_rates(responses: Responses, task: str) -> bool:
+    return has_rates(task) and not np.isnan(chance_of(task, responses.answers[task]))
 
 
 def _plan(responses: Responses) -> str:

@@ -42,20 +42,17 @@ from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import provenance_table
 from analysis.report.section_reliability import reliability_section
 from analysis.report.section_speed_accuracy import speed_accuracy_section
+from analysis.report.section_task import task_section, tasks_without_chapter
 from analysis.report.sections import Progress, Section, of_pairs
 from analysis.report.sentences import cautions
+from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import (
-    ODDITY_CHANCE,
-    ClaimFound,
-    chance_of,
-    claims_found,
-    models_of,
-)
+from analysis.statistics.verdicts import ClaimFound, chance_of, claims_found, models_of
 from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.writing import write_text
 
 LEAD = "Surfaces recorded, modelled, simplified by what can be felt, and judged."
@@ -213,10 +210,13 @@ def _answer_sections(
     Models are compared in no answers of an unfinished task.
     """
     shown = [one for one in found if len(one.tests)]
-    if not shown:
+    others = tasks_without_chapter(responses)
+    if not shown and not others:
         return []
     simulated = responses.simulated
-    sections: list[Section | None] = [verdict_section(responses, shown, planted=planted)]
+    sections: list[Section | None] = []
+    if shown:
+        sections.append(verdict_section(responses, shown, planted=planted))
     judged = [one for one in shown if not one.standing.unfinished]
     finished = {t: own for t, own in responses.answers.items() if t not in responses.unfinished}
     by_task = {task: [one for one in judged if one.claim.task == task] for task in finished}
@@ -228,8 +228,12 @@ def _answer_sections(
         confused = confusion_section(responses.relative, models, simulated=simulated, rng=rng)
         sections.append(confused)
     sections.append(oddity_section(judged, simulated=simulated))
+    draws = generators(rng)
+    for task in others:
+        sections.append(task_section(responses, task, by_task.get(task, ()), rng=draws[task]))
     sections.append(mixed_section(responses, judged, rng=rng))
-    pairs = list(dict.fromkeys(one.claim.models for one in judged))
+    # Task by task, so that one more changes nothing of those before it.
+    pairs = list(dict.fromkeys(one.claim.models for own in by_task.values() for one in own))
     speeds, hands = {}, {}
     for pair in pairs:
         same = list(responses.identical(pair))
@@ -239,7 +243,7 @@ def _answer_sections(
             moved = hand[~hand["texture"].isin(same) & hand["task"].isin(list(finished))]
             hands[pair] = hand_section(moved, models=pair, simulated=simulated, rng=rng)
     sections.append(of_pairs(speeds))
-    asked = {one.claim.task for one in shown}
+    asked = {*(one.claim.task for one in shown), *others}
     tasks = {task: answers for task, answers in responses.answers.items() if task in asked}
     sections.append(
         # Who answers at chance is told by a test of the share of right answers: an effect.
@@ -256,10 +260,12 @@ def _answer_sections(
 
 def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
     """Rates of guessing participants in the tasks with right answers."""
-    chances = {"oddity": ODDITY_CHANCE} if "oddity" in tasks else {}
-    if "relative" in tasks:
-        chances["relative"] = chance_of(tasks["relative"])
-    return chances
+    chances = {
+        task: chance_of(task, answers)
+        for task, answers in tasks.items()
+        if "correct" in ANSWER_TABLES[task].measures and len(answers)
+    }
+    return {task: chance for task, chance in chances.items() if not np.isnan(chance)}
 
 
 def _overview(
@@ -279,12 +285,14 @@ def _overview(
         unfinished=[] if responses is None else unfinished_tasks(responses),
     )
     outcomes = [outcome for section in sections for outcome in section.outcomes]
-    done = [sentence for section in sections for sentence in section.done]
+    # A task that is not finished is told of by its own section and by that on the verdicts.
+    tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
+    done = list(dict.fromkeys(sentence for section in sections for sentence in section.done))
     done += [f"On drawing the pictures: {undrawn}"] * bool(undrawn)
     otherwise = [] if responses is None else deviations(responses, found)
     planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
     return (
-        tiles([tile for section in sections for tile in section.tiles])
+        tiles(tiles_once)
         + "<h3>What came out</h3>"
         + grouped(by_weight(outcomes))
         + '<div class="caution"><h3>What may not be concluded</h3>'

@@ -11,13 +11,13 @@ from analysis.answers.responses import Responses
 from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
-from analysis.labels import ALL_TEXTURES, MODELS, TASKS
+from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
-from analysis.statistics.rates import CORRECT_RATE_COLUMNS, correct_rates
+from analysis.statistics.rates import CORRECT_RATE_COLUMNS, UNKNOWN_CHANCE, correct_rates
 from analysis.statistics.verdicts import (
     PLANTED_COLUMNS,
     SETUP_COLUMNS,
@@ -54,7 +54,7 @@ def verdict_section(
     simulated = responses.simulated
     judged = [one for one in found if not one.standing.unfinished]
     begun = dict.fromkeys(one.claim.task for one in found if one.standing.unfinished)
-    so_far = [_participants(responses, task) for task in begun]
+    so_far = [who_took_part(responses, task) for task in begun]
     tests = pd.concat([one.tests for one in found], ignore_index=True)
     verdicts = Table(
         "claims",
@@ -149,7 +149,7 @@ def _planted_table(
 
 def rating_section(responses: Responses, found: Sequence[ClaimFound]) -> Section:
     """Absolute evaluation (PAPER VIII-A); `found` are its claims, one at least."""
-    done, tile = _participants(responses, "absolute")
+    done, tile = who_took_part(responses, "absolute")
     pairs = list(dict.fromkeys(one.claim.models for one in found))
     pictures = [
         Picture(
@@ -179,9 +179,9 @@ def choice_section(
     """Relative evaluation (PAPER VIII-B); `found` are its claims, `rng` draws the bootstrap."""
     relative, simulated = responses.relative, responses.simulated
     models = models_of(responses, "relative")
-    chance = chance_of(relative)
+    chance = chance_of("relative", relative)
     rates = correct_rates(relative, models, rng=rng, chance=chance)
-    done, tile = _participants(responses, "relative")
+    done, tile = who_took_part(responses, "relative")
     overall = rates[rates["texture"] == ALL_TEXTURES].set_index("model")["mean"]
     shown = " → ".join(f"{overall[model]:.0%}" for model in models if model in overall)
     rate_tile = (shown, f"right answers, {' → '.join(models)} (chance {chance:.0%})")
@@ -189,10 +189,13 @@ def choice_section(
         "choices",
         "Relative evaluation: forced choice",
         (
-            *(_rates_picture(one, chance=chance, simulated=simulated) for one in found),
-            _rates_table(rates, simulated=simulated),
+            *(
+                rates_picture(one, "correct_rates", chance=chance, simulated=simulated)
+                for one in found
+            ),
+            rates_table(rates, "correct_rates", chance=chance, simulated=simulated),
         ),
-        outcomes=tuple(rate_outcomes(rates, chance=chance)),
+        outcomes=tuple(rate_outcomes(rates, "relative", chance=chance)),
         done=(done,),
         tiles=(tile, rate_tile),
     )
@@ -203,33 +206,43 @@ def _name(what: str, pair: tuple[str, str]) -> str:
     return what if pair == MODELS else f"{what}_{file_stem('_'.join(pair))}"
 
 
-def _rates_picture(found: ClaimFound, *, chance: float, simulated: bool) -> Picture:
-    reference, other = found.claim.models
+def rates_picture(found: ClaimFound, name: str, *, chance: float, simulated: bool) -> Picture:
+    """Shares of right answers with either model of a claim; `name` begins that of the file."""
+    task, (reference, other) = found.claim.task, found.claim.models
+    paper = " Cf. the paper's figure 11, whose bars are standard errors." * (task == "relative")
+    line = f"; {UNKNOWN_CHANCE}." if np.isnan(chance) else "; dashed: chance."
     return Picture(
-        _name("correct_rates", found.claim.models),
-        f"Correct rates of the forced choice, {reference} and {other} models",
-        "Bars: means over participants with 95% confidence intervals; points: participants; "
-        "dashed: chance. Cf. the paper's figure 11, whose bars are standard errors.",
+        _name(name, found.claim.models),
+        f"Correct rates of the {TASKS[task]}, {reference} and {other} models",
+        "Bars: means over participants with 95% confidence intervals; points: participants"
+        f"{line}{paper}",
         figure_correct_rates(found, chance=chance, simulated=simulated),
         simulated,
     )
 
 
-def _rates_table(rates: pd.DataFrame, *, simulated: bool) -> Table:
+def rates_table(rates: pd.DataFrame, name: str, *, chance: float, simulated: bool) -> Table:
+    """Shares of right answers from `correct_rates`; `name` is that of the file."""
+    title, test = "Correct rates", f"; {UNKNOWN_CHANCE}, nothing is tested against it"
+    if not np.isnan(chance):
+        title = "Correct rates against chance"
+        test = (
+            ", and a one-sample t-test against chance (sign flips where all have one rate) with "
+            "Holm over the textures of one model"
+        )
     return Table(
-        "correct_rates",
-        "Correct rates against chance",
+        name,
+        title,
         "Participants are the units: mean of their rates with a 95% interval (bias-corrected and "
-        "accelerated bootstrap over participants), and a one-sample t-test against chance (sign "
-        "flips where all have one rate) with Holm over the textures of one model. The rows over "
-        "all textures weigh textures equally, and have complete participants only.",
+        f"accelerated bootstrap over participants){test}. The rows over all textures weigh "
+        "textures equally, and have complete participants only.",
         rates,
         CORRECT_RATES_SHOWN,
         simulated,
     )
 
 
-def _participants(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:
+def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:
     """The sentence and the tile that say how many took part, of how many."""
     where = TASKS[task]
     done, planned = responses.done(task), responses.planned.get(task)
@@ -238,10 +251,10 @@ def _participants(responses: Responses, task: str) -> tuple[str, tuple[str, str]
     who += " at the simulated rig" if responses.simulated_rig else ""
     trials = f"{len(responses.answers[task])} trials (training left out)"
     if planned is None:
-        return f"{where.capitalize()}: {people} {who}, {trials}.", (people, f"{who}, {where}")
+        return f"{sentence_case(where)}: {people} {who}, {trials}.", (people, f"{who}, {where}")
     people += f" of {planned.participants}"
     sentence = (
-        f"{where.capitalize()}: {people} planned {who}, {done.sessions} of {planned.sessions} "
+        f"{sentence_case(where)}: {people} planned {who}, {done.sessions} of {planned.sessions} "
         f"planned sessions, {trials}."
     )
     return sentence, (people, f"planned {who}, {where}")

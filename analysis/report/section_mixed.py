@@ -13,13 +13,16 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.columns import Column, names, p_value
+from analysis.labels import SCALES
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Table
 from analysis.report.sections import Section
+from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.gee import GEE, GEE_COLUMNS, gee_effects
 from analysis.statistics.mixed import MIXED_COLUMNS, mixed_effects
-from analysis.statistics.verdicts import ENDS, ClaimFound, answers_about
+from analysis.statistics.verdicts import ClaimFound, answers_about
+from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 
 CLAIM = Column("claim", is_name=True)
 CLAIM_MIXED_COLUMNS = (CLAIM, *MIXED_COLUMNS)
@@ -60,28 +63,28 @@ def mixed_section(
     ----------
     responses : Responses
     found : sequence of ClaimFound
-        With tests, of any tasks. Claims about the odd one out, whose trials hold both models, are
-        passed over.
+        With tests, of any tasks. Claims about tasks whose trials hold both models are passed over.
     rng : Generator
         Draws sign flips.
     """
     mixed, odds, outcomes = [], [], []
+    draws = generators(rng)
     for one in found:
         claim = one.claim
-        if claim.task == "oddity":
+        if ANSWER_TABLES[claim.task].both_models:
             continue
         answers = answers_about(responses, claim)
         answers = answers[~answers["texture"].isin(list(one.standing.identical))]
         if answers["model"].nunique() < 2:
             continue
-        said = []
-        if claim.task == "absolute":
-            of_claim = mixed_effects(answers, claim.measure, models=claim.models, rng=rng)
+        said, own = [], draws[claim.task]
+        if claim.measure in SCALES:
+            of_claim = mixed_effects(answers, claim.measure, models=claim.models, rng=own)
             mixed.append(of_claim.assign(claim=claim.name))
             said.append(_mixed_said(of_claim.to_dict("records")[0]))
-        largest = ENDS[1] if claim.task == "absolute" else 1.0
+        largest = ENDS[1] if claim.measure in SCALES else 1.0
         of_claim = gee_effects(
-            answers, claim.measure, models=claim.models, largest=largest, rng=rng
+            answers, claim.measure, models=claim.models, largest=largest, rng=own
         )
         odds.append(of_claim.assign(claim=claim.name))
         said.append(_gee_said(of_claim.to_dict("records")[0]))

@@ -18,7 +18,8 @@ from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Table
 from analysis.report.sections import Section
 from analysis.statistics.dprime import d_primes, oddity_d_prime
-from analysis.statistics.verdicts import ODDITY_CHANCE, ClaimFound
+from analysis.statistics.verdicts import ClaimFound
+from modeling.files.answer_tables import ANSWER_TABLES
 
 ODDITY_COLUMNS = (
     Column("claim", is_name=True),
@@ -86,8 +87,8 @@ def oddity_sensitivity(found: ClaimFound) -> pd.DataFrame:
 
 
 def _sensitivity(row: Mapping[Hashable, Any]) -> dict[str, object]:
-    share = float(row["mean_other"])
-    low, high, bound = (ODDITY_CHANCE + row[name] for name in ("ci_low", "ci_high", "bound_high"))
+    share, chance = float(row["mean_other"]), ANSWER_TABLES["oddity"].chance
+    low, high, bound = (chance + row[name] for name in ("ci_low", "ci_high", "bound_high"))
     d_prime, d_low, d_high, as_d_prime = d_primes(share, low, high, bound, of=oddity_d_prime)
     return {
         **{name: row[name] for name in ("claim", "texture", "verdict", "n")},

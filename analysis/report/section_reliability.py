@@ -16,6 +16,7 @@ from analysis.labels import SCALES, TASKS
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Item, Table
 from analysis.report.sections import Section
+from analysis.statistics.draws import generators
 from analysis.statistics.reliability import (
     AGREEMENT_COLUMNS,
     RATER_COLUMNS,
@@ -57,8 +58,8 @@ def reliability_section(
     if not given:
         return None
     rated = [
-        (table, scale)
-        for table in given.values()
+        (table, scale, _scale_words(task, scale, given))
+        for task, table in given.items()
         for scale in SCALES
         if scale in table and table[scale].notna().any()
     ]
@@ -87,6 +88,7 @@ def careless_signs(
         `CARELESS_COLUMNS`, a row for each participant and sign; often none.
     """
     found = []
+    draws = generators(rng)
     for task, table in answers.items():
         for scale in (scale for scale in SCALES if scale in table):
             same = same_ratings(table, scale)
@@ -95,14 +97,21 @@ def careless_signs(
         if "response_time_s" in table:
             found.append(fast_answers(table, limit_s=FASTEST_S).assign(task=task))
         if task in chances:
-            found.append(answers_at_chance(table, chance=chances[task], rng=rng).assign(task=task))
+            guessing = answers_at_chance(table, chance=chances[task], rng=draws[task])
+            found.append(guessing.assign(task=task))
     every = pd.concat(found, ignore_index=True) if found else pd.DataFrame()
     return every.reindex(columns=names(CARELESS_COLUMNS))
 
 
-def _of_ratings(rated: list[tuple[pd.DataFrame, str]]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    agreed = [agreement(table, scale) for table, scale in rated]
-    raters = [rater_table(table, scale) for table, scale in rated]
+def _scale_words(task: str, scale: str, given: Mapping[str, pd.DataFrame]) -> str:
+    """A scale in words, with the task unless it is the first that has the scale."""
+    first = next(other for other, table in given.items() if scale in table)
+    return SCALES[scale] + f" in the {TASKS[task]}" * (task != first)
+
+
+def _of_ratings(rated: list[tuple[pd.DataFrame, str, str]]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    agreed = [agreement(table, scale).assign(scale=words) for table, scale, words in rated]
+    raters = [rater_table(table, scale).assign(scale=words) for table, scale, words in rated]
     return (
         pd.concat(agreed, ignore_index=True) if agreed else pd.DataFrame(),
         pd.concat(raters, ignore_index=True) if raters else pd.DataFrame(),
@@ -118,7 +127,7 @@ def _rating_tables(agreed: pd.DataFrame, raters: pd.DataFrame, *, simulated: boo
         "own mean, which paired comparisons leave out too. One rating, or the mean of all "
         "participants'. Where all surfaces are rated alike they are low, however well people "
         "agree. Intervals: 95%.",
-        agreed.replace({"scale": SCALES}),
+        agreed,
         AGREEMENT_COLUMNS,
         simulated,
     )
@@ -127,7 +136,7 @@ def _rating_tables(agreed: pd.DataFrame, raters: pd.DataFrame, *, simulated: boo
         "How each participant used the scales",
         "Share at ends: of ratings that are 0 or 100. SD between repeats: of ratings of the same "
         "texture with the same model; n/a without repeats.",
-        raters.replace({"scale": SCALES}),
+        raters,
         RATER_COLUMNS,
         simulated,
     )
@@ -169,7 +178,7 @@ def _agreement_told(own: pd.DataFrame, scale: str) -> str:
     if np.isnan(one["icc"]):
         return ""
     return (
-        f"Agreement on {SCALES[scale]}: one participant's ratings have an intraclass correlation "
+        f"Agreement on {scale}: one participant's ratings have an intraclass correlation "
         f"(consistency) of {_with_interval(one)}, the mean of {one['participants']} participants' "
         f"{_with_interval(all_)}."
     )
@@ -185,6 +194,6 @@ def _repeats_told(own: pd.DataFrame, scale: str) -> str:
     if np.isnan(spread):
         return ""
     return (
-        f"Ratings of {SCALES[scale]} that a participant repeated have a standard deviation of "
+        f"Ratings of {scale} that a participant repeated have a standard deviation of "
         f"{spread:.1f} points."
     )

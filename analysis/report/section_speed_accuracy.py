@@ -32,7 +32,7 @@ from analysis.statistics.speed_accuracy import (
     time_ratios,
     trade_off_sentence,
 )
-from analysis.statistics.verdicts import ODDITY_CHANCE, chance_of
+from analysis.statistics.verdicts import chance_of, holding_both
 
 BOTH = "both models in each trial"
 # Title, note and columns of the tables behind the pictures.
@@ -82,26 +82,20 @@ def speed_accuracy_section(
     outcomes: list[Outcome] = []
     relative = answers.get("relative", pd.DataFrame())
     if len(relative) and len(participant_scores(relative, models=models)):
-        chance = chance_of(relative)
+        chance = chance_of("relative", relative)
         items += _pictures(relative, "relative", models, chance=chance, simulated=simulated)
         tables, outcomes = _compared(relative, models, simulated=simulated, rng=rng)
         items += tables
         items.append(_details(relative, "relative", models, simulated=simulated, rng=rng))
-    oddity = _oddity(answers, models)
+    oddity = answers.get("oddity", pd.DataFrame(columns=["layout"]))
+    oddity = holding_both(oddity, models).assign(model=BOTH)
     if len(oddity) and len(participant_scores(oddity, models=(BOTH,))):
-        items += _pictures(oddity, "oddity", (BOTH,), chance=ODDITY_CHANCE, simulated=simulated)
+        chance = chance_of("oddity", oddity)
+        items += _pictures(oddity, "oddity", (BOTH,), chance=chance, simulated=simulated)
         items.append(_details(oddity, "oddity", (BOTH,), simulated=simulated, rng=rng))
     if not items:
         return None
     return Section("speed", "Speed and accuracy", tuple(items), outcomes=tuple(outcomes))
-
-
-def _oddity(answers: Mapping[str, pd.DataFrame], models: tuple[str, str]) -> pd.DataFrame:
-    """The odd-one-out trials that hold these two models, as if of one."""
-    table = answers.get("oddity", pd.DataFrame(columns=["layout"]))
-    return table[[set(held.split("|")) == set(models) for held in table["layout"]]].assign(
-        model=BOTH
-    )
 
 
 def _pictures(

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 import pandas as pd
 
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL
+from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, TASKS, sentence_case
 from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
+from analysis.statistics.rates import UNKNOWN_CHANCE
 
 ALPHA = 0.05
 
 
-def rate_outcomes(rates: pd.DataFrame, *, chance: float) -> list[Outcome]:
-    """A sentence on each model's correct rates against chance, from `rates.correct_rates`."""
+def rate_outcomes(rates: pd.DataFrame, task: str, *, chance: float) -> list[Outcome]:
+    """A sentence on each model's correct rates against chance, from `rates.correct_rates`.
+
+    Of a chance that is not known (NaN) it says so, and compares nothing with it.
+    """
+    compared = _described_rate if np.isnan(chance) else partial(_against_chance, chance=chance)
     return [
-        Outcome(Weight.SECONDARY, _against_chance(of_model, model=str(model), chance=chance))
+        Outcome(
+            Weight.DESCRIPTIVE if np.isnan(chance) else Weight.SECONDARY,
+            f"{sentence_case(TASKS[task])}, {model} model: {compared(of_model)}.",
+        )
         for model, of_model in rates.groupby("model", sort=False)
     ]
 
@@ -195,19 +204,32 @@ def cautions(
     return sentences
 
 
-def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
+def _described_rate(rates: pd.DataFrame) -> str:
+    return f"{_overall_rate(rates)}; {UNKNOWN_CHANCE}, nothing is tested against it)"
+
+
+def _overall_rate(rates: pd.DataFrame) -> str:
+    """Of how many answers over all textures were right; its bracket is left open."""
     overall = rates[rates["texture"] == ALL_TEXTURES].iloc[0]
+    if not overall["participants"]:
+        return "no participant has answered all textures (no share over all of them"
+    interval = "no interval, for want of variation between participants"
+    if np.isfinite(overall["ci_low"]):
+        interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"
+    return (
+        f"{overall['mean']:.1%} of the answers were right ({interval}; participants: "
+        f"{overall['participants']}"
+    )
+
+
+def _against_chance(rates: pd.DataFrame, *, chance: float) -> str:
     family = rates[rates["texture"] != ALL_TEXTURES]
     significant = family["p_holm"] < ALPHA
     above = family[significant & (family["mean"] > chance)]
     below = family[significant & (family["mean"] < chance)]
-    interval = "no interval, for want of variation between participants"
-    if not overall["note"]:
-        interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"
     text = (
-        f"Forced choice, {model} model: {overall['mean']:.1%} of the answers were right "
-        f"({interval}; participants: {overall['participants']}; chance {chance:.1%}); above chance "
-        f"after Holm: {_names(above['texture'])}"
+        f"{_overall_rate(rates)}; chance {chance:.1%}); above chance after Holm: "
+        f"{_names(above['texture'])}"
     )
     if not below.empty:
         text += f"; below chance: {_names(below['texture'])}"
@@ -217,7 +239,7 @@ def _against_chance(rates: pd.DataFrame, *, model: str, chance: float) -> str:
     undefined = family[family["p_holm"].isna()]
     if not undefined.empty:
         text += f"; test undefined (see the notes): {_names(undefined['texture'])}"
-    return text + "."
+    return text
 
 
 def _strongest_confusion(matrix: ConfusionMatrix) -> list[str]:

@@ -12,6 +12,7 @@ import pandas as pd
 
 from analysis.answers.hand import MEASURES
 from analysis.columns import Column, P, names
+from analysis.statistics.draws import generators
 from analysis.statistics.paired import paired_test
 
 _CELL = ["task", "measure", "participant_id"]
@@ -119,9 +120,10 @@ def hand_tests(
         texture that was measured with both models are left out and named under `excluded`.
     """
     rows = []
+    draws = generators(rng)
     for (task, measure), own in hand_means(hand, models=models).groupby(_CELL[:2], sort=False):
         pairs = own.dropna(subset=["reference", "other"])
-        test = asdict(paired_test(pairs["reference"], pairs["other"], rng=rng))
+        test = asdict(paired_test(pairs["reference"], pairs["other"], rng=draws[str(task)]))
         excluded = ", ".join(sorted(set(own["participant_id"]) - set(pairs["participant_id"])))
         rows.append({"task": task, "measure": measure, **test, "excluded": excluded})
     return pd.DataFrame(rows, columns=names(HAND_TEST_COLUMNS))

@@ -26,6 +26,7 @@ from modeling import InputError
 from modeling.arrays import Floats
 
 BOOTSTRAP_RESAMPLES = 5000
+UNKNOWN_CHANCE = "chance not declared"
 CORRECT_RATE_COLUMNS = (
     TEXTURE,
     MODEL,
@@ -44,7 +45,7 @@ CORRECT_RATE_COLUMNS = (
 
 
 def correct_rates(
-    relative: pd.DataFrame,
+    answers: pd.DataFrame,
     models: Sequence[str],
     *,
     rng: np.random.Generator,
@@ -56,14 +57,14 @@ def correct_rates(
 
     Parameters
     ----------
-    relative : DataFrame
+    answers : DataFrame
         Columns participant_id, texture, model, correct (0, 1 or NaN).
     models : sequence of str
         The sets of models, in the order of the rows.
     rng : Generator
         Draws the participants of the bootstrap, and sign flips.
     chance : float
-        Rate of a guessing participant, 0 … 1.
+        Rate of a guessing participant, 0 … 1; NaN where it is not known, so that nothing is tested.
 
     Returns
     -------
@@ -79,8 +80,8 @@ def correct_rates(
     InputError
         Where nobody answered.
     """
-    rates = relative.groupby(["model", "texture", "participant_id"])["correct"].mean().dropna()
-    trials = relative[relative["correct"].notna()].groupby(["model", "texture"]).size()
+    rates = answers.groupby(["model", "texture", "participant_id"])["correct"].mean().dropna()
+    trials = answers[answers["correct"].notna()].groupby(["model", "texture"]).size()
     rows: list[pd.DataFrame] = []
     for model in models:
         if model not in rates.index.get_level_values("model"):
@@ -96,26 +97,23 @@ def correct_rates(
         ).sort_values("texture", key=ignoring_case)
         complete = wide.dropna()
         overall = _rate_row(complete.mean(axis=1).to_numpy(float), rng=rng, chance=chance)
-        of_complete = relative["participant_id"].isin(complete.index) & (relative["model"] == model)
+        of_complete = answers["participant_id"].isin(complete.index) & (answers["model"] == model)
         overall |= {
             "texture": ALL_TEXTURES,
-            "trials": int(relative[of_complete]["correct"].notna().sum()),
+            "trials": int(answers[of_complete]["correct"].notna().sum()),
         }
         both = [family.assign(p_holm=holm(family["p"])), pd.DataFrame([overall])]
         rows += [table.assign(model=model) for table in both]
     if not rows:
-        raise InputError("expected answers of the forced choice, got none; run a session first.")
+        raise InputError("expected answers that are right or wrong, got none; run a session first.")
     return pd.concat(rows, ignore_index=True)[names(CORRECT_RATE_COLUMNS)]
 
 
 def _rate_row(rates: Floats, *, rng: np.random.Generator, chance: float) -> dict[str, Any]:
     """Of one rate per participant."""
-    against_chance = without_rounding_noise(rates - chance)
-    undefined = why_undefined(against_chance)
-    t, p = (
-        (np.nan, sign_flips_p(against_chance, rng=rng)) if undefined else t_test(against_chance)[:2]
-    )
+    undefined = why_undefined(without_rounding_noise(rates))
     low, high = (np.nan, np.nan) if undefined else bootstrap_interval(rates, rng)
+    t, p = _against_chance(rates - chance, rng=rng)
     return {
         "participants": rates.size,
         "mean": mean(rates),
@@ -125,8 +123,16 @@ def _rate_row(rates: Floats, *, rng: np.random.Generator, chance: float) -> dict
         "t": t,
         "df": max(rates.size - 1, 0),
         "p": p,
-        "note": undefined,
+        "note": UNKNOWN_CHANCE if np.isnan(chance) else undefined,
     }
+
+
+def _against_chance(above: Floats, *, rng: np.random.Generator) -> tuple[float, float]:
+    """t and p of rates less chance; NaN of an unknown one."""
+    above = without_rounding_noise(above)
+    if np.isnan(above).any():
+        return np.nan, np.nan
+    return (np.nan, sign_flips_p(above, rng=rng)) if why_undefined(above) else t_test(above)[:2]
 
 
 def bootstrap_interval(rates: Floats, rng: np.random.Generator) -> tuple[float, float]:

@@ -15,10 +15,10 @@ from scipy import stats
 
 from analysis.columns import Column, names
 from analysis.statistics.paired import ignoring_case, sign_flips_p
+from modeling.files.answer_tables import ENDS
 
 ALPHA = 0.05
 LEAST_ANSWERS = 5  # fewer tell nothing about how somebody answers
-ENDS = (0.0, 100.0)
 
 AGREEMENT_COLUMNS = (
     Column("scale", is_name=True),

@@ -27,6 +27,7 @@ from analysis.statistics.claims import (
     complete_means,
     share_at_ends,
 )
+from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import ALPHA, EQUIVALENT, WITHIN_BOUNDS
 from analysis.statistics.paired import (
     sign_flips_p,
@@ -36,9 +37,7 @@ from analysis.statistics.paired import (
 )
 from modeling import InputError
 from modeling.arrays import Floats
-
-ENDS = (0.0, 100.0)  # of the rating scales
-ODDITY_CHANCE = 1 / 3
+from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,10 +75,11 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
         Without those about tasks that nobody has begun.
     """
     found = []
+    own = generators(rng)
     for claim in all_claims(responses):
         values = claim_values(responses, claim)
-        standing = claim_standing(responses, claim, rng=rng)
-        tests = claim_tests(claim, values, standing=standing, rng=rng)
+        standing = claim_standing(responses, claim, rng=own[claim.task])
+        tests = claim_tests(claim, values, standing=standing, rng=own[claim.task])
         found.append(ClaimFound(claim=claim, tests=tests, values=values.table, standing=standing))
     return found
 
@@ -91,7 +91,7 @@ def all_claims(responses: Responses) -> tuple[Claim, ...]:
     known = {(claim.task, claim.measure, claim.models) for claim in planned}
     others = [
         Claim(
-            name=" ".join([MEASURES[measure], *pair[1:] * (pair != MODELS)]),
+            name=_exploratory_name(task, measure, pair, begun=begun),
             task=task,
             measure=measure,
             models=pair,
@@ -100,18 +100,23 @@ def all_claims(responses: Responses) -> tuple[Claim, ...]:
             planned=False,
         )
         for task in begun
-        for measure in measures_of(task)
+        for measure in ANSWER_TABLES[task].measures
         for pair in pairs_of(responses, task)
         if (task, measure, pair) not in known
     ]
     return (*planned, *others)
 
 
-def measures_of(task: str) -> tuple[str, ...]:
-    """Columns that claims about a task can be about; none of one that compares no models."""
-    if task == "absolute":
-        return tuple(SCALES)
-    return () if task == "threshold" else ("correct",)
+def _exploratory_name(
+    task: str, measure: str, pair: tuple[str, str], *, begun: Sequence[str]
+) -> str:
+    """The measure, with the model unless it is the usual one, and the task unless it is the first.
+
+    The first of those that have the measure, so that adding a task renames no claim.
+    """
+    first = next(other for other in begun if measure in ANSWER_TABLES[other].measures)
+    words = [MEASURES[measure], *pair[1:] * (pair != MODELS)]
+    return " ".join([*words, *[f"of the {TASKS[task]}"] * (task != first)])
 
 
 def pairs_of(responses: Responses, task: str) -> list[tuple[str, str]]:
@@ -132,16 +137,16 @@ def models_of(responses: Responses, task: str) -> tuple[str, ...]:
 def claim_values(responses: Responses, claim: Claim) -> Values:
     """What every participant gave for each texture, with either model; complete cells only.
 
-    In the oddity task, whose trials hold both models, the reference is chance.
+    In a task whose trials hold both models the reference is chance.
     """
     answers = answers_about(responses, claim)
     repeats = repeats_of(responses, claim.task)
-    if claim.task == "oddity":
+    if ANSWER_TABLES[claim.task].both_models:
         both = answers.assign(model=claim.models[1])
         table = complete_means(both, claim.measure, models=claim.models, repeats=repeats)
-        return Values(table=table.assign(reference=ODDITY_CHANCE))
+        return Values(table=table.assign(reference=chance_of(claim.task, answers)))
     table = complete_means(answers, claim.measure, models=claim.models, repeats=repeats)
-    if claim.task != "absolute":
+    if claim.measure not in SCALES:
         return Values(table=table)
     same = responses.identical(claim.models)
     return Values(
@@ -151,11 +156,21 @@ def claim_values(responses: Responses, claim: Claim) -> Values:
 
 
 def answers_about(responses: Responses, claim: Claim) -> pd.DataFrame:
-    """The main trials in which one of the claim's models was presented; in the oddity task both."""
+    """The main trials in which one of the claim's models was presented; both, where trials do."""
     answers = responses.answers[claim.task]
-    if claim.task == "oddity":
-        return answers[[set(held.split("|")) == set(claim.models) for held in answers["layout"]]]
+    if ANSWER_TABLES[claim.task].both_models:
+        return holding_both(answers, claim.models)
     return answers[answers["model"].isin(claim.models)]
+
+
+def holding_both(answers: pd.DataFrame, models: tuple[str, str]) -> pd.DataFrame:
+    """Of a task whose trials hold both models: all, or none where it compares another pair.
+
+    Such a task compares two sets of models, as a study's check sees to.
+    """
+    if answers.empty or set(answers["model"].dropna()) <= set(models):
+        return answers
+    return answers.iloc[:0]
 
 
 def repeats_of(responses: Responses, task: str) -> int:
@@ -163,7 +178,7 @@ def repeats_of(responses: Responses, task: str) -> int:
     if task in responses.planned:
         return responses.planned[task].repeats
     answers = responses.answers[task]
-    cells = ["participant_id", "texture"] + ["model"] * (task != "oddity")
+    cells = ["participant_id", "texture"] + ["model"] * (not ANSWER_TABLES[task].both_models)
     return int(answers.groupby(cells).size().mode().max())
 
 
@@ -194,16 +209,47 @@ def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator
         failed = "anchors were not rated lower than the textures' own models"
     elif claim.task == "relative":
         values = claim_values(responses, claim).table.groupby("participant_id")["reference"].mean()
-        above = values - chance_of(responses.relative)
+        above = values - chance_of("relative", responses.relative)
         failed = f"answers on {claim.models[0]} models were not above chance"
     else:
         return NOT_TESTED
     return SHOWN if _one_sided_p(above.dropna(), rng=rng) < ALPHA else failed
 
 
-def chance_of(relative: pd.DataFrame) -> float:
-    """Share of right answers of who guesses: one of all that lay on the buttons."""
-    return 1 / max(len(layout.split("|")) for layout in relative["layout"].dropna())
+def chance_of(task: str, answers: pd.DataFrame) -> float:
+    """Proportion correct of a participant who guesses, as the task's table declares it.
+
+    Parameters
+    ----------
+    task : str
+    answers : DataFrame
+        Of the task.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; NaN where it is not declared, or no alternatives are listed.
+
+    Raises
+    ------
+    InputError
+        Where trials differ in the number of alternatives, so that no one chance holds.
+    """
+    table = ANSWER_TABLES[task]
+    if not table.alternatives:
+        return table.chance
+    numbers = {len(listed.split("|")) for listed in answers[table.alternatives].dropna()}
+    if len(numbers) > 1:
+        raise InputError(
+            f"expected as many alternatives in every trial of the {table.title}, got "
+            f"{' and '.join(map(str, sorted(numbers)))}; declare its chance instead."
+        )
+    return 1 / numbers.pop() if numbers else float("nan")
+
+
+def has_rates(task: str) -> bool:
+    """Whether shares of right answers with either model can be told: each trial has one of them."""
+    return "correct" in ANSWER_TABLES[task].measures and not ANSWER_TABLES[task].both_models
 
 
 def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:

@@ -116,6 +116,7 @@ class Button:
         self._action = action
         self._color = color
         self._held = False
+        self._looks: tuple[bool, bool, bool] | None = None  # enabled, lit and held when drawn last
         self._shape = visual.ShapeStim(
             window, vertices=rounded(size, 0.014), pos=at, units="height", autoLog=False
         )
@@ -159,14 +160,19 @@ class Button:
 
     def draw(self) -> None:
         """Filled while lit, outlined while not, pale while disabled."""
-        lit = self.enabled and self.lit
-        line = self._color if self.enabled else PALE
-        self._shape.fillColor = self._color if lit else CARD
-        self._shape.lineColor = line
-        self._shape.lineWidth = 5 if self._held else 2
-        self._label.color = CARD if lit else (self._color if self.enabled else GREY)
+        looks = (self.enabled, self.lit, self._held)
+        if looks != self._looks:  # PsychoPy takes a millisecond to set the colours of a button
+            self._looks = looks
+            self._color_parts()
         self._shape.draw()
         self._label.draw()
+
+    def _color_parts(self) -> None:
+        lit = self.enabled and self.lit
+        self._shape.fillColor = self._color if lit else CARD
+        self._shape.lineColor = self._color if self.enabled else PALE
+        self._shape.lineWidth = 5 if self._held else 2
+        self._label.color = CARD if lit else (self._color if self.enabled else GREY)
 
     def handles(self) -> dict[str, Point]:
         """The button's middle."""

@@ -48,14 +48,14 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
             "DerivedFrom": sources,
             **({"Damaged": damaged} if damaged else {}),
             "Files": {path.name: hashlib.sha256(data).hexdigest() for path, data in made.items()},
-            **{c.name: c.sidecar() for c in ANSWER_TABLES[held.manifest.task]},
+            **{c.name: c.sidecar() for c in ANSWER_TABLES[held.manifest.task].columns},
         }
     )
     return made, (*lost_rows, *lost_readings)
 
 
 def _answers(held: Held) -> Made:
-    names = [column.name for column in ANSWER_TABLES[held.manifest.task]]
+    names = [column.name for column in ANSWER_TABLES[held.manifest.task].columns]
     return {held.files.answers: table_bytes(names, held.state.rows)}
 
 

@@ -120,8 +120,7 @@ def _check_rows(events: Iterable[Event], files: SessionFiles) -> None:
 
 def _wrong_in(row: Mapping[str, Any], task: str) -> str:
     """The first value of an answer that cannot be one; empty where there is none."""
-    columns = ANSWER_TABLES[task]
-    for column in columns:
+    for column in ANSWER_TABLES[task].columns:
         value = row.get(column.name)
         whole = column.name not in _WHOLE or value is None or is_whole(value)
         if not (whole and column.holds(value)):

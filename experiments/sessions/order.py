@@ -7,7 +7,6 @@ from typing import Any
 
 from experiments.sessions.task import Task
 from experiments.study.design import (
-    BOTH_IN_A_TRIAL,
     Occasion,
     Phase,
     SessionPlan,
@@ -16,6 +15,7 @@ from experiments.study.design import (
     with_first_models,
 )
 from experiments.study.study import Study
+from modeling.files.answer_tables import ANSWER_TABLES
 
 
 def draw_session(study: Study, task: Task, *, subject: int, session: int, slot: int) -> SessionPlan:
@@ -68,7 +68,7 @@ def _order(occasion: Occasion) -> list[tuple[str, str]]:
     """Textures and models in random order, each model first for as many textures as planned."""
     plan = occasion.study.plan_of(occasion.task)
     repeats = plan.repeats
-    if occasion.task in BOTH_IN_A_TRIAL:
+    if ANSWER_TABLES[occasion.task].both_models:  # so that a trial is a repeat of each
         repeats //= len(plan.models)
     pairs = [(texture, model) for model in occasion.models for texture in occasion.study.textures]
     order = fisher_yates(pairs * repeats, occasion.rng)

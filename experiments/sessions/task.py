@@ -61,4 +61,4 @@ class Task:
     @property
     def columns(self) -> tuple[AnswerColumn, ...]:
         """The columns of its answers, in order."""
-        return ANSWER_TABLES[self.name]
+        return ANSWER_TABLES[self.name].columns

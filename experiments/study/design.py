@@ -19,8 +19,6 @@ from modeling.seeds import generator, number_of
 Phase = Literal["training", "main"]
 Item = TypeVar("Item")
 HIGHEST_SUBJECT = 9999
-# Tasks whose trials hold all models, so that a trial is a repeat of each; its own is the odd one.
-BOTH_IN_A_TRIAL = ("oddity",)
 
 
 def fisher_yates(items: Sequence[Item], rng: np.random.Generator) -> list[Item]:

@@ -17,18 +17,22 @@ from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.checks import check_choice, check_keys, check_number, is_number
 from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 from modeling.files.hashes import sha256_of_values
 
 Test = Literal["equivalence", "difference"]
 TESTS: tuple[Test, ...] = ("equivalence", "difference")
-RATINGS = ("magnitude_similarity", "frequency_similarity")
+RATINGS = tuple(dict.fromkeys(c.name for t in ANSWER_TABLES.values() for c in t.columns if c.scale))
 # The largest difference that there can be: in points of a scale, or between two shares.
-LARGEST = {**dict.fromkeys(RATINGS, 100.0), "correct": 1.0}
+LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
 
 
 def measures_of(task: str) -> tuple[str, ...]:
-    """What claims about a task can be about: its scales, or the share of right answers."""
-    return RATINGS if task == "absolute" else ("correct",)
+    """What claims about a task can be about: its scales, and the share of right answers.
+
+    Anything of a task that does not exist; `Plan.check` names it.
+    """
+    return ANSWER_TABLES[task].measures if task in ANSWER_TABLES else tuple(LARGEST)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +46,8 @@ class Claim:
     measure : str
         One of `measures_of(task)`.
     models : (str, str)
-        The difference is that of the second from the first; in the oddity task, whose trials hold
-        both, it is that of the share of right answers from chance.
+        The difference is that of the second from the first; in a task whose trials hold both it
+        is that of the share of right answers from chance.
     bounds : (float, float)
         The smallest differences that matter, below and above 0, in raw units: points of the scale,
         or shares of right answers.
@@ -66,6 +70,11 @@ class Claim:
         object.__setattr__(self, "models", tuple(self.models))
         object.__setattr__(self, "bounds", tuple(self.bounds))
         require_label("the name of a claim", self.name)
+        if not measures_of(self.task):
+            raise InputError(
+                f"expected a task with ratings or right answers about models in the claim "
+                f"{self.name}, got {self.task}, which compares no models; leave the claim out."
+            )
         check_choice(f"the measure of {self.name}", self.measure, measures_of(self.task))
         check_choice(f"the test of {self.name}", self.test, TESTS)
         if len(self.models) != 2 or self.models[0] == self.models[1]:

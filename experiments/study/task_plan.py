@@ -17,6 +17,7 @@ from experiments.study.tables import (
 from modeling import InputError
 from modeling.checks import check_keys, check_whole
 from modeling.errors import shown
+from modeling.files.answer_tables import ANSWER_TABLES
 
 Schedule = Literal["by-day", "interleaved"]
 SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
@@ -40,8 +41,8 @@ class TaskPlan:
     schedule : {"by-day", "interleaved"}
         Either each model on a day of its own (one session per model), or all mixed in one session.
     repeats : int
-        How often each texture comes with each model, ≥ 1. In the oddity task, whose every trial
-        holds both models: trials of each texture; in the threshold task: trials of each frequency.
+        How often each texture comes with each model, ≥ 1. In a task whose every trial holds both
+        models: trials of each texture; in the threshold task: trials of each frequency.
     models : tuple of str
         The sets of models that are compared, two at least; empty for the first two of the study.
     training_trials, most_training_trials : int
@@ -156,11 +157,11 @@ def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:
             "remove it there."
         )
     _check_anchors(task, plan.anchors, textures)
-    if task == "oddity":
-        _check_oddity(plan)
-    if task == "threshold" and plan.schedule != "interleaved":
+    if ANSWER_TABLES[task].both_models:
+        _check_both_models(task, plan)
+    if not ANSWER_TABLES[task].of_surfaces and plan.schedule != "interleaved":
         raise InputError(
-            "expected the schedule interleaved in [threshold], where no models are compared, got "
+            f"expected the schedule interleaved in [{task}], where no models are compared, got "
             f"{plan.schedule}; correct it."
         )
 
@@ -178,14 +179,14 @@ def _check_anchors(task: str, anchors: Mapping[str, str], textures: tuple[str, .
             )
 
 
-def _check_oddity(plan: TaskPlan) -> None:
+def _check_both_models(task: str, plan: TaskPlan) -> None:
     if len(plan.models) != 2 or plan.schedule != "interleaved":
         raise InputError(
-            "expected two models and the schedule interleaved in [oddity], each of whose trials "
+            f"expected two models and the schedule interleaved in [{task}], each of whose trials "
             f"holds both, got {', '.join(plan.models)} {plan.schedule}; correct it."
         )
     if plan.repeats % 2:
         raise InputError(
-            "expected an even number of repeats in [oddity], so that each of the two models is "
-            f"the odd one equally often, got {plan.repeats}; 6 have it at each place once."
+            f"expected an even number of repeats in [{task}], so that each of the two models has "
+            f"its turn equally often, got {plan.repeats}; correct it."
         )

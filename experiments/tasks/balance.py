@@ -59,8 +59,7 @@ def balance_of(study: Study, task: str) -> list[Balance]:
         found = list(_first(sessions, study, models))
     if hasattr(flat[0][0], "first_surface"):
         found += _surfaces(flat, study, models)
-    if hasattr(flat[0][0], "layout") and hasattr(flat[0][0], "texture"):
-        found += _buttons(flat)
+    found += _buttons(flat)
     return [
         Balance(task=task, what=what, least=min(counts), most=max(counts), of=of)
         for what, counts, of in found
@@ -123,20 +122,27 @@ def _surfaces(
 
 
 def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
-    """How often each button is right: that of the real texture, the odd surface, or the tone."""
+    """How often each button is right: that of the real texture, the odd surface, or the tone.
+
+    Nothing of a task that has no buttons, or whose layout does not say which one is right.
+    """
     over: Counter[int] = Counter()
     within = []
     for trials in sessions:
-        right = Counter(map(_right, trials))
+        places = [place for place in map(_right, trials) if place is not None]
+        if len(places) < len(trials):
+            return
+        right = Counter(places)
         over.update(right)
         within += [right[button] for button in range(len(trials[0].layout))]  # type: ignore[attr-defined]
     yield "trials of a session in which a button is right", within, len(sessions[0])
     trials_in_all = sum(map(len, sessions))
-    yield "trials of all in which a button is right", list(over.values()), trials_in_all
+    buttons = range(len(sessions[0][0].layout))  # type: ignore[attr-defined]
+    yield "trials of all in which a button is right", [over[b] for b in buttons], trials_in_all
 
 
-def _right(trial: Trial) -> int:
-    layout: tuple[str, ...] = trial.layout  # type: ignore[attr-defined]
-    return next(
-        layout.index(what) for what in (trial.texture, trial.model, "tone") if what in layout
-    )
+def _right(trial: Trial) -> int | None:
+    layout: tuple[str, ...] = getattr(trial, "layout", ())
+    named = (trial.texture, trial.model, "tone")
+    places = (layout.index(what) for what in named if layout.count(what) == 1)
+    return next(places, None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
 
 from experiments.study.models import ModelSets
 from experiments.study.plan import RATINGS, Claim
@@ -10,6 +11,7 @@ from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
 from experiments.tasks.durations import minutes_of_session, trials_of_session
+from modeling.files.answer_tables import ANSWER_TABLES
 
 TESTED = {
     "equivalence": "two one-sided t-tests of the differences within persons (TOST)",
@@ -64,11 +66,11 @@ def _design(study: Study, task: str) -> Iterator[str]:
     training, main = trials_of_session(study, task)
     yield f"**{task.capitalize()} task.** {task_named(task).description}"
     yield ""
-    if task == "threshold":
+    if not ANSWER_TABLES[task].of_surfaces:
         yield f"- Each frequency comes {_times(plan.repeats)}."
     else:
         yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
-        times = "comes" if task == "oddity" else "comes with each model"
+        times = "comes" if ANSWER_TABLES[task].both_models else "comes with each model"
         yield f"- Each texture {times} {_times(plan.repeats)}."
     yield (
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
@@ -138,8 +140,9 @@ def _claimed(claim: Claim) -> str:
     if claim.measure in RATINGS:
         what = f"{measure} in the {claim.task} task"
     against = f"{second} minus {first}"
-    if claim.task == "oddity":
-        against = f"{second} against {first}, minus chance (1/3)"
+    if ANSWER_TABLES[claim.task].both_models:
+        chance = Fraction(ANSWER_TABLES[claim.task].chance).limit_denominator(100)
+        against = f"{second} against {first}, minus chance ({chance})"
     low, high = claim.bounds
     return (
         f"Measure: {what}, {against}. Smallest differences that matter: {low:g} and {high:g} "

@@ -1,17 +1,20 @@
 """The tables of answers, declared once: experiments write them, analysis reads and checks them.
 
 A task exists once its table stands in `ANSWER_TABLES`; what is presented and asked in it is in
-`experiments.tasks`, in a module of the task's name.
+`experiments.tasks`, in a module of the task's name. What the report says of it follows from the
+table (docs/own-protocol.md).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, isnan, nan
 from typing import Any
 
 from modeling.checks import is_number
+
+ENDS = (0.0, 100.0)  # of every scale that people rate on
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +34,8 @@ class AnswerColumn:
     right : str
         Of a column `answer` beside one that is called `correct`: the column that holds the right
         answer.
+    scale : str
+        Of a column of ratings, whose `limits` are then `ENDS`: the similarity of what is rated.
     """
 
     name: str
@@ -40,6 +45,11 @@ class AnswerColumn:
     unit: str = ""
     required: bool = False
     right: str = "texture"
+    scale: str = ""
+
+    def __post_init__(self) -> None:
+        if self.scale and self.limits != ENDS:
+            raise ValueError(f"expected the limits {ENDS} of the scale {self.name}; correct them.")
 
     def holds(self, value: object) -> bool:
         """Whether this may stand in the column; None where nothing was answered."""
@@ -63,10 +73,81 @@ class AnswerColumn:
 YES_NO = {"1": "yes", "0": "no"}
 
 
-def answer_columns(
-    *own: AnswerColumn, texture: str, model: str, of_surfaces: bool = True
-) -> tuple[AnswerColumn, ...]:
-    """The columns of a task's table: those of every task, with its own among them.
+@dataclass(frozen=True, kw_only=True)
+class AnswerTable:
+    """The answers to one task: their columns, and what a report has to know of them.
+
+    Parameters
+    ----------
+    title : str
+        The task in words that can stand after "the", such as "forced choice".
+    columns : tuple of AnswerColumn
+    of_surfaces : bool
+        Whether every trial has a texture and a model; else nothing compares models.
+    both_models : bool
+        Whether every trial holds both models, so that the share of right answers is compared with
+        chance, not that of one model with that of the other.
+    chance : float
+        Proportion correct of a participant who guesses, between 0 and 1; NaN where it is not
+        known.
+    alternatives : str
+        The column that lists what could be answered, separated by |, as many in each trial;
+        chance is one over their number.
+    """
+
+    title: str
+    columns: tuple[AnswerColumn, ...]
+    of_surfaces: bool = True
+    both_models: bool = False
+    chance: float = nan
+    alternatives: str = ""
+
+    def __post_init__(self) -> None:
+        names = [column.name for column in self.columns]
+        if not (isnan(self.chance) or 0 < self.chance < 1):
+            raise ValueError(f"expected a chance between 0 and 1, got {self.chance}; correct it.")
+        if self.alternatives and self.alternatives not in names:
+            raise ValueError(
+                f"expected a column of the {self.title} as its alternatives, got "
+                f"{self.alternatives!r}; name one of {', '.join(names)}."
+            )
+        if self.alternatives and not isnan(self.chance):
+            raise ValueError(
+                f"expected a chance or alternatives in the {self.title}, got both; keep one."
+            )
+        if (self.alternatives or not isnan(self.chance)) and "correct" not in names:
+            raise ValueError(
+                f"expected right answers in the {self.title}, whose chance is declared, got no "
+                "column correct; declare it."
+            )
+        if self.both_models and (isnan(self.chance) or self.measures != ("correct",)):
+            raise ValueError(
+                f"expected right answers and their chance in the {self.title}, whose trials hold "
+                "both models, so that nothing else can be claimed; declare them."
+            )
+
+    @property
+    def measures(self) -> tuple[str, ...]:
+        """The columns that claims can be about: ratings, and whether the answer is right.
+
+        None where nothing compares models.
+        """
+        if not self.of_surfaces:
+            return ()
+        return tuple(c.name for c in self.columns if c.scale or c.name == "correct")
+
+
+def answer_table(
+    *own: AnswerColumn,
+    title: str,
+    texture: str,
+    model: str,
+    of_surfaces: bool = True,
+    both_models: bool = False,
+    chance: float = nan,
+    alternatives: str = "",
+) -> AnswerTable:
+    """The table of a task: the columns of every task, with its own among them.
 
     Parameters
     ----------
@@ -74,9 +155,22 @@ def answer_columns(
         What only this task has.
     texture, model : str
         What these two columns mean in it.
-    of_surfaces : bool
-        Whether every trial has a texture and a model.
+    title, of_surfaces, both_models, chance, alternatives
+        As in `AnswerTable`.
     """
+    return AnswerTable(
+        title=title,
+        columns=_with_common_columns(*own, texture=texture, model=model, of_surfaces=of_surfaces),
+        of_surfaces=of_surfaces,
+        both_models=both_models,
+        chance=chance,
+        alternatives=alternatives,
+    )
+
+
+def _with_common_columns(
+    *own: AnswerColumn, texture: str, model: str, of_surfaces: bool
+) -> tuple[AnswerColumn, ...]:
     return (
         AnswerColumn(
             name="trial",
@@ -158,7 +252,7 @@ PRESSES = AnswerColumn(
 
 # In the order in which a study does them; that order is part of every seed.
 ANSWER_TABLES = {
-    "absolute": answer_columns(
+    "absolute": answer_table(
         AnswerColumn(
             name="virtual_texture",
             description="Texture that the virtual surface models: the real one's, or in an anchor "
@@ -173,14 +267,16 @@ ANSWER_TABLES = {
         AnswerColumn(
             name="magnitude_similarity",
             description="Rated similarity of vibration magnitude, 0 (different) to 100 (identical)",
-            limits=(0, 100),
+            limits=ENDS,
             unit="arbitrary",
+            scale="vibration magnitude",
         ),
         AnswerColumn(
             name="frequency_similarity",
             description="Rated similarity of frequency pattern, 0 (different) to 100 (identical)",
-            limits=(0, 100),
+            limits=ENDS,
             unit="arbitrary",
+            scale="frequency pattern",
         ),
         AnswerColumn(
             name="toggles",
@@ -188,10 +284,11 @@ ANSWER_TABLES = {
             limits=(0, inf),
         ),
         RESPONSE_TIME,
+        title="absolute evaluation",
         texture="Real surface",
         model="Model behind the virtual surface",
     ),
-    "relative": answer_columns(
+    "relative": answer_table(
         AnswerColumn(
             name="layout",
             description="Texture behind each button, from button 1, separated by |",
@@ -200,10 +297,12 @@ ANSWER_TABLES = {
         CORRECT,
         PRESSES,
         RESPONSE_TIME,
+        title="forced choice",
         texture="Real surface, which is the right answer",
         model="Model behind all virtual surfaces of the trial",
+        alternatives="layout",
     ),
-    "oddity": answer_columns(
+    "oddity": answer_table(
         AnswerColumn(
             name="layout",
             description="Model behind each button, from button 1, separated by |",
@@ -223,10 +322,13 @@ ANSWER_TABLES = {
         CORRECT,
         PRESSES,
         RESPONSE_TIME,
+        title="oddity task",
         texture="Texture that all three virtual surfaces model",
         model="Model of the odd one",
+        both_models=True,
+        chance=1 / 3,
     ),
-    "threshold": answer_columns(
+    "threshold": answer_table(
         AnswerColumn(
             name="frequency_hz",
             description="Frequency of the sinusoid",
@@ -262,8 +364,10 @@ ANSWER_TABLES = {
         ),
         CORRECT,
         RESPONSE_TIME,
+        title="detection threshold",
         texture="n/a: no surface is presented",
         model="n/a: no surface is presented",
         of_surfaces=False,
+        chance=1 / 2,
     ),
 }

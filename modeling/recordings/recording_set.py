@@ -139,10 +139,13 @@ class RecordingSet:
         InputError
             With the file's name, for a folder that is not one and for any unusable record.
         """
-        rows = listed(Path(folder))
-        return RecordingSet(
-            _load_row(Path(folder), row) for row in rows if texture in (None, row["texture"])
-        )
+        rows = [r for r in listed(Path(folder)) if texture in (None, r["texture"])]
+        if texture is not None and not rows:
+            raise InputError(
+                f"expected a recording of {shown(texture)} in {folder}, got none; choose another "
+                "texture or record this one."
+            )
+        return RecordingSet(_load_row(Path(folder), row) for row in rows)
 
 
 def load_usable(

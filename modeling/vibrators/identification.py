@@ -153,7 +153,7 @@ def _transfer(drive: Floats, acceleration: Floats, *, rate_hz: float) -> _Transf
     of_drive, of_response, cross = density(x, x).real, density(y, y).real, np.abs(density(x, y))
     # Where there is no drive, the transfer is anything and the coherence may be leakage.
     driven = of_drive >= of_drive.max() * 10 ** (EMPTY_BELOW_DB / 10)
-    driven &= of_response > 0
+    driven &= of_drive * of_response > 0
     coherence = np.zeros(cross.size)
     np.divide(cross**2, of_drive * of_response, out=coherence, where=driven)
     by_chance = (1 - coherence) / (INDEPENDENT_SEGMENTS - 1)

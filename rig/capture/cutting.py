@@ -151,8 +151,9 @@ class StrokeCutter:
         self._waiting = np.concatenate((self._waiting, new), axis=1)
         if not self._readings.size:
             return []
-        until_s = self._readings["time_s"][-1] - self._delay_s
-        known = int(np.searchsorted(self._waiting[0], until_s, side="right"))
+        # Added as in `_hand_at`: by its rounding a sample is known, or waits.
+        needed_s = self._waiting[0] + self._delay_s
+        known = int(np.searchsorted(needed_s, self._readings["time_s"][-1], side="right"))
         ready, self._waiting = self._waiting[:, :known], self._waiting[:, known:]
         hand = _hand_at(ready[0], self._readings, speed_delay_s=self._delay_s)
         if ready.size:

@@ -80,6 +80,7 @@ class Child:
 
     def __init__(self, module: str, settings: Mapping[str, Any]) -> None:
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as this)
+        self._said = ""
         self._process = started(module, settings, complaints=self._complaints)
         self._answers: queue.Queue[str] = queue.Queue()
         threading.Thread(target=self._listen, daemon=True).start()
@@ -114,7 +115,7 @@ class Child:
             self._process.stdin.write(json.dumps(wanted) + "\n")
             self._process.stdin.flush()
         except (OSError, ValueError):
-            raise ChildLost(f"it has ended{last_complaint(self._complaints)}") from None
+            raise ChildLost(f"it has ended{self._complaint()}") from None
         return self._answer(within_s)
 
     def close(self) -> None:
@@ -134,6 +135,12 @@ class Child:
             with suppress(OSError, ValueError):
                 assert pipe is not None
                 pipe.close()
+        self._said = self._complaint()
+        self._complaints.close()
+
+    def _complaint(self) -> str:
+        """The last line of its standard error, after its end, too."""
+        return self._said if self._complaints.closed else last_complaint(self._complaints)
 
     def _listen(self) -> None:
         """Pass its lines on; an empty one is its end."""
@@ -150,7 +157,7 @@ class Child:
             raise ChildLost(f"it has not answered for {within_s:g} s") from None
         if not line:
             self._answers.put("")  # for who asks next
-            raise ChildLost(f"it has ended{last_complaint(self._complaints)}")
+            raise ChildLost(f"it has ended{self._complaint()}")
         answer: dict[str, Any] = json.loads(line)
         if "error" in answer:
             raise InputError(answer["error"])

@@ -174,7 +174,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
         Where there is no claim, a claim is about a task that compares no models, or a number of
         participants leaves the order of models unbalanced.
     """
-    from analysis.statistics.verdicts import measures_of
+    from modeling.files.answer_tables import ANSWER_TABLES
 
     if not plan.plan.claims:
         raise ValueError(
@@ -182,7 +182,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
             "none; write down what is claimed (tactileq study init shows how)."
         )
     for claim in plan.plan.claims:
-        if not measures_of(claim.task):
+        if not ANSWER_TABLES[claim.task].measures:
             raise ValueError(
                 f"expected claims about tasks that compare models, got {claim.name} about "
                 f"{claim.task}; leave it out."
@@ -372,14 +372,14 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
 
 def _planned(people: People, *, n: int) -> dict[str, PlannedTask]:
     from analysis.answers.responses import PlannedTask
+    from experiments.tasks.durations import trials_of_session
 
-    study = people.study
-    return {
-        task: PlannedTask(
-            n, n * study.sessions(task), study.plan_of(task).models, study.plan_of(task).repeats
-        )
-        for task in people.tasks
-    }
+    study, planned = people.study, {}
+    for task in people.tasks:
+        plan, sessions = study.plan_of(task), n * study.sessions(task)
+        _, trials = trials_of_session(study, task)
+        planned[task] = PlannedTask(n, sessions, plan.models, plan.repeats, sessions * trials)
+    return planned
 
 
 def _write(

@@ -293,7 +293,7 @@ TEXTURES = ("canvas", "MDF", "PVC", "oak")
 
 
 def answer_rows() -> str:
-    cells = {column.name: "" for column in ANSWER_TABLES["absolute"]}
+    cells = {column.name: "" for column in ANSWER_TABLES["absolute"].columns}
     rows = ["\t".join(cells)]
     for trial, texture in enumerate(TEXTURES, start=1):
         given = {"trial": str(trial), "phase": "main" if trial > 1 else "training"}

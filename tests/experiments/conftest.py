@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -152,6 +153,12 @@ def respondent() -> Script:
 def misbehaving() -> type[Script]:
     """The class to derive misbehaving respondents from."""
     return Script
+
+
+@pytest.fixture
+def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No wait for the disk: what a killed process wrote is there, unless the power fails too."""
+    monkeypatch.setattr(os, "fsync", lambda handle: None)
 
 
 @pytest.fixture

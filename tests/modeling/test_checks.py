@@ -20,6 +20,8 @@ from modeling.checks import (
     is_positive,
     is_whole,
 )
+from modeling.errors import shown
+from tests.refusals import refused
 
 NUMBERS = (0, -3, 2.5, float("nan"), np.float64(1.5), np.float32(1.5), np.int64(4), np.uint8(4))
 NEITHER = (True, False, np.bool_(True), "5", None, [5], 5j, b"5", Decimal(5), np.ones(2))
@@ -35,19 +37,19 @@ def test_numbers(value: object) -> None:
 def test_what_is_no_number(value: object) -> None:
     assert not is_number(value)
     assert not is_whole(value)
-    for check in (
-        lambda: check_number("gain", value, high=10),
-        lambda: check_whole("seed", value, low=0, high=10),
-        lambda: check_rate(value),
+    for name, check in (
+        ("gain", lambda: check_number("gain", value, high=10)),
+        ("seed", lambda: check_whole("seed", value, low=0, high=10)),
+        ("rate", lambda: check_rate(value)),
     ):
-        with pytest.raises(InputError, match="expected .*, got .*; "):
+        with refused(InputError, names=name, got=shown(value)):
             check()
 
 
 @pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), np.float32("inf"), 10**400])
 def test_rates_are_finite_and_above_zero(value: float) -> None:
     assert not is_positive(value)
-    with pytest.raises(InputError, match="expected a rate above 0 Hz"):
+    with refused(InputError, expected=["rate", "0 Hz"], got=shown(value)):
         check_rate(value)
     assert is_positive(5e-324)
     assert is_positive(np.float32(5000))
@@ -57,35 +59,35 @@ def test_ends_of_a_range_are_in_it() -> None:
     check_number("gain", 0, high=10)
     check_number("gain", 10.0, high=10)
     check_whole("seed", np.int64(10), low=0, high=10)
-    with pytest.raises(InputError, match="from 0 to 10 for gain, got 10.1; correct it"):
+    with refused(InputError, expected=["gain", 0, 10], got=10.1):
         check_number("gain", 10.1, high=10)
-    with pytest.raises(InputError, match="from 0 to 10 for seed, got 11; correct it"):
+    with refused(InputError, expected=["seed", 0, 10], got=11):
         check_whole("seed", 11, low=0, high=10)
 
 
 def test_words() -> None:
     check_choice("mode", "rms", ("rms", "peak"))
     check_name("a label", "full · 1")
-    with pytest.raises(InputError, match='expected mode to be "rms" or "peak", got .loud.'):
+    with refused(InputError, expected=["mode", '"rms"', '"peak"'], got="'loud'"):
         check_choice("mode", "loud", ("rms", "peak"))
     for name in ("", "  ", "two\nlines", 5):
-        with pytest.raises(InputError, match="expected printable text in one line as a label"):
+        with refused(InputError, expected="a label", got=shown(name)):
             check_name("a label", name)
 
 
 def test_rates_and_durations_have_upper_ends() -> None:
     check_rate(1e7)
     check_duration(1.0, 1e7)
-    with pytest.raises(InputError, match="a rate of at most 10000000 Hz, got 10000001"):
+    with refused(InputError, expected="10000000 Hz", got=10000001):
         check_rate(10_000_001)
     for duration_s in (0, -1, float("nan"), float("inf")):
-        with pytest.raises(InputError, match="a duration above 0 s, got"):
+        with refused(InputError, expected="0 s", got=shown(duration_s)):
             check_duration(duration_s, 5000.0)
-    with pytest.raises(InputError, match=r"at most 2000 s at 5000 Hz \(10000000 samples\), got 1e"):
+    with refused(InputError, expected=["2000 s", "5000 Hz", 10000000], got="1e+300 s"):
         check_duration(1e300, 5000.0)
 
 
 def test_names_are_short() -> None:
     check_texture_name("x" * 100)
-    with pytest.raises(InputError, match="at most 100 characters, got 5000 in 'xxx.*; shorten it"):
+    with refused(InputError, expected=["texture name", 100], got=[5000, shown("x" * 5000)]):
         check_texture_name("x" * 5000)

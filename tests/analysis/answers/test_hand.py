@@ -26,6 +26,7 @@ from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, Threshold, simplify
+from modeling.files.answer_tables import ANSWER_TABLES, CORRECT, answer_table
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
@@ -46,11 +47,16 @@ def store(tmp_path: Path) -> Callable[..., Path]:
     """Write the hand of one start of a session by the program that stores real ones."""
 
     def write(
-        strokes: Sequence[Stroke], *, run: int = 1, person: str = "sub-01", assumed: bool = False
+        strokes: Sequence[Stroke],
+        *,
+        task: str = "absolute",
+        run: int = 1,
+        person: str = "sub-01",
+        assumed: bool = False,
     ) -> Path:
         beh = tmp_path / person / "ses-01" / "beh"
         beh.mkdir(parents=True, exist_ok=True)
-        stem = f"{person}_ses-01_task-absolute"
+        stem = f"{person}_ses-01_task-{task}"
         begun_s, parts = 0.0, []
         for number, (trial, surface, duration_s, speed, force) in enumerate(strokes, start=1):
             # Held for the whole stroke, since speeds are linear between readings.
@@ -136,6 +142,20 @@ def test_repeats_of_a_cell_count_the_same(store, tmp_path):
     (row,) = load_hand(tmp_path, {"absolute": answers}).to_dict("records")
     assert row["trials"] == 2
     assert [row[name] for name in MEASURES] == pytest.approx([150.0, 1.5, 5.0, 1.0])
+
+
+@pytest.mark.parametrize(("both_models", "rows"), [(False, 1), (True, 0)])
+def test_a_task_counts_where_its_trials_hold_one_model(
+    store, tmp_path, monkeypatch, both_models, rows
+):
+    table = answer_table(
+        CORRECT, title="pair", texture="", model="", both_models=both_models, chance=1 / 2
+    )
+    monkeypatch.setitem(ANSWER_TABLES, "pair", table)
+    store([(2, "virtual", 1.0, 100.0, 1.0)], task="pair")
+    found = load_hand(tmp_path, {"pair": answers_of((1, 2, "oak", "full"))})
+    assert len(found) == rows
+    assert found["speed_mm_s"].tolist() == pytest.approx([100.0] * rows)
 
 
 def test_a_session_without_a_hand_has_rows_without_values(store, tmp_path):

@@ -518,7 +518,7 @@ def test_a_changed_manifest_or_design_is_refused(
     assert load_responses(study_folder).warnings == ()
     write_task("absolute", absolute_rows[:-2])
     changed = hashlib.sha256(manifest.read_bytes()).hexdigest()
-    facts = {"expected": ["manifest", digest[:8]], "got": changed[:8]}
+    facts = {"expected": ["manifest", f"{digest[:12]}…"], "got": f"{changed[:12]}…"}
     with refused(InputError, **facts) as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, manifest)
@@ -743,11 +743,11 @@ def _relative_columns() -> tuple[str, ...]:
 @pytest.mark.parametrize(
     ("design", "planned"),
     [
-        ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48)),
-        ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20)),
+        ({"participants": 24, "schedule": "by-day"}, PlannedTask(24, 48, trials=48 * 7)),
+        ({"participants": 20, "schedule": "interleaved"}, PlannedTask(20, 20, trials=20 * 7)),
         (
             {"participants": 3, "schedule": "by-day", "models": ["full", "paper", "AR"]},
-            PlannedTask(3, 9, ("full", "paper", "AR")),
+            PlannedTask(3, 9, ("full", "paper", "AR"), trials=9 * 7),
         ),
     ],
 )

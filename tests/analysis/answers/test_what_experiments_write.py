@@ -90,9 +90,15 @@ def test_every_answer_arrives(responses):
     assert responses.absolute["magnitude_similarity"].between(0, 100).all()
 
 
+def test_as_many_trials_are_done_as_were_planned_anchors_included(responses):
+    done = {task: responses.trials_done(task) for task in ("absolute", "relative", "oddity")}
+    assert done == {"absolute": 3 * (3 * 2 + 1), "relative": 48, "oddity": 6}
+    assert done == {task: responses.planned[task].trials for task in done}
+
+
 def test_the_study_and_its_models_are_known(responses):
     assert responses.name == "Three surfaces"
-    assert responses.planned["relative"] == PlannedTask(4, 8, ("full", "simplified"), 2)
+    assert responses.planned["relative"] == PlannedTask(4, 8, ("full", "simplified"), 2, 48)
     assert responses.unfinished == ()
     assert set(responses.models) == set(TEXTURES)
     assert responses.identical() == frozenset()

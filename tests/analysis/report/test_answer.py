@@ -18,7 +18,7 @@ from analysis.statistics.claims import CONTROL
 from analysis.statistics.verdicts import ClaimFound, claims_found
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def people(ratings, choices, plan) -> Responses:
     return Responses(
         {"absolute": ratings, "relative": choices},
@@ -26,6 +26,12 @@ def people(ratings, choices, plan) -> Responses:
         simulated_rig=False,
         plan=plan,
     )
+
+
+@pytest.fixture(scope="module")
+def own(people) -> list[ClaimFound]:
+    """The claims about these people's answers."""
+    return analysed(people)
 
 
 def analysed(responses: Responses) -> list[ClaimFound]:
@@ -46,15 +52,15 @@ def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
     return changed
 
 
-def test_the_answer_is_the_verdicts_with_their_intervals(people, found):
-    sentence = told(people)
+def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
+    sentence = answer(own, people)
     assert sentence.startswith("Simplified models against full ones, over all textures: ")
     assert sentence.count(".") == sentence.replace(". ", "").count(".")  # one sentence
-    for one in found:
+    for one in own:
         row = overall_row(one)
         assert row is not None
         assert difference(one, row, confidence="90%") in sentence
-    low, high = (f"{found[0].tests.iloc[0][name]:+.1f}" for name in ("ci90_low", "ci90_high"))
+    low, high = (f"{own[0].tests.iloc[0][name]:+.1f}" for name in ("ci90_low", "ci90_high"))
     shown = f"(90% CI {low} to {high}, bounds -7.5 to +7.5)".replace("-", "−")
     assert shown in sentence
     assert "bounds −10.0 to +10.0)" in sentence
@@ -102,11 +108,11 @@ def test_without_a_plan_nothing_is_called_equal(people):
     assert first.startswith("No claim was registered before the first answer")
 
 
-def test_who_did_not_feel_a_surface_is_said_first(people):
-    assert told(replace(people, simulated_participants=True)).startswith(
+def test_who_did_not_feel_a_surface_is_said_first(people, own):
+    assert answer(own, replace(people, simulated_participants=True)).startswith(
         "In a simulation without people, simplified models"
     )
-    assert told(replace(people, simulated_rig=True)).startswith(
+    assert answer(own, replace(people, simulated_rig=True)).startswith(
         "At a simulated rig, where nobody felt a real surface, simplified"
     )
 
@@ -168,8 +174,8 @@ def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan)
     assert sentences[-1] == "On reading the answers: sub-09 relative ses-01 was a pilot."
 
 
-def test_the_methods_are_told_as_a_paper_tells_them(people, plan):
-    text = methods_paragraph(people, analysed(people))
+def test_the_methods_are_told_as_a_paper_tells_them(people, own):
+    text = methods_paragraph(people, own)
     assert text.startswith(
         "16 participants took part in the absolute evaluation of 7 textures; 16 participants took "
         "part in the forced choice of 7 textures."

@@ -19,6 +19,7 @@ from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
 from analysis.statistics.dprime import oddity_d_prime, oddity_share
 from analysis.statistics.equivalence import DIFFERENT
 from analysis.statistics.verdicts import ClaimFound
+from modeling.files.answer_tables import ANSWER_TABLES
 
 pytestmark = pytest.mark.filterwarnings("error")
 MakeFound = Callable[..., ClaimFound]
@@ -45,6 +46,10 @@ def odd(plan: AnalysisPlan) -> MakeFound:
         return ClaimFound(claim=claim, tests=tests, values=values.table, standing=standing)
 
     return make
+
+
+def test_the_declared_chance_is_that_of_who_feels_nothing() -> None:
+    assert ANSWER_TABLES["oddity"].chance == pytest.approx(oddity_share(0.0))
 
 
 def test_planted_d_primes_are_within_their_intervals(odd):

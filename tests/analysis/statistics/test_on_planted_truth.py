@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
+import pytest
 from scipy import stats
 
 from analysis.answers.plan import Claim
@@ -22,6 +23,13 @@ def binomial_limits(probability: float, repeats: int) -> tuple[float, float]:
     return float(low), float(high)
 
 
+@pytest.fixture
+def few_flips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sign flips stand beside the t-test: none of what is judged here is theirs."""
+    monkeypatch.setattr("analysis.statistics.paired.RESAMPLES", 99)
+
+
+@pytest.mark.usefixtures("few_flips")
 def test_the_paired_test_errs_in_five_per_cent_and_its_interval_covers_the_truth():
     rng = np.random.default_rng(20)
     repeats, people, shift = 600, 20, 3.0
@@ -74,6 +82,7 @@ def test_the_bootstrap_interval_of_a_correct_rate_covers_the_truth(monkeypatch):
     )
 
 
+@pytest.mark.usefixtures("few_flips")
 def test_a_planted_effect_is_found_where_it_is_and_nowhere_else():
     rng = np.random.default_rng(23)
     repeats, people = 20, 20

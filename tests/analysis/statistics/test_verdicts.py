@@ -215,10 +215,19 @@ def test_equality_of_guesses_is_none(answers):
     blind = replace(answers, answers={"relative": guessed})
     standing = claim_standing(blind, answers.plan.claims[2], rng=rng())
     assert standing.sensitivity == "answers on full models were not above chance"
-    assert chance_of(guessed) == 1 / 7
+    assert chance_of("relative", guessed) == 1 / 7
     wide = replace(answers.plan.claims[2], bounds=(-0.3, 0.3))
     (one,) = claims_found(replace(blind, plan=AnalysisPlan(claims=(wide,))), rng=rng())
     assert one.tests["verdict"].iloc[0] == WITHHELD
+
+
+def test_chance_is_one_over_the_alternatives_that_every_trial_has(answers):
+    of_three = answers.relative.assign(layout="a|b|c")
+    assert chance_of("relative", of_three) == 1 / 3
+    assert np.isnan(chance_of("relative", of_three.assign(layout=np.nan)))
+    of_three.loc[of_three.index[0], "layout"] = "a|b"
+    with refused(InputError, expected="forced choice", got=[2, 3]):
+        chance_of("relative", of_three)
 
 
 def test_everybody_right_is_above_chance_and_equal(answers):

@@ -1,12 +1,15 @@
-"""Shows a short session at the console on a simulated rig, and tells the test what happens.
+"""Shows short sessions at the console on a simulated rig, and tells the test what happens.
 
-    python console_session.py LANGUAGE PART ...
+    python console_session.py
 
-Parts: "known" and "new" (welcome), "wait", "absolute", "relative", "oddity", "rest", "closing".
+Standard input: one JSON object per session, {"language": …, "parts": [part, …]}, of the parts
+"known" and "new" (welcome), "wait", "absolute", "relative", "oddity", "rest", "training" and
+"closing"; or {"screens": [number, …]} to open a console on each. During a session a line presses
+the rig's button; while the participant waits, it ends the wait, and "stop" ends it as an
+experimenter does. One process shows them all: PsychoPy takes seconds to start.
 Standard output: one JSON object per line, {"page": …, "handles": …}, {"presented": …, "after_ms":
 since the frame that was shown last, "shown": the words in it}, {"silent": …}, {"noted": …}, or
-{"result": …}. Standard input: a line presses the rig's button; while the participant waits, it ends
-the wait, and "stop" ends it as an experimenter does.
+{"result": …}.
 """
 
 import json
@@ -46,9 +49,8 @@ def line():
 class Frames:
     """When the last frame was shown, and which words it held."""
 
-    def __init__(self, window):
+    def __init__(self):
         self.words, self.shown, self.at_s = [], [], 0.0
-        self._swap, window.backend.swapBuffers = window.backend.swapBuffers, self.swap
         draw = visual.TextStim.draw
 
         def noted(stimulus, *given, **options):
@@ -56,6 +58,10 @@ class Frames:
             return draw(stimulus, *given, **options)
 
         visual.TextStim.draw = noted
+
+    def watch(self, window):
+        self.words, self.shown, self.at_s = [], [], 0.0
+        self._swap, window.backend.swapBuffers = window.backend.swapBuffers, self.swap
 
     def swap(self, *given, **options):
         self._swap(*given, **options)
@@ -105,7 +111,7 @@ def surfaces_of(count, begin, *, feel_all=False):
     )
 
 
-def run(part):
+def run(console, part):
     if part in ("known", "new"):
         known = part == "known"
         return console.welcome(
@@ -124,16 +130,34 @@ def run(part):
     return console.rest() if part == "rest" else console.announce(f"absolute.{part}")
 
 
-language, *parts = sys.argv[1:]
-with Console(
-    language=language,
-    stamp="pilot",
-    on_page=lambda page, handles: tell(page=page, handles=handles, shown=frames.shown),
-) as console:
-    frames = Frames(console._window)
-    console.hear(lambda event, **fields: tell(noted=event, **fields))
-    console.progress(12, 28)
+def hold(language, parts):
+    with Console(
+        language=language,
+        stamp="pilot",
+        on_page=lambda page, handles: tell(page=page, handles=handles, shown=frames.shown),
+    ) as console:
+        frames.watch(console._window)
+        console.hear(lambda event, **fields: tell(noted=event, **fields))
+        console.progress(12, 28)
+        try:
+            result = [run(console, part) for part in parts]
+        except SessionAborted as aborted:
+            result = [aborted.reason, aborted.by]
+    tell(result=result)
+
+
+def open_on(screen):
     try:
-        tell(result=[run(part) for part in parts])
-    except SessionAborted as aborted:
-        tell(result=[aborted.reason, aborted.by])
+        with Console(screen=screen):
+            return "open"
+    except ValueError as refusal:
+        return str(refusal)
+
+
+frames = Frames()
+while order := sys.stdin.readline():
+    asked = json.loads(order)
+    if "screens" in asked:
+        tell(result=[open_on(screen) for screen in asked["screens"]])
+    else:
+        hold(asked["language"], asked["parts"])

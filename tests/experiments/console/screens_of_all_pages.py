@@ -14,8 +14,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from psychopy import visual
+from pyglet import gl
 from pyglet.window import key
 
+from experiments.console import page_runner
 from experiments.console.console import Console
 from experiments.console.languages import Texts
 from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
@@ -67,6 +69,10 @@ class Visitor:
     def sit_down(self, window):
         self.window, self._flip = window, window.flip
         window.flip = self.flip
+        if self.folder is None:
+            # Everything is drawn but for the pixels, which nobody sees.
+            gl.glEnable(gl.GL_RASTERIZER_DISCARD)
+            window.winHandle.flip = lambda: None
 
     def on_page(self, page, handles):
         self.handles = handles
@@ -251,6 +257,7 @@ def look_at_all(screen, folder):
         try_everything(console, visitor)
 
 
+page_runner.FRAME_PAUSE_S = 0.0
 folder, *screens = sys.argv[1:]
 for screen in screens:
     look_at_all(screen, None if folder == "-" else Path(folder))

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
@@ -14,17 +12,11 @@ from typing import Any
 import pytest
 
 from experiments.console.languages import Texts
+from tests.experiments.driven import Driven
 
-ROOT = Path(__file__).parents[3]
 DRIVER = Path(__file__).with_name("console_session.py")
 ALL_PARTS = ("new", "training", "wait", "absolute", "rest", "relative", "oddity", "closing")
-
-
-@pytest.fixture(scope="module")
-def display(x_server: Callable[..., AbstractContextManager[str]]) -> Iterator[str]:
-    """A small screen, which software draws sooner."""
-    with x_server(size=(1280, 800)) as name:
-        yield name
+Seated = Callable[..., AbstractContextManager["Participant"]]
 
 
 class Participant:
@@ -80,21 +72,30 @@ class Participant:
         return [news for news in self.heard if news.get("noted") == event]
 
 
+@pytest.fixture(scope="module")
+def consoles(x_server: Callable[..., AbstractContextManager[str]]) -> Iterator[Driven]:
+    """On small screens, which software draws sooner."""
+    with x_server(screens=2, size=(1280, 800)) as display:
+        shown = Driven(DRIVER, display=display)
+        yield shown
+        shown.close()
+
+
 @contextmanager
-def seated(language: str, *parts: str, display: str) -> Iterator[Participant]:
-    environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
-    session = subprocess.Popen(
-        [sys.executable, str(DRIVER), language, *parts],
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        yield Participant(session, environment)
-    finally:
-        session.kill()
-        session.communicate(timeout=10)
+def asked(consoles: Driven, **order: object) -> Iterator[Participant]:
+    """The person at a console; the block is left with the result."""
+    with consoles.window(json.dumps(order)) as session:
+        person = Participant(session, consoles.environment)
+        yield person
+        assert "result" in person.heard[-1]
+
+
+@pytest.fixture
+def seated(consoles: Driven) -> Seated:
+    def seat(language: str, *parts: str) -> AbstractContextManager[Participant]:
+        return asked(consoles, language=language, parts=parts)
+
+    return seat
 
 
 def begins_with_its_page(person: Participant, surface: str, words: str) -> bool:
@@ -103,9 +104,9 @@ def begins_with_its_page(person: Participant, surface: str, words: str) -> bool:
     return first["presented"] == surface and words in first["shown"]
 
 
-def test_a_session_by_mouse_alone(display: str) -> None:
+def test_a_session_by_mouse_alone(seated: Seated) -> None:
     words = Texts.load("ja").by_key
-    with seated("ja", *ALL_PARTS, display=display) as person:
+    with seated("ja", *ALL_PARTS) as person:
         person.wait_for_page("consent")
         assert words["stamp.pilot"] in person.heard[-1]["shown"]
         person.click("yes")
@@ -185,8 +186,8 @@ def test_a_session_by_mouse_alone(display: str) -> None:
     ]
 
 
-def test_a_session_by_keys_alone(display: str) -> None:
-    with seated("en", *ALL_PARTS, display=display) as person:
+def test_a_session_by_keys_alone(seated: Seated) -> None:
+    with seated("en", *ALL_PARTS) as person:
         person.wait_for_page("consent")
         person.keys("Return")  # nothing has the focus at first: consent is given by no chance
         person.keys("Tab", "Tab", "Tab", "Tab", "shift+Tab", "shift+Tab", "shift+Tab", "space")
@@ -243,8 +244,8 @@ def test_a_session_by_keys_alone(display: str) -> None:
     assert (magnitude, frequency) == (21, 79)
 
 
-def test_stopping_is_asked_again_in_silence(display: str) -> None:
-    with seated("en", "absolute", display=display) as person:
+def test_stopping_is_asked_again_in_silence(seated: Seated) -> None:
+    with seated("en", "absolute") as person:
         person.wait_for_page("rate")
         person.rate("magnitude", 30)
         assert person.wait_for("noted") == "slider"
@@ -277,19 +278,19 @@ def test_stopping_is_asked_again_in_silence(display: str) -> None:
     assert [note["value"] for note in person.noted("slider")] == [pytest.approx(30, abs=0.2)]
 
 
-def test_who_refuses_or_has_another_code_ends_the_session(display: str) -> None:
-    with seated("en", "new", display=display) as person:
+def test_who_refuses_or_has_another_code_ends_the_session(seated: Seated) -> None:
+    with seated("en", "new") as person:
         person.wait_for_page("consent")
         person.click("no")
         assert person.wait_for("result") == ["consent refused", "participant"]
-    with seated("ja", "known", display=display) as person:
+    with seated("ja", "known") as person:
         person.wait_for_page("known")
         person.keys("Tab", "Tab", "Return")
         assert person.wait_for("result") == ["the code is another person's", "participant"]
 
 
-def test_who_is_known_is_asked_for_the_code_alone(display: str) -> None:
-    with seated("en", "known", "wait", display=display) as person:
+def test_who_is_known_is_asked_for_the_code_alone(seated: Seated) -> None:
+    with seated("en", "known", "wait") as person:
         person.wait_for_page("known")
         assert "Is TAKI-46 your code?" in person.heard[-1]["shown"]
         person.click("yes")
@@ -298,31 +299,9 @@ def test_who_is_known_is_asked_for_the_code_alone(display: str) -> None:
         assert person.wait_for("result") == ["the rig is broken", "experimenter"]
 
 
-OPEN = """
-import sys
-from experiments.console.console import Console
-for screen in map(int, sys.argv[1:]):
-    try:
-        with Console(screen=screen) as console:
-            print("open")
-    except ValueError as refusal:
-        print(refusal)
-"""
-
-
-def test_a_screen_that_is_not_there_is_refused(
-    x_server: Callable[..., AbstractContextManager[str]],
-) -> None:
-    with x_server(screens=2, size=(1280, 800)) as name:
-        environment = {**os.environ, "DISPLAY": name, "PYTHONPATH": str(ROOT)}
-        opened = subprocess.run(
-            [sys.executable, "-c", OPEN, "2", "-1", "0"],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
-    too_high, too_low, there = opened.stdout.splitlines()
+def test_a_screen_that_is_not_there_is_refused(consoles: Driven) -> None:
+    with asked(consoles, screens=[2, -1, 0]) as session:
+        too_high, too_low, there = session.wait_for("result")
     for refusal, number in ((too_high, 2), (too_low, -1)):
         assert refusal == (
             f"expected the number of a screen (0 to 1, of 2), got {number}; choose one that is "

@@ -1,8 +1,10 @@
-"""Shows a visit on a rig that only notes, and tells the test what happens.
+"""Shows visits on a rig that only notes, and tells the test what happens.
 
+Standard input: a line for each window, its width and height in pixels. While it is open, a line is
+the path of a picture of the next frame, or "close" for the window's own button.
 Standard output: one JSON object per line: {"asked": …} for what the rig is asked, {"frame": …} with
-handles (pixels of the screen) and all words for the first frame and for each line of the standard
-input, which is the path of a picture of that frame, or "close" for the window's own button.
+handles (pixels of the screen) and all words for the first frame and for each line, and {"ended": …}
+with the places to which the pointer went.
 """
 
 import json
@@ -20,7 +22,6 @@ from experiments.feel.visit import Visit
 from modeling import Threshold, simplify
 from stimuli.planted.textures import planted_texture
 
-size = tuple(map(int, sys.argv[1:3]))
 live_texts = []
 pointed = set()
 
@@ -85,14 +86,22 @@ def on_frame(shown):
     tell(frame=handles, words=[text.content for text in live_texts])
 
 
-first = True
+def visit_in(size):
+    global first
+    first = True
+    live_texts.clear()
+    pointed.clear()
+    visit = Visit(textures, NotingRig())
+    with window.FeelWindow(visit, yardstick, size=size, on_frame=on_frame) as shown:
+        shown.run()
+    tell(ended=True, pointed=sorted(pointed))
+
+
 window.LiveText = panels.LiveText = NotedText
 threshold = Threshold.shipped("codec")
 canvas, leather = planted_texture("canvas"), planted_texture("leather")
 textures = [Texture(full=canvas, simplified=simplify(canvas, threshold).model)]
 textures.append(Texture(full=leather))
-visit = Visit(textures, NotingRig())
 yardstick = Yardstick(threshold=threshold)
-with window.FeelWindow(visit, yardstick, size=size, on_frame=on_frame) as shown:
-    shown.run()
-tell(ended=True, pointed=sorted(pointed))
+while order := sys.stdin.readline():
+    visit_in(tuple(map(int, order.split())))

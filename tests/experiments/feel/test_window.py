@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from PIL import Image
 
-ROOT = Path(__file__).parents[3]
+from tests.experiments.driven import Driven
+
 DRIVER = Path(__file__).with_name("feel_visit.py")
 BLUE = (0x00, 0x72, 0xB2)
 
@@ -62,26 +62,23 @@ class Visitor:
         return self.wait_for("asked")
 
 
+@pytest.fixture(scope="module")
+def windows(display: str) -> Iterator[Driven]:
+    shown = Driven(DRIVER, display=display)
+    yield shown
+    shown.close()
+
+
 @contextmanager
-def visiting(display: str, width: int, height: int) -> Iterator[Visitor]:
-    environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
-    program = subprocess.Popen(
-        [sys.executable, str(DRIVER), str(width), str(height)],
-        env=environment,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    try:
-        visitor = Visitor(program, environment)
+def visiting(windows: Driven, width: int, height: int) -> Iterator[Visitor]:
+    """Somebody at a window; the block is left with its end."""
+    with windows.window(f"{width} {height}") as program:
+        visitor = Visitor(program, windows.environment)
         assert visitor.wait_for("asked") == ["canvas", 4]  # it plays at once
         visitor.wait_for("frame")
         x, y = visitor.handles["noise"]
         visitor.xdotool("mousemove", x, y + 40)  # keys go to the window under the pointer
         yield visitor
-    finally:
-        program.kill()
-        program.communicate(timeout=10)
 
 
 def pixels(picture: np.ndarray[Any, Any], colour: tuple[int, int, int]) -> int:
@@ -90,9 +87,11 @@ def pixels(picture: np.ndarray[Any, Any], colour: tuple[int, int, int]) -> int:
     return int((np.abs(half - np.array(colour)).max(axis=-1) < 12).sum())
 
 
-def test_keys_and_buttons_change_what_plays_and_what_is_drawn(tmp_path: Path, display: str) -> None:
+def test_keys_and_buttons_change_what_plays_and_what_is_drawn(
+    tmp_path: Path, windows: Driven
+) -> None:
     size = (1024, 768)
-    with visiting(display, *size) as visitor:
+    with visiting(windows, *size) as visitor:
         full = visitor.look(tmp_path / "full.png")
         assert "canvas, full model" in visitor.words
         assert "simulated texture, simulated hand, force assumed" in visitor.words
@@ -130,8 +129,8 @@ def test_keys_and_buttons_change_what_plays_and_what_is_drawn(tmp_path: Path, di
         assert all(0 <= x < size[0] and 0 <= y < size[1] for x, y in news["pointed"])
 
 
-def test_a_wide_window_is_filled(tmp_path: Path, display: str) -> None:
-    with visiting(display, 1920, 1080) as visitor:
+def test_a_wide_window_is_filled(tmp_path: Path, windows: Driven) -> None:
+    with visiting(windows, 1920, 1080) as visitor:
         picture = visitor.look(tmp_path / "wide.png")
         assert picture.shape == (1080, 1920, 3)
         white = (picture.min(axis=-1) > 250).mean(axis=0)  # the ground of its parts, by columns

@@ -38,7 +38,7 @@ def test_every_trial_of_every_session_is_answered(simulate: Any, study: Study) -
     assert len(answers["absolute"]) == 3 * (1 + 3 * 2)
     assert len(answers["relative"]) == 4 * 2 * (1 + 3 * 2)
     for task, rows in answers.items():
-        columns = [column.name for column in ANSWER_TABLES[task]]
+        columns = [column.name for column in ANSWER_TABLES[task].columns]
         assert all(set(columns) <= set(row) for row in rows)
         assert all(row["simulated"] and row["valid"] == 1 for row in rows)
         main = [row for row in rows if row["phase"] == "main"]

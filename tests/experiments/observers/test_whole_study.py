@@ -7,6 +7,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from experiments import Study, simulate_study
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.percepts import Perception
@@ -29,6 +31,7 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
     )
 
 
+@pytest.mark.usefixtures("unsynced")
 def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: Any) -> None:
     study = Study.load()
     truths = {texture: planted_texture(texture) for texture in study.textures}

@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +33,7 @@ from experiments.study.task_plan import TaskPlan
 from modeling import InputError, simplify
 from modeling.files.answer_tables import ANSWER_TABLES
 from rig.twin import SimulatedRig
-from tests.experiments.sessions.conftest import STUDY
+from tests.experiments.sessions.conftest import STUDY, session_on_disk
 from tests.refusals import refused
 
 VALIDATOR = Path(sys.executable).with_name("bids-validator-deno")
@@ -73,10 +74,12 @@ def beh(files: SessionFiles, ending: str) -> Path:
     return files.root / participant / session / "beh" / f"{files.stem}_{ending}"
 
 
-@pytest.fixture
-def study_on_disk(write_session) -> Path:
+@pytest.fixture(scope="module")
+def whole_study(tmp_path_factory) -> Path:
     """All tasks; complete, aborted, crashed and resumed sessions of two people."""
-    files = write_session(answers=PERSON)
+    data = tmp_path_factory.mktemp("study") / "data"
+    write_session = partial(session_on_disk, data)
+    write_session(answers=PERSON)
     for session in (1, 2):
         write_session("relative", session=session)
     write_session("oddity", answered=3, status="aborted", reason='tired, "really"\tyes\n=1+1')
@@ -85,8 +88,14 @@ def study_on_disk(write_session) -> Path:
     write_session(subject=2, resume=True, answered=2, status="aborted")
     write_session(subject=2, resume=True, invalid=[6])
     write_session("threshold", subject=2, answered=0, status=None)
-    export_all(files.root)
-    return files.root
+    export_all(data)
+    return data
+
+
+@pytest.fixture
+def study_on_disk(whole_study, tmp_path) -> Path:
+    """A copy of it in the folder of `write_session`."""
+    return Path(shutil.copytree(whole_study, tmp_path / "data"))
 
 
 @pytest.mark.parametrize("kind", [True, False])
@@ -153,7 +162,7 @@ def test_every_answer_stands_in_its_table(write_session):
     files = write_session(invalid=[4])
     export_session(files.root, files.manifest)
     found = table(beh(files, "beh.tsv"))
-    assert list(found) == [column.name for column in ANSWER_TABLES["absolute"]]
+    assert list(found) == [column.name for column in ANSWER_TABLES["absolute"].columns]
     planned = json.loads(files.manifest.read_text())["trials"]
     assert found["texture"].tolist() == [trial["texture"] for trial in planned]
     assert found["virtual_texture"].tolist() == [trial["virtual_texture"] for trial in planned]

@@ -70,6 +70,7 @@ def test_a_subject_whose_own_slot_was_taken_gets_another(tmp_path: Path) -> None
         enrolled(roster, 4, 2)
 
 
+@pytest.mark.usefixtures("unsynced")
 @given(
     st.lists(
         st.tuples(st.sampled_from(["enroll", "drop", "withdraw"]), st.integers(1, 8)), max_size=40

@@ -500,6 +500,7 @@ def killed_at(event: int, session: Callable[[], object]) -> bool:
     return os.WIFSIGNALED(status)
 
 
+@pytest.mark.usefixtures("unsynced")
 def test_killed_between_every_two_events_no_answer_is_lost_or_doubled(
     run: Callable[..., Any], small: Study, tmp_path: Path
 ) -> None:

@@ -679,6 +679,23 @@ def test_the_hands_history_and_the_presentations_of_each_trial_reach_the_store(
         assert min(rows.speed_mm_s) < -200 < 200 < max(rows.speed_mm_s)
 
 
+def test_what_the_hand_did_while_a_sample_was_mounted_is_of_no_trial(
+    run: Callable[..., Ran],
+) -> None:
+    rig, store = Stroking(), Keeping()
+    mounted_s = []
+
+    class Mounting(Scripted):
+        def wait(self, until: Callable[[], bool]) -> None:
+            for _ in range(50):
+                rig.read()
+            mounted_s.append(rig.now_s())
+
+    run(Mounting(), rig=rig, store=store)
+    for (_, rows, _), moment_s in zip(store.traces, mounted_s, strict=True):
+        assert rows.time_s[0] > moment_s
+
+
 class Leaving(Scripted):
     """Leaves in the third trial, once the first surface has been stroked."""
 

@@ -79,6 +79,19 @@ def test_a_dropout_keeps_the_data(root):
     assert files_of(root, 1) == ()
 
 
+def test_somebody_whose_number_begins_alike_keeps_the_row(root, write_session):
+    """Also where it could not be made again, since what it was made from is damaged."""
+    for before, number in ((1, 10), (2, 100)):  # in the place of a dropout
+        drop_out(root, before)
+        write_session(subject=number, **PEOPLE)
+    export_all(root)
+    (log,) = root.glob("sourcedata/sub-100/ses-01/*_log.jsonl")
+    log.write_bytes(log.read_bytes().replace(b'"trial": 4', b'"trial": "4"'))
+    withdraw(root, 10)
+    people = pd.read_csv(root / "participants.tsv", sep="\t")
+    assert people["participant_id"].tolist() == ["sub-01", "sub-02", "sub-100"]
+
+
 def test_the_last_one_leaves_an_empty_list(root):
     withdraw(root, 1)
     withdraw(root, 2)

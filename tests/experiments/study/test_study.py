@@ -12,6 +12,7 @@ from experiments.study.questions import Question
 from experiments.study.study import SHIPPED_STUDY, Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError
+from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
 from tests.refusals import refused
 
 
@@ -253,3 +254,14 @@ def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:
     with refused(InputError, expected=["study", tmp_path / "none.toml"]):
         Study.load(tmp_path / "none.toml")
+
+
+def test_no_claim_about_a_task_without_ratings_or_right_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    about = {"title": "pair comparison", "texture": "", "model": ""}
+    monkeypatch.setitem(ANSWER_TABLES, "pair", answer_table(RESPONSE_TIME, **about))
+    claim = {"name": "alike", "models": ("full", "simplified"), "test": "difference"}
+    for task, measure in (("pair", "response_time_s"), ("threshold", "correct")):
+        with refused(InputError, expected="alike", got=task):
+            Claim(**claim, task=task, measure=measure, bounds=(-0.1, 0.1))

@@ -10,6 +10,7 @@ import pytest
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import Psychometrics
+from experiments.study.design import SessionPlan
 from experiments.study.models import ModelSets
 from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study, plan_sha256
@@ -36,6 +37,24 @@ def test_imbalance_is_counted(study: Study) -> None:
     rows = balance_of(study, "absolute")
     assert [(row.least, row.most, row.of) for row in rows[:2]] == [(1, 2, 3), (1, 2, 3)]
     assert all(row.most - row.least <= 1 for row in rows)
+
+
+def test_a_layout_that_does_not_tell_what_is_right_is_not_counted(
+    study: Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of buttons that say "same" and "different"."""
+    counted = balance_of(study, "relative")
+
+    def with_words(*args: object, **settings: object) -> SessionPlan:
+        plan = plan_session(*args, **settings)  # type: ignore[arg-type]
+        words = ("same", "different")
+        return replace(plan, trials=tuple(replace(each, layout=words) for each in plan.trials))
+
+    monkeypatch.setattr("experiments.tasks.balance.plan_session", with_words)
+    assert balance_of(study, "relative") == [
+        row for row in counted if not row.what.endswith("a button is right")
+    ]
+    assert len(counted) > len(balance_of(study, "relative"))
 
 
 def test_anchors_count_for_nothing(study: Study) -> None:

@@ -123,7 +123,7 @@ def test_each_interval_is_felt_once_and_the_answer_is_stored(
     result, store = run(study, person, rig=rig, models=models)
     assert result.completed
     assert result.answered == len(store.rows) == 2 + 24
-    columns = [column.name for column in ANSWER_TABLES["threshold"]]
+    columns = [column.name for column in ANSWER_TABLES["threshold"].columns]
     assert all(list(row) == columns for row in store.rows)
     assert len(rig.bursts) == 2 * len(person.felt)  # the third and fourth press only selected
     for trial, row, first, second in zip(

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from modeling import PEQ, InputError
 from modeling.equalizer.bands import band_coefficients, clamp_bands, rational_tan
+from tests.refusals import refused
 
 RATE_HZ = 5000.0
 frequencies = st.floats(1.0, 0.49 * RATE_HZ)
@@ -195,27 +196,29 @@ def test_legal_edges_are_accepted(edge: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value"),
+    ("name", "value", "expected", "got"),
     [
-        ("frequencies_hz", [0.999]),
-        ("frequencies_hz", [0.4901 * RATE_HZ]),
-        ("frequencies_hz", [np.nan]),
-        ("frequencies_hz", [np.inf]),
-        ("frequencies_hz", [100.0, 200.0]),
-        ("bandwidths_hz", [0.099]),
-        ("bandwidths_hz", [0.4501 * RATE_HZ]),
-        ("bandwidths_hz", [np.nan]),
-        ("gains", [np.nan]),
-        ("gains", [-np.inf]),
-        ("gains", [[1.0]]),
-        ("noise_gain", -0.1),
-        ("noise_gain", np.nan),
-        ("noise_gain", np.inf),
-        ("rate_hz", 0.0),
-        ("rate_hz", np.nan),
+        ("frequencies_hz", [0.999], ["frequency", "1…2450 Hz", "5000 Hz"], 0.999),
+        ("frequencies_hz", [0.4901 * RATE_HZ], ["frequency", "1…2450 Hz", "5000 Hz"], 2450.5),
+        ("frequencies_hz", [np.nan], ["frequency", "1…2450 Hz", "5000 Hz"], "nan"),
+        ("frequencies_hz", [np.inf], ["frequency", "1…2450 Hz", "5000 Hz"], "inf"),
+        ("frequencies_hz", [100.0, 200.0], ["frequency", "layer"], ["(1,)", "(2,)"]),
+        ("bandwidths_hz", [0.099], ["bandwidth", "0.1…2250 Hz", "5000 Hz"], 0.099),
+        ("bandwidths_hz", [0.4501 * RATE_HZ], ["bandwidth", "0.1…2250 Hz", "5000 Hz"], 2250.5),
+        ("bandwidths_hz", [np.nan], ["bandwidth", "0.1…2250 Hz", "5000 Hz"], "nan"),
+        ("gains", [np.nan], "gains", "[nan]"),
+        ("gains", [-np.inf], "gains", "[-inf]"),
+        ("gains", [[1.0]], ["gain", "layer"], ["(1,)", "(1, 1)"]),
+        ("noise_gain", -0.1, ["noise gain", 0], -0.1),
+        ("noise_gain", np.nan, ["noise gain", 0], "nan"),
+        ("noise_gain", np.inf, ["noise gain", 0], "inf"),
+        ("rate_hz", 0.0, "0 Hz", 0.0),
+        ("rate_hz", np.nan, "0 Hz", "nan"),
     ],
 )
-def test_illegal_values_are_refused(name: str, value: object) -> None:
+def test_illegal_values_are_refused(
+    name: str, value: object, expected: object, got: object
+) -> None:
     good: dict[str, object] = {
         "noise_gain": 0.1,
         "frequencies_hz": [100.0],
@@ -224,7 +227,7 @@ def test_illegal_values_are_refused(name: str, value: object) -> None:
         "rate_hz": RATE_HZ,
     }
     PEQ(**good)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="expected"):
+    with refused(InputError, expected=expected, got=got):
         PEQ(**{**good, name: value})  # type: ignore[arg-type]
 
 

@@ -19,6 +19,7 @@ from modeling.estimation.joint import fit_jointly
 from modeling.estimation.likelihood import signal_power
 from modeling.estimation.peaks import MOST_LAYERS, PENALTY, find_peaks_jointly
 from modeling.recordings.spectrum import spectrum_of_samples, subtract_floor
+from tests.refusals import refused
 
 RATE_HZ = 5000.0
 
@@ -261,11 +262,11 @@ def test_silence_is_no_noise_and_no_layers() -> None:
 
 
 def test_what_is_no_vibration_is_refused_before_it_comes_here() -> None:
-    with pytest.raises(InputError, match="expected a vibration, got the constant value 3"):
+    with refused(InputError, names="planted", expected="vibration", got=3):
         find_layers(spectrum(Recording(np.full(5000, 3.0), RATE_HZ, 100.0, 1.0, "planted")))
     samples = np.ones(5000)
     samples[7] = np.nan
-    with pytest.raises(InputError, match="finite"):
+    with refused(InputError, names="planted", expected="finite", got=[1, "NaN", "sample 7"]):
         Recording(samples, RATE_HZ, 100.0, 1.0, "planted")
 
 

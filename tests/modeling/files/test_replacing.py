@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import threading
 from collections.abc import Callable
@@ -16,6 +17,7 @@ from modeling.files.locks import Lock, is_held
 from modeling.files.places import LOCK_NAME, locked
 from modeling.files.writing import write_files
 from tests.power_cut import Files, laid_out, watched
+from tests.refusals import refused
 
 OLD: Files = {"set": None, "set/figures": None, "set/a": b"old", "set/figures/b": b"old"}
 NEW: Files = {"set": None, "set/a": b"new"}
@@ -87,7 +89,7 @@ def test_what_came_where_nothing_was_stays(tmp_path: Path) -> None:
             (target / "a").write_text("mine")
             (tmp_path / "set-2").mkdir()
 
-    with pytest.raises(InputError, match=r"got a, which was added.* in .*set-3\."):
+    with refused(InputError, expected=target, got=["a", tmp_path / "set-3"]):
         replaced()
     assert (target / "a").read_text() == "mine"
 
@@ -104,7 +106,7 @@ def test_what_comes_between_the_two_moves_stays(
             (target / "mine").write_bytes(b"mine")
 
     monkeypatch.setattr(folders, "_check_same", meanwhile)
-    with pytest.raises(InputError, match="got mine, which was added"), replace_folder(target) as f:
+    with refused(InputError, expected=target, got="mine"), replace_folder(target) as f:
         (f / "a").write_bytes(b"new")
     kept = {(path.name, (path / "a").exists()) for path in target.parent.iterdir()}
     assert kept == {("set", False), ("set-2", True), ("set-3", True)}
@@ -122,7 +124,11 @@ def test_behind_a_lock_that_nobody_gives_back_the_new_is_kept(
             (fresh / "a").write_bytes(b"new")
             lock.acquire(0)
 
-    with pytest.raises(InputError, match=r"has held for .* What was made is in .*set-2\."):
+    with refused(
+        InputError,
+        expected=target.parent,
+        got=[f"process {os.getpid()}", target.with_name("set-2")],
+    ):
         replaced()
     lock.release()
     assert files_in(target.parent) == {**OLD, "set-2": None, "set-2/a": b"new"}
@@ -177,7 +183,7 @@ def test_who_writes_into_it_meanwhile_ends_first_and_is_seen(target: Path) -> No
             threading.Timer(0.1, goes_on.set).start()
 
     writer = threading.Thread(target=write)
-    with pytest.raises(InputError, match="mine"):
+    with refused(InputError, expected=target, got="mine"):
         replace()
     writer.join()
     assert files_in(target.parent) == {

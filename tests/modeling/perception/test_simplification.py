@@ -19,6 +19,7 @@ from modeling.perception.simplification import (
     layer_amplitudes_g,
     with_signs_chosen_again,
 )
+from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]
 # 0.1 g from 10 to 1000 Hz: with `paper-gain` a layer's gain is its level.
@@ -433,18 +434,18 @@ def test_known_levels_never_flip(make_model: ModelMaker) -> None:
 
 
 def test_arbitrary_units_are_refused(make_model: ModelMaker) -> None:
-    with pytest.raises(InputError, match="expected a model in g, got the unit 'arbitrary'"):
+    with refused(InputError, names="planted", expected="g", got="'arbitrary'"):
         run(make_model(0.0, at_db(1), unit="arbitrary"))
 
 
 @pytest.mark.parametrize("margin_db", [-0.1, np.nan, np.inf])
 def test_wrong_margins_are_refused(make_model: ModelMaker, margin_db: float) -> None:
-    with pytest.raises(InputError, match="margin of at least 0 dB"):
+    with refused(InputError, expected=["margin", "0 dB"], got=margin_db):
         run(make_model(0.0, at_db(1)), margin_db=margin_db)
 
 
 def test_unknown_criteria_are_refused(make_model: ModelMaker) -> None:
-    with pytest.raises(InputError, match="energy, paper-fft, paper-gain, got 'loudness'"):
+    with refused(InputError, expected=["energy", "paper-fft", "paper-gain"], got="'loudness'"):
         run(make_model(0.0, at_db(1)), criterion="loudness")
 
 

@@ -17,6 +17,7 @@ from modeling.recordings.spectrum import (
     spectrum_of_samples,
     subtract_floor,
 )
+from tests.refusals import refused
 
 RecordingMaker = Callable[..., Recording]
 
@@ -67,6 +68,20 @@ def test_resampling_keeps_a_sines_amplitude(
     # A bin-centred sine has |X| = A·N/2; the 10 Hz high-pass settles within the record.
     amplitude = found.magnitude[peak] * np.sqrt(np.pi * 5000) / 2 * 2 / 5000
     assert amplitude == pytest.approx(0.3, rel=0.02)
+
+
+@pytest.mark.parametrize("frequency_hz", [60.0, 440.3, 1000.5])
+def test_a_pure_tone_is_fitted_as_a_band_of_its_power(
+    make_recording: RecordingMaker, frequency_hz: float
+) -> None:
+    """Of a signal of power P the squared magnitudes sum to 2nP/π (Parseval)."""
+    n = 10000
+    sine = 0.3 * np.sin(2 * np.pi * frequency_hz * np.arange(n) / 5000)
+    noise = 0.01 * np.random.default_rng(4).standard_normal(n)
+    found = spectrum(make_recording(sine + noise))
+    assert len(found.notes) == 1
+    power = np.sum(found.without_leakage**2) * np.pi / (2 * n)
+    assert power == pytest.approx(0.3**2 / 2 + 0.01**2, rel=0.01)
 
 
 def test_high_pass_is_3_db_down_at_10_hz(make_recording: RecordingMaker) -> None:
@@ -127,9 +142,11 @@ def test_slow_data_keep_their_own_rate(make_recording: RecordingMaker) -> None:
 
 def test_records_too_short_or_too_slow_are_refused(make_recording: RecordingMaker) -> None:
     noise = np.random.default_rng(0).standard_normal(100)
-    with pytest.raises(InputError, match="at least 64 samples at 5000 Hz, got 22"):
+    with refused(
+        InputError, names=["planted", "100 mm/s", "22704 Hz"], expected=[64, "5000 Hz"], got=22
+    ):
         spectrum(make_recording(noise, rate_hz=22704.0))
-    with pytest.raises(InputError, match="rate above 20 Hz"):
+    with refused(InputError, names=["planted", "1 N"], expected="20 Hz", got="15 Hz"):
         spectrum(make_recording(noise, rate_hz=15.0))
 
 

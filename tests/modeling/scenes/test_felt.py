@@ -20,6 +20,7 @@ from modeling.scenes.felt import (
 from modeling.scenes.places import places_of
 from modeling.scenes.scene import Actuator, HandRange, Scene
 from stimuli.planted.textures import TEXTURES, planted_texture
+from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]
 CODEC = Threshold.shipped("codec")
@@ -136,7 +137,7 @@ def test_a_layer_that_fills_anothers_shape_goes_with_it_or_not_at_all(
 
 def test_arbitrary_units_are_refused(make_model: ModelMaker) -> None:
     model = make_model(0.1, [(200.0, 20.0, 1.0)], unit="arbitrary")
-    with pytest.raises(InputError, match="expected a model in g, got the unit 'arbitrary'"):
+    with refused(InputError, names="planted", expected="g", got="'arbitrary'"):
         least(model, Scene(name="no unit", hand=HAND))
 
 

@@ -14,6 +14,7 @@ from modeling.models.parameter_table import Parameters
 from modeling.recordings.spectrum import smooth
 from modeling.scenes.measures import Errors, Yardstick, errors_between
 from modeling.scenes.scene import Bound
+from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]
 RATE_HZ = 5000.0
@@ -126,5 +127,9 @@ def test_shares_of_a_bound_that_allows_nothing() -> None:
 
 @pytest.mark.parametrize("band_hz", [(1.0, 9.0), (2480.0, 9000.0)])
 def test_a_band_without_anything_in_it_is_refused(band_hz: tuple[float, float]) -> None:
-    with pytest.raises(InputError, match="expected an actuator's band that reaches into 10…2450"):
+    with refused(
+        InputError,
+        expected=["10…2450 Hz", "5000 Hz"],
+        got=["band_hz", f"{max(band_hz[0], 10):g} to {min(band_hz[1], 2450):g} Hz"],
+    ):
         Yardstick(RATE_HZ, narrowest_hz=15.0, band_hz=band_hz)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
@@ -69,18 +69,20 @@ def cut(samples, rows, *, blocks=(), longest_s=1.0, speed_delay_s=0.0, grid=GRID
     st.integers(0, 2**31),
     st.lists(st.floats(0, 1), max_size=20),
     st.sampled_from([0.2, 0.5, 1.0]),
+    st.sampled_from([0.0, 0.015, 0.1]),
 )
+@example(1, [0.0546875], 0.2, 0.015)  # ends where time + delay is rounded past the last reading
 @settings(max_examples=30)
 def test_pieces_never_overlap_never_leave_their_cell_and_do_not_depend_on_blocks(
-    readings_of, stroking, seed, blocks, longest_s
+    readings_of, stroking, seed, blocks, longest_s, speed_delay_s
 ) -> None:
     speed, force = stroking(4.0, GRID.speeds_mm_s, GRID.forces_n, seed=seed)
     rng = np.random.default_rng(seed)
     rows = readings_of(speed, force)
     rows["flags"][rng.integers(rows.size, size=3)] |= GONE
     samples = numbered(4.0)
-    pieces = cut(samples, rows, blocks=blocks, longest_s=longest_s)
-    whole = cut(samples, rows, longest_s=longest_s)
+    options = {"longest_s": longest_s, "speed_delay_s": speed_delay_s}
+    pieces, whole = (cut(samples, rows, blocks=given, **options) for given in (blocks, ()))
     assert [p.samples_g.tolist() for p in pieces] == [p.samples_g.tolist() for p in whole]
     used = np.zeros(samples.size, dtype=int)
     for piece in pieces:
@@ -90,7 +92,7 @@ def test_pieces_never_overlap_never_leave_their_cell_and_do_not_depend_on_blocks
         used[places] += 1
         at = places / RATE_HZ
         assert piece.start_s == pytest.approx(at[0])
-        v = np.abs(np.interp(at, rows["time_s"], speed))
+        v = np.abs(np.interp(at + speed_delay_s, rows["time_s"], speed))
         f = np.interp(at, rows["time_s"], force)
         cell = GRID.conditions.index(piece.condition)
         assert (GRID.cells(v, f) == cell).all()
@@ -99,11 +101,13 @@ def test_pieces_never_overlap_never_leave_their_cell_and_do_not_depend_on_blocks
     assert used.max(initial=0) <= 1
 
 
-def test_a_steady_hand_loses_nothing_but_the_ends(readings_of) -> None:
+@pytest.mark.parametrize(("speed_delay_s", "last"), [(0.0, 997), (0.02, 957)])
+@pytest.mark.parametrize("blocks", [(), np.linspace(0, 1, 101)])
+def test_a_steady_hand_loses_nothing_but_the_ends(readings_of, blocks, speed_delay_s, last) -> None:
     rows = readings_of(*steady(2.0, -160))
-    pieces = cut(numbered(2.0), rows, longest_s=0.75)
-    # To the last reading, which is 2 ms before the end: 0.75 + 0.75 + 0.498 s.
-    assert [p.samples_g.size for p in pieces] == [1500, 1500, 997]
+    pieces = cut(numbered(2.0), rows, blocks=blocks, longest_s=0.75, speed_delay_s=speed_delay_s)
+    # To the last reading, 2 ms before the end, or as long before it as its speed is late.
+    assert [p.samples_g.size for p in pieces] == [1500, 1500, last]
     assert {p.condition for p in pieces} == {(160.0, 0.6)}
     assert all(p.simulated and not p.force_assumed and not p.clipped for p in pieces)
 

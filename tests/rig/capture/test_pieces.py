@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,8 +16,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import wavfile
 
 from modeling import InputError, Recording, RecordingSet
+from modeling.files.locks import Lock
+from modeling.files.places import locked
 from rig.capture.cutting import Piece
 from rig.capture.grid import StrokeGrid
 from rig.capture.joining import joined
@@ -90,6 +94,31 @@ def test_opened_again_it_goes_on_with_what_is_missing(strokes, ends) -> None:
             assert tables[0] == tables[1]
         assert _recordings(once) == _recordings(more)
         assert len(_recordings(once)) == stores[0].coverage.full.sum()
+
+
+def test_of_two_who_record_into_one_folder_none_loses_a_piece(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """While one of them waits for the folder, the other one keeps a piece there."""
+    first, second = (PieceStore(tmp_path / "oak", plan(wanted_s=2.0)) for _ in range(2))
+    first.add(piece(seed=0))
+    adding = threading.Thread(target=second.add, args=(piece(seed=1),))
+    waits, acquire = threading.Event(), Lock.acquire
+
+    def told(self: Lock, wait_s: float) -> None:
+        if threading.current_thread() is adding:
+            waits.set()
+        acquire(self, wait_s)
+
+    monkeypatch.setattr(Lock, "acquire", told)
+    with locked(tmp_path / "oak/pieces/pieces.tsv") as table:
+        adding.start()
+        assert waits.wait(30)
+        first.add(piece(seed=2))
+    adding.join()
+    files = [line.split("\t")[0] for line in table.read_text().splitlines()[1:]]
+    kept = [wavfile.read(table.with_name(file))[1].tolist() for file in files]
+    assert kept == [piece(seed=n).samples_g.astype(np.float32).tolist() for n in (0, 2, 1)]
 
 
 def test_less_is_wanted_the_second_time(tmp_path: Path) -> None:

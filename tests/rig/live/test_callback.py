@@ -176,6 +176,17 @@ def test_whatever_hand_and_model_the_limits_hold_and_every_sample_is_a_number(
     assert np.sqrt(mean_square.max()) <= 0.1 * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("count", [2400, 4800])
+def test_a_signal_counts_for_how_long_vibration_may_last(live: Live, count: int) -> None:
+    """A texture right behind it is muted once both have lasted for as long as one alone may."""
+    callback = Callback(live, scale=1.0)
+    callback.signal(1, np.full(count, 0.1))
+    first = callback.play(count)
+    callback.texture(2, Limits(peak=1.0, duration_s=0.2, pause_s=0.1))
+    played = np.concatenate((first, callback.play(14400)))
+    assert np.flatnonzero(played)[-1] == 0.2 * RATE_HZ - 1
+
+
 def test_all_pole_and_layered_models_follow_each_other_through_silence(live: Live) -> None:
     """Fades included, what is played of an all-pole model is what Python makes of it."""
     callback, limits = Callback(live, scale=1.0), Limits(peak=5.0)

@@ -132,6 +132,19 @@ def test_no_reader_sees_half_a_row_of_a_writer_that_races_ahead() -> None:
         assert live.readings_written == 20 * RING
 
 
+def test_a_reader_who_is_overtaken_gets_no_row_under_way(tmp_path: Path) -> None:
+    """At every load of a copy in turn: a row and a half are written there (overtaken.c)."""
+    program = tmp_path / "overtaken"
+    source, headers = Path(__file__).with_name("overtaken.c"), Path(memory.__file__).parent
+    command = ["gcc", "-std=gnu11", "-O1", f"-I{headers}", str(source), "-o", str(program)]
+    subprocess.run(command, check=True)
+    told = subprocess.run([program], check=True, capture_output=True, text=True).stdout
+    moments, fewest, most, torn = map(int, told.split())
+    assert moments == 4 * 6 + 2  # of four rows of six words, and the count before and after
+    assert (fewest, most) == (3, 4)
+    assert torn == 0
+
+
 def test_the_file_is_gone_with_who_made_it() -> None:
     live = Live.create()
     other = Live.attach(live.path)
