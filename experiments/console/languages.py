@@ -60,8 +60,11 @@ class Texts:
         if unknown:
             _refuse(language, "the texts that English has", f"got {', '.join(unknown)}; remove it")
         for key, content in texts.items():
-            if _places(content) != _places(complete[key]):
-                _refuse(language, f"the {{places}} of English in {key}", "got others; correct it")
+            wanted, found = _places(complete[key]), _places(content)
+            if found != wanted:
+                expected = f"the places {', '.join(sorted(wanted)) or 'none'} of English in {key}"
+                got = ", ".join(sorted(found)) or "none"
+                _refuse(language, expected, f"got {got}; correct it")
         return Texts(language, texts)
 
     def of(self, key: str, **values: object) -> str:

@@ -24,8 +24,9 @@ from experiments.sessions.held import (
 )
 from experiments.sessions.roster import Roster
 from modeling import InputError
-from modeling.errors import shown
+from modeling.errors import shortened
 from modeling.files.documents import read_json_object
+from modeling.files.reading import LONGEST_PATH
 from modeling.files.writing import write_files
 
 
@@ -68,7 +69,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
     if files is None:
         raise InputError(
             f"expected the manifest of a session below {Path(data_folder) / 'sourcedata'}, got "
-            f"{shown(str(manifest_path))}; give its path."
+            f"{shortened(str(manifest_path), longest=LONGEST_PATH)}; give its path."
         )
     own = held_session(files)
     if own.state.events:  # killed before its first event, it has nothing to show

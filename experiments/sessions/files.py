@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modeling import InputError
-from modeling.errors import shown
+from modeling.errors import shortened
 from modeling.files.places import LOCK_NAME
+from modeling.files.reading import LONGEST_PATH
 from modeling.files.writing import write_bytes
 
 _MANIFEST = re.compile(r"sub-(\d+)_ses-(\d+)_task-([A-Za-z]+)_manifest\.json")
@@ -141,6 +142,7 @@ def require_data_folder(root: Path) -> None:
     """InputError where there is no such folder."""
     if not root.is_dir():
         raise InputError(
-            f"expected the data folder of a study, got none at {shown(str(root))}; the first "
-            "session makes it, or name another with --data."
+            "expected the data folder of a study, got none at "
+            f"{shortened(str(root), longest=LONGEST_PATH)}; the first session makes it, or name "
+            "another with --data."
         )

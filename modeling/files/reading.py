@@ -8,7 +8,7 @@ from pathlib import Path
 
 from modeling.errors import InputError, shortened
 
-_LONGEST_PATH = 200
+LONGEST_PATH = 200
 _REASONS = {
     errno.ENOENT: "nothing there",
     errno.ENOTDIR: "nothing there",
@@ -86,5 +86,5 @@ def reason_of(error: OSError) -> str:
 
 
 def _refused(path: Path, what: str, got: str, *, advice: str) -> InputError:
-    shown = shortened(str(path), longest=_LONGEST_PATH)
+    shown = shortened(str(path), longest=LONGEST_PATH)
     return InputError(f"expected {what} at {shown}, got {got}; {advice}.")

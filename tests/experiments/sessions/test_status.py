@@ -99,5 +99,5 @@ def test_no_name_of_a_condition_is_told(write_session):
 def test_a_folder_without_sessions_is_refused(tmp_path):
     with refused(InputError, expected=["sessions", tmp_path / "sourcedata"], got="--study"):
         study_progress(tmp_path)
-    with refused(InputError, expected="folder", got=["elsewhere", "--data"]):
+    with refused(InputError, expected="folder", got=[tmp_path / "elsewhere", "--data"]):
         study_progress(tmp_path / "elsewhere")

@@ -188,5 +188,5 @@ def test_a_running_session_and_a_stranger_are_refused(root, leave):
     for number in (0, 9):
         with refused(InputError, expected="subject", got=number):
             leave(root, number)
-    with refused(InputError, expected="folder", got=["elsewhere", "--data"]):
+    with refused(InputError, expected="folder", got=[root / "elsewhere", "--data"]):
         leave(root / "elsewhere", 1)
