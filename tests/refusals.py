@@ -56,6 +56,7 @@ def check_refusal(
         for fact in _listed(given)
     ]
     assert facts, "expected at least one fact that the refusal must name"
+    assert all(str(fact) for fact, _ in facts), "expected facts, got an empty one"
     for fact, part in facts:
         assert _stands(str(fact), part), f"expected {fact!s} in {part!r} of {sentence!r}"
 

@@ -14,7 +14,7 @@ from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.tables import read_table, write_table
 from modeling.files.writing import file_stem, write_text
-from tests.refusals import refused
+from tests.refusals import refused, warned
 
 
 @pytest.mark.parametrize(
@@ -160,8 +160,7 @@ def test_an_old_folder_that_stays_does_not_undo_the_new_one(
         raise OSError(errno.EBUSY, "Device or resource busy")
 
     monkeypatch.setattr("os.rmdir", busy)
-    warned = pytest.warns(UserWarning, match=r"remove .*\.sets\..*\.old yourself")
-    with warned, replace_folder(link) as fresh:
+    with warned(expected=place, got="remove"), replace_folder(link) as fresh:
         (fresh / "new").write_text("x")
     monkeypatch.undo()
     assert [p.name for p in place.iterdir()] == ["new"]

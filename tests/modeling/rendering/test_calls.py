@@ -181,10 +181,10 @@ def test_streams_render_at_once_in_threads() -> None:
 @compiled_only
 def test_one_renderer_in_two_threads_at_once_is_refused() -> None:
     """Both would write to one state, and beyond the caller's arrays."""
-    renderer, refused = Renderer(CANVAS), Event()
+    renderer, stopped = Renderer(CANVAS), Event()
 
     def long_calls() -> None:
-        while not refused.is_set():
+        while not stopped.is_set():
             renderer.render(150.0, 1.5, samples=200_000)
 
     def short_calls() -> None:
@@ -194,10 +194,10 @@ def test_one_renderer_in_two_threads_at_once_is_refused() -> None:
     with ThreadPoolExecutor(1) as pool:
         other = pool.submit(long_calls)
         try:
-            with pytest.raises(RuntimeError, match="expected one call of a renderer at a time"):
+            with refused(RuntimeError, expected="one", got=["two", "threads"]):
                 short_calls()
         finally:
-            refused.set()
+            stopped.set()
         other.result()
     assert renderer.render(150.0, 1.5, samples=1).shape == (1,)
 
@@ -255,11 +255,11 @@ def test_single_precision_stays_a_number_in_a_long_window(rms: float, window_s: 
 
 
 def test_single_precision_is_refused_where_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
-    sentence = "expected a layered model and the compiled kernel for single precision"
-    with pytest.raises(InputError, match=sentence):
+    facts = {"expected": ["layered", "kernel", "single precision"], "got": "autoregressive"}
+    with refused(InputError, **facts):
         Renderer(oak(), single=True)
     monkeypatch.setenv(SWITCH, "1")
-    with pytest.raises(InputError, match=sentence):
+    with refused(InputError, expected=facts["expected"], got="no kernel"):
         Renderer(CANVAS, single=True)
 
 
