@@ -242,6 +242,14 @@ class JackServer:
             time.sleep(0.05)
         raise AssertionError(f"expected a port with {part!r} within {seconds} s: {self.ports()}")
 
+    def wait_until_gone(self, *parts: str, seconds: float = 20) -> None:
+        """Until no port's name contains any of these: those of a killed client stay a moment."""
+        end = time.monotonic() + seconds
+        while left := [port for port in self.ports() if any(part in port for part in parts)]:
+            if time.monotonic() > end:
+                raise AssertionError(f"expected no such ports after {seconds} s, got {left}")
+            time.sleep(0.05)
+
     def connect(self, source: str, target: str) -> None:
         """Connect an output port to an input port."""
         self._tool("jack_connect", source, target)

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from rig.capture.grid import StrokeGrid
 from rig.capture.input import InputSettings
 from rig.setup.rig_file import SHIPPED_RIG_FILE, RigFile
 from tactileq.commands.record_audio import InputOptions, input_from, tell_assumed
+from tests.rig.waiting import wait_until
 
 ROOT = Path(__file__).parents[2]
 PLAYING = ROOT / "tests/rig/capture/playing.py"
@@ -64,6 +64,7 @@ def pieces_in(folder: Path) -> list[list[str]]:
     return [line.split("\t") for line in lines]
 
 
+@pytest.mark.timeout(120)  # which a blocked line would take
 def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
     jack_server, tmp_path: Path
 ) -> None:
@@ -72,14 +73,15 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
     with jack_server(block=256) as server:
         first = begin(tmp_path, "record", "oak", *BY_HAND, *INPUT)
         player = play_into(server, tmp_path)
-        while len(pieces_in(oak)) < 2:
-            assert first.poll() is None
-            time.sleep(0.02)
+        wait_until(lambda: len(pieces_in(oak)) >= 2 or first.poll() is not None, seconds=60)
+        assert first.poll() is None
         first.send_signal(signal.SIGKILL)
         first.communicate(timeout=30)
         before = pieces_in(oak)
         player.kill()
         player.communicate(timeout=30)
+        # Else the second one's noise might go to the first one's port.
+        server.wait_until_gone("in_0", "out_0")
 
         second = begin(tmp_path, "record", "oak", *BY_HAND, *INPUT)
         player = play_into(server, tmp_path)
