@@ -52,9 +52,7 @@ def transferred_information(counts: ArrayLike) -> TransferredInformation:
             f"{matrices.shape}; few trials of one person read as information at pure chance, so "
             "pool several people."
         )
-    wrong = matrices[~(np.isfinite(matrices) & (matrices >= 0))]
-    if wrong.size:
-        raise InputError(f"expected counts of at least 0, got {wrong[0]:g}; count answers.")
+    check_counts(matrices)
     if not (matrices.sum(axis=(1, 2)) > 0).all():
         raise InputError(
             "expected answers of every participant, got a matrix without any; leave it out."
@@ -114,3 +112,16 @@ def _interval(matrices: Floats, pooled: Floats) -> tuple[float, float]:
     reach = float(stats.t.ppf((1 + CONFIDENCE) / 2, n - 1)) * error
     bits = float(corrected_bits(pooled))
     return bits - reach, bits + reach
+
+
+def check_counts(counts: Floats) -> None:
+    """Refuse counts (of any shape) that are negative, NaN or inf.
+
+    Raises
+    ------
+    InputError
+        It names the first of them.
+    """
+    wrong = counts[~(np.isfinite(counts) & (counts >= 0))]
+    if wrong.size:
+        raise InputError(f"expected counts of at least 0, got {wrong[0]:g}; count answers.")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import stats
 
+from analysis.statistics.information import check_counts
 from modeling import InputError
 from modeling.arrays import Floats
 
@@ -74,9 +75,7 @@ def similarity_choice(counts: ArrayLike, *, rng: np.random.Generator) -> Similar
             f"expected a square matrix of {FEWEST_CLASSES} to {MOST_CLASSES} classes, got the "
             f"shape {table.shape}; count rows presented against columns answered."
         )
-    wrong = table[~(np.isfinite(table) & (table >= 0))]
-    if wrong.size:
-        raise InputError(f"expected counts of at least 0, got {wrong[0]:g}; count answers.")
+    check_counts(table)
     similarities, biases = np.full((k, k), np.nan), np.full(k, np.nan)
     known = np.flatnonzero(np.diag(table) > 0)
     if known.size < 2:

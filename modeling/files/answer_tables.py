@@ -120,7 +120,8 @@ class AnswerTable:
             raise ValueError(
                 f"expected a chance or alternatives in the {self.title}, got both; keep one."
             )
-        if not self.both_models and self._has_chance and "correct" not in names:
+        declared = self.alternatives or not isnan(self.chance)
+        if not self.both_models and declared and "correct" not in names:
             raise ValueError(
                 f"expected right answers in the {self.title}, whose chance is declared, got no "
                 "column correct; declare it."
@@ -130,10 +131,6 @@ class AnswerTable:
                 f"expected right answers and their chance in the {self.title}, whose trials hold "
                 "both models, so that nothing else can be claimed; declare them."
             )
-
-    @property
-    def _has_chance(self) -> bool:
-        return bool(self.alternatives) or not isnan(self.chance)
 
     @property
     def measures(self) -> tuple[str, ...]:
