@@ -10,6 +10,7 @@ from typing import TypeGuard
 from modeling.errors import InputError, shortened, shown
 
 UNITS = ("g", "arbitrary")
+LOWEST_RATE_HZ = 1.0
 HIGHEST_RATE_HZ = 1e7  # above any accelerometer's; a second then holds 80 MB
 LARGEST_VALUE = 1e100  # of samples, so that powers of them stay finite
 HIGHEST_SPEED_MM_S = 1e5  # beyond any hand's, as the force
@@ -49,14 +50,12 @@ def is_positive(value: object) -> TypeGuard[float]:
         return False
 
 
-def check_rate(rate_hz: object) -> None:
-    """Refuse what cannot be a sampling rate: anything but a number above 0, up to 10 MHz."""
-    if not is_positive(rate_hz):
-        raise InputError(f"expected a rate above 0 Hz, got {shown(rate_hz)}; give the rate.")
-    if rate_hz > HIGHEST_RATE_HZ:
+def check_rate(rate_hz: object, *, what: str = "a rate") -> None:
+    """Refuse what cannot be a sampling rate: anything but a number from 1 Hz to 10 MHz."""
+    if not (is_number(rate_hz) and LOWEST_RATE_HZ <= rate_hz <= HIGHEST_RATE_HZ):
         raise InputError(
-            f"expected a rate of at most {HIGHEST_RATE_HZ:.0f} Hz, got {shown(rate_hz)}; give the "
-            "rate in Hz."
+            f"expected {what} from {LOWEST_RATE_HZ:.0f} to {HIGHEST_RATE_HZ:.0f} Hz, got "
+            f"{shown(rate_hz)}; give the rate in Hz."
         )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.checks import UNITS, check_rate, check_texture_name, is_positive
+from modeling.checks import UNITS, check_rate, check_texture_name
 from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
@@ -95,16 +95,14 @@ class RegressedModel(SavedModel):
 
     def _check_kinds(self) -> None:
         check_texture_name(self.texture)
-        rate = self.rate_hz
+        check_rate(self.rate_hz)
         kinds = isinstance(self.simulated, bool) and isinstance(self.estimator, str)
-        if not (kinds and is_positive(rate) and self.unit in UNITS):
+        if not (kinds and self.unit in UNITS):
             raise InputError(
-                f"{self.texture}: expected a rate above 0 Hz, a unit among {', '.join(UNITS)}, "
-                f"true or false for simulated and text for estimator, got {shown(rate)}, "
-                f"{shown(self.unit)}, {shown(self.simulated)} and {shown(self.estimator)}; make "
-                "the model again."
+                f"{self.texture}: expected a unit among {', '.join(UNITS)}, true or false for "
+                f"simulated and text for estimator, got {shown(self.unit)}, "
+                f"{shown(self.simulated)} and {shown(self.estimator)}; make the model again."
             )
-        check_rate(rate)
         check_driver(self.driven_by)
 
     def _check_shapes(self) -> None:

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Bools, Floats
 from modeling.checks import (
     HIGHEST_FORCE_N,
-    HIGHEST_RATE_HZ,
     HIGHEST_SPEED_MM_S,
     LARGEST_VALUE,
     UNITS,
+    check_rate,
     check_texture_name,
 )
 from modeling.errors import InputError, shown
@@ -71,15 +71,10 @@ class Recording:
         object.__setattr__(self, "samples", _checked_samples(self.samples, where))
         for name in ("rate_hz", "speed_mm_s", "force_n"):
             object.__setattr__(self, name, float(getattr(self, name)))
-        if not (np.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(
-                f"{where}: expected a sampling rate above 0 Hz, got {self.rate_hz}; give the rate."
-            )
-        if self.rate_hz > HIGHEST_RATE_HZ:
-            raise InputError(
-                f"{where}: expected a sampling rate of at most {HIGHEST_RATE_HZ:.0f} Hz, got "
-                f"{self.rate_hz:g}; give the rate in Hz."
-            )
+        try:
+            check_rate(self.rate_hz)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
         for name, unit, highest in (
             ("speed_mm_s", "mm/s", HIGHEST_SPEED_MM_S),
             ("force_n", "N", HIGHEST_FORCE_N),

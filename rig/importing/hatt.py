@@ -23,6 +23,7 @@ from modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_RATE_HZ,
     HIGHEST_SPEED_MM_S,
+    LOWEST_RATE_HZ,
     check_duration,
 )
 from modeling.errors import shortened, shown
@@ -162,10 +163,10 @@ class HattTexture:
             For values out of range, and where no condition lies within the hull and vibrates.
         """
         rate = self.rate_hz if rate_hz is None else rate_hz
-        if not 0 < rate <= self.rate_hz:
+        if not LOWEST_RATE_HZ <= rate <= self.rate_hz:
             raise InputError(
-                f"{self.material}: expected a rate above 0 and up to the file's {self.rate_hz:g} "
-                f"Hz, got {rate:g}; leave it out to keep the file's."
+                f"{self.material}: expected a rate from {LOWEST_RATE_HZ:.0f} to the file's "
+                f"{self.rate_hz:g} Hz, got {rate:g}; leave it out to keep the file's."
             )
         check_duration(duration_s, self.rate_hz)
         if round(duration_s * rate) < MIN_SAMPLES:
@@ -242,9 +243,11 @@ def load_hatt(path: str | Path) -> HattTexture:
         if (given := root.findtext(name, unit).strip()) != unit:
             file.refuse(f"{name} of {unit}", given, "convert its models")
     rate_hz = file.number(root, "SampleRate")
-    if not 0 < rate_hz <= HIGHEST_RATE_HZ:
+    if not LOWEST_RATE_HZ <= rate_hz <= HIGHEST_RATE_HZ:
         file.refuse(
-            f"a SampleRate above 0 and up to {HIGHEST_RATE_HZ:.0f} Hz", f"{rate_hz:g}", "correct it"
+            f"a SampleRate from {LOWEST_RATE_HZ:.0f} to {HIGHEST_RATE_HZ:.0f} Hz",
+            f"{rate_hz:g}",
+            "correct it",
         )
     conditions = _conditions(file, root)
     models = _models_of(file, root, conditions)

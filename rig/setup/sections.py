@@ -9,12 +9,11 @@ from typing import Any, TypeVar
 
 from modeling import InputError
 from modeling.checks import (
-    HIGHEST_RATE_HZ,
     check_choice,
     check_name,
     check_number,
+    check_rate,
     check_whole,
-    is_positive,
 )
 from modeling.errors import shown
 from rig.setup.figures import Curve, Figure, curve_from, figure_from
@@ -56,12 +55,8 @@ def _checked_whole(value: object, what: str, low: int, high: int) -> int:
 
 
 def _rate(value: object, what: str) -> float:
-    if not (is_positive(value) and value <= HIGHEST_RATE_HZ):
-        raise InputError(
-            f"expected a rate above 0 to {HIGHEST_RATE_HZ:.0f} Hz for {what}, got {shown(value)}; "
-            "give the rate in Hz."
-        )
-    return float(value)
+    check_rate(value, what=what)
+    return float(value)  # type: ignore[arg-type]
 
 
 def _level(value: object, what: str) -> float:

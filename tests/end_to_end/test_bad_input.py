@@ -58,7 +58,7 @@ DAMAGES = {
     "constant": (fill("0002.csv", ["0.25"] * 100), "got the constant value 0.25"),
     "unit": (edit("recordings.tsv", "\tg\t", "\tfurlong\t"), "got 'furlong'"),
     "rate": (edit("recordings.tsv", "\t5000.0\t", "\t\t"), "expected a number for rate_hz"),
-    "zero rate": (edit("recordings.tsv", "\t5000.0\t", "\t0\t"), "rate above 0 Hz"),
+    "zero rate": (edit("recordings.tsv", "\t5000.0\t", "\t0\t"), "rate from 1 to 10000000 Hz"),
     "speed": (edit("recordings.tsv", "\t50.0\t", "\t-50.0\t"), "speed_mm_s of at least 0"),
     "missing file": (lambda f: (f / "0003.csv").unlink(), "got nothing there"),
     "text": (fill("0002.csv", ["0.1", "o.2"] * 50), "one number per line"),

@@ -49,7 +49,7 @@ def test_what_is_no_number(value: object) -> None:
 @pytest.mark.parametrize("value", [0, -1.0, float("nan"), float("inf"), np.float32("inf"), 10**400])
 def test_rates_are_finite_and_above_zero(value: float) -> None:
     assert not is_positive(value)
-    with refused(InputError, expected=["rate", "0 Hz"], got=shown(value)):
+    with refused(InputError, expected=["rate", 1, "10000000 Hz"], got=shown(value)):
         check_rate(value)
     assert is_positive(5e-324)
     assert is_positive(np.float32(5000))
@@ -73,6 +73,13 @@ def test_words() -> None:
     for name in ("", "  ", "two\nlines", 5):
         with refused(InputError, expected="a label", got=shown(name)):
             check_name("a label", name)
+
+
+@pytest.mark.parametrize("value", [5e-324, 1e-308, 0.5, 0.999])
+def test_rates_start_at_one_hertz(value: float) -> None:
+    check_rate(1)
+    with refused(InputError, expected=["rate", 1, "10000000 Hz"], got=shown(value)):
+        check_rate(value)
 
 
 def test_rates_and_durations_have_upper_ends() -> None:

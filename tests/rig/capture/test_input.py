@@ -206,7 +206,7 @@ def test_what_cannot_be_opened_is_refused_in_one_sentence(
         ({"g_per_fullscale": 0.0}, ["full-scale", "0 g"], 0.0),
         ({"g_per_fullscale": float("nan")}, ["full-scale", "0 g"], "nan"),
         ({"g_per_fullscale": 1.0, "channel": 0}, ["channel", 1, 64], 0),
-        ({"g_per_fullscale": 1.0, "rate_hz": -1.0}, ["rate", "0 Hz"], -1.0),
+        ({"g_per_fullscale": 1.0, "rate_hz": -1.0}, ["rate", 1, "10000000 Hz"], -1.0),
     ],
 )
 def test_settings_out_of_range_are_refused(settings, expected, got) -> None:

@@ -210,8 +210,8 @@ def test_such_a_set_becomes_a_model_and_a_rival(
 @pytest.mark.parametrize(
     ("options", "expected", "got"),
     [
-        ({"rate_hz": 2000.0}, ["rate", 0, "1000 Hz"], 2000),
-        ({"rate_hz": 0.0}, ["rate", 0, "1000 Hz"], 0),
+        ({"rate_hz": 2000.0}, ["rate", 1, "1000 Hz"], 2000),
+        ({"rate_hz": 0.0}, ["rate", 1, "1000 Hz"], 0),
         ({"duration_s": 0.0}, ["duration", "0 s"], 0.0),
         ({"duration_s": np.inf}, ["duration", "0 s"], "inf"),
         ({"duration_s": 0.01}, "64 samples", ["0.01 s", "1000 Hz"]),
@@ -277,7 +277,7 @@ BAD = [
     (lambda t: "<other/>", "modelSet", "other"),
     (lambda t: re.sub("<SampleRate>.*?</SampleRate>", "", t), "SampleRate", "none"),
     (lambda t: t.replace(">1000<", ">fast<"), ["numbers", "SampleRate"], "'fast'"),
-    (lambda t: t.replace(">1000<", ">0<"), ["SampleRate", 0, "10000000 Hz"], 0),
+    (lambda t: t.replace(">1000<", ">0<"), ["SampleRate", 1, "10000000 Hz"], 0),
     (lambda t: t.replace("<material>Planted 1", "<material> "), "material", "none"),
     (lambda t: t.replace("m/s^2", "g"), ["AccelUnits", "m/s^2"], "g"),
     (lambda t: t.replace(">mm/s<", ">in/s<"), ["SpeedUnits", "mm/s"], "in/s"),

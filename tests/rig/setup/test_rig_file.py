@@ -82,7 +82,7 @@ def test_limits_are_those_of_the_file(tmp_path):
         ("block = 128", "blocks = 128", "in [sound], got blocks"),
         ("[limits] ", "[limit] ", "in a rig file, got limit;"),
         ("rate_hz = 48000", "", "expected rate_hz under [sound], got none"),
-        ("rate_hz = 48000", "rate_hz = -1", "for sound.rate_hz, got -1"),
+        ("rate_hz = 48000", "rate_hz = -1", "sound.rate_hz from 1 to 10000000 Hz, got -1"),
         ("block = 128", "block = 1.5", "for sound.block, got 1.5"),
         ("vibration_channel = 1", "vibration_channel = 3", "sound.vibration_channel among the 2"),
         ("masking_channel = 2", "masking_channel = 1", "another channel than the vibration"),

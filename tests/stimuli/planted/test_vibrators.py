@@ -48,7 +48,7 @@ def test_a_sensor_reports_the_response_and_its_own_noise() -> None:
         ((2500.0, 5.0, 5000.0), ["resonance", "1…2450 Hz"], 2500),
         ((float("nan"), 5.0, 5000.0), ["resonance", "1…2450 Hz"], "nan"),
         ((80.0, 0.0, 5000.0), ["quality", 0], 0),
-        ((80.0, 5.0, -1.0), ["rate", "0 Hz"], -1.0),
+        ((80.0, 5.0, -1.0), ["rate", 1, "10000000 Hz"], -1.0),
     ],
 )
 def test_impossible_vibrators_are_refused(values, expected, got) -> None:
