@@ -10,12 +10,12 @@ import os
 import platform
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from importlib import metadata
 from math import log10
 from pathlib import Path
 from typing import Literal
 
 from modeling.errors import InputError
+from modeling.files.provenance import version_of
 from modeling.rendering.compiled import is_compiled
 from rig.hand.devices import connected_devices
 from rig.hand.sample import ConnectedDevice
@@ -59,13 +59,20 @@ class Finding:
 def versions() -> list[Finding]:
     """Programs and libraries, and whether the compiled parts are there."""
     found = [Finding("Python", f"{platform.python_version()}, {platform.platform(terse=True)}")]
-    found += [Finding(name, metadata.version(name)) for name in PACKAGES]
+    found += map(_package, PACKAGES)
     found.append(_tried("PortAudio", lambda: portaudio().get_portaudio_version()[1].split(",")[0]))
     rendering = Finding("rendering kernel", "compiled")
     if not is_compiled():
         told = "expected the compiled kernel, got none; install a C compiler, then tactileq."
         rendering = Finding("rendering kernel", told, "fault")
     return [*found, rendering, _tried("audio callback", lambda: str(compiled() and "compiled"))]
+
+
+def _package(name: str) -> Finding:
+    version = version_of(name)
+    if version is None:
+        return Finding(name, f"expected {name}, got none; pip install {name}.", "note")
+    return Finding(name, version)
 
 
 def connected_sound() -> list[Finding]:

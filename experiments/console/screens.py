@@ -15,7 +15,7 @@ def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
     Raises
     ------
     InputError
-        For a screen that does not exist, or where there is none at all.
+        For a screen that does not exist, where there is none at all, and without PsychoPy.
     """
     try:
         from psychopy import logging, visual
@@ -36,6 +36,11 @@ def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
         )
     except InputError:
         raise
+    except ModuleNotFoundError as error:
+        raise InputError(
+            f"expected PsychoPy for the window, got no module {error.name}; install it with "
+            "pip install psychopy."
+        ) from error
     except Exception as error:  # whatever the window system raises means the same to a user
         raise InputError(
             f"expected a screen for the window, got {error or type(error).__name__}; start a "

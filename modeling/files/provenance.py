@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from modeling.files.writing import write_text
 
 PROVENANCE_NAME = "provenance.json"
+NOT_INSTALLED = "not installed"
 
 
 def provenance_of(
@@ -30,11 +31,19 @@ def provenance_of(
     return {
         "command": f"tactileq {command}",
         "python": sys.version.split()[0],
-        "versions": {name: version(name) for name in libraries},
+        "versions": {name: version_of(name) or NOT_INSTALLED for name in libraries},
         "settings": dict(settings),
         "seed": seed,
         "inputs_sha256": dict(inputs or {}),
     }
+
+
+def version_of(package: str) -> str | None:
+    """The version of an installed package; None where it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
 
 
 def write_provenance(

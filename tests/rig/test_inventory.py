@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from rig import inventory
 from rig.hand.sample import ConnectedDevice
 from rig.inventory import Finding, connected_input, connected_sound, of_rig, remedies, versions
 from rig.sound.devices import NoPortAudio, SoundDevice
+from tests.refusals import check_refusal
 from tests.rig.desk.rig_files import rig_file, rig_text
 
 TODAY = datetime.date.today()
@@ -111,6 +113,16 @@ def test_without_portaudio_one_line_installs_it(monkeypatch: pytest.MonkeyPatch)
     findings = [*versions(), *connected_sound()]
     assert remedies(findings) == ["sudo apt-get install libportaudio2"]
     assert [f.name for f in findings if f.state == "fault"] == ["PortAudio"]
+
+
+def test_without_psychopy_the_rig_is_checked_all_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("modeling.files.provenance.version", none)
+    found = {finding.name: finding for finding in versions()}
+    assert found["psychopy"].state == "note"
+    check_refusal(found["psychopy"].told, expected="psychopy", got="pip install psychopy")
 
 
 def test_no_card_at_all_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
