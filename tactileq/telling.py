@@ -43,11 +43,11 @@ def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[item]}"),
+        TextColumn("{task.fields[item]}", markup=False),
     )
     with Progress(*columns) as bar:
         task = bar.add_task(title, total=total, item="")
@@ -58,9 +58,10 @@ def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
 @contextmanager
 def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
     """A progress bar for work that tells its share done (0–1)."""
-    from rich.progress import Progress
+    from rich.progress import Progress, TextColumn
 
-    with Progress() as bar:
+    _, *columns = Progress.get_default_columns()
+    with Progress(TextColumn("{task.description}", markup=False), *columns) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share, what: bar.update(task, completed=share)
 
