@@ -87,13 +87,21 @@ def simulated_note(model: AnyModel) -> str:
 
 
 def tell_models(sets: ModelSets, textures: Sequence[str]) -> None:
-    """Name the textures of a study of which two sets hold one model, or models of other ones."""
+    """Name the textures of a study of which two sets hold one model, or models of other ones.
+
+    Not for who runs sessions and has to stay blind: `tell_foreign_models` alone is.
+    """
     for first, second in combinations(sets.names, 2):
         if controls := sets.identical(textures, (first, second)):
             print(
                 f"note: {first} and {second} are identical for {', '.join(controls)}: a control, "
                 "nothing to compare."
             )
+    tell_foreign_models(sets, textures)
+
+
+def tell_foreign_models(sets: ModelSets, textures: Sequence[str]) -> None:
+    """Name models that were made from a model that is in none of the sets."""
     for texture, name in sets.of_others(textures):
         print(
             f"warning: the {name} model of {texture} was made from a model that is in none of the "

@@ -35,10 +35,11 @@ class Mouse:
 
 
 class Key(NamedTuple):
-    """A press of a key: its name in small letters ("tab", "enter", "7", "left"), and shift."""
+    """A press of a key: its name in small letters ("tab", "enter", "7", "left"), with shift or ctrl held."""
 
     name: str
     shift: bool = False
+    ctrl: bool = False
 
 
 class Keys:
@@ -73,8 +74,9 @@ class Keys:
         }
         if symbol == names.user_key(TAB_ON_X):
             symbol = names.TAB
-        if symbol not in repeated and not modifiers & (names.MOD_CTRL | names.MOD_ALT):
-            self._add(symbol, shift=bool(modifiers & names.MOD_SHIFT))
+        if symbol not in repeated and not modifiers & names.MOD_ALT:
+            shift, ctrl = (bool(modifiers & held) for held in (names.MOD_SHIFT, names.MOD_CTRL))
+            self._add(symbol, shift=shift, ctrl=ctrl)
         return True  # pyglet would close the window at Escape
 
     def _release(self, symbol: int, _modifiers: int) -> None:
@@ -82,9 +84,9 @@ class Keys:
         if symbol == self._names.TAB and hasattr(self._handle, "pressed_keys"):
             self._handle.pressed_keys.discard(self._names.user_key(TAB_ON_X))
 
-    def _add(self, symbol: int, *, shift: bool) -> bool:
+    def _add(self, symbol: int, *, shift: bool, ctrl: bool = False) -> bool:
         name = self._names.symbol_string(symbol).lower().removeprefix("motion_")
         name = name.removeprefix("num_").removeprefix("_")
         same = {"return": "enter", "previous_page": "pageup", "next_page": "pagedown"}
-        self._presses.append(Key(same.get(name, name), shift))
+        self._presses.append(Key(same.get(name, name), shift, ctrl))
         return True

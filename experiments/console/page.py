@@ -29,6 +29,7 @@ class Page:
     focus : Widget, optional
         What has the focus at first; nothing has without it.
     shortcuts : mapping of key name to Button, optional
+        "ctrl+1" is pressed together with Ctrl.
     """
 
     def __init__(
@@ -66,7 +67,9 @@ class Page:
 
     def handle_key(self, key: Key) -> None:
         """Move the focus, press the button of a shortcut, or pass the key on."""
-        shortcut = self._shortcuts.get(key.name)
+        shortcut = self._shortcuts.get(f"ctrl+{key.name}" if key.ctrl else key.name)
+        if key.ctrl and shortcut is None:
+            return
         if key.name == "tab":
             self._move_focus(-1 if key.shift else 1)
         elif shortcut is not None:

@@ -18,8 +18,9 @@ from experiments.sessions.surfaces import Note, SessionAborted, Surfaces
 # --- Parameters -----------------------------------------------------------------------------
 
 FRAME_PAUSE_S = 0.004  # keeps a display without vertical synchronisation from spinning
-REASONS = ("tired", "discomfort", "time", "device", "other")
-REASONS_TOP, REASONS_PITCH = 0.13, 0.083
+NOT_STATED = "not stated"  # first of all, since nobody owes a reason
+REASONS = (NOT_STATED, "tired", "discomfort", "time", "device", "other")
+REASONS_TOP, REASONS_PITCH = 0.145, 0.08
 
 # Called when a page has come up: its name, and the window's pixel (from the top left) of each
 # handle.
@@ -195,13 +196,17 @@ class PageRunner(Parts):
             surfaces.resume()
 
     def _reason_to_stop(self) -> str | None:
-        """One of `REASONS`; None where the participant goes on, also by Escape."""
+        """One of `REASONS`; None where the participant goes on, also by Escape.
+
+        Before the first trial nobody is asked for one.
+        """
         of = self.texts.of
+        asked = REASONS if self.progress is not None else ()
         picked: list[str] = []
         said: list[str] = []
 
         def stop_now() -> None:
-            said.append(picked[-1])
+            said.append(picked[-1] if picked else NOT_STATED)
             self.finish()
 
         wide = partial(self.button, size=(0.44, 0.078))
@@ -213,7 +218,7 @@ class PageRunner(Parts):
                 size=(0.62, 0.066),
                 action=partial(picked.append, reason),
             )
-            for row, reason in enumerate(REASONS)
+            for row, reason in enumerate(asked)
         ]
         go_on = wide("go on", of("stopping.go_on"), at=(-0.24, -0.385), action=self.finish)
         stop = wide(
@@ -221,8 +226,7 @@ class PageRunner(Parts):
         )
 
         def update() -> None:
-            stop.enabled = bool(picked)
-            for reason, button in zip(REASONS, rows, strict=True):
+            for reason, button in zip(asked, rows, strict=True):
                 button.lit = picked[-1:] == [reason]
 
         self.show(
@@ -230,7 +234,7 @@ class PageRunner(Parts):
             widgets=[*rows, go_on, stop],
             decoration=[
                 self.title(of("stopping.title"), y=0.33),
-                self.body(of("stopping.text"), y=0.235),
+                self.body(of("stopping.text" if asked else "stopping.at_first"), y=0.24),
             ],
             update=update,
             stoppable=False,

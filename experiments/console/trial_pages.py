@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from experiments.console.drawing import ORANGE
+from experiments.console.drawing import INK, ORANGE, SMALL_HEIGHT, Point
 from experiments.console.page_runner import PageRunner
 from experiments.console.widgets import Button, RatingScale
 from experiments.sessions.surfaces import Choice, RatedTrial, Rating, Surfaces
 from experiments.sessions.task import Task
 
 BUTTONS_PER_ROW = 7
-BUTTON_PITCH = 0.15
+BUTTON_PITCH, ROW_PITCH = 0.15, 0.19
 SCALES_Y = {"magnitude": 0.06, "frequency": -0.165}
 
 
@@ -63,35 +64,42 @@ def rate(runner: PageRunner, trial: RatedTrial, surfaces: Surfaces) -> Rating:
 
 
 def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
-    """One numbered button per virtual surface, one to confirm, and one for the real surface in
-    tasks that have one."""
+    """Per virtual surface a numbered button to feel it and one below to choose it; one to confirm,
+    and one for the real surface in tasks that have one.
+
+    A surface can be chosen once it has been felt; feeling another one leaves the choice as it is.
+    """
     of = runner.texts.of
     real = _real(runner, surfaces, at=(0.0, 0.3)) if task.mounts else None
-    rows = -(-surfaces.count // BUTTONS_PER_ROW)
-    numbered = [_numbered(runner, index, surfaces, rows=rows) for index in range(surfaces.count)]
+    places = [_Place.of(index, surfaces.count) for index in range(surfaces.count)]
+    numbered = [_numbered(runner, index, surfaces, at) for index, at in enumerate(places)]
+    answers = [_answer(runner, index, surfaces, at) for index, at in enumerate(places)]
     confirm = runner.proceed(of(f"{task.name}.confirm"), y=-0.36)
     told = _Line(runner, y=-0.27)
 
     def update() -> None:
         # What the page announces: the task begins with it.
         at_first = None if task.mounts or surfaces.bursts else 0
-        shown = at_first if not surfaces.started else surfaces.selected
+        shown = at_first if not surfaces.started else surfaces.last
         shows_real = surfaces.shows_real if surfaces.started else task.mounts
         if real is not None:
             real.lit = shows_real
         for index, button in enumerate(numbered):
             button.lit = shown == index and not shows_real
-        confirm.enabled = surfaces.selected is not None and _remaining(surfaces) == 0
+        for index, button in enumerate(answers):
+            button.enabled = index in surfaces.felt
+            button.lit = surfaces.chosen == index
+        confirm.enabled = surfaces.chosen is not None and _remaining(surfaces) == 0
         told.say(_told(partial(runner.texts.of_task, task.name), surfaces))
 
     reals = [] if real is None else [real]
     runner.show(
         "choose",
-        widgets=(*reals, *numbered, confirm),
+        widgets=(*reals, *numbered, *answers, confirm),
         decoration=(
             runner.title(of(f"{task.name}.question")),
             runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
-            runner.card(0.0, 0.06 + BUTTON_PITCH * rows),
+            runner.card(0.0, 0.05 + len({place.row for place in places}) * ROW_PITCH),
             told,
             *runner.foot(of("choice.keys")),
         ),
@@ -99,11 +107,12 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         update=update,
         shortcuts={
             **{str(number): button for number, button in enumerate(numbered[:9], start=1)},
+            **{f"ctrl+{number}": button for number, button in enumerate(answers[:9], start=1)},
             **({} if real is None else {"r": real}),
         },
     )
-    assert surfaces.selected is not None
-    return Choice(button=surfaces.selected, response_time_s=surfaces.response_time_s)
+    assert surfaces.chosen is not None
+    return Choice(button=surfaces.chosen, response_time_s=surfaces.response_time_s)
 
 
 def _begins_real(trial: RatedTrial) -> bool:
@@ -134,19 +143,43 @@ def _scale(runner: PageRunner, name: str, surfaces: Surfaces) -> RatingScale:
     )
 
 
-def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, *, rows: int) -> Button:
-    row, column = divmod(index, BUTTONS_PER_ROW)
-    in_row = min(BUTTONS_PER_ROW, surfaces.count - row * BUTTONS_PER_ROW)
-    at = (
-        BUTTON_PITCH * (column - (in_row - 1) / 2),
-        BUTTON_PITCH * ((rows - 1) / 2 - row),
-    )
+@dataclass(frozen=True)
+class _Place:
+    """Where a virtual surface stands: its row, from the top, and the middle of its two buttons."""
+
+    row: int
+    at: Point
+
+    @classmethod
+    def of(cls, index: int, count: int) -> _Place:
+        rows = -(-count // BUTTONS_PER_ROW)
+        row, column = divmod(index, BUTTONS_PER_ROW)
+        in_row = min(BUTTONS_PER_ROW, count - row * BUTTONS_PER_ROW)
+        x = BUTTON_PITCH * (column - (in_row - 1) / 2)
+        return cls(row, (x, ROW_PITCH * ((rows - 1) / 2 - row)))
+
+
+def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place) -> Button:
+    x, y = place.at
     return runner.button(
         f"button {index + 1}",
         str(index + 1),
-        at=at,
-        size=(0.12, 0.12),
+        at=(x, y + 0.032),
+        size=(0.12, 0.1),
         action=lambda: surfaces.present_virtual(index),
+    )
+
+
+def _answer(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place) -> Button:
+    x, y = place.at
+    return runner.button(
+        f"answer {index + 1}",
+        runner.texts.of("choice.choose"),
+        at=(x, y - 0.056),
+        size=(0.12, 0.05),
+        action=lambda: surfaces.choose(index),
+        color=INK,
+        height=SMALL_HEIGHT,
     )
 
 
@@ -156,9 +189,11 @@ def _remaining(surfaces: Surfaces) -> int:
 
 
 def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
-    """What there is to do: press a number, feel the rest, or confirm the choice."""
-    selected = surfaces.selected
-    told = of("choice.press") if selected is None else of("choice.so_far", number=selected + 1)
+    """What there is to do: press a number, choose, feel the rest, or confirm the choice."""
+    if surfaces.chosen is not None:
+        told = of("choice.so_far", number=surfaces.chosen + 1)
+    else:
+        told = of("choice.choose_one" if surfaces.felt else "choice.press")
     if count := _remaining(surfaces):
         told += "\n" + of("choice.remaining", count=count)
     return told

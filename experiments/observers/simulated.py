@@ -178,7 +178,7 @@ class SimulatedParticipant:
             for look in range(self._looks()):
                 surfaces.present_virtual(look % surfaces.count)
             button = self._odd_one(trial)
-        surfaces.present_virtual(button)
+        surfaces.choose(button)
         return Choice(button=button, response_time_s=self._response_time_s())
 
     def _interval(self, trial: ThresholdTrial) -> int:

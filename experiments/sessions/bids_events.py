@@ -23,7 +23,7 @@ _MEANINGS = {
     "mount_confirmed": "The experimenter said that it is mounted",
     "presented": "A surface was presented",
     "slider": "A slider was let go",
-    "pressed": "A button or key was pressed",
+    "chosen": "A virtual surface was chosen; the last one before the answer counts",
     "answer": "The trial was answered; the answer is in the table of answers",
     "training_over": "Training ended",
     "outside": "The participant was asked to stroke otherwise",

@@ -17,7 +17,7 @@ from experiments.sessions.state import SessionState
 Planned = Mapping[str, Any]
 
 # That somebody starts a session again ends no break: what the participant does there ends it.
-_ACTIVE = ("presented", "pressed", "slider", "answer")
+_ACTIVE = ("presented", "slider", "chosen", "answer")
 
 
 @dataclass(frozen=True, kw_only=True)

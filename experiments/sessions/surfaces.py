@@ -124,7 +124,8 @@ class Surfaces:
         self._begin = begin
         self._note = note
         self._shown: str | None = None
-        self._selected: int | None = None
+        self._last: int | None = None
+        self._chosen: int | None = None
         self.feel_all = feel_all
         self.started = False
         self.switches = 0
@@ -140,9 +141,14 @@ class Surfaces:
         return self._shown == "real"
 
     @property
-    def selected(self) -> int | None:
+    def last(self) -> int | None:
         """Index of the virtual surface presented last, None before the first."""
-        return self._selected
+        return self._last
+
+    @property
+    def chosen(self) -> int | None:
+        """Index of the virtual surface chosen so far, None before a choice."""
+        return self._chosen
 
     @property
     def count(self) -> int:
@@ -185,7 +191,7 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        self._selected = index
+        self._last = index
         shown = self._models[index]
         if isinstance(shown, ToneBurst) and index in self.felt:
             return
@@ -194,12 +200,29 @@ class Surfaces:
         self.felt.add(index)
         self._presented("virtual", left_s, index=index)
 
+    def choose(self, index: int) -> None:
+        """Choose a virtual surface that was felt (index from 0); the last choice counts.
+
+        An act of its own: what was felt last is no choice.
+
+        Raises
+        ------
+        InputError
+            If it was not felt yet.
+        """
+        if index not in self.felt:
+            raise InputError(
+                f"expected a choice of a surface that was felt, got {index}; press it first."
+            )
+        self._chosen = index
+        self._note("chosen", index=index)
+
     def toggle(self) -> None:
         """Change between the real surface and the virtual one presented last, if any."""
         if not self.shows_real:
             self.present_real()
-        elif self._selected is not None:
-            self.present_virtual(self._selected)
+        elif self._last is not None:
+            self.present_virtual(self._last)
         elif len(self._models) == 1:
             self.present_virtual()
 
@@ -212,10 +235,10 @@ class Surfaces:
         self._rig.read()  # a press of the rig's button meanwhile is not one in the trial
         if self.shows_real:
             self._again("real", self._rig.present_real(self._texture))
-        elif self._selected is not None:
-            shown = self._models[self._selected]
+        elif self._last is not None:
+            shown = self._models[self._last]
             if not isinstance(shown, ToneBurst):
-                self._again("virtual", present(self._rig, shown), index=self._selected)
+                self._again("virtual", present(self._rig, shown), index=self._last)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""

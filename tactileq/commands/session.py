@@ -9,7 +9,7 @@ import typer
 
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
-from tactileq.telling import share_of, tell_models
+from tactileq.telling import share_of, tell_foreign_models
 
 if TYPE_CHECKING:
     TaskName = str
@@ -84,7 +84,7 @@ def session(
         sources=sources,
     )
     sets.require(plan, allow=Overrides(override).allow)
-    tell_models(sets, plan.textures)
+    tell_foreign_models(sets, plan.textures)
     device = rig_of(plan, sets, rig=rig, override=override)
     if selftest:
         tell_timings(sets, device, plan=plan, data=data, fullscreen=fullscreen, screen=screen)

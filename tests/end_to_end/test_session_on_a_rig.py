@@ -90,6 +90,7 @@ class Unlucky(Scripted):
             surfaces.present_virtual(button)
             self._feel(surfaces, 0.15)
         surfaces.present_real()
+        surfaces.choose(1)
         return Choice(button=1, response_time_s=surfaces.response_time_s)
 
     def _feel(self, surfaces: Surfaces, seconds: float) -> None:

@@ -105,6 +105,7 @@ class Script:
     def choose(self, trial: RelativeTrial, surfaces: Surfaces) -> Choice:
         for button in (0, 1, 1):
             surfaces.present_virtual(button)
+        surfaces.choose(1)
         self.answered += 1
         return Choice(button=1, response_time_s=3.25)
 

@@ -51,7 +51,7 @@ class Scripted:
         surfaces.start()
         for button in range(surfaces.count):
             surfaces.present_virtual(button)
-        surfaces.present_virtual(1)
+        surfaces.choose(1)
         self.answered += 1
         return Choice(button=1, response_time_s=3.25)
 

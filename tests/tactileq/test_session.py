@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -49,6 +50,7 @@ def language_of(place: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr("tactileq.commands.session.open_console", open_console)
         given = ["--task", "absolute", "--study", place / "study.toml", "--data", place / "data"]
         ended = CliRunner().invoke(app, [*map(str, given), *words])
+        (place / "printed.txt").write_text(ended.output)
         if ended.exception:
             raise ended.exception
         return opened[-1]
@@ -88,6 +90,17 @@ def test_a_language_that_the_study_lost_is_refused_until_one_is_named(
     with refused(InputError, expected=["language", "en"], got="'ja'"):
         language_of(Scripted(), *words)
     assert language_of(Scripted(), *words, "--language", "en") == "en"
+
+
+def test_the_experimenter_is_not_told_which_models_are_identical(
+    place: Path, language_of: Any
+) -> None:
+    shutil.copy(place / "models" / "MDF.json", place / "simplified" / "MDF.json")
+    language_of(Scripted())
+    printed = (place / "printed.txt").read_text()
+    assert "completed" in printed
+    assert "MDF" not in printed
+    assert list(manifest_in(place).identical) == ["MDF"]
 
 
 def test_what_was_never_begun_cannot_go_on(place: Path, language_of: Any) -> None:

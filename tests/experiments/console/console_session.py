@@ -2,7 +2,8 @@
 
     python console_session.py
 
-Standard input: one JSON object per session, {"language": …, "parts": [part, …]}, of the parts
+Standard input: one JSON object per session, {"language": …, "parts": [part, …], "done": whether
+there were trials before}, of the parts
 "known" and "new" (welcome), "wait", "absolute", "relative", "oddity", "rest", "training" and
 "closing"; or {"screens": [number, …]} to open a console on each. During a session a line presses
 the rig's button; while the participant waits, it ends the wait, and "stop" ends it as an
@@ -130,7 +131,7 @@ def run(console, part):
     return console.rest() if part == "rest" else console.announce(f"absolute.{part}")
 
 
-def hold(language, parts):
+def hold(language, parts, *, done):
     with Console(
         language=language,
         stamp="pilot",
@@ -138,7 +139,8 @@ def hold(language, parts):
     ) as console:
         frames.watch(console._window)
         console.hear(lambda event, **fields: tell(noted=event, **fields))
-        console.progress(12, 28)
+        if done:
+            console.progress(12, 28)
         try:
             result = [run(console, part) for part in parts]
         except SessionAborted as aborted:
@@ -160,4 +162,4 @@ while order := sys.stdin.readline():
     if "screens" in asked:
         tell(result=[open_on(screen) for screen in asked["screens"]])
     else:
-        hold(asked["language"], asked["parts"])
+        hold(asked["language"], asked["parts"], done=asked["done"])

@@ -167,6 +167,9 @@ def ask_everything(console, visitor):
     new = Intake(consent="2026-11", code="TAKI-46", known=False, questions=questions)
     console.welcome(new)
     console.welcome(Intake(consent="", code="TAKI-46", known=True, questions=questions))
+    visitor.plan = {"consent": ["key ESCAPE"], "stop": ["look stop-first", "press stop now"]}
+    with suppress(SessionAborted):
+        console.welcome(new)
 
 
 def announce_everything(console, visitor, texts):
@@ -190,7 +193,8 @@ def try_everything(console, visitor):
     console.rate(ABSOLUTE, surfaces_of(1))
     visitor.plan = {
         "choose": [
-            *("look choose-7", "press button 2", "look choose-7-chosen", "press continue"),
+            *("look choose-7", "press button 2", "press answer 2", "press button 5"),
+            *("look choose-7-chosen", "press continue"),
         ]
     }
     console.choose(RELATIVE, surfaces_of(7))
@@ -202,13 +206,20 @@ def try_everything(console, visitor):
         console.choose(RELATIVE, surfaces_of(12, feel_all=True))
     buttons = [f"press button {number}" for number in (1, 2, 3)]
     visitor.plan = {
-        "choose": ["look choose-odd", *buttons, "look choose-odd-all", "press continue"]
+        "choose": [
+            "look choose-odd",
+            *buttons,
+            "press answer 3",
+            "look choose-odd-all",
+            "press continue",
+        ]
     }
     console.choose(ODDITY, surfaces_of(3, feel_all=True, real=False))
     visitor.plan = {
         "choose": [
             *("look choose-interval", "press button 1", "look choose-interval-first"),
-            *("press button 2", "look choose-interval-second", "press continue"),
+            *("press button 2", "look choose-interval-second", "press answer 1"),
+            *("look choose-interval-chosen", "press continue"),
         ]
     }
     console.choose(THRESHOLD, intervals())

@@ -45,6 +45,10 @@ class Participant:
     def wait_for_page(self, name: str) -> None:
         assert self.wait_for("page") == name
 
+    def wait_for_note(self, event: str) -> None:
+        while self.wait_for("noted") != event:
+            pass
+
     def say(self, line: str) -> None:
         self.session.stdin.write(line + "\n")
         self.session.stdin.flush()
@@ -92,8 +96,8 @@ def asked(consoles: Driven, **order: object) -> Iterator[Participant]:
 
 @pytest.fixture
 def seated(consoles: Driven) -> Seated:
-    def seat(language: str, *parts: str) -> AbstractContextManager[Participant]:
-        return asked(consoles, language=language, parts=parts)
+    def seat(language: str, *parts: str, done: bool = True) -> AbstractContextManager[Participant]:
+        return asked(consoles, language=language, parts=parts, done=done)
 
     return seat
 
@@ -154,12 +158,17 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
         person.click("continue")
         person.wait_for_page("choose")
         person.click("continue")  # nothing has been chosen: no effect
-        for button in (1, 3):
+        person.click("answer 2")  # nor this: it has not been felt
+        for button in (1, 3, 2):
             person.click(f"button {button}")
             assert person.wait_for("presented") == "virtual"
+        person.click("continue")  # what was felt last is no choice: no effect
+        for answer in (3, 2):
+            person.click(f"answer {answer}")
+            person.wait_for_note("chosen")
         person.click("real")
         assert person.wait_for("presented") == "real"
-        person.click("button 2")
+        person.click("button 1")  # the choice stays
         assert person.wait_for("presented") == "virtual"
         person.click("continue")
 
@@ -167,6 +176,8 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
         assert "real" not in person.handles
         person.click("button 3")
         assert person.wait_for("presented") == "virtual"
+        person.click("answer 3")
+        person.wait_for_note("chosen")
         person.click("continue")  # the second has not been felt: no effect
         person.click("button 2")
         assert person.wait_for("presented") == "virtual"
@@ -179,7 +190,8 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
     assert magnitude == pytest.approx(80, abs=0.2)
     assert frequency == pytest.approx(25, abs=0.2)
     assert response_time_s > 0
-    assert (related, odd) == (1, 1)
+    assert (related, odd) == (1, 2)
+    assert [note["index"] for note in person.noted("chosen")] == [2, 1, 2]
     assert [(n["scale"], n["value"]) for n in person.noted("slider")] == [
         ("magnitude", pytest.approx(magnitude, abs=0.06)),
         ("frequency", pytest.approx(frequency, abs=0.06)),
@@ -225,17 +237,19 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
         assert person.wait_for("presented") == "real"
         person.keys("KP_3")
         assert person.wait_for("presented") == "virtual"
+        # Back over "stop" and "confirm", which is pale as long as nothing is chosen.
         person.keys("shift+Tab", "shift+Tab", "Return")
+        person.wait_for_note("chosen")
+        person.keys("Tab", "Return")
         person.wait_for_page("choose")
-        person.keys("r", "Return", "shift+Tab", "shift+Tab", "Return")  # one cannot confirm yet
-        assert person.wait_for("presented") == "virtual"
-        person.keys("2", "1", "Tab", "Return")
+        person.keys("r", "ctrl+3", "Return")  # there is no real one; 3 has not been felt
+        person.keys("3", "ctrl+3", "2", "shift+Tab", "shift+Tab", "Return")
         person.wait_for_page("absolute.closing")
         person.keys("space")
         result = person.wait_for("result")
     answers, _, _, (magnitude, frequency, _), _, related, odd, _ = result
     assert answers == {"age": 42, "handedness": "both"}
-    assert (related, odd) == (2, 0)
+    assert (related, odd) == (2, 2)
     values: dict[str, list[float]] = {"magnitude": [], "frequency": []}
     for note in person.noted("slider"):
         values[note["scale"]].append(note["value"])
@@ -256,7 +270,6 @@ def test_stopping_is_asked_again_in_silence(seated: Seated) -> None:
         assert person.wait_for("noted") == "stop_asked"
         person.wait_for_page("stop")
         person.xdotool("mouseup", 1)
-        person.click("stop now")  # without a reason: no effect
         person.click("go on")
         assert person.wait_for("noted") == "stop_withdrawn"
         assert person.wait_for("presented") == "virtual"
@@ -276,6 +289,28 @@ def test_stopping_is_asked_again_in_silence(seated: Seated) -> None:
     presentations = [news for news in person.heard if "presented" in news]
     assert [news["presented"] for news in presentations] == ["virtual"] * 3
     assert [note["value"] for note in person.noted("slider")] == [pytest.approx(30, abs=0.2)]
+
+
+def test_nobody_has_to_give_a_reason(seated: Seated) -> None:
+    with seated("en", "absolute") as person:
+        person.wait_for_page("rate")
+        person.click("stop")
+        person.wait_for_page("stop")
+        assert [name for name in person.handles if name.startswith("reason")][0] == (
+            "reason not stated"
+        )
+        person.click("stop now")
+        assert person.wait_for("result") == ["not stated", "participant"]
+
+
+def test_before_the_first_trial_nobody_is_asked_for_a_reason(seated: Seated) -> None:
+    with seated("en", "new", done=False) as person:
+        person.wait_for_page("consent")
+        person.click("stop")
+        person.wait_for_page("stop")
+        assert not [name for name in person.handles if name.startswith("reason")]
+        person.click("stop now")
+        assert person.wait_for("result") == ["not stated", "participant"]
 
 
 def test_who_refuses_or_has_another_code_ends_the_session(seated: Seated) -> None:

@@ -278,7 +278,7 @@ def test_every_surface_is_felt_before_a_choice(
         one = surfaces(3)
         choice = somebody(perception, Psychometrics()).choose(trial, one)
         assert one.felt == {0, 1, 2}
-        assert one.selected == choice.button
+        assert one.chosen == choice.button
 
 
 def triangle(sensitivity: float) -> float:

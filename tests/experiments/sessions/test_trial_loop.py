@@ -259,12 +259,12 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
     surfaces.present_real()
     surfaces.toggle()
     assert surfaces.shows_real
-    assert surfaces.selected is None
+    assert surfaces.last is None
     surfaces.present_virtual(2)
     surfaces.toggle()
     surfaces.toggle()
     assert rig.notes[-1] == ("virtual", several[2])
-    assert (surfaces.selected, surfaces.presses, surfaces.switches) == (2, 2, 3)
+    assert (surfaces.last, surfaces.presses, surfaces.switches) == (2, 2, 3)
     assert surfaces.felt == {2}
     with refused(InputError, expected=["button", 0, 2], got=3):
         surfaces.present_virtual(3)

@@ -99,12 +99,12 @@ class Feeling(Scripted):
 
     def choose(self, trial: ThresholdTrial, surfaces: Surfaces) -> Choice:
         surfaces.start()
-        for button in (0, 1, 0):  # the third press only selects
+        for button in (0, 1, 0):  # the third press presents nothing
             surfaces.present_virtual(button)
         assert trial.amplitude_g is not None
         self.felt.append(trial)
         share = self._correct[trial.frequency_hz](20 * np.log10(trial.amplitude_g))
         right = self._rng.random() < share
         button = trial.interval - 1 if right else 2 - trial.interval
-        surfaces.present_virtual(button)
+        surfaces.choose(button)
         return Choice(button=button, response_time_s=2.5)
