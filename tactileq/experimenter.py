@@ -16,6 +16,16 @@ from rich.markup import escape
 from experiments.sessions.surfaces import SessionAborted, Standing
 
 STOP = "stop"
+PAGES = {
+    "consent": "reads the consent form's page",
+    "code": "reads the code",
+    "known": "is asked for the code",
+    "wait": "waits for you",
+    "rate": "compares and rates",
+    "choose": "feels and chooses",
+    "rest": "has a break",
+    "stop": "is asked whether to stop",
+}
 CLOSED = "the experimenter's terminal was closed"
 
 
@@ -62,6 +72,14 @@ class Terminal:
             parts.append(f"about {max(1, round(standing.minutes_left))} min left")
         parts.append("rig: " + (" ".join(standing.problems) or "ready"))
         self._console.print("\n" + " · ".join(parts), markup=False)
+
+    def page(self, name: str) -> None:
+        """Show which page the participant is on."""
+        self._console.print(f"  participant: {_on_page(name)}", markup=False)
+
+    def answered(self) -> None:
+        """Show that an answer came."""
+        self._console.print("  an answer came")
 
     def ready(self) -> bool:
         """Whether what was asked last has been confirmed.
@@ -110,3 +128,11 @@ class Terminal:
         for line in lines:
             self._typed.put(line)
         self._typed.put(None)
+
+
+def _on_page(name: str) -> str:
+    """What the participant does on a page."""
+    kind, _, what = name.partition(" ")
+    if kind == "question":
+        return f"answers a question ({what})"
+    return PAGES.get(name) or f"reads a page ({name.rpartition('.')[2].replace('_', ' ')})"

@@ -86,9 +86,9 @@ class Console:
 
     # --- The respondent: each page may raise SessionAborted -----------------------------------
 
-    def hear(self, note: Note) -> None:
-        """Be told where events go, such as that somebody asked to stop."""
-        self._runner.note = note
+    def hear(self, note: Note, page: Callable[[str], None]) -> None:
+        """Be told where events go, such as that somebody asked to stop, and who follows pages."""
+        self._runner.note, self._runner.follow = note, page
 
     def welcome(self, intake: Intake) -> dict[str, str | int]:
         """Consent, code and questions; the answers by question."""

@@ -47,6 +47,7 @@ class PageRunner(Parts):
     def __init__(self, window: Any, texts: Texts, *, stamp: str, on_page: PageHook | None) -> None:
         super().__init__(window, texts)
         self.note: Note = _unheard
+        self.follow: Callable[[str], None] = _unheard
         self._stamp = stamp
         self._on_page = on_page
         self._mouse, self._keys = Mouse(window), Keys(window)
@@ -137,6 +138,7 @@ class PageRunner(Parts):
         self.window.flip()
         self._mouse.take()  # what was pressed before the page could be seen is not for it
         self._keys.take()
+        self.follow(page.name)
         if self._on_page is not None:
             self._on_page(page.name, self._pixels(page))
 

@@ -14,7 +14,7 @@ from experiments.sessions.surfaces import Choice, RatedTrial, Rating, Surfaces
 from experiments.sessions.task import Task
 
 BUTTONS_PER_ROW = 7
-BUTTON_PITCH, ROW_PITCH = 0.15, 0.19
+BUTTON_PITCH, ROW_PITCH = 0.15, 0.18
 SCALES_Y = {"magnitude": 0.06, "frequency": -0.165}
 
 
@@ -99,7 +99,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         decoration=(
             runner.title(of(f"{task.name}.question")),
             runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
-            runner.card(0.0, 0.05 + len({place.row for place in places}) * ROW_PITCH),
+            runner.card(0.0, 0.03 + len({place.row for place in places}) * ROW_PITCH),
             told,
             *runner.foot(of("choice.keys")),
         ),
@@ -164,8 +164,8 @@ def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place)
     return runner.button(
         f"button {index + 1}",
         str(index + 1),
-        at=(x, y + 0.032),
-        size=(0.12, 0.1),
+        at=(x, y + 0.03),
+        size=(0.12, 0.096),
         action=lambda: surfaces.present_virtual(index),
     )
 
@@ -175,8 +175,8 @@ def _answer(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place) -
     return runner.button(
         f"answer {index + 1}",
         runner.texts.of("choice.choose"),
-        at=(x, y - 0.056),
-        size=(0.12, 0.05),
+        at=(x, y - 0.053),
+        size=(0.12, 0.046),
         action=lambda: surfaces.choose(index),
         color=INK,
         height=SMALL_HEIGHT,

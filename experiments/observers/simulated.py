@@ -79,8 +79,8 @@ class SimulatedParticipant:
         self._between = (self.person.sensitivity * felt.between).tolist()
         self._rng = generator(seed, subject, *occasion)
 
-    def hear(self, note: Note) -> None:
-        """Simulated participants have nothing to note."""
+    def hear(self, note: Note, page: Callable[[str], None]) -> None:
+        """Simulated participants have nothing to note, and see no pages."""
 
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
         """Consent, and answer each question at random; no answer to a trial hangs on it."""

@@ -324,8 +324,8 @@ class Respondent(Protocol):
         """True unless a person answers."""
         ...
 
-    def hear(self, note: Note) -> None:
-        """Be told where events outside trials go."""
+    def hear(self, note: Note, page: Callable[[str], None]) -> None:
+        """Be told where events outside trials go, and who follows which page is shown."""
         ...
 
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
@@ -400,4 +400,12 @@ class Experimenter(Protocol):
 
     def tell(self, standing: Standing) -> None:
         """Show how far the session is, and how the rig is."""
+        ...
+
+    def page(self, name: str) -> None:
+        """Show which page the participant is on."""
+        ...
+
+    def answered(self) -> None:
+        """Show that an answer came; never which one."""
         ...

@@ -97,7 +97,7 @@ def run_trials(
     )
     try:
         rig.silence()
-        people.respondent.hear(running.note)
+        people.respondent.hear(running.note, people.experimenter.page)
         if intake is not None:
             answers = people.respondent.welcome(intake)
             store.log("welcome", consent=intake.consent, answers=dict(answers))
@@ -283,6 +283,7 @@ class _Running:
         valid = not any(fault.invalidates for fault in faults)
         row = self._row(trial, answer, valid=valid, repeats=repeats)
         self._store.answer(trial.trial, row)
+        self._experimenter.answered()
         self._rows.append(row)
         self._owed += not valid and not last
         self._mains_done += trial.phase == "main" and not again

@@ -6,7 +6,7 @@ from experiments.study.study import Study
 from experiments.tasks import plan_session
 
 # Seconds of one trial, with the mounting of its sample where there is one: assumed, not measured.
-TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0, "threshold": 4.0}
+TRIAL_S = {"absolute": 50.0, "relative": 75.0, "oddity": 60.0, "threshold": 5.0}
 OTHER_TRIAL_S = 60.0
 WELCOME_S = 300.0  # consent, questions, explanation
 BREAK_S = 120.0

@@ -20,7 +20,7 @@ class Scripted:
         self.rests = 0
         self.answered = 0
 
-    def hear(self, note: Note) -> None:
+    def hear(self, note: Note, page: Callable[[str], None]) -> None:
         self.note = note
 
     def welcome(self, intake: Intake) -> dict[str, str | int]:
@@ -63,6 +63,7 @@ class Ready:
         self.trays: list[str] = []
         self.called: list[str] = []
         self.told: list[Standing] = []
+        self.answers = 0
 
     def ask_mount(self, tray: str) -> None:
         self.trays.append(tray)
@@ -78,3 +79,9 @@ class Ready:
 
     def tell(self, standing: Standing) -> None:
         self.told.append(standing)
+
+    def page(self, name: str) -> None:
+        pass
+
+    def answered(self) -> None:
+        self.answers += 1

@@ -73,6 +73,17 @@ def test_labels_and_sentences_are_shown_as_they_stand(desk: Desk) -> None:
     assert problem in desk.shown
 
 
+def test_the_page_is_shown_and_that_an_answer_came(desk: Desk) -> None:
+    for page in ("consent", "question age", "absolute.training", "wait", "rate", "stop"):
+        desk.terminal.page(page)
+    desk.terminal.answered()
+    shown = desk.shown.splitlines()
+    assert len(set(shown)) == len(shown) == 7
+    assert "age" in shown[1]
+    assert "training" in shown[2]
+    assert "answer" in shown[-1]
+
+
 def test_where_nothing_is_mounted_only_a_stop_holds_the_session_up(desk: Desk) -> None:
     desk.terminal.go_on()
     assert desk.terminal.ready()

@@ -138,7 +138,9 @@ def hold(language, parts, *, done):
         on_page=lambda page, handles: tell(page=page, handles=handles, shown=frames.shown),
     ) as console:
         frames.watch(console._window)
-        console.hear(lambda event, **fields: tell(noted=event, **fields))
+        console.hear(
+            lambda event, **fields: tell(noted=event, **fields), lambda page: tell(followed=page)
+        )
         if done:
             console.progress(12, 28)
         try:

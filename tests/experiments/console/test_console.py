@@ -185,6 +185,8 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
         person.wait_for_page("absolute.closing")
         person.click("continue")
         result = person.wait_for("result")
+    followed = [news["followed"] for news in person.heard if "followed" in news]
+    assert followed == [news["page"] for news in person.heard if "page" in news]
     answers, _, _, (magnitude, frequency, response_time_s), _, related, odd, _ = result
     assert answers == {"age": 19, "handedness": "left"}
     assert magnitude == pytest.approx(80, abs=0.2)

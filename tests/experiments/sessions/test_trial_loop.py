@@ -198,9 +198,15 @@ def test_every_presentation_is_logged_with_its_trial(run: Callable[..., Ran]) ->
         ("virtual", 0),
         ("virtual", 1),
         ("virtual", 2),
-        ("virtual", 1),
     ]
     assert all("start_s" in event for event in shown)
+    assert [event["index"] for event in ran.events("chosen") if event["trial"] == 1] == [1]
+
+
+def test_the_experimenter_hears_of_every_answer(run: Callable[..., Ran]) -> None:
+    desk = Ready()
+    ran = run(experimenter=desk)
+    assert desk.answers == ran.result.answered > 0
 
 
 def test_what_a_respondent_notes_carries_its_trial_or_none(run: Callable[..., Ran]) -> None:
@@ -268,6 +274,22 @@ def test_toggling_among_several_returns_to_the_one_presented_last(
     assert surfaces.felt == {2}
     with refused(InputError, expected=["button", 0, 2], got=3):
         surfaces.present_virtual(3)
+
+
+def test_what_was_felt_last_is_no_choice(models: ModelSets, rig: Any) -> None:
+    surfaces = surfaces_of(rig, list(models.sets["full"].values()))
+    for index in (0, 1):
+        surfaces.present_virtual(index)
+    assert surfaces.chosen is None
+    surfaces.choose(0)
+    surfaces.present_virtual(2)
+    assert (surfaces.chosen, surfaces.last) == (0, 2)
+    surfaces.choose(2)
+    assert (surfaces.chosen, surfaces.presses) == (2, 3)
+    for unfelt in (3, -1):
+        with refused(InputError, expected="felt", got=unfelt):
+            surfaces.choose(unfelt)
+    assert surfaces.chosen == 2
 
 
 def test_a_pause_is_silent_and_changes_no_count(models: ModelSets, rig: Any) -> None:

@@ -105,8 +105,8 @@ def test_thresholds_are_planned_by_frequencies(study: Study, models: ModelSets) 
     plan = TaskPlan(participants=10, schedule="interleaved", repeats=60, break_after=80)
     study = replace(study, tasks={"threshold": plan})
     assert trials_of_session(study, "threshold") == (2, 480)
-    # 482 trials of 4 s, 5 min, and 5 breaks of 2 min.
-    assert minutes_of_session(study, "threshold") == round((482 * 4 + 300 + 600) / 60)
+    # 482 trials of 5 s, 5 min, and 5 breaks of 2 min.
+    assert minutes_of_session(study, "threshold") == round((482 * 5 + 300 + 600) / 60)
     page = plan_page(study, models)
     design, _, _ = page.partition("## Models")
     assert "Each frequency comes 60 times" in design.partition("**Threshold")[2]
