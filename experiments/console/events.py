@@ -35,7 +35,7 @@ class Mouse:
 
 
 class Key(NamedTuple):
-    """A press of a key: its name in small letters ("tab", "enter", "7", "left"), with shift or ctrl held."""
+    """A press of a key: its small name ("tab", "enter", "7", "left"), with shift or ctrl held."""
 
     name: str
     shift: bool = False

@@ -8,6 +8,7 @@ nodes, so that a narrower scene never counts places that a wider one does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -85,15 +86,29 @@ def nodes_of(model: TextureModel) -> tuple[Floats, Floats]:
     return speeds, forces
 
 
+def ranges_of(model: TextureModel, hand: HandRange) -> tuple[Range, Range]:
+    """Lowest and highest speed and force of a hand that may stay anywhere in a range.
+
+    Raises
+    ------
+    InputError
+        For a range beyond the recorded grid.
+    """
+    speeds, forces = nodes_of(model)
+    return (
+        _range_on(model, hand.speed_mm_s, speeds, unit="mm/s", what="speeds"),
+        _range_on(model, hand.force_n, forces, unit="N", what="forces"),
+    )
+
+
 def _of_range(model: TextureModel, hand: HandRange) -> Places:
     speeds, forces = nodes_of(model)
-    _check_inside(model, hand.speed_mm_s, speeds, unit="mm/s", what="speeds")
-    _check_inside(model, hand.force_n, forces, unit="N", what="forces")
-    rows, columns = enclosing(speeds, hand.speed_mm_s), enclosing(forces, hand.force_n)
+    speed_range, force_range = ranges_of(model, hand)
+    rows, columns = enclosing(speeds, speed_range), enclosing(forces, force_range)
     counts = rows[:, None] & columns[None, :]
-    omega, fastest = 2 * np.pi * hand.stroke_hz, hand.speed_mm_s[1]
+    omega, fastest = 2 * np.pi * hand.stroke_hz, speed_range[1]
     speed_change = omega * np.sqrt(np.maximum(fastest**2 - speeds**2, 0.0))
-    force_change = omega * (hand.force_n[1] - hand.force_n[0]) / 2
+    force_change = omega * (force_range[1] - force_range[0]) / 2
     return Places(
         speeds,
         forces,
@@ -101,18 +116,23 @@ def _of_range(model: TextureModel, hand: HandRange) -> Places:
         counts,
         np.broadcast_to(speed_change[:, None], counts.shape),
         np.full(counts.shape, force_change),
-        hand.speed_mm_s,
-        hand.force_n,
+        speed_range,
+        force_range,
     )
 
 
-def _check_inside(model: TextureModel, asked: Range, axis: Floats, *, unit: str, what: str) -> None:
+def _range_on(
+    model: TextureModel, asked: Range | Literal["recorded"], axis: Floats, *, unit: str, what: str
+) -> Range:
     low, high = float(axis[0]), float(axis[-1])
+    if isinstance(asked, str):  # all that was recorded
+        return low, high
     if not low <= asked[0] <= asked[1] <= high:
         raise InputError(
             f"expected {what} of the scene within {low:g}…{high:g} {unit}, where {model.texture} "
             f"was recorded, got {asked[0]:g}…{asked[1]:g} {unit}; narrow the scene, or record more."
         )
+    return asked
 
 
 def enclosing(axis: Floats, asked: Range) -> Bools:

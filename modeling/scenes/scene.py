@@ -13,7 +13,7 @@ A scene is a TOML file; its paths are relative to it, and unknown keys are refus
 
     [hand]                         # one of three: a range,
     speed_mm_s = [50, 150]         #   speeds; each place of a range may be where the hand stays
-    force_n = [0.5, 1.0]           #   forces
+    force_n = [0.5, 1.0]           #   forces; "recorded": all at which a texture was recorded
     stroke_hz = 2.0                #   how often a second the hand goes to and fro (2)
     file = "hand.csv"              # a recorded hand: time_s, speed_mm_s, force_n,
     [[hand.place]]                 # or a distribution: places with their shares of the time
@@ -46,7 +46,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -86,6 +86,7 @@ _SECTIONS = {
     "budget": ("operations", "device", "bytes"),
 }
 _PLACE = ("speed_mm_s", "force_n", "share")
+RECORDED = "recorded"
 Range = tuple[float, float]
 
 
@@ -95,30 +96,29 @@ class HandRange:
 
     Parameters
     ----------
-    speed_mm_s, force_n : (float, float)
-        Lowest and highest, 0 < lowest ≤ highest.
+    speed_mm_s, force_n : (float, float) or "recorded"
+        Lowest and highest, 0 < lowest ≤ highest; or all at which a texture was recorded.
     stroke_hz : float
         How often a second it goes to and fro, up to the highest speed, and presses up and down
         through all forces: what a parameter update comes too late for. 0 … 20.
     """
 
-    speed_mm_s: Range
-    force_n: Range
+    speed_mm_s: Range | Literal["recorded"]
+    force_n: Range | Literal["recorded"]
     stroke_hz: float = STROKE_HZ
 
     def __post_init__(self) -> None:
         highest = {"speed_mm_s": HIGHEST_SPEED_MM_S, "force_n": HIGHEST_FORCE_N}
         for name, most in highest.items():
-            object.__setattr__(
-                self, name, _range(f"{name} under [hand]", getattr(self, name), most)
-            )
+            if (value := getattr(self, name)) != RECORDED:
+                object.__setattr__(self, name, _range(f"{name} under [hand]", value, most))
         check_number("stroke_hz under [hand]", self.stroke_hz, high=FASTEST_STROKES_HZ)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, those of a scene file."""
+        asked = {"speed_mm_s": self.speed_mm_s, "force_n": self.force_n}
         return {
-            "speed_mm_s": list(self.speed_mm_s),
-            "force_n": list(self.force_n),
+            **{key: ends if isinstance(ends, str) else list(ends) for key, ends in asked.items()},
             "stroke_hz": float(self.stroke_hz),
         }
 
@@ -512,7 +512,7 @@ def _range(what: str, value: object, highest: float) -> Range:
     if len(pair) != 2 or not all(is_positive(end) and end <= highest for end in pair):
         raise InputError(
             f"expected the lowest and the highest {what}, above 0 and up to {highest:g}, got "
-            f"{shown(value)}; write [lowest, highest]."
+            f'{shown(value)}; write [lowest, highest], or "{RECORDED}" for all of the grid.'
         )
     low, high = float(pair[0]), float(pair[1])
     if low > high:

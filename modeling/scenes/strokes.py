@@ -11,9 +11,11 @@ import numpy as np
 
 from modeling.arrays import Floats
 from modeling.hand import Hand
+from modeling.models.texture_model import TextureModel
 from modeling.rendering.renderer import Renderer
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.measures import Features, Yardstick, errors_between
+from modeling.scenes.places import ranges_of
 from modeling.scenes.scene import STROKE_HZ, HandRange, HandUse, Scene
 from modeling.seeds import generator
 
@@ -51,7 +53,8 @@ def windows_kept(
     plan = compiled.plan
     yardstick = Yardstick.of(compiled.full, band_hz=scene.actuator.band_hz)
     settling, window = (round(s * plan.rate_hz) for s in (SETTLING_S, WINDOW_S))
-    hand = random_stroke(scene.hand, settling + count * window, rate_hz=plan.rate_hz, seed=seed)
+    samples = settling + count * window
+    hand = random_stroke(compiled.full, scene.hand, samples, rate_hz=plan.rate_hz, seed=seed)
     truth = Renderer(compiled.felt, rate_hz=plan.rate_hz, seed=seed, update_samples=1)
     ours = Renderer(
         compiled.model,
@@ -69,7 +72,9 @@ def windows_kept(
     return Windows(int(kept.sum()), count, float(errors.shares(scene.bound).max()))
 
 
-def random_stroke(hand: HandUse, samples: int, *, rate_hz: float, seed: int = 0) -> Hand:
+def random_stroke(
+    model: TextureModel, hand: HandUse, samples: int, *, rate_hz: float, seed: int = 0
+) -> Hand:
     """A hand within a scene: from one random place of it to the next, as fast as it strokes.
 
     Of a range all places are alike; else they come by their share of the time.
@@ -79,7 +84,7 @@ def random_stroke(hand: HandUse, samples: int, *, rate_hz: float, seed: int = 0)
     count = samples // turn + 2
     rng = generator(seed, 14)
     if isinstance(hand, HandRange):
-        speeds, forces = (rng.uniform(*ends, count) for ends in (hand.speed_mm_s, hand.force_n))
+        speeds, forces = (rng.uniform(*ends, count) for ends in ranges_of(model, hand))
     else:
         chosen = rng.choice(hand.share.size, count, p=hand.share)
         speeds, forces = hand.speed_mm_s[chosen], hand.force_n[chosen]

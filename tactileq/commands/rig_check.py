@@ -60,7 +60,9 @@ def _show(console: Console, title: str, findings: Sequence[Finding]) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(title=Text(title), title_justify="left", box=None, show_header=False, pad_edge=False)
+    table = Table(
+        title=Text(title), title_justify="left", box=None, show_header=False, pad_edge=False
+    )
     table.add_column(no_wrap=True)
     table.add_column(overflow="fold")
     table.add_column(justify="right", no_wrap=True)

@@ -153,7 +153,9 @@ def tell_in_motion(texture: CompiledTexture, compiled: CompiledScene, *, seed: i
     plan = texture.full_plan
     full = Renderer(texture.full, rate_hz=plan.rate_hz, update_samples=plan.update_samples)
     least = texture.renderer()
-    hand = random_stroke(compiled.scene.hand, round(plan.rate_hz), rate_hz=plan.rate_hz, seed=seed)
+    hand = random_stroke(
+        texture.full, compiled.scene.hand, round(plan.rate_hz), rate_hz=plan.rate_hz, seed=seed
+    )
     before, after = (ns_per_sample(renderer, hand) for renderer in (full, least))
     windows = windows_kept(texture, compiled.scene, count=WINDOWS, seed=seed)
     print(

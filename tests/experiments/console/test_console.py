@@ -298,7 +298,7 @@ def test_nobody_has_to_give_a_reason(seated: Seated) -> None:
         person.wait_for_page("rate")
         person.click("stop")
         person.wait_for_page("stop")
-        assert [name for name in person.handles if name.startswith("reason")][0] == (
+        assert next(name for name in person.handles if name.startswith("reason")) == (
             "reason not stated"
         )
         person.click("stop now")

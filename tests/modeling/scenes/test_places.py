@@ -47,6 +47,15 @@ def test_a_range_is_rounded_outwards(
     assert (places.share > 0).tolist() == places.counts.tolist()
 
 
+def test_all_that_was_recorded_is_the_whole_grid(model: TextureModel) -> None:
+    ends = [(float(axis[0]), float(axis[-1])) for axis in (model.speeds_mm_s, model.forces_n)]
+    written = places_of(model, HandRange(speed_mm_s=ends[0], force_n=ends[1]))
+    named = places_of(model, HandRange(speed_mm_s="recorded", force_n="recorded"))
+    for name in ("share", "counts", "speed_change_mm_s2", "force_change_n_s"):
+        np.testing.assert_array_equal(getattr(named, name), getattr(written, name))
+    assert (named.speed_range, named.force_range) == (written.speed_range, written.force_range)
+
+
 def test_a_stroke_changes_fastest_where_it_is_slow(model: TextureModel) -> None:
     hand = HandRange(speed_mm_s=(60, 220), force_n=(0.5, 3), stroke_hz=1)
     places = places_of(model, hand)

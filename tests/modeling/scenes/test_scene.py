@@ -99,6 +99,14 @@ def test_what_is_left_out_has_its_default(tmp_path: Path) -> None:
     assert scene.budget.most_bytes == scene.budget.most_operations(5000) == np.inf
 
 
+def test_a_hand_may_do_all_that_was_recorded(tmp_path: Path) -> None:
+    text = LEAST.replace("speed_mm_s = [50, 150]", 'speed_mm_s = "recorded"')
+    scene = loaded(tmp_path, text)
+    assert scene.hand == HandRange(speed_mm_s="recorded", force_n=(0.5, 0.5))
+    assert scene.hand.to_dict()["speed_mm_s"] == "recorded"
+    assert scene.sha256 != loaded(tmp_path, LEAST).sha256
+
+
 def test_a_device_gives_operations_and_bytes() -> None:
     budget = Budget(device="stm32l432")
     assert budget.most_operations(5000) == pytest.approx(2 * budget.most_operations(10_000))

@@ -14,6 +14,7 @@ from modeling import InputError, Renderer, TextureModel, fit_texture
 from modeling.recordings.trajectory import Trajectory
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.measures import Yardstick, errors_between
+from modeling.scenes.places import ranges_of
 from modeling.scenes.scene import Actuator, HandRange, HandUse, Scene, distributed_hand
 from modeling.scenes.scene import recorded_hand as recorded
 from modeling.scenes.strokes import Windows, random_stroke, windows_kept
@@ -24,11 +25,13 @@ from tests.refusals import refused
 Compile = Callable[[TextureModel, Scene], CompiledTexture]
 TIME_S = np.linspace(0, 10, 2001)
 SINE = Trajectory("sine", TIME_S, 250 * np.sin(2 * np.pi * TIME_S), 1.5 + np.sin(3 * TIME_S))
+MODEL = planted_texture("canvas")
 FULL = HandRange(speed_mm_s=(50.0, 350.0), force_n=(0.5, 3.5))
 SLOW = HandRange(speed_mm_s=(50.0, 150.0), force_n=(0.5, 1.0))
 HANDS: dict[str, HandUse] = {
     "full": FULL,
     "slow": SLOW,
+    "all that was recorded": HandRange(speed_mm_s="recorded", force_n="recorded"),
     "fast strokes": HandRange(speed_mm_s=(50.0, 350.0), force_n=(0.5, 3.5), stroke_hz=6.0),
     "recorded": recorded(SINE),
     "distribution": distributed_hand([80, 200, 330], [1, 2, 1], [0.7, 0.2, 0.1]),
@@ -143,8 +146,8 @@ def test_the_worst_error_is_the_one_that_is_rendered(compiled_for: Any) -> None:
 @pytest.mark.parametrize("hand", HANDS)
 def test_a_random_stroke_stays_inside_the_scene(hand: str) -> None:
     use = HANDS[hand]
-    stroke = random_stroke(use, 20_000, rate_hz=5000.0, seed=3)
-    ends = (use.speed_mm_s, use.force_n) if isinstance(use, HandRange) else use.ranges
+    stroke = random_stroke(MODEL, use, 20_000, rate_hz=5000.0, seed=3)
+    ends = ranges_of(MODEL, use) if isinstance(use, HandRange) else use.ranges
     for values, (low, high) in zip(stroke, ends, strict=True):
         assert low <= values.min() < low + 0.4 * (high - low)
         assert high - 0.4 * (high - low) < values.max() <= high
@@ -152,14 +155,14 @@ def test_a_random_stroke_stays_inside_the_scene(hand: str) -> None:
 
 
 def test_a_random_stroke_follows_its_seed_alone() -> None:
-    one, same, other = (random_stroke(FULL, 500, rate_hz=1000.0, seed=n) for n in (1, 1, 2))
+    one, same, other = (random_stroke(MODEL, FULL, 500, rate_hz=1000.0, seed=n) for n in (1, 1, 2))
     assert np.array_equal(one, same)
     assert not np.array_equal(one, other)
 
 
 def test_a_hand_that_does_not_stroke_stays_where_it_is() -> None:
     still = HandRange(speed_mm_s=(50.0, 350.0), force_n=(0.5, 3.5), stroke_hz=0.0)
-    stroke = random_stroke(still, 500, rate_hz=1000.0)
+    stroke = random_stroke(MODEL, still, 500, rate_hz=1000.0)
     assert np.ptp(stroke.speed_mm_s) < 1e-3
 
 
