@@ -10,6 +10,7 @@ from experiments.sessions.files import write_new
 from experiments.sessions.log import plain
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.overrides import Overrides
+from experiments.study.study import Study
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.documents import dump_json, read_json_object
@@ -46,6 +47,23 @@ def claim_data_set(root: Path, manifest: SessionManifest, *, overrides: Override
         except FileExistsError:
             found = read_json_object(path, advice="choose another data folder for these sessions")
             _check(found, describe_data_set(manifest), path=path, overrides=overrides)
+
+
+def require_study(root: Path, study: Study) -> None:
+    """Refuse a data folder of another study, by its name: its file may have been edited since.
+
+    Raises
+    ------
+    InputError
+        Also where it does not describe its data.
+    """
+    path = root / DESCRIPTION_NAME
+    found = read_json_object(path, advice="name the folder of the study's data").get("Name")
+    if found != study.name:
+        raise InputError(
+            f"expected the data of the study {shown(study.name)} in {root}, got those of "
+            f"{shown(found)}; name their folder with --data, or the other study."
+        )
 
 
 def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:

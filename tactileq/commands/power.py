@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from modeling.files.folders import Contents
 
 PICTURE_DPI = 150
+FIRST_ANSWER_S = 15.0
 
 
 def power(
@@ -75,7 +77,7 @@ def power(
     """Simulate a study with n participants many times: the chance of each verdict on its claims.
 
     What stands for the real surfaces are the planted textures of the same names. Writes power.tsv,
-    power.png and power.svg.
+    power.png and power.svg. A first answer comes within 20 s, with how long the rest takes.
 
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
@@ -95,6 +97,14 @@ def power(
         planted=planted,
     )
     tell_models(people.models, plan.textures)
+
+    def tell_first(table: pd.DataFrame, left_s: float) -> None:
+        done = int(table["simulations"].iloc[0])
+        print(f"first answer, from {done} of {simulations} simulated studies:")
+        for line in _sentences(table, plan, out):
+            print(f"  {line}")
+        print(f"about {max(1, round(left_s / 60))} min more")
+
     with progress("Simulated studies", simulations) as advance:
         table = chances(
             people,
@@ -104,6 +114,7 @@ def power(
             jobs=jobs,
             dask=dask,
             advance=advance,
+            first=tell_first,
         )
     settings = {
         "study_sha256": plan.sha256,
@@ -273,6 +284,7 @@ def chances(
     jobs: int | None = None,
     dask: str | None = None,
     advance: Callable[[str], None] = lambda item: None,
+    first: Callable[[pd.DataFrame, float], None] = lambda table, left_s: None,
 ) -> pd.DataFrame:
     """The chance of each verdict on each claim, by n.
 
@@ -292,6 +304,9 @@ def chances(
         Address of a scheduler.
     advance : callable, optional
         Called after each simulation.
+    first : callable, optional
+        Told what the simulations that are done by `FIRST_ANSWER_S` say, and about how long the
+        others take in s; not where all are done by then.
 
     Returns
     -------
@@ -302,10 +317,20 @@ def chances(
 
     work = partial(simulated_verdicts, people, sizes, seed=seed)
     found: dict[int, list[Verdict]] = {}
+    began_s = first_s = monotonic()
+    told = False
     with working(work, range(simulations), jobs=jobs, dask=dask) as done:
         for number, one in done:
             found[number] = one
             advance("")
+            now_s, count = monotonic(), len(found)
+            if count == 1:
+                first_s = now_s  # before it, workers were begun
+            elif not told and count < simulations and now_s - began_s >= FIRST_ANSWER_S:
+                told = True
+                so_far = (one for each in found.values() for one in each)
+                left_s = (simulations - count) * (now_s - first_s) / (count - 1)
+                first(power_table(so_far, simulations=count), left_s)
     in_order = (one for number in sorted(found) for one in found[number])
     return power_table(in_order, simulations=simulations)
 
@@ -392,10 +417,8 @@ def _write(
     settings: dict[str, object],
     inputs: Mapping[str, str],
 ) -> None:
-    from analysis.answers.plan import plan_from
     from analysis.figures.power import figure_power
     from analysis.figures.saving import save_figure, svg_of
-    from analysis.statistics.power import power_sentences
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.files.writing import write_text
@@ -409,6 +432,13 @@ def _write(
         save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)
         (fresh / "power.svg").write_bytes(svg_of(figure)[0])
         seal_folder(fresh, provenance)
-    for line in power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims):
+    for line in _sentences(table, plan, out):
         print(line)
     print(f"simulated: {out / 'power.png'}")
+
+
+def _sentences(table: pd.DataFrame, plan: Study, out: Path) -> list[str]:
+    from analysis.answers.plan import plan_from
+    from analysis.statistics.power import power_sentences
+
+    return power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims)

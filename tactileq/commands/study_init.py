@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
+from collections.abc import Sequence
 from pathlib import Path
+from string import ascii_uppercase
 from typing import Annotated
 
 import typer
@@ -14,10 +17,23 @@ HIGHEST_SEED = 2**53  # what every reader of numbers holds exactly
 
 def study_init(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The study file (TOML) to write.")],
+    models: Annotated[
+        Path | None, typer.Option("--models", help="Folder of full models: a study of these.")
+    ] = None,
+    simplified: Annotated[
+        Path | None,
+        typer.Option(
+            "--simplified", help="Folder of simplified ones; that beside --models without it."
+        ),
+    ] = None,
 ) -> None:
     """Write a commented study file, the paper's design with a freshly drawn seed.
 
+    With --models its textures are those of the folder, and the file passes tactileq study check.
+
     Example: tactileq study init study.toml
+
+    Example: tactileq study init study.toml --models models --simplified simplified
     """
     from experiments.study.study import SHIPPED_STUDY, Study
     from modeling.files.writing import write_text
@@ -28,9 +44,80 @@ def study_init(
         )
     if path.suffix != ".toml":
         raise ValueError(f"expected a name that ends in .toml, got {path}; rename it.")
+    if simplified is not None and models is None:
+        raise ValueError(
+            f"expected --models beside --simplified, got {simplified} alone; name the folder of "
+            "full models, too."
+        )
+    seed = secrets.randbelow(HIGHEST_SEED)
     shipped = SHIPPED_STUDY.read_text(encoding="utf-8")
-    text = shipped.replace("\nseed = 1 ", f"\nseed = {secrets.randbelow(HIGHEST_SEED)} ")
-    write_text(path, text)
-    Study.load(path)
-    print(f"study file: {path}")
-    print("Name your textures, trays, models and people in it, then: tactileq study check", path)
+    text = shipped.replace("\nseed = 1 ", f"\nseed = {seed} ")
+    if models is None:
+        write_text(path, text)
+        Study.load(path)
+        print(f"study file: {path}")
+        print(
+            "Name your textures, trays, models and people in it, then: tactileq study check", path
+        )
+        return
+    folders = (models, simplified or models.parent / "simplified")
+    textures = _textures_in(folders)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_text(path, _of_models(text, textures, folders, beside=path.parent, seed=seed))
+    try:
+        _check(path)
+    except ValueError:
+        path.unlink()
+        raise
+    print(f"study file: {path}: {', '.join(textures)}")
+    print(f"Write down your trays, anchors and people in it, then: tactileq study check {path}")
+
+
+def _textures_in(folders: Sequence[Path]) -> list[str]:
+    """The textures of the first folder, which the other one has to have, too."""
+    from modeling.models.loading import load_any_models
+
+    full, simplified = (sorted(load_any_models(folder)) for folder in folders)
+    if missing := [name for name in full if name not in simplified]:
+        raise ValueError(
+            f"expected a model of each of {', '.join(full)} in {folders[1]}, got none of "
+            f"{', '.join(missing)}; simplify {'it' if len(missing) == 1 else 'them'}, or name "
+            "another folder with --simplified."
+        )
+    return full
+
+
+def _of_models(
+    text: str, textures: Sequence[str], folders: Sequence[Path], *, beside: Path, seed: int
+) -> str:
+    """The shipped study with these textures: models, trays, and no anchors that it lacks."""
+    from experiments.study.design import fisher_yates
+    from experiments.study.study import Study
+    from modeling.seeds import generator
+    from rig.setup.editing import as_toml
+
+    full, simplified = (as_toml(os.path.relpath(folder, beside)) for folder in folders)
+    trays = fisher_yates(ascii_uppercase[: len(textures)], generator(seed))
+    pairs = zip(textures, trays, strict=True)
+    lines = [f"{as_toml(name)} = {as_toml(tray)}" for name, tray in pairs]
+    changes = {
+        r"(?m)^textures = .*$": f"textures = {as_toml(list(textures))}",
+        r"(?m)^full = .*$": f"full = {full}",
+        r"(?m)^simplified = .*$": f"simplified = {simplified}",
+        r"(?ms)^\[trays\]\n.*?\Z": "\n".join(["[trays]", *lines, ""]),
+    }
+    named = {name for pair in Study.load().tasks["absolute"].anchors.items() for name in pair}
+    if not named <= set(textures):
+        first, second = map(as_toml, textures[:2])
+        changes[r"(?m)^anchors = .*$"] = f"# anchors = {{{first} = {second}}}"
+    for pattern, replacement in changes.items():
+        text = re.sub(pattern, replacement.replace("\\", r"\\"), text)
+    return text
+
+
+def _check(path: Path) -> None:
+    from experiments.study.models import load_model_sets
+    from experiments.study.study import Study
+
+    study = Study.load(path)
+    load_model_sets(study, path.parent)[0].require(study)

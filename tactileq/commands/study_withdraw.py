@@ -11,16 +11,23 @@ from tactileq.commands.study_status import tell_made
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
+StudyFile = Annotated[
+    Path | None,
+    typer.Option("--study", help="Study file (TOML): refuses the data of another study."),
+]
 Yes = Annotated[bool, typer.Option("--yes", help="Do not ask.")]
 
 
-def study_withdraw(subject: Subject, data: Data = Path("data"), yes: Yes = False) -> None:
+def study_withdraw(
+    subject: Subject, data: Data = Path("data"), study: StudyFile = None, yes: Yes = False
+) -> None:
     """Delete all data of a person; the number stays taken, the slot goes to a replacement.
 
     Example: tactileq study withdraw 7 --data data
     """
     from experiments.sessions.withdrawing import files_of, withdraw
 
+    _require(data, study)
     there = len(files_of(data, subject))
     _confirm(f"Delete {there} files of subject {subject} in {data}, for good?", yes=yes)
     made = withdraw(data, subject)
@@ -29,17 +36,29 @@ def study_withdraw(subject: Subject, data: Data = Path("data"), yes: Yes = False
     tell_made(made)
 
 
-def study_dropout(subject: Subject, data: Data = Path("data"), yes: Yes = False) -> None:
+def study_dropout(
+    subject: Subject, data: Data = Path("data"), study: StudyFile = None, yes: Yes = False
+) -> None:
     """Note that a person will not come again: the data stay, the slot goes to a replacement.
 
     Example: tactileq study dropout 7 --data data
     """
     from experiments.sessions.withdrawing import drop_out
 
+    _require(data, study)
     _confirm(f"Give the slot of subject {subject} to somebody else?", yes=yes)
     made = drop_out(data, subject)
     print(f"dropped out: subject {subject}; the data stay, the slot is free")
     tell_made(made)
+
+
+def _require(data: Path, study: Path | None) -> None:
+    """Refuse the data of another study than the one that is named."""
+    from experiments.sessions.data_set import require_study
+    from experiments.study.study import Study
+
+    if study is not None:
+        require_study(data, Study.load(study))
 
 
 def _confirm(question: str, *, yes: bool) -> None:

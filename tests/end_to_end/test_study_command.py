@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from experiments.study.study import SHIPPED_STUDY, Study
 from modeling import Threshold, simplify
 from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
+from tests.refusals import check_refusal
 
 SMALL = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
 Main = Callable[..., subprocess.CompletedProcess[str]]
@@ -49,6 +52,45 @@ def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(
         "name.\n"
     )
     assert Study.load(tmp_path / "a.toml") == first
+
+
+def test_a_study_of_the_models_that_are_there_passes_its_check(place: Path, main: Main) -> None:
+    made = main("study", "init", "mine/study.toml", "--models", "models")
+    assert made.returncode == 0, made.stderr
+    assert main("study", "check", "mine/study.toml").returncode == 0
+    study = Study.load(place / "mine/study.toml")
+    assert study.textures == tuple(sorted(Study.load().textures))
+    assert study.plan_of("absolute").anchors == Study.load().plan_of("absolute").anchors
+    # Fewer textures, of other names than the shipped ones, in another place.
+    for folder in ("some/full", "some/simplified"):
+        (place / folder).mkdir(parents=True)
+    for name, texture in (("say 'aah'", "canvas"), ("[oak]", "PVC")):
+        model = replace(planted_texture(texture, **SMALL), texture=name)
+        model.save(place / f"some/full/{texture}.json")
+        model.with_layers([0]).save(place / f"some/simplified/{texture}.json")
+    made = main("study", "init", "other.toml", "--models", "some/full")
+    assert made.returncode == 0, made.stderr
+    checked = main("study", "check", "other.toml")
+    assert checked.returncode == 0, checked.stderr
+    study = Study.load(place / "other.toml")
+    assert sorted(study.trays) == sorted(study.textures) == ["[oak]", "say 'aah'"]
+    assert not study.plan_of("absolute").anchors
+
+
+def test_a_study_of_models_that_lack_a_simplified_one_is_not_written(
+    place: Path, main: Main
+) -> None:
+    (place / "simplified/3.json").unlink()
+    refused = main("study", "init", "new.toml", "--models", "models")
+    assert refused.returncode == 1
+    check_refusal(refused.stderr, expected="simplified", got="MDF")
+    refused = main("study", "init", "new.toml", "--simplified", "simplified")
+    check_refusal(refused.stderr, expected="--models", got="simplified")
+    shutil.rmtree(place / "simplified")
+    shutil.copytree(place / "models", place / "simplified")
+    refused = main("study", "init", "new.toml", "--models", "models")
+    assert refused.returncode == 1  # nothing differs, so there is nothing to study
+    assert not (place / "new.toml").exists()
 
 
 def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main: Main) -> None:

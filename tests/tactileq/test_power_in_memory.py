@@ -99,6 +99,28 @@ def test_any_number_of_workers_gives_the_same_tables(study: Study, models: Model
     assert found[0] == found[1]
 
 
+def test_a_first_answer_comes_before_all_simulations_are_done(
+    study: Study, models: ModelSets, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    who, sizes = people(study, models, most=6), (4, 6)
+    heard: list[tuple[pd.DataFrame, float]] = []
+    monkeypatch.setattr("tactileq.commands.power.FIRST_ANSWER_S", 0.0)
+
+    def run(simulations: int) -> pd.DataFrame:
+        def hear(table: pd.DataFrame, left_s: float) -> None:
+            heard.append((table, left_s))
+
+        return chances(who, sizes, simulations=simulations, seed=1, jobs=1, first=hear)
+
+    run(3)
+    ((table, left_s),) = heard
+    pd.testing.assert_frame_equal(table, run(2))
+    assert left_s > 0
+    monkeypatch.setattr("tactileq.commands.power.FIRST_ANSWER_S", 3600.0)
+    run(3)
+    assert len(heard) == 1
+
+
 def test_the_first_n_are_a_study_planned_for_n(study: Study, models: ModelSets):
     larger = simulated_verdicts(people(study, models, most=8), (4, 8), 0, seed=2)
     smaller = simulated_verdicts(people(study, models, most=4), (4,), 0, seed=2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 
 import pytest
@@ -17,9 +18,12 @@ from experiments.sessions.status import (
     StudyProgress,
     TaskProgress,
 )
+from experiments.study.study import SHIPPED_STUDY, Study
+from modeling import InputError
 from tactileq.commands.study_status import table_of
 from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 from tests.experiments.sessions.enrolling import enrolled
+from tests.refusals import refused
 
 
 def test_every_person_and_session_has_its_place():
@@ -77,3 +81,18 @@ def test_with_a_yes_it_is_done(app, data, command, left, told):
     assert told in ended.output
     assert Roster(data).subjects()[1]["left"] == left
     assert (data / "sub-01").exists() is (command == "dropout")
+
+
+@pytest.mark.parametrize("command", ["withdraw", "dropout"])
+def test_the_data_of_another_study_are_refused(app, data, command):
+    file = data.parent / "study.toml"
+    file.write_text(SHIPPED_STUDY.read_text(encoding="utf-8"), encoding="utf-8")
+    name = Study.load().name
+    words = [command, "1", "--data", str(data), "--study", str(file), "--yes"]
+    (data / "dataset_description.json").write_text(json.dumps({"Name": "Pebbles"}))
+    with refused(InputError, expected=name, got="Pebbles"):
+        raise CliRunner().invoke(app, words).exception
+    assert Roster(data).subjects()[1]["left"] == ""
+    (data / "dataset_description.json").write_text(json.dumps({"Name": name}))
+    assert CliRunner().invoke(app, words).exit_code == 0
+    assert Roster(data).subjects()[1]["left"] != ""
