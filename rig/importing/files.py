@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,6 +13,7 @@ import numpy as np
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
+from modeling.checks import check_number
 from modeling.errors import shortened, shown
 from modeling.files.reading import read_bytes
 from modeling.files.tables import csv_cells, is_number
@@ -22,13 +23,19 @@ from modeling.recordings.recording import clipped_samples
 from modeling.recordings.spectrum import dft321
 from rig.importing.labels import Label
 from rig.importing.plausible import G_PER_UNIT, doubts_about
-from rig.importing.times import TimeColumn
+from rig.importing.times import TimeColumn, since_first
 
 Axis = Literal["x", "y", "z", "dft321"]
 AXES: tuple[Axis, ...] = ("x", "y", "z", "dft321")
 # Below it layers are missed: docs/method/recordings.md#shortest-records
 SHORTEST_MODELLED_S = 0.2
+ROLES = ("time", "x", "y", "z")
+VOLTS_PER_UNIT = {"V": 1.0, "mV": 1e-3}
+SENSITIVITIES_MV_PER_G = (0.01, 1e5)  # from shock sensors to seismic ones
 _TIME_NAMES = {"time", "t", "timestamp"}
+_UNIT_ALONE = re.compile(r"\s*[\[(][^\])]*[\])]\s*")  # a line below the header: (ms),(V)
+_ELAPSED = re.compile(r"(?:elapsed_)?(milli|micro|nano)?seconds(?:_elapsed)?")  # seconds_elapsed
+_SECONDS = {None: "s", "milli": "ms", "micro": "us", "nano": "ns"}
 _AXIS_NAME = re.compile(r"(?:(?:a|.*acc.*?)_?)?([xyz])")  # x, ax, acc_x, linear_acceleration_x
 
 
@@ -105,8 +112,12 @@ def import_csv(
     axis: Axis | None = None,
     unit: str | None = None,
     rate_hz: float | None = None,
+    mv_per_g: float | None = None,
+    named: Mapping[str, str] | None = None,
 ) -> RecordingSet:
     """CSV files with a header line, a time column (or a rate) and one or three axes.
+
+    Samples at uneven times are resampled at even ones, unless a rate is given.
 
     Parameters
     ----------
@@ -115,18 +126,24 @@ def import_csv(
         One per path.
     axis : {"x", "y", "z", "dft321"}, optional
         Needed where a file has more than one column beside time.
-    unit : {"g", "mg", "m/s2", "arbitrary"}, optional
+    unit : {"g", "mg", "m/s2", "V", "mV", "arbitrary"}, optional
         Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
         `arbitrary`.
     rate_hz : float, optional
         Where there is no time column, or one that tells no rate; must not contradict one that does.
+    mv_per_g : float, optional
+        Sensitivity of the accelerometer, 0.01 … 100,000 mV/g; needed for samples in volts.
+    named : mapping of "time", "x", "y" or "z" to str, optional
+        Headers of columns of other names.
 
     Raises
     ------
     InputError
         Naming the file and what is wrong with it, or cannot be meant.
     """
-    read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
+    read = partial(
+        import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz, mv_per_g=mv_per_g, named=named
+    )
     return RecordingSet(_meant(read(*one)) for one in zip(paths, labels, strict=True))
 
 
@@ -144,6 +161,8 @@ def import_csv_file(
     axis: Axis | None = None,
     unit: str | None = None,
     rate_hz: float | None = None,
+    mv_per_g: float | None = None,
+    named: Mapping[str, str] | None = None,
 ) -> Imported:
     """One CSV file, with warnings and doubts; otherwise as `import_csv`."""
     if axis is not None and axis not in AXES:
@@ -151,9 +170,12 @@ def import_csv_file(
             f"expected an axis among {', '.join(AXES)}, got {shown(axis)}; choose one."
         )
     _check_unit(unit, "--unit")
-    columns, warnings = _read_columns(path)
-    rate_hz, jitter, contradiction = _rate(path, columns, rate_hz)
+    columns, warnings = _read_columns(path, named or {})
+    time = _time_column(path, columns)
     axes, found_unit = _chosen_axes(path, columns, axis)
+    # Combined axes no longer show their limits, nor do resampled ones: they are looked for here.
+    clipped_share = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
+    rate_hz, axes, uneven, contradiction = _even(path, time, axes, columns, given_hz=rate_hz)
     if unit and found_unit and unit != found_unit:
         raise InputError(
             f"expected one unit for {path.name}, got {shown(found_unit)} in its header and "
@@ -163,18 +185,38 @@ def import_csv_file(
     _check_unit(final_unit, f"the header of {path.name}")
     recording = _recording(
         path,
-        (dft321(axes) if len(axes) == 3 else axes[0]) * G_PER_UNIT[final_unit],
+        (dft321(axes) if len(axes) == 3 else axes[0]) * _g_per(final_unit, mv_per_g, path.name),
         rate_hz,
         label,
         unit="arbitrary" if final_unit == "arbitrary" else "g",
-        # Combined axes no longer show their limits, so those are looked for here.
-        clipped_share=float(np.any([clipped_samples(one) for one in axes], axis=0).mean()),
+        clipped_share=clipped_share,
     )
+    taken_as = "g" if final_unit in VOLTS_PER_UNIT else final_unit
     return Imported(
         recording,
-        (*warnings, *jitter, *_too_short(path, recording)),
-        doubts=(*contradiction, *doubts_about(recording, path.name, unit=final_unit)),
+        (*warnings, *uneven, *_too_short(path, recording)),
+        doubts=(*contradiction, *doubts_about(recording, path.name, unit=taken_as)),
     )
+
+
+def parse_columns(text: str) -> dict[str, str]:
+    """Which column is which: `time=Zeit,z=Beschl_Z`.
+
+    Raises
+    ------
+    InputError
+        For anything else than time, x, y and z, each with a column of its own.
+    """
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        role, equals, column = (piece.strip() for piece in part.partition("="))
+        if role not in ROLES or not (equals and column) or role in found:
+            raise InputError(
+                f"expected {', '.join(ROLES)}, each once, with = and a column, got {shown(part)}; "
+                "write --map time=Zeit,z=Beschl_Z."
+            )
+        found[role] = column
+    return found
 
 
 def usable(
@@ -208,23 +250,65 @@ def usable(
     return records, tuple(map(str, refusals))
 
 
-def _rate(
-    path: Path, columns: dict[str, Floats], given_hz: float | None
-) -> tuple[float, Sequence[str], Sequence[str]]:
-    """The rate, given or told; what is to be said of uneven samples; what contradicts the rate."""
-    name = _time_column(columns)
-    if name is None:
+def _even(
+    path: Path,
+    time: TimeColumn | None,
+    axes: Floats,
+    columns: Mapping[str, Floats],
+    *,
+    given_hz: float | None,
+) -> tuple[float, Floats, Sequence[str], Sequence[str]]:
+    """Rate and evenly spaced samples; what is to be said of that; what contradicts the rate.
+
+    A rate that is given says that the samples are even, whatever their times.
+    """
+    if time is None:
         if given_hz is None:
             raise InputError(
                 f"expected a time column or --rate for {path.name}, got the columns "
-                f"{shortened(', '.join(columns), longest=120)}; give the sampling rate in Hz."
+                f"{shortened(', '.join(columns), longest=120)}; name it with --time-column, or "
+                "give the sampling rate in Hz."
             )
-        return given_hz, (), ()
-    time = TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
-    rate_hz = time.rate_hz() if given_hz is None else given_hz
-    contradiction = None if given_hz is None else time.contradiction(given_hz)
-    jitter = None if contradiction else time.jitter_warning(rate_hz)
-    return rate_hz, [jitter] if jitter else [], [contradiction] if contradiction else []
+        return given_hz, axes, (), ()
+    if given_hz is None:
+        rate_hz = time.rate_hz()
+        uneven = time.unevenness(rate_hz)
+        if uneven is None:
+            return rate_hz, axes, (), ()
+        told = (
+            f"{path.name}: {uneven}; they were resampled at even times by a spline through their "
+            "own ones; if only the times are uneven, give --rate."
+        )
+        return rate_hz, time.resampled(axes, rate_hz), (told,), ()
+    contradiction = time.contradiction(given_hz)
+    uneven = None if contradiction else time.unevenness(given_hz)
+    if uneven is None:
+        return given_hz, axes, (), (contradiction,) if contradiction else ()
+    told = (
+        f"{path.name}: {uneven}, but are taken as evenly spaced, as --rate says; if they are not, "
+        f"that turns {uneven.share:.0%} of the power of a vibration at {uneven.highest_hz:.4g} Hz "
+        "into noise, and less at lower frequencies."
+    )
+    return given_hz, axes, (told,), ()
+
+
+def _g_per(unit: str, mv_per_g: float | None, file: str) -> float:
+    """How many g one of this unit is."""
+    if unit not in VOLTS_PER_UNIT:
+        if mv_per_g is not None:
+            raise InputError(
+                f"expected {file} in volts for --mv-per-g, got the unit {shown(unit)}; leave "
+                "--mv-per-g out, or give --unit V."
+            )
+        return G_PER_UNIT[unit]
+    if mv_per_g is None:
+        raise InputError(
+            f"expected the sensitivity of the accelerometer for {file}, whose samples are "
+            f"{unit}, got none; give --mv-per-g, as its data sheet says."
+        )
+    low, high = SENSITIVITIES_MV_PER_G
+    check_number("--mv-per-g", mv_per_g, low=low, high=high)
+    return 1e3 * VOLTS_PER_UNIT[unit] / mv_per_g
 
 
 def _beyond_full_scale(path: Path, samples: Floats, scale: float | None) -> list[str]:
@@ -274,16 +358,22 @@ def _recording(
 
 
 def _check_unit(unit: str | None, where: str) -> None:
-    if unit is not None and unit not in G_PER_UNIT:
+    if unit is not None and unit not in (*G_PER_UNIT, *VOLTS_PER_UNIT):
         raise InputError(
-            f"expected a unit among {', '.join(G_PER_UNIT)} in {where}, got {shown(unit)}; "
-            "convert the data or name the unit with --unit."
+            f"expected a unit among {', '.join((*G_PER_UNIT, *VOLTS_PER_UNIT))} in {where}, got "
+            f"{shown(unit)}; convert the data or name the unit with --unit."
         )
 
 
 def _read_lines(path: Path) -> tuple[list[str], bool]:
     """Lines that are neither empty nor comments, and whether the last one has its end."""
     text = _decoded(path)
+    if text.startswith("LabVIEW Measurement"):
+        raise InputError(
+            f"expected a CSV file with a header line, got a LabVIEW measurement file (LVM) at "
+            f"{path}; save it as CSV, or remove all lines above the one that begins with X_Value "
+            "and give --map time=X_Value,x= and the column of the axis."
+        )
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         raise InputError(
@@ -320,8 +410,14 @@ def _decoded(path: Path) -> str:
     raise InputError(f"expected a text file, got other bytes in {path}; export CSV.")
 
 
-def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
-    """Columns of numbers by their header, and what to be warned of."""
+def _read_columns(
+    path: Path, named: Mapping[str, str]
+) -> tuple[dict[str, Floats], tuple[str, ...]]:
+    """Columns of numbers by their header, and what to be warned of.
+
+    Those that are named have the header of their role, and no other one has it. Times since 1970
+    have the unit that they are in.
+    """
     lines, ended = _read_lines(path)
     delimiter = max(",;\t", key=lines[0].count)
     rows = [
@@ -329,6 +425,8 @@ def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
         for number, line in enumerate(lines, start=1)
     ]
     header = [cell.strip() for cell in rows[0]]
+    if len(rows) > 2 and all(_UNIT_ALONE.fullmatch(cell) for cell in rows[1]):
+        header = [f"{name} {unit.strip()}" for name, unit in zip(header, rows.pop(1), strict=False)]
     if all(is_number(cell) for cell in header):
         raise InputError(
             f"expected a header line in {path.name} (time,x,y,z), got numbers; add one."
@@ -355,29 +453,77 @@ def _read_columns(path: Path) -> tuple[dict[str, Floats], tuple[str, ...]]:
             f"expected numbers below the header of {path.name}, got {shown(other)}; correct the "
             "file."
         ) from None
-    return dict(zip(header, values.T, strict=True)), warnings
+    columns = {}
+    for place, name in enumerate(_roles(path, header, named)):
+        if name is not None:
+            told, column = name, values[:, place]
+            kind, unit = _name_and_unit(name)
+            if kind in _TIME_NAMES:
+                column, since_1970 = since_first([row[place] for row in rows[1:]])
+                told = f"{name} ({since_1970})" if since_1970 and not unit else name
+            columns[told] = column
+    return columns, warnings
+
+
+def _roles(path: Path, header: Sequence[str], named: Mapping[str, str]) -> list[str | None]:
+    """The header with the roles that columns are given; None for one that a role replaces."""
+    roles: list[str | None] = [None if named and _role(name) in named else name for name in header]
+    for role, wanted in named.items():
+        same = [name for name in header if name == wanted] or [
+            name for name in header if _name_and_unit(name)[0] == _name_and_unit(wanted)[0]
+        ]
+        if len(same) != 1:
+            raise InputError(
+                f"expected a column {shown(wanted)} in {path.name}, got "
+                f"{shortened(', '.join(header), longest=120)}; correct --map or --time-column."
+            )
+        unit = _name_and_unit(same[0])[1]
+        roles[header.index(same[0])] = f"{role} ({unit})" if unit else role
+    return roles
+
+
+def _role(header: str) -> str | None:
+    """What a column is by its header alone: "time", an axis, or neither."""
+    name = _name_and_unit(header)[0]
+    if name in _TIME_NAMES:
+        return "time"
+    axis = _AXIS_NAME.fullmatch(name)
+    return axis[1] if axis else None
 
 
 def _name_and_unit(header: str) -> tuple[str, str]:
-    """`Acc X (m/s²)` → (acc_x, m/s2); `x_g` → (x, g); `time_ms` → (time, ms)."""
+    """`Acc X (m/s²)` → (acc_x, m/s2); `x_g` → (x, g); `seconds_elapsed` → (time, s)."""
     text = header.lower().replace("²", "2").replace("^2", "2").replace("µ", "u").replace("s^-2", "")
     unit = ""
     if bracket := re.search(r"[\[(](.*?)[\])]", text):
         unit = bracket.group(1).strip()
         text = text[: bracket.start()]
-    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|s|ms|us|ns)", text.strip()):
+    elif suffix := re.fullmatch(r"(.+?)_(g|mg|m_s2|v|mv|s|ms|us|ns)", text.strip()):
         text, unit = suffix.groups()
-    return re.sub(r"[\s_]+", "_", text.strip()).strip("_"), unit.replace("m_s2", "m/s2")
+    name = re.sub(r"[\s_]+", "_", text.strip()).strip("_")
+    if not unit and (elapsed := _ELAPSED.fullmatch(name)):
+        return "time", _SECONDS[elapsed[1]]
+    volts = {"v": "V", "volt": "V", "volts": "V", "mv": "mV"}
+    return name, volts.get(unit, unit.replace("m_s2", "m/s2"))
 
 
-def _time_column(columns: dict[str, Floats]) -> str | None:
-    return next((name for name in columns if _name_and_unit(name)[0] in _TIME_NAMES), None)
+def _times_in(columns: Mapping[str, Floats]) -> list[str]:
+    return [name for name in columns if _role(name) == "time"]
+
+
+def _time_column(path: Path, columns: Mapping[str, Floats]) -> TimeColumn | None:
+    """The first column of times that tells a rate, or else the first one, if there is any."""
+    every = [
+        TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
+        for name in _times_in(columns)
+    ]
+    return next((time for time in every if time.tells_a_rate()), every[0] if every else None)
 
 
 def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> tuple[Floats, str]:
     """The chosen axis (1, n), or all three (3, n), as recorded, and the unit in their header."""
-    time = _time_column(columns)
-    others = [name for name in columns if name != time]
+    times = _times_in(columns)
+    others = [name for name in columns if name not in times]
     if axis is None and len(others) != 1:
         raise InputError(
             f"expected --axis x, y, z or dft321 for {path.name}, got none and the columns "

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +24,35 @@ RATE_TOLERANCE = 0.005
 # Share of the power at the highest frequency of a model that jitter may turn into noise (-20 dB).
 TOLERATED_NOISE_SHARE = 0.01
 LOCAL_S = 0.1
+# Of 3, 5 and 7 the one with the least spectral error (docs/method/recordings.md#uneven-samples).
+SPLINE_DEGREE = 7
+# Times that count from 1970 tell their unit: from 2001 to 2096.
+_EPOCH = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+_EPOCH_S = (1e9, 4e9)
+
+
+class Unevenness(NamedTuple):
+    """How far times are from evenly spaced ones, and the share of the power that this costs.
+
+    Parameters
+    ----------
+    rms_s, most_s : float
+        RMS, and at most.
+    share : float
+        Of the power of a vibration at `highest_hz` that becomes noise in samples taken as even.
+    highest_hz : float
+    """
+
+    rms_s: float
+    most_s: float
+    share: float
+    highest_hz: float
+
+    def __str__(self) -> str:
+        return (
+            f"its samples are up to {self.most_s * 1e3:.2g} ms ({self.rms_s * 1e3:.2g} ms RMS) "
+            f"from where even spacing within {LOCAL_S:g} s puts them"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +99,14 @@ class TimeColumn:
             )
         return rate_hz
 
+    def tells_a_rate(self) -> bool:
+        """Whether `rate_hz` does."""
+        try:
+            self.rate_hz()
+        except InputError:
+            return False
+        return True
+
     def contradiction(self, rate_hz: float) -> str | None:
         """A sentence where neither the mean nor the typical step agrees with a rate that was given.
 
@@ -107,26 +147,32 @@ class TimeColumn:
     def _lowest_hz(self) -> float:
         return LOWEST_RATE_HZ if self.unit else LOWEST_RATE_WITHOUT_TIME_UNIT_HZ
 
-    def jitter_warning(self, rate_hz: float) -> str | None:
-        """What uneven spacing does to samples that are taken as even, where it matters.
+    def unevenness(self, rate_hz: float) -> Unevenness | None:
+        """How uneven the times are, where that matters to samples that are taken as even.
 
         docs/method/recordings.md#uneven-samples
         """
-        try:
-            self.rate_hz()
-        except InputError:
+        if not self.tells_a_rate():
             return None
         rms_s, most_s = _astray(self._time_s())
         highest_hz = min(rate_hz, MODEL_RATE_HZ) / 2
-        share = -np.expm1(-((2 * np.pi * highest_hz * rms_s) ** 2))
+        share = float(-np.expm1(-((2 * np.pi * highest_hz * rms_s) ** 2)))
         if share <= TOLERATED_NOISE_SHARE:
             return None
-        return (
-            f"{self.file}: its samples are up to {most_s * 1e3:.2g} ms "
-            f"({rms_s * 1e3:.2g} ms RMS) from where even spacing within {LOCAL_S:g} s puts them, "
-            f"but are taken as evenly spaced; that turns {share:.0%} of the power of a vibration "
-            f"at {highest_hz:.4g} Hz into noise, and less at lower frequencies."
-        )
+        return Unevenness(rms_s, most_s, share, highest_hz)
+
+    def resampled(self, samples: Floats, rate_hz: float) -> Floats:
+        """Samples (k, n) at even times of this rate, by a spline through them at their own times.
+
+        Where a time repeats, its first sample counts.
+        """
+        from scipy.interpolate import make_interp_spline  # late: slow to load
+
+        time_s = self._time_s() - self._time_s()[0]
+        first = np.append(True, np.diff(time_s) > 0)
+        even_s = np.arange(int(time_s[-1] * rate_hz + 1e-6) + 1) / rate_hz
+        spline = make_interp_spline(time_s[first], samples[:, first], k=SPLINE_DEGREE, axis=1)
+        return np.asarray(spline(np.minimum(even_s, time_s[-1])))
 
     def _time_s(self) -> Floats:
         return self.values * SECONDS_PER_UNIT[self.unit]
@@ -178,3 +224,22 @@ def _astray(time_s: Floats) -> tuple[float, float]:
     if most <= tick:
         return 0.0, 0.0
     return float(np.sqrt(max(float(np.mean(off**2)) - tick**2 / 12, 0.0))), most
+
+
+def since_first(cells: Sequence[str]) -> tuple[Floats, str]:
+    """Times as numbers, and their unit where they count from 1970, else "".
+
+    Whole numbers that floating-point ones would round (those of nanoseconds to 256 ns) are given
+    from the first one on.
+    """
+    values = np.array(cells, dtype=np.float64)
+    unit = _unit_since_1970(float(values[0]))
+    if abs(values[0]) > 2**53 and all(re.fullmatch(r"\s*\d+\s*", cell) for cell in cells):
+        first = int(cells[0])
+        values = np.array([int(cell) - first for cell in cells], dtype=np.float64)
+    return values, unit
+
+
+def _unit_since_1970(time: float) -> str:
+    low, high = _EPOCH_S
+    return next((unit for unit, per_s in _EPOCH.items() if low <= time / per_s < high), "")

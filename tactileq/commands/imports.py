@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from functools import partial
@@ -87,25 +88,59 @@ def import_csv(
     axis: Annotated[
         Literal["x", "y", "z", "dft321"] | None, typer.Option(help="Axis, or all as one.")
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="g, mg, m/s2 or arbitrary.")] = None,
+    unit: Annotated[str | None, typer.Option(help="g, mg, m/s2, V, mV or arbitrary.")] = None,
     rate_hz: Annotated[
         float | None,
         typer.Option("--rate", help="Sampling rate in Hz; the time column's without it."),
+    ] = None,
+    mv_per_g: Annotated[
+        float | None,
+        typer.Option("--mv-per-g", help="Sensitivity of the accelerometer, for logs in volts."),
+    ] = None,
+    time_column: Annotated[
+        str | None, typer.Option("--time-column", help="Which column holds the time.")
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option("--map", help="Which column is which: time=Zeit,z=Beschl_Z."),
     ] = None,
     yes: Yes = False,
 ) -> None:
     """Add CSV recordings (time and one or three axes) to a recording set.
 
+    Samples at uneven times, such as a phone's, are resampled at even ones, unless --rate says that
+    they are even. Times since 1970 may be in s, ms, us or ns; of other ones the header says it.
+
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
+
+    Example: tactileq import csv *.csv --labels labels.tsv --map time=Zeit,z=Kanal_1 --mv-per-g 100
     """
     from modeling.files.hashes import sha256_of_paths
-    from rig.importing.files import import_csv_file, usable
+    from rig.importing.files import import_csv_file, parse_columns, usable
+
+    role_of = parse_columns(columns) if columns is not None else {}
+    if time_column is not None:
+        if "time" in role_of:
+            raise ValueError(
+                f"expected the column of times once, got --time-column {time_column} and --map "
+                f"{columns}; leave one out."
+            )
+        role_of["time"] = time_column
 
     inputs = sha256_of_paths(files)
     named = labels_of(files, labels, texture=texture or out.name, speed=speed, force=force)
-    read = partial(import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz)
+    read = partial(
+        import_csv_file, axis=axis, unit=unit, rate_hz=rate_hz, mv_per_g=mv_per_g, named=role_of
+    )
     records, refused = usable(read, files, named)
-    settings = {"axis": axis, "unit": unit, "rate_hz": rate_hz, "labels": str(labels)}
+    settings = {
+        "axis": axis,
+        "unit": unit,
+        "rate_hz": rate_hz,
+        "mv_per_g": mv_per_g,
+        "columns": role_of,
+        "labels": str(labels),
+    }
     add_to_set(
         out, records, "import csv", settings=settings, inputs=inputs, left_out=refused, yes=yes
     )
@@ -113,7 +148,9 @@ def import_csv(
 
 @imports.command("hatt")
 def import_hatt(
-    files: Annotated[list[Path], typer.Argument(help="Models_....xml of the toolkit.")],
+    files: Annotated[
+        list[Path], typer.Argument(help="Models_....xml of the toolkit, or folders of them.")
+    ],
     out: Out = Path("recordings"),
     speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated.")] = None,
     force: Annotated[list[float] | None, typer.Option(help="N; may be repeated.")] = None,
@@ -136,6 +173,7 @@ def import_hatt(
     from rig.importing.hatt import load_hatt
     from rig.importing.plausible import doubts_about
 
+    files = [file for given in files for file in models_of_the_toolkit(given)]
     inputs = sha256_of_paths(files)
     speeds = speed or [50.0 * step for step in range(1, 8)]
     forces = force or [0.5 * step for step in range(1, 8)]
@@ -156,8 +194,20 @@ def import_hatt(
     ]
     settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
     add_to_set(out, records, "import hatt", settings=settings, inputs=inputs, yes=yes)
-    for texture in textures:
-        tell_beyond_hull(texture, [(v, f) for v in speeds for f in forces])
+    tell_beyond_hull(textures, [(v, f) for v in speeds for f in forces])
+
+
+def models_of_the_toolkit(given: Path) -> list[Path]:
+    """A file itself, or the Models_….xml anywhere in a folder, by name."""
+    if not given.is_dir():
+        return [given]
+    found = sorted(given.rglob("Models_*.xml"))
+    if not found:
+        raise ValueError(
+            f"expected files Models_….xml of the toolkit in {given}, got none; name the folder of "
+            "its models."
+        )
+    return found
 
 
 def labels_of(
@@ -216,15 +266,15 @@ def add_to_set(
     doubts = [doubt for one in new for doubt in one.doubts]
     if doubts and not yes:
         raise ValueError(several(doubts))
-    for doubt in doubts:
-        print(f"warning: taken in all the same: {doubt}", file=sys.stderr)
     records = RecordingSet(one.recording for one in new)
-    for warning in clipping_warnings(records):
-        print(warning, file=sys.stderr)
-    for sentence in (sentence for one in new for sentence in one.warnings):
-        print(f"warning: {sentence}", file=sys.stderr)
-    for sentence in left_out:
-        print(f"warning: left out: {sentence}", file=sys.stderr)
+    names = [Path(path).name for path in inputs]
+    for sentence in (
+        *alike([f"warning: taken in all the same: {doubt}" for doubt in doubts], names),
+        *alike(clipping_warnings(records), names),
+        *alike([f"warning: {sentence}" for one in new for sentence in one.warnings], names),
+        *alike([f"warning: left out: {sentence}" for sentence in left_out], names),
+    ):
+        print(sentence, file=sys.stderr)
     provenance = out / PROVENANCE_NAME
     taken = {"doubts": doubts} if doubts else {}
     origin = provenance_of(command, {**settings, **taken}, inputs=inputs)
@@ -241,6 +291,31 @@ def add_to_set(
     if left_out:
         print(f"note: {len(left_out)} of {len(new) + len(left_out)} files left out")
     print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
+
+
+def alike(sentences: Sequence[str], names: Sequence[str]) -> list[str]:
+    """The first of each kind of sentences, and of which files there are more.
+
+    Of one kind are those that differ in numbers and in these names of files alone.
+    """
+    if not sentences:
+        return []
+    files = "|".join(map(re.escape, sorted(names, key=len, reverse=True)))
+    kinds: dict[str, list[str]] = {}
+    for sentence in sentences:
+        kind = re.sub(r"[-+]?\d[\d.]*(?:e[-+]?\d+)?", "0", re.sub(files, "", sentence))
+        kinds.setdefault(kind, []).append(sentence)
+    return [_with_others(one, names) for one in kinds.values()]
+
+
+def _with_others(sentences: Sequence[str], names: Sequence[str]) -> str:
+    if len(sentences) == 1:
+        return sentences[0]
+    others = [next((name for name in names if name in one), "") for one in sentences[1:]]
+    named = [name for name in others if name][:MOST_NAMES]
+    more = ", …" if len(others) > len(named) else ""
+    which = f": {', '.join(named)}{more}" if named else ""
+    return f"{sentences[0].removesuffix('.')} ({len(others)} more like it{which})."
 
 
 def several(sentences: Sequence[str]) -> str:
@@ -270,13 +345,18 @@ def imports_before(provenance: Path) -> list[dict[str, Any]]:
     return history
 
 
-def tell_beyond_hull(texture: HattTexture, conditions: Sequence[tuple[float, float]]) -> None:
-    """Say which conditions a toolkit's texture does not tell of, and so have no recording."""
-    inside = set(texture.conditions_inside(conditions))
-    outside = [condition for condition in conditions if condition not in inside]
-    if outside:
-        names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in outside)
+def tell_beyond_hull(
+    textures: Sequence[HattTexture], conditions: Sequence[tuple[float, float]]
+) -> None:
+    """Say how many conditions of each texture have no recording, in one line."""
+    outside = {
+        texture.material: len(conditions) - len(texture.conditions_inside(conditions))
+        for texture in textures
+    }
+    lacking = [f"{name} ({count})" for name, count in outside.items() if count]
+    if lacking:
+        more = f" and {len(lacking) - MOST_NAMES} more" if len(lacking) > MOST_NAMES else ""
         print(
-            f"note: {texture.material}: {len(outside)} of {len(conditions)} conditions lie beyond "
-            f"its models, or are silent there, and are left out: {names}"
+            f"note: of {len(conditions)} conditions those beyond a texture's models, or silent "
+            f"there, are left out: {', '.join(lacking[:MOST_NAMES])}{more}"
         )

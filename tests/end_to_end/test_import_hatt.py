@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from modeling import RecordingSet, TextureModel
+from tests.refusals import check_refusal
 
 Xml = Callable[..., str]
 GRID = [*("--speed", 100, "--speed", 200, "--speed", 280), *("--force", 1, "--force", 3)]
@@ -28,7 +29,7 @@ def test_two_textures_become_recordings_and_models(main, tmp_path: Path, files: 
     imported = main("import", "hatt", *files, *GRID, "--out", "set", "--seed", 3)
     assert imported.returncode == 0, imported.stderr
     assert "12 recordings added at 1000 Hz, 12 in set" in imported.stdout
-    assert "beyond its models" not in imported.stdout
+    assert "left out" not in imported.stdout
     records = RecordingSet.load(tmp_path / "set")
     assert records.textures == ("Canvas 9", "MDF")
     assert all(r.simulated and r.unit == "g" for r in records)
@@ -49,11 +50,29 @@ def test_default_grid_leaves_out_what_lies_beyond(main, tmp_path: Path, files: l
     imported = main("import", "hatt", files[0], "--duration", 0.2, "--rate", 800, "--out", "set")
     assert imported.returncode == 0, imported.stderr
     # 350 mm/s is beyond the 300 of the file, at each of seven forces.
-    assert "beyond its models" in imported.stdout
+    (line,) = [line for line in imported.stdout.splitlines() if "left out" in line]
+    assert "Canvas 9 (7)" in line
     records = RecordingSet.load(tmp_path / "set")
     assert len(records) == 42
     assert {r.rate_hz for r in records} == {800.0}
     assert max(r.speed_mm_s for r in records) == 300.0
+
+
+def test_a_folder_stands_for_its_files(main, tmp_path: Path, files: list[str]) -> None:
+    (tmp_path / "toolkit/deep").mkdir(parents=True)
+    for name in files:
+        (tmp_path / name).rename(tmp_path / "toolkit/deep" / name)
+    (tmp_path / "toolkit/readme.xml").write_text("<other/>")
+    imported = main("import", "hatt", "toolkit", "--duration", 0.2, "--out", "set")
+    assert imported.returncode == 0, imported.stderr
+    assert RecordingSet.load(tmp_path / "set").textures == ("Canvas 9", "MDF")
+    (line,) = [line for line in imported.stdout.splitlines() if "left out" in line]
+    assert "Canvas 9 (7)" in line
+    assert "MDF (7)" in line
+    (tmp_path / "empty").mkdir()
+    refused = main("import", "hatt", "empty", "--out", "set")
+    assert refused.returncode == 1
+    check_refusal(refused.stderr, expected=["Models_….xml", "empty"], got="none")
 
 
 def test_broken_file_is_named_and_nothing_is_written(

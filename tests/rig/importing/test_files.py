@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.io import wavfile
+from scipy.signal import welch
 
 from modeling import InputError, RecordingSet
 from rig.importing.files import (
@@ -16,12 +18,14 @@ from rig.importing.files import (
     import_csv_file,
     import_wav,
     import_wav_file,
+    parse_columns,
     usable,
 )
 from rig.importing.labels import Label, labels_from_table
-from tests.refusals import refused
+from tests.refusals import check_refusal, refused
 
 LABEL = Label("oak", 100.0, 1.0)
+CHANNEL_C = {"axis": "z", "mv_per_g": 1.0, "named": {"z": "Channel C"}}
 RATE_HZ = 3200.0
 
 
@@ -395,13 +399,13 @@ def test_a_rate_must_not_contradict_a_column_of_nanoseconds(
         InputError,
         names="a.csv",
         expected="--rate",
-        got=["1000 Hz", f"'{header}'", "3200 Hz", "ns"],
+        got=["1000 Hz", header, "3200 Hz", "ns"],
     ):
         import_csv([path], [LABEL], rate_hz=1000.0)
     assert import_csv([path], [LABEL], rate_hz=RATE_HZ).recordings[0].rate_hz == RATE_HZ
     told = import_csv_file(path, LABEL, rate_hz=1000.0)
     assert (told.recording.rate_hz, len(told.doubts)) == (1000.0, 1)
-    if "ns" in header:
+    if "ns" in header or header == "time":  # without a unit times since 1970 tell theirs
         assert import_csv([path], [LABEL]).recordings[0].rate_hz == pytest.approx(RATE_HZ)
 
 
@@ -457,18 +461,211 @@ def test_jitter_is_told_with_what_it_does(
     """Phone data: 400 Hz, of which a vibration at 200 Hz is the highest that is there."""
     time_s = np.arange(2000) / 400 + np.random.default_rng(2).normal(0, jitter_ms / 1000, 2000)
     path = write_csv(tmp_path / "a.csv", "time_s,x_g", np.vstack([time_s, axes[0]]))
-    for rate_hz in (None, 400.0):
-        warnings = import_csv_file(path, LABEL, rate_hz=rate_hz).warnings
-        if jitter_ms < 0.1:
-            assert warnings == ()
-            continue
-        [told] = warnings
-        # The power of a sinusoid at f with Gaussian jitter s falls to exp(-(2 pi f s)^2).
-        share = 1 - np.exp(-((2 * np.pi * 200 * jitter_ms / 1000) ** 2))
-        found = re.search(r"\(([\d.]+) ms RMS\).* turns (\d+)% .* at 200 Hz into noise", told)
-        assert found is not None
-        assert float(found[1]) == pytest.approx(jitter_ms, rel=0.05)
-        assert float(found[2]) == pytest.approx(100 * share, abs=1)
+    even = import_csv_file(path, LABEL, rate_hz=400.0)
+    assert np.array_equal(even.recording.samples, axes[0])
+    if jitter_ms < 0.1:
+        assert import_csv_file(path, LABEL).recording.samples.tolist() == axes[0].tolist()
+        assert import_csv_file(path, LABEL).warnings == even.warnings == ()
+        return
+    # The power of a sinusoid at f with Gaussian jitter s falls to exp(-(2 pi f s)^2).
+    share = 1 - np.exp(-((2 * np.pi * 200 * jitter_ms / 1000) ** 2))
+    [told] = even.warnings
+    found = re.search(r"\(([\d.]+) ms RMS\).* turns (\d+)% .* at 200 Hz into noise", told)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(jitter_ms, rel=0.05)
+    assert float(found[2]) == pytest.approx(100 * share, abs=1)
+    [told] = import_csv_file(path, LABEL).warnings
+    check_refusal(told, names=["a.csv", "--rate", f"{float(found[1]):g} ms RMS"])
+
+
+@pytest.mark.parametrize("jitter", [0.1, 0.15, 0.2])
+def test_samples_at_uneven_times_have_the_spectrum_of_even_ones(
+    tmp_path: Path, jitter: float
+) -> None:
+    """Sinusoids of known phases, which have a value at any time."""
+    rng = np.random.default_rng(1)
+    frequencies_hz, phases = rng.uniform(5, 1550, 1500), rng.uniform(0, 2 * np.pi, 1500)
+    heights = 0.02 / (1 + (frequencies_hz / 500) ** 2)
+
+    def vibration(time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        parts = np.array_split(time_s, 8)
+        angles = (2 * np.pi * np.outer(part, frequencies_hz) + phases for part in parts)
+        return np.concatenate([np.sin(angle) @ heights for angle in angles])
+
+    even_s = np.arange(3 * 3200) / RATE_HZ
+    uneven_s = np.sort(even_s + rng.normal(0, jitter / RATE_HZ, even_s.size))
+    uneven_s[[0, -1]] = even_s[[0, -1]]
+    columns = np.vstack([uneven_s, vibration(uneven_s)])
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", columns)
+    found = import_csv_file(path, LABEL).recording
+    assert found.rate_hz == pytest.approx(RATE_HZ, rel=1e-9)
+    assert found.samples.size == even_s.size
+
+    def error_db(samples: NDArray[np.float64]) -> float:
+        """RMS over lines of 20 Hz from 10 to 1000 Hz."""
+        ours, truth = (welch(x, RATE_HZ, nperseg=160)[1] for x in (samples, vibration(even_s)))
+        return float(np.sqrt(np.mean((10 * np.log10(ours / truth)[1:51]) ** 2)))
+
+    taken_as_even = import_csv_file(path, LABEL, rate_hz=RATE_HZ).recording.samples
+    assert error_db(found.samples) < min(0.05, error_db(taken_as_even) / 3)
+
+
+def test_a_time_that_repeats_is_passed_over(tmp_path: Path) -> None:
+    time_s = np.arange(4000) / 400 + np.random.default_rng(2).normal(0, 2e-4, 4000)
+    time_s[1000] = time_s[999]
+    columns = np.vstack([time_s, np.sin(2 * np.pi * 60 * time_s)])
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", columns)
+    found = import_csv([path], [LABEL]).recordings[0]
+    even_s = time_s[0] + np.arange(found.samples.size) / found.rate_hz
+    away = found.samples - np.sin(2 * np.pi * 60 * even_s)
+    assert np.abs(away[20:-20]).max() < 1e-3
+
+
+# --- Phones, data loggers and other header words
+
+
+def test_nanoseconds_since_1970_are_exact(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+    """Sensor Logger: two time columns, axes from z to x, no units in the header."""
+    first_ns, step_ns = 1_732_000_000_123_456_789, 2_481_390
+    rows = [
+        f"{first_ns + n * step_ns},{n * step_ns / 1e9:.9f},{z!r},{y!r},{x!r}"
+        for n, (x, y, z) in enumerate(axes.T.tolist())
+    ]
+    path = tmp_path / "Accelerometer.csv"
+    path.write_text("\n".join(["time,seconds_elapsed,z,y,x", *rows]) + "\n")
+    told = import_csv_file(path, LABEL, axis="z", unit="m/s2")
+    assert told.warnings == ()
+    assert told.recording.rate_hz == pytest.approx(1e9 / step_ns, rel=1e-12)
+    np.testing.assert_allclose(told.recording.samples, axes[2] / 9.80665, rtol=1e-15)
+    for column in ("time", "seconds_elapsed"):
+        same = import_csv_file(path, LABEL, axis="z", unit="m/s2", named={"time": column})
+        assert same.recording.rate_hz == pytest.approx(1e9 / step_ns, rel=1e-9)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("s", 1.0), ("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_times_since_1970_tell_their_unit(
+    tmp_path: Path, axes: NDArray[np.float64], unit: str, scale: float
+) -> None:
+    columns = with_time(axes[:1], scale=scale) + np.array([[1.73e9 * scale], [0.0]])
+    path = write_csv(tmp_path / "a.csv", "timestamp,x", columns)
+    found = import_csv([path], [LABEL]).recordings[0]
+    assert found.rate_hz == pytest.approx(RATE_HZ, rel=1e-3)
+
+
+def test_a_column_of_times_is_named(tmp_path: Path, axes: NDArray[np.float64]) -> None:
+    columns = np.vstack([np.arange(2000.0), with_time(axes, scale=1e3)])
+    path = write_csv(tmp_path / "a.csv", "time,Zeit [ms],Beschl_X,Beschl_Y,Beschl_Z (g)", columns)
+    named = {"time": "Zeit", "z": "Beschl_Z"}
+    found = import_csv([path], [LABEL], axis="z", named=named).recordings[0]
+    assert found.rate_hz == pytest.approx(RATE_HZ)
+    assert (found.unit, found.samples.tolist()) == ("g", axes[2].tolist())
+    with refused(InputError, names=["a.csv", "--map"], expected="'Uhr'", got="Zeit"):
+        import_csv([path], [LABEL], axis="z", named={"time": "Uhr"})
+
+
+def test_a_map_of_columns_is_read() -> None:
+    assert parse_columns("time=Zeit, z=Beschl Z") == {"time": "Zeit", "z": "Beschl Z"}
+    for text, got in (("q=a", "'q=a'"), ("x=", "'x='"), ("x=a,x=b", "'x=b'"), ("", "''")):
+        with refused(InputError, expected="time, x, y, z", got=got):
+            parse_columns(text)
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "g_per_number"),
+    [
+        ("time_s,CH1 (V)", {}, 10.0),
+        ("time_s,CH1 [mV]", {}, 0.01),
+        ("time_s,x_mV", {"axis": "x"}, 0.01),
+        ("time_s,Voltage", {"unit": "V"}, 10.0),
+    ],
+)
+def test_a_log_in_volts_needs_the_sensitivity(
+    tmp_path: Path,
+    axes: NDArray[np.float64],
+    header: str,
+    options: dict[str, str],
+    g_per_number: float,
+) -> None:
+    columns = with_time(axes[:1] / g_per_number)
+    path = write_csv(tmp_path / "a.csv", header, columns)
+    found = import_csv([path], [LABEL], mv_per_g=100.0, **options).recordings[0]  # type: ignore[arg-type]
+    assert found.unit == "g"
+    np.testing.assert_allclose(found.samples, axes[0], rtol=1e-12)
+    with refused(InputError, names=["a.csv", "--mv-per-g"], got="none"):
+        import_csv([path], [LABEL], **options)  # type: ignore[arg-type]
+    for value in (0.0, -1.0, float("nan"), float("inf")):
+        with refused(InputError, expected="--mv-per-g", got=value):
+            import_csv([path], [LABEL], mv_per_g=value, **options)  # type: ignore[arg-type]
+
+
+def test_a_sensitivity_of_what_is_no_voltage_is_refused(
+    tmp_path: Path, axes: NDArray[np.float64]
+) -> None:
+    path = write_csv(tmp_path / "a.csv", "time_s,x_g", with_time(axes[:1]))
+    with refused(InputError, names="a.csv", expected="--mv-per-g", got="'g'"):
+        import_csv([path], [LABEL], mv_per_g=100.0)
+
+
+@pytest.mark.parametrize(
+    ("head", "time_scale", "end", "options"),
+    [
+        # phyphox, a phone, in CSV (comma, decimal point)
+        (
+            '"Time (s)","Linear Acceleration x (m/s^2)","Linear Acceleration y (m/s^2)",'
+            '"Linear Acceleration z (m/s^2)","Absolute acceleration (m/s^2)"',
+            1.0,
+            ",1.0",
+            {"axis": "z"},
+        ),
+        # PicoScope: units in a line of their own
+        ("Time,Channel A,Channel B,Channel C\n(ms),(mV),(mV),(mV)\n", 1e3, "", CHANNEL_C),
+        # WaveForms: comments, then the header
+        (
+            "#Digilent WaveForms Oscilloscope Acquisition\n#Device Name: Discovery2\n"
+            "#Sample rate: 3200Hz\n\nTime (s),Channel 1 (V),Channel 2 (V),Channel 3 (V)",
+            1.0,
+            "",
+            {"axis": "z", "mv_per_g": 1000.0, "named": {"z": "Channel 3"}},
+        ),
+    ],
+)
+def test_files_of_a_phone_and_of_two_loggers(
+    tmp_path: Path,
+    axes: NDArray[np.float64],
+    head: str,
+    time_scale: float,
+    end: str,
+    options: dict[str, Any],
+) -> None:
+    """In the forms that their documentation shows, with numbers of ours."""
+    numbers = with_time(axes, scale=time_scale).T.tolist()
+    rows = [",".join(f"{value:.9g}" for value in row) + end for row in numbers]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join([head, *rows]) + "\n")
+    told = import_csv_file(path, LABEL, **options)
+    assert told.warnings == ()
+    assert told.recording.unit == "g"
+    assert told.recording.rate_hz == pytest.approx(RATE_HZ, rel=1e-6)
+    scale = 9.80665 if "m/s^2" in head else 1.0
+    np.testing.assert_allclose(told.recording.samples, axes[2] / scale, rtol=1e-8)
+
+
+LVM = """LabVIEW Measurement
+Writer_Version	2
+Separator	Tab
+***End_of_Header***
+Channels	1
+***End_of_Header***
+X_Value	Acceleration	Comment
+0.000000	0.1
+"""
+
+
+def test_a_labview_measurement_file_is_named_as_such(tmp_path: Path) -> None:
+    path = tmp_path / "a.lvm"
+    path.write_text(LVM)
+    with refused(InputError, expected="CSV", got=["LVM", path, "X_Value"]):
+        import_csv([path], [LABEL])
 
 
 def test_a_rate_that_wanders_slowly_is_no_jitter(tmp_path: Path, axes: NDArray[np.float64]) -> None:
