@@ -11,7 +11,10 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import pandas as pd
+
 from analysis.labels import ALL_LAYERS, ALL_TEXTURES
+from modeling.files.tables import guarded
 
 HASH_DIGITS = 12
 SHA256 = re.compile(r"[0-9a-f]{64}")
@@ -126,3 +129,9 @@ LAYER = Column("layer", is_name=True, total=ALL_LAYERS)
 CONDITIONS = Column("conditions")
 P = Column("p", is_p_value=True)
 SIMULATED = Column("simulated")
+
+
+def tsv_text(table: pd.DataFrame) -> str:
+    """A table as the text of a TSV; what is missing is n/a, text as `files.tables.guarded`."""
+    safe = table.map(lambda value: guarded(value) if isinstance(value, str) else value)
+    return str(safe.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n"))

@@ -64,9 +64,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[object]:
     if not needs_time(item):
         return (yield)
-    # However many workers there are, and whatever they steal from each other.
-    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
-    with FileLock(Path(tempfile.gettempdir()) / f"tactileq-real-time-{run}.lock"):
+    # However many workers and runs there are on this machine: a JACK server that begins or ends
+    # cuts the clients of another one off for a moment (github.com/jackaudio/jack2/issues/280).
+    with FileLock(Path(tempfile.gettempdir()) / f"tactileq-real-time-{os.getuid()}.lock"):
         return (yield)
 
 

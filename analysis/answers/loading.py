@@ -27,7 +27,7 @@ from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_text
-from modeling.files.tables import check_named_once, csv_cells
+from modeling.files.tables import check_named_once, csv_cells, unguarded
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
@@ -546,7 +546,7 @@ def _read_lines(path: Path) -> pd.DataFrame:
                 f"expected {len(names)} values in line {number} of {path}, but found {len(cells)}; "
                 f"{_DERIVE}."
             )
-        rows.append(cells)
+        rows.append(list(map(unguarded, cells)))
     return pd.DataFrame(rows, columns=names, dtype=object).replace("n/a", np.nan)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from analysis.columns import tsv_text
 from analysis.textures.between import distances_to_recordings, joint_fit, left_out_table
 from analysis.textures.recordings import (
     RecordingLayers,
@@ -141,7 +142,7 @@ def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
 
 def table_bytes(table: pd.DataFrame) -> bytes:
     """A table as the text of a TSV file."""
-    return bytes(table.to_csv(sep="\t", index=False, na_rep="n/a").encode())
+    return tsv_text(table).encode()
 
 
 def picture_bytes(figure: Figure) -> bytes:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
+from analysis.columns import tsv_text
 from analysis.figures.saving import missing_fonts, png_of, svg_of
 from analysis.labels import MODELS
 from analysis.report.answer import answer, unfinished_tasks
@@ -366,5 +367,4 @@ class _Files:
 
 def _save_table(table: Table, folder: Path) -> None:
     marked = table.frame.assign(simulated=str(table.simulated).lower())
-    text = marked.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n")
-    write_text(folder / f"{table.name}.tsv", text)
+    write_text(folder / f"{table.name}.tsv", tsv_text(marked))

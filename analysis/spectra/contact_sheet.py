@@ -10,6 +10,7 @@ import pandas as pd
 
 from modeling.arrays import Bools, Floats
 from modeling.files.folders import listed_file
+from modeling.files.tables import unguarded
 from stimuli.sets.manifest import COMPENSATED, MANIFEST
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.rendering import steady_part
@@ -101,13 +102,16 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
 
 def _manifest(path: Path) -> pd.DataFrame:
     # A texture may be called "NA".
-    return pd.read_csv(
+    table = pd.read_csv(
         path,
         sep="\t",
         dtype=dict.fromkeys(_NAMES, str),
         keep_default_na=False,
         na_values={"full_scale_g": ["n/a"]},
     )
+    names = [name for name in _NAMES if name in table]
+    table[names] = table[names].map(unguarded)
+    return table
 
 
 def _density(path: Path, full_scale_g: float) -> Floats:

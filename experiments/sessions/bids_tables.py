@@ -10,6 +10,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from modeling.files.tables import guarded
+
 MISSING = "n/a"
 # A table of BIDS has one line for a row, so neither a tab nor a line end can stand in a cell: they
 # become the characters that picture them (U+2409 for a tab), as all control characters do.
@@ -20,7 +22,8 @@ def cell(value: object) -> str:
     """A value as one cell: n/a for nothing and NaN, true or false, ten digits of a number.
 
     Text that holds a quote is put in quotes and its quotes are doubled, as in CSV; readers of CSV
-    get it back as it was. Control characters become their pictures.
+    get it back as it was. Control characters become their pictures. What a spreadsheet would
+    calculate has ' before it (`modeling.files.tables.guarded`).
     """
     if value is None or value == "":
         return MISSING
@@ -29,7 +32,7 @@ def cell(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.10g}" if math.isfinite(value) else MISSING
     text = value if isinstance(value, str) else _text(value)
-    text = text.translate(_PICTURES).encode("utf-8", "backslashreplace").decode("utf-8")
+    text = guarded(text).translate(_PICTURES).encode("utf-8", "backslashreplace").decode("utf-8")
     return '"' + text.replace('"', '""') + '"' if '"' in text else text
 
 

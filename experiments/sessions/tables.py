@@ -14,6 +14,7 @@ from experiments.sessions.files import open_file, write_all
 from experiments.sessions.writer import store_error
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.tables import guarded
 
 MISSING = "n/a"
 
@@ -108,7 +109,7 @@ def cell(value: object) -> str:
         if math.isinf(value):
             raise InputError(f"expected a finite number in a row, got {value}; present it again.")
         return MISSING if math.isnan(value) else f"{value:.10g}"
-    text = str(value)
+    text = guarded(str(value))
     if text.isprintable() and "\\" not in text and '"' not in text:
         return text  # as nearly all are
     return "".join(_plain(character) for character in text)

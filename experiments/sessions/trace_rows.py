@@ -10,6 +10,7 @@ from pathlib import Path
 from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
 from modeling import InputError
 from modeling.files.reading import read_bytes
+from modeling.files.tables import unguarded
 from rig.interface import SURFACES
 
 _WHOLE = r"\d{1,9}"
@@ -55,7 +56,7 @@ def presentation_rows(
 ) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     """The presentations in these starts of the session as text, and what is damaged."""
     found = _rows(path, tuple(PRESENTATION_COLUMNS), runs=runs)
-    cells = (row.decode("utf-8", "replace").split("\t") for row in found.rows)
+    cells = (map(unguarded, row.decode("utf-8", "replace").split("\t")) for row in found.rows)
     return [dict(zip(PRESENTATION_COLUMNS, row, strict=True)) for row in cells], found.damaged
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 from pathlib import Path
@@ -11,6 +12,19 @@ from modeling.errors import InputError, shortened, shown
 from modeling.files.reading import read_text
 from modeling.files.writing import write_text
 
+# A spreadsheet would calculate what begins so, whatever it names.
+_FORMULA = re.compile(r"'*[=+@]")
+
+
+def guarded(cell: str) -> str:
+    """A cell of text that no spreadsheet takes for a formula: with ' before a leading =, + or @."""
+    return f"'{cell}" if _FORMULA.match(cell) else cell
+
+
+def unguarded(cell: str) -> str:
+    """A cell as it was before `guarded`."""
+    return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
+
 
 def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a TSV with a header line; cells must not hold tabs or line ends."""
@@ -18,10 +32,10 @@ def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequenc
 
 
 def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """The text of a TSV, as `write_table` writes it."""
+    """The text of a TSV, as `write_table` writes it; see `guarded`."""
     lines = ["\t".join(columns)]
     for row in rows:
-        cells = [str(cell) for cell in row]
+        cells = [guarded(str(cell)) for cell in row]
         if any(c in cell for cell in cells for c in "\t\r\n"):
             raise InputError(f"expected cells without tabs and line ends, got {cells}; rename.")
         lines.append("\t".join(cells))
@@ -62,7 +76,7 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
                 f"expected {len(header)} cells in each row of {source}, got {len(cells)} in "
                 f"{shown(line)}; the table is damaged or not tab-separated."
             )
-        rows.append(dict(zip(header, cells, strict=True)))
+        rows.append(dict(zip(header, map(unguarded, cells), strict=True)))
     return rows
 
 

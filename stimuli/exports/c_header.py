@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from modeling import Compensation, Limits
+from modeling.checks import check_name
 from modeling.files.writing import write_text
 from modeling.models.loading import AnyModel
 from modeling.rendering.noise import stream_key
@@ -41,6 +42,7 @@ def write_c_header(
     single: bool = False,
     limits: Limits | None = None,
     compensation: Compensation | None = None,
+    name: str | None = None,
 ) -> str:
     """Write one C99 header that renders a model and needs nothing else: tables and kernel.
 
@@ -65,11 +67,13 @@ def write_c_header(
         None by default.
     compensation : Compensation, optional
         Of the vibrator that plays the output, at its rate.
+    name : str, optional
+        Instead of the texture's name, which two headers of one texture cannot share.
 
     Returns
     -------
     str
-        NAME, from the texture's.
+        NAME: texture_ and that name, with _ for all but letters and digits.
 
     Raises
     ------
@@ -78,7 +82,7 @@ def write_c_header(
         with which samples would not stay finite, or, in single precision, numbers that it cannot
         hold or tell apart.
     """
-    name, text = c_header(
+    named, text = c_header(
         Path(path).name,
         model,
         rate_hz=rate_hz,
@@ -86,9 +90,10 @@ def write_c_header(
         single=single,
         limits=limits,
         compensation=compensation,
+        name=name,
     )
     write_text(path, text)
-    return name
+    return named
 
 
 def c_header(
@@ -100,10 +105,13 @@ def c_header(
     single: bool = False,
     limits: Limits | None = None,
     compensation: Compensation | None = None,
+    name: str | None = None,
 ) -> tuple[str, str]:
     """NAME and the text of the header that `write_c_header` writes; refused as there."""
     layered = check_layered(model)
-    name = c_identifier(layered.texture)
+    if name is not None:
+        check_name("the name of the texture in the header", name)
+    name = c_identifier(layered.texture if name is None else name)
     if rate_hz is not None:
         check_rate(rate_hz)
     plan = plan_for(
@@ -147,6 +155,18 @@ def _tables(name: str, members: Mapping[str, Any]) -> str:
     )
 
 
+def _origin(model: Layered) -> str:
+    """Where the table's grid comes from, where it is not that of the recordings."""
+    stored = model.table.speeds_mm_s.size, model.table.forces_n.size
+    made_at = model.speeds_mm_s.size, model.forces_n.size
+    if stored == made_at:
+        return ""
+    return (
+        f",\n   stored at {stored[0]} x {stored[1]} places, so that they blend as the model made "
+        f"at {made_at[0]} x {made_at[1]} conditions does"
+    )
+
+
 def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, seed: int) -> str:
     speeds, forces = model.table.speeds_mm_s, model.table.forces_n
     made = "simulated" if model.simulated else "from recordings"
@@ -156,7 +176,8 @@ def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, see
 {plan.rate_hz:g} Hz, seed {seed}.
 
    {model.n_layers} layers ({quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} \
-to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N.
+to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N\
+{_origin(model)}.
    Model: SHA-256 {model.sha256}
 
    cc -std=c99 -O2 -ffp-contract=off -fno-math-errno PROGRAM.c -lm, never with -ffast-math.

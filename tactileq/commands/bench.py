@@ -166,10 +166,12 @@ def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str,
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer beside its rivals, print and write what was measured."""
     from analysis.benches.rendering import QUICK, Effort, bench_rendering
+    from analysis.columns import tsv_text
     from analysis.figures.rendering import figure_rendering
     from analysis.report.findings import DOTS_PER_INCH
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
+    from modeling.files.writing import write_text
 
     seen = check_own_results(out, "bench render")
     effort = QUICK if quick else Effort()
@@ -178,7 +180,7 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     with replace_folder(out, seen) as fresh:
         tables = {"times": timed.times, "layers": timed.sweep, "aims": timed.aims}
         for name, table in {**tables, "operations": timed.operations}.items():
-            table.to_csv(fresh / f"{name}.tsv", sep="\t", index=False)
+            write_text(fresh / f"{name}.tsv", tsv_text(table))
         if plot:
             figure_rendering(timed).savefig(fresh / "rendering.png", dpi=DOTS_PER_INCH)
         settings = {

@@ -27,6 +27,12 @@ def export_c(
     rate_hz: Annotated[
         float | None, typer.Option("--rate", help="Output rate in Hz; the model's without it.")
     ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            "--name", help="Instead of the texture's: two headers of one texture need two."
+        ),
+    ] = None,
     single: Annotated[bool, typer.Option("--single", help="Single precision.")] = False,
     seed: Seed = 0,
     vibrator: VibratorFile = None,
@@ -49,6 +55,7 @@ def export_c(
     export_c_header(
         model_file,
         out,
+        name=name,
         rate_hz=rate_hz,
         seed=seed,
         single=single,
@@ -105,6 +112,7 @@ def export_c_header(
     model_file: Path,
     out: Path | None,
     *,
+    name: str | None,
     rate_hz: float | None,
     seed: int,
     single: bool,
@@ -124,7 +132,7 @@ def export_c_header(
 
     inputs = sha256_of_paths(path for path in (model_file, vibrator) if path is not None)
     model = load_model(model_file)
-    target = out or Path(f"{file_stem(model.texture)}.h")
+    target = out or Path(f"{file_stem(name or model.texture)}.h")
     note = note_of_file(target, "export c", texture=model.texture)
     rate_hz = model.rate_hz if rate_hz is None else rate_hz
     compensation, played_by = None, ""
@@ -132,19 +140,20 @@ def export_c_header(
         found = Vibrator.load(vibrator)
         compensation = compensation_for(found, rate_hz=rate_hz)
         played_by = f" for a vibrator{' (simulated)' if found.simulated else ''}"
-    name, text = c_header(
+    symbol, text = c_header(
         target.name,
         model,
+        name=name,
         rate_hz=rate_hz,
         seed=seed,
         single=single,
         limits=Limits(**{what: value for what, value in limits.items() if value is not None}),
         compensation=compensation,
     )
-    settings = {"rate_hz": rate_hz, "single": single, "limits": dict(limits)}
+    settings = {"name": name, "rate_hz": rate_hz, "single": single, "limits": dict(limits)}
     provenance = provenance_of("export c", settings, seed=seed, inputs=inputs)
     write_own_files({target: text.encode()}, note, provenance, texture=model.texture)
-    print(f"{name}{simulated_note(model)}{played_by}: {target}")
+    print(f"{symbol}{simulated_note(model)}{played_by}: {target}")
 
 
 def export_wav_file(

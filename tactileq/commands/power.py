@@ -417,6 +417,7 @@ def _write(
     settings: dict[str, object],
     inputs: Mapping[str, str],
 ) -> None:
+    from analysis.columns import tsv_text
     from analysis.figures.power import figure_power
     from analysis.figures.saving import save_figure, svg_of
     from modeling.files.folders import replace_folder
@@ -427,8 +428,7 @@ def _write(
     marked = table.assign(simulated="true")
     figure = figure_power(table)
     with replace_folder(out, seen) as fresh:
-        text = marked.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n")
-        write_text(fresh / "power.tsv", text)
+        write_text(fresh / "power.tsv", tsv_text(marked))
         save_figure(figure, fresh / "power.png", dpi=PICTURE_DPI)
         (fresh / "power.svg").write_bytes(svg_of(figure)[0])
         seal_folder(fresh, provenance)

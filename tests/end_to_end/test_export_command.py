@@ -50,7 +50,8 @@ def test_a_header_is_a_renderer_of_its_own(run, model: Path, tmp_path: Path) -> 
     made = provenance(tmp_path / "canvas.h")
     assert (made["command"], made["seed"]) == ("tactileq export c", 5)
     none = {"peak": None, "rms": None, "duration_s": None}
-    assert made["settings"] == {"rate_hz": 8000.0, "single": False, "limits": none}
+    settings = {"name": None, "rate_hz": 8000.0, "single": False, "limits": none}
+    assert made["settings"] == settings
     sha256 = hashlib.sha256(model.read_bytes()).hexdigest()
     assert made["inputs_sha256"] == {"canvas.json": sha256}
     (tmp_path / "program.c").write_text(PROGRAM)

@@ -293,6 +293,35 @@ def test_two_exports_of_one_name_are_not_confused(tmp_path: Path) -> None:
         compiled(both, tmp_path, [])
 
 
+def test_two_headers_of_one_texture_have_names_of_their_own(tmp_path: Path) -> None:
+    """As the full and the simplified model."""
+    full = MODELS["canvas"]
+    assert write_c_header(tmp_path / "a.h", full) == "texture_canvas"
+    fewer = full.with_layers([0])
+    assert write_c_header(tmp_path / "b.h", fewer, name="canvas, few") == "texture_canvas__few"
+    both = (
+        '#include "a.h"\n#include "b.h"\n'
+        "int main(void) { return texture_canvas.layers == texture_canvas__few.layers; }\n"
+    )
+    assert subprocess.run([compiled(both, tmp_path, [])], check=False).returncode == 0
+    for name in ("", "  ", "two\nlines"):
+        with refused(InputError, expected="name", got=repr(name)):
+            write_c_header(tmp_path / "c.h", full, name=name)
+
+
+def test_a_header_says_where_its_grid_comes_from(tmp_path: Path) -> None:
+    full = MODELS["canvas"]
+    write_c_header(tmp_path / "a.h", full)
+    comment = (tmp_path / "a.h").read_text(encoding="utf-8").split("*/")[0]
+    stored = full.table.speeds_mm_s.size, full.table.forces_n.size
+    assert stored != (full.speeds_mm_s.size, full.forces_n.size)
+    assert f"stored at {stored[0]} x {stored[1]} places" in comment
+    assert f"at {full.speeds_mm_s.size} x {full.forces_n.size} conditions" in comment
+    linear = replace(full, blending="linear")
+    write_c_header(tmp_path / "b.h", linear)
+    assert "stored at" not in (tmp_path / "b.h").read_text(encoding="utf-8").split("*/")[0]
+
+
 @given(st.text())
 def test_any_texture_has_an_identifier(texture: str) -> None:
     assert re.fullmatch("texture_[A-Za-z0-9_]*", c_identifier(texture))

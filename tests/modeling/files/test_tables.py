@@ -1,0 +1,55 @@
+"""Tables: what a spreadsheet would take for a formula is text, and read back as it was."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from analysis.columns import tsv_text
+from experiments.sessions.bids_tables import cell as bids_cell
+from experiments.sessions.tables import cell as session_cell
+from modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
+
+FORMULAS = ["=1+1", "+1", "@SUM(A1)", "'=1", "''@x", '=HYPERLINK("a")']
+PLAIN = ["oak", "'oak'", "'", "-1", "1=1", "", "wall paper", "a@b", "−1"]
+TEXT = st.text(st.sampled_from("'=+@-a 1"), max_size=6)
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_cell_begins_as_a_formula(text: str) -> None:
+    assert guarded(text) == f"'{text}"
+    for written in (
+        table_text(["name"], [[text]]).splitlines()[1],
+        tsv_text(pd.DataFrame({"name": [text]})).splitlines()[1],
+        bids_cell(text),
+        session_cell(text),
+    ):
+        assert written.lstrip('"').startswith("'")
+
+
+@pytest.mark.parametrize("text", PLAIN)
+def test_other_cells_stay_as_they_are(text: str) -> None:
+    assert guarded(text) == unguarded(text) == text
+
+
+@given(TEXT)
+def test_every_text_is_read_back_as_it_was(text: str) -> None:
+    assert unguarded(guarded(text)) == text
+    assert guarded(text)[:1] not in ("=", "+", "@")
+    if text.strip():
+        (row,) = csv.reader(io.StringIO(bids_cell(text)), delimiter="\t")
+        assert unguarded(row[0]) == text
+
+
+def test_a_table_is_read_back_as_it_was(tmp_path: Path) -> None:
+    texts = [*FORMULAS, *filter(None, PLAIN)]
+    write_table(tmp_path / "a.tsv", ["name", "number"], [[text, -1.5] for text in texts])
+    rows = read_table(tmp_path / "a.tsv", ["name"])
+    assert [row["name"] for row in rows] == texts
+    assert {row["number"] for row in rows} == {"-1.5"}
