@@ -27,6 +27,7 @@ from modeling import (
     compensation_for,
     regressed,
 )
+from modeling.errors import shown
 from modeling.rendering.compiled import SWITCH
 from stimuli.exports.c_header import c_identifier, write_c_header
 from stimuli.exports.peq_json import write_peq_json
@@ -305,7 +306,7 @@ def test_two_headers_of_one_texture_have_names_of_their_own(tmp_path: Path) -> N
     )
     assert subprocess.run([compiled(both, tmp_path, [])], check=False).returncode == 0
     for name in ("", "  ", "two\nlines"):
-        with refused(InputError, expected="name", got=repr(name)):
+        with refused(InputError, expected="name", got=shown(name)):
             write_c_header(tmp_path / "c.h", full, name=name)
 
 
