@@ -32,6 +32,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, simplify
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.tables import guarded
 from rig.twin import SimulatedRig
 from tests.experiments.sessions.conftest import STUDY, session_on_disk
 from tests.refusals import refused
@@ -417,7 +418,8 @@ def test_text_survives_the_table(values):
     found = pd.read_csv(io.BytesIO(data), sep="\t", keep_default_na=False, dtype=str)
     # Tabs, line ends and other control characters, which no cell of BIDS can hold, are pictured.
     pictured = {n: 0x2400 + n for n in range(32)} | {127: 0x2421}
-    assert found["note"].tolist() == [text.translate(pictured) or "n/a" for text in values]
+    expected = [guarded(text).translate(pictured) or "n/a" for text in values]
+    assert found["note"].tolist() == expected
     assert data.count(b"\n") == len(values) + 1
 
 
