@@ -145,7 +145,7 @@ def staged(
             if there := (target / INDEX_NAME).is_file():
                 _check_conditions(listed(target), recordings)
             else:
-                check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+                _check_new(target)
             place = target / INDEX_NAME if there else behind_links(target)
             hidden = stack.enter_context(unfinished_folder(place))
             files = [
@@ -157,6 +157,15 @@ def staged(
                 for file, recording, source in zip(files, recordings, sources, strict=True)
             ]
         yield Staged(target, recordings, tuple(files), tuple(rows))
+
+
+def _check_new(target: Path) -> None:
+    """Refuse a folder with other files in it, but not one into which somebody adds just now."""
+    try:
+        check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
+    except InputError:
+        if not any((target / name).is_file() for name in (UNFINISHED_NAME, INDEX_NAME)):
+            raise
 
 
 @contextmanager
