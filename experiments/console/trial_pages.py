@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -71,10 +70,9 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
     """
     of = runner.texts.of
     real = _real(runner, surfaces, at=(0.0, 0.3)) if task.mounts else None
-    places = [_Place.of(index, surfaces.count) for index in range(surfaces.count)]
-    numbered = [_numbered(runner, index, surfaces, at) for index, at in enumerate(places)]
-    answers = [_answer(runner, index, surfaces, at) for index, at in enumerate(places)]
-    confirm = runner.proceed(of(f"{task.name}.confirm"), y=-0.36)
+    numbered = [_numbered(runner, index, surfaces) for index in range(surfaces.count)]
+    answers = [_answer(runner, index, surfaces) for index in range(surfaces.count)]
+    confirm = runner.proceed(of("choice.confirm"), y=-0.36)
     told = _Line(runner, y=-0.27)
 
     def update() -> None:
@@ -99,7 +97,7 @@ def choose(runner: PageRunner, task: Task, surfaces: Surfaces) -> Choice:
         decoration=(
             runner.title(of(f"{task.name}.question")),
             runner.remark(runner.texts.of_task(task.name, "surface.felt_now"), y=0.225),
-            runner.card(0.0, 0.03 + len({place.row for place in places}) * ROW_PITCH),
+            runner.card(0.0, 0.03 + ROW_PITCH * _rows(surfaces.count)),
             told,
             *runner.foot(of("choice.keys")),
         ),
@@ -143,24 +141,20 @@ def _scale(runner: PageRunner, name: str, surfaces: Surfaces) -> RatingScale:
     )
 
 
-@dataclass(frozen=True)
-class _Place:
-    """Where a virtual surface stands: its row, from the top, and the middle of its two buttons."""
-
-    row: int
-    at: Point
-
-    @classmethod
-    def of(cls, index: int, count: int) -> _Place:
-        rows = -(-count // BUTTONS_PER_ROW)
-        row, column = divmod(index, BUTTONS_PER_ROW)
-        in_row = min(BUTTONS_PER_ROW, count - row * BUTTONS_PER_ROW)
-        x = BUTTON_PITCH * (column - (in_row - 1) / 2)
-        return cls(row, (x, ROW_PITCH * ((rows - 1) / 2 - row)))
+def _rows(count: int) -> int:
+    return -(-count // BUTTONS_PER_ROW)
 
 
-def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place) -> Button:
-    x, y = place.at
+def _middle(index: int, count: int) -> Point:
+    """Between the two buttons of a virtual surface."""
+    row, column = divmod(index, BUTTONS_PER_ROW)
+    in_row = min(BUTTONS_PER_ROW, count - row * BUTTONS_PER_ROW)
+    x = BUTTON_PITCH * (column - (in_row - 1) / 2)
+    return x, ROW_PITCH * ((_rows(count) - 1) / 2 - row)
+
+
+def _numbered(runner: PageRunner, index: int, surfaces: Surfaces) -> Button:
+    x, y = _middle(index, surfaces.count)
     return runner.button(
         f"button {index + 1}",
         str(index + 1),
@@ -170,8 +164,8 @@ def _numbered(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place)
     )
 
 
-def _answer(runner: PageRunner, index: int, surfaces: Surfaces, place: _Place) -> Button:
-    x, y = place.at
+def _answer(runner: PageRunner, index: int, surfaces: Surfaces) -> Button:
+    x, y = _middle(index, surfaces.count)
     return runner.button(
         f"answer {index + 1}",
         runner.texts.of("choice.choose"),

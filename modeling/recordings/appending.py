@@ -160,11 +160,12 @@ def staged(
 
 
 def _check_new(target: Path) -> None:
-    """Refuse a folder with other files in it, but not one into which somebody adds just now."""
+    """Refuse a folder with other files in it, unless it has become a set meanwhile: then they may
+    be those of somebody who adds to it just now."""
     try:
         check_replaceable(target, index_name=INDEX_NAME, what="a recording set")
     except InputError:
-        if not any((target / name).is_file() for name in (UNFINISHED_NAME, INDEX_NAME)):
+        if not (target / INDEX_NAME).is_file():
             raise
 
 

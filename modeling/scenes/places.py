@@ -8,7 +8,6 @@ nodes, so that a narrower scene never counts places that a wider one does not.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from modeling.arrays import Bools, Floats, Integers
 from modeling.errors import InputError
 from modeling.hand import Hand
 from modeling.models.texture_model import TextureModel
-from modeling.scenes.scene import HandPlaces, HandRange, HandUse, Range
+from modeling.scenes.scene import AskedRange, HandPlaces, HandRange, HandUse, Range
 
 LEAST_VISITED = 0.01  # of the hand's time, over which a bound may be broken
 
@@ -122,7 +121,7 @@ def _of_range(model: TextureModel, hand: HandRange) -> Places:
 
 
 def _range_on(
-    model: TextureModel, asked: Range | Literal["recorded"], axis: Floats, *, unit: str, what: str
+    model: TextureModel, asked: AskedRange, axis: Floats, *, unit: str, what: str
 ) -> Range:
     low, high = float(axis[0]), float(axis[-1])
     if isinstance(asked, str):  # all that was recorded

@@ -88,6 +88,7 @@ _SECTIONS = {
 _PLACE = ("speed_mm_s", "force_n", "share")
 RECORDED = "recorded"
 Range = tuple[float, float]
+AskedRange = Range | Literal["recorded"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,8 +104,8 @@ class HandRange:
         through all forces: what a parameter update comes too late for. 0 … 20.
     """
 
-    speed_mm_s: Range | Literal["recorded"]
-    force_n: Range | Literal["recorded"]
+    speed_mm_s: AskedRange
+    force_n: AskedRange
     stroke_hz: float = STROKE_HZ
 
     def __post_init__(self) -> None:

@@ -459,7 +459,7 @@ def _read_columns(
             told, column = name, values[:, place]
             kind, unit = _name_and_unit(name)
             if kind in _TIME_NAMES:
-                column, since_1970 = since_first([row[place] for row in rows[1:]])
+                column, since_1970 = since_first(column, [row[place] for row in rows[1:]])
                 told = f"{name} ({since_1970})" if since_1970 and not unit else name
             columns[told] = column
     return columns, warnings

@@ -226,13 +226,12 @@ def _astray(time_s: Floats) -> tuple[float, float]:
     return float(np.sqrt(max(float(np.mean(off**2)) - tick**2 / 12, 0.0))), most
 
 
-def since_first(cells: Sequence[str]) -> tuple[Floats, str]:
-    """Times as numbers, and their unit where they count from 1970, else "".
+def since_first(values: Floats, cells: Sequence[str]) -> tuple[Floats, str]:
+    """Times, read from these cells, and their unit where they count from 1970, else "".
 
     Whole numbers that floating-point ones would round (those of nanoseconds to 256 ns) are given
     from the first one on.
     """
-    values = np.array(cells, dtype=np.float64)
     unit = _unit_since_1970(float(values[0]))
     if abs(values[0]) > 2**53 and all(re.fullmatch(r"\s*\d+\s*", cell) for cell in cells):
         first = int(cells[0])

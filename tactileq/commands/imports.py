@@ -228,11 +228,7 @@ def labels_of(
             )
         labels, unused = labels_from_table(table, files, texture=texture)
         if unused:
-            more = f" and {len(unused) - MOST_NAMES} more" if len(unused) > MOST_NAMES else ""
-            print(
-                f"note: rows of {table} for files that were not given: "
-                f"{', '.join(unused[:MOST_NAMES])}{more}"
-            )
+            print(f"note: rows of {table} for files that were not given: {_first_of(unused)}")
         return labels
     if speed is None or force is None:
         raise ValueError(
@@ -240,6 +236,12 @@ def labels_of(
             f"--speed {speed} and --force {force}; give both, or --labels with a TSV."
         )
     return [Label(texture, speed, force) for _ in files]
+
+
+def _first_of(names: Sequence[str]) -> str:
+    """The first few of some names, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+    return ", ".join(names[:MOST_NAMES]) + more
 
 
 def add_to_set(
@@ -355,8 +357,7 @@ def tell_beyond_hull(
     }
     lacking = [f"{name} ({count})" for name, count in outside.items() if count]
     if lacking:
-        more = f" and {len(lacking) - MOST_NAMES} more" if len(lacking) > MOST_NAMES else ""
         print(
             f"note: of {len(conditions)} conditions those beyond a texture's models, or silent "
-            f"there, are left out: {', '.join(lacking[:MOST_NAMES])}{more}"
+            f"there, are left out: {_first_of(lacking)}"
         )

@@ -12,6 +12,8 @@ from typing import Annotated
 
 import typer
 
+from tactileq.commands.study_check import loaded
+
 HIGHEST_SEED = 2**53  # what every reader of numbers holds exactly
 
 
@@ -65,7 +67,7 @@ def study_init(
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, _of_models(text, textures, folders, beside=path.parent, seed=seed))
     try:
-        _check(path)
+        loaded(path)
     except ValueError:
         path.unlink()
         raise
@@ -113,11 +115,3 @@ def _of_models(
     for pattern, replacement in changes.items():
         text = re.sub(pattern, replacement.replace("\\", r"\\"), text)
     return text
-
-
-def _check(path: Path) -> None:
-    from experiments.study.models import load_model_sets
-    from experiments.study.study import Study
-
-    study = Study.load(path)
-    load_model_sets(study, path.parent)[0].require(study)

@@ -11,7 +11,7 @@ from tactileq.commands.study_status import tell_made
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
-StudyFile = Annotated[
+OfStudy = Annotated[
     Path | None,
     typer.Option("--study", help="Study file (TOML): refuses the data of another study."),
 ]
@@ -19,7 +19,7 @@ Yes = Annotated[bool, typer.Option("--yes", help="Do not ask.")]
 
 
 def study_withdraw(
-    subject: Subject, data: Data = Path("data"), study: StudyFile = None, yes: Yes = False
+    subject: Subject, data: Data = Path("data"), study: OfStudy = None, yes: Yes = False
 ) -> None:
     """Delete all data of a person; the number stays taken, the slot goes to a replacement.
 
@@ -37,7 +37,7 @@ def study_withdraw(
 
 
 def study_dropout(
-    subject: Subject, data: Data = Path("data"), study: StudyFile = None, yes: Yes = False
+    subject: Subject, data: Data = Path("data"), study: OfStudy = None, yes: Yes = False
 ) -> None:
     """Note that a person will not come again: the data stay, the slot goes to a replacement.
 
