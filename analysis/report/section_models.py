@@ -194,7 +194,8 @@ def _course_picture(result: TextureResult, stem: str) -> Picture:
     courses = [layers_over_speed(result.model, force_n=force_n)]
     note = "Frequency and amplitude of each layer."
     if result.truth is not None and force_n in result.truth.forces_n:
-        courses.append(layers_over_speed(result.truth, force_n=force_n))
+        truth = result.truth.at_rate(result.model.rate_hz)
+        courses.append(layers_over_speed(truth, force_n=force_n))
         note += " Dashed: what was planted."
     return Picture(
         f"layers_{stem}",

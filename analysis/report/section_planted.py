@@ -71,7 +71,9 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
         "have a partner; recall: share of the conditions in which it was found; medians over the "
         "pairs and, beside each, the worst pair with its sign and place. Bandwidth ratio: "
         "estimated over planted. Frequency errors are estimated − planted; their median is of "
-        "absolute values. Levels compare |G| at one rate.",
+        "absolute values. Levels compare |G| at one rate. The truth is planted at the "
+        "recorder's rate, where skirts are wider than at the model's; noise gains are compared "
+        "with the one that brings the planted layers, at the model's rate, closest to that truth.",
         score,
         PLANTED_TRUTH_COLUMNS,
         simulated=True,
@@ -87,7 +89,7 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
     detail = Table(
         "planted_layers",
         "Planted and estimated parameters, layer by layer",
-        "At the strongest force and highest speed of each texture; gains are |G| at the planted "
+        "At the strongest force and highest speed of each texture; gains are |G| at the estimated "
         "model's rate; surplus: estimated where nothing was planted.",
         layers,
         PLANTED_LAYER_COLUMNS,

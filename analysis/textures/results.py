@@ -27,7 +27,7 @@ class TextureResult:
     simplification : Simplification
         Its simplified model and the verdict on every layer.
     truth : TextureModel, optional
-        What was planted, where the recordings are simulated from a known model.
+        What was planted, where the recordings are simulated from a known model, at their rate.
     other_estimates : tuple of TextureModel
         Models of other estimators, to be compared with the truth beside `model`.
     left_out : mapping of str to DataFrame

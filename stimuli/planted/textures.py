@@ -22,7 +22,7 @@ from modeling.seeds import noise_seed
 
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
 FORCES_N = np.linspace(0.5, 3.5, 7)
-TRUTH_RATE_HZ = 5000.0
+MODEL_RATE_HZ = 5000.0
 RECORDER_RATE_HZ = 22704.0
 REFERENCE_SPEED_MM_S = 200.0
 REFERENCE_FORCE_N = 2.0
@@ -43,7 +43,8 @@ class PlantedLayer:
     bandwidth_hz : float
         Constant.
     rms_g : float
-        Level of the layer alone; grows as (v/200)^growth_speed · (F/2)^growth_force.
+        Level of the layer alone at 5 kHz, which sets its peak gain; grows as
+        (v/200)^growth_speed · (F/2)^growth_force.
     sign : {1, -1}
         Of the gain, over the whole texture.
     growth_speed, growth_force : float
@@ -138,8 +139,13 @@ def planted_texture(
     *,
     speeds_mm_s: Floats = SPEEDS_MM_S,
     forces_n: Floats = FORCES_N,
+    rate_hz: float = MODEL_RATE_HZ,
 ) -> TextureModel:
-    """The truth of one planted texture as a model (estimator "planted", simulated, 5 kHz).
+    """One planted texture as a model (estimator "planted", simulated) at one rate.
+
+    Frequency, −3 dB width and peak gain of a layer mean the same at every rate; its skirts do not,
+    since the filter warps less at a higher one. So the truth of a recording is the texture at the
+    recorder's rate, and the texture at 5 kHz is what a model of that rate renders.
 
     Parameters
     ----------
@@ -147,11 +153,13 @@ def planted_texture(
         One of `TEXTURES`.
     speeds_mm_s, forces_n : (S,), (F,) ndarray
         The grid, rising, > 0; 50…350 mm/s × 0.5…3.5 N by default.
+    rate_hz : float
+        Where its layers are defined, more than about twice the highest frequency.
 
     Raises
     ------
     InputError
-        For a name that is not in the catalogue.
+        For a name that is not in the catalogue; for a rate that is too low for its layers.
     """
     if name not in CATALOGUE:
         raise InputError(
@@ -166,11 +174,11 @@ def planted_texture(
     bandwidths = [np.full(shape, float(layer.bandwidth_hz)) for layer in layers]
     # Gain of a layer of 1 g RMS, the inverse of the PEQ's band variance.
     gain_per_rms = [
-        1 / band_rms(1.0, layer.bandwidth_hz, rate_hz=TRUTH_RATE_HZ) for layer in layers
+        1 / band_rms(1.0, layer.bandwidth_hz, rate_hz=MODEL_RATE_HZ) for layer in layers
     ]
-    return TextureModel(
+    at_5_khz = TextureModel(
         texture=name,
-        rate_hz=TRUTH_RATE_HZ,
+        rate_hz=MODEL_RATE_HZ,
         speeds_mm_s=np.asarray(speeds_mm_s),
         forces_n=np.asarray(forces_n),
         noise_gains=planted.noise_g * v**NOISE_GROWTH_SPEED * np.ones_like(f),
@@ -190,46 +198,37 @@ def planted_texture(
         simulated=True,
         blending="logarithmic",
     )
+    return at_5_khz.at_rate(rate_hz)
 
 
 @dataclass(frozen=True)
 class PlantedSurface:
-    """A planted texture as a recorder meets it: its spectrum at any speed and force, by formula.
-
-    The recorder's rate is higher than the model's, and filters warp less there, so that far skirts
-    differ by up to 2 dB from those of the planted model at its own rate.
-    """
+    """A planted texture at the recorder's rate: its spectrum at any speed and force, by formula."""
 
     texture: str
-    recorder_rate_hz: float = RECORDER_RATE_HZ
 
     def magnitude(self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float) -> Floats:
         """True magnitude (n,) in g per unit noise at 5 kHz; speed and force above 0."""
         here = planted_texture(
-            self.texture, speeds_mm_s=np.array([speed_mm_s]), forces_n=np.array([force_n])
+            self.texture,
+            speeds_mm_s=np.array([speed_mm_s]),
+            forces_n=np.array([force_n]),
+            rate_hz=RECORDER_RATE_HZ,
         )
-        recorded = here.at_rate(self.recorder_rate_hz).peq(speed_mm_s, force_n)
-        scale = float(np.sqrt(TRUTH_RATE_HZ / self.recorder_rate_hz))
-        return recorded.response(frequency_hz) * scale
+        scale = float(np.sqrt(MODEL_RATE_HZ / RECORDER_RATE_HZ))
+        return here.peq(speed_mm_s, force_n).response(frequency_hz) * scale
 
 
-def record_texture(
-    truth: TextureModel,
-    *,
-    rate_hz: float = RECORDER_RATE_HZ,
-    duration_s: float = 1.0,
-    seed: int = 0,
-) -> RecordingSet:
-    """Record a texture in silico, one record per condition of its grid.
+def record_texture(truth: TextureModel, *, duration_s: float = 1.0, seed: int = 0) -> RecordingSet:
+    """Record a texture in silico, one record per condition of its grid, at the truth's own rate.
 
-    The noise floor reaches to the recorder's Nyquist frequency; the sensor's step (0.001907349 g)
-    and range (±50 g) are those of the recorder's accelerometer.
+    The noise floor reaches to the Nyquist frequency; the sensor's step (0.001907349 g) and range
+    (±50 g) are those of the recorder's accelerometer.
 
     Parameters
     ----------
     truth : TextureModel
-    rate_hz : float
-        The recorder's rate, at least twice the highest layer's frequency.
+        At the recorder's rate: `planted_texture(name, rate_hz=RECORDER_RATE_HZ)`.
     duration_s : float
         Length of each record, > 0; ten million samples at most.
     seed : int
@@ -240,14 +239,14 @@ def record_texture(
     RecordingSet
         All marked `simulated`.
     """
+    rate_hz = truth.rate_hz
     check_duration(duration_s, rate_hz)
-    at_rate = truth.at_rate(rate_hz)
     settling, samples = round(SETTLING_S * rate_hz), round(duration_s * rate_hz)
     conditions = [(v, f) for v in truth.speeds_mm_s.tolist() for f in truth.forces_n.tolist()]
     count = len(conditions)
     held = {value: np.full(settling + samples, value) for each in conditions for value in each}
     vibrations = render_many(
-        [at_rate] * count,
+        [truth] * count,
         [(held[speed], held[force]) for speed, force in conditions],
         # Two textures under one seed must not share their noise.
         seeds=[noise_seed(seed, truth.texture)] * count,

@@ -130,9 +130,9 @@ def demo_texture(name: str, folder: Path, *, threshold: Threshold, seed: int) ->
     from modeling import simplify as drop_layers
     from modeling.files.writing import file_stem
     from modeling.perception.verdicts import ENDING
-    from stimuli.planted.textures import planted_texture, record_texture
+    from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
-    truth = planted_texture(name)
+    truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)
     place = folder / "recordings" / file_stem(name)
     record_texture(truth, seed=seed).save(place)
     records = RecordingSet.load(place)

@@ -90,9 +90,9 @@ def record_in_silico(
     folder_behind(folder)
     if folder.exists() and (folder.is_file() or any(folder.iterdir())):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")
-    truth = planted_texture(texture)
+    truth = planted_texture(texture, rate_hz=rate_hz)
     with progress(f"Recording {texture} in silico", 1) as advance:
-        records = record_texture(truth, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
+        records = record_texture(truth, duration_s=duration_s, seed=seed)
         settings = {"texture": texture, "rate_hz": rate_hz, "duration_s": duration_s}
         with replace_folder(folder, {}) as fresh:
             records.save(fresh)

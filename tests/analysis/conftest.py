@@ -257,7 +257,7 @@ def _small_truth(name: str, texture: str) -> TextureModel:
 
 def _result(name: str, texture: str) -> TextureResult:
     truth = _small_truth(name, texture)
-    recordings = record_texture(truth, rate_hz=5000.0, duration_s=0.5, seed=3)
+    recordings = record_texture(truth, duration_s=0.5, seed=3)
     full = fit_texture(recordings)
     return TextureResult(
         recordings=recordings,

@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from modeling import Recording, RecordingSet
 from stimuli.planted.textures import (
     FORCES_N,
+    RECORDER_RATE_HZ,
     SPEEDS_MM_S,
     TEXTURES,
     planted_texture,
@@ -41,7 +42,8 @@ def study(timed: bool) -> tuple[RecordingSet, ...]:
     names = list(TEXTURES) if timed else list(TEXTURES)[:1]
     some = slice(None, None, 1 if timed else 3)
     axes = {"speeds_mm_s": SPEEDS_MM_S[some], "forces_n": FORCES_N[some]}
-    return tuple(record_texture(planted_texture(name, **axes), seed=1) for name in names)
+    truths = [planted_texture(name, **axes, rate_hz=RECORDER_RATE_HZ) for name in names]
+    return tuple(record_texture(truth, seed=1) for truth in truths)
 
 
 @pytest.fixture(scope="session")

@@ -67,7 +67,7 @@ def place(
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     for name in ("canvas", "MDF"):
         truth = planted_texture(name, **axes)
-        records = record_texture(truth, rate_hz=5000.0, duration_s=0.5)
+        records = record_texture(truth, duration_s=0.5)
         records.save(tmp_path / "recordings" / name)
         truth.save(tmp_path / f"models/{name}.json")
         fewer = drop_layers(truth, Threshold.named("codec"))

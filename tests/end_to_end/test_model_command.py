@@ -28,7 +28,7 @@ PICTURES = ("_spectra.png", "_layers.png")
 
 def recorded(name: str) -> RecordingSet:
     """A planted texture on 2 × 2 conditions of half a second at the model rate."""
-    return record_texture(planted_texture(name, **AXES), rate_hz=5000.0, duration_s=0.5)
+    return record_texture(planted_texture(name, **AXES), duration_s=0.5)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -227,7 +227,7 @@ def test_layers_check_and_alone(main, tmp_path: Path) -> None:
     """A prescribed number of layers; conditions predicted; each recording by itself."""
     axes = {"speeds_mm_s": np.array([100.0, 200.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     truth = planted_texture("canvas", **axes)
-    record_texture(truth, rate_hz=5000.0, duration_s=0.5).save(tmp_path / "set")
+    record_texture(truth, duration_s=0.5).save(tmp_path / "set")
     done = main("model", "set", "--layers", 2, "--check", "--alone", "--out", "models")
     assert done.returncode == 0, done.stderr
     assert TextureModel.load(tmp_path / "models/canvas.json").n_layers == 2
@@ -277,7 +277,7 @@ def test_hum_is_taken_out_with_a_warning_and_kept_on_request(main, tmp_path: Pat
 def test_unusable_recordings_of_a_texture_are_named_and_left_out(main, tmp_path: Path) -> None:
     axes = {"speeds_mm_s": np.array([100.0, 200.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
     truth = planted_texture("canvas", **axes)
-    record_texture(truth, rate_hz=5000.0, duration_s=0.5).save(tmp_path / "set")
+    record_texture(truth, duration_s=0.5).save(tmp_path / "set")
     table = pd.read_csv(tmp_path / "set/recordings.tsv", sep="\t")
     dead = table.file[(table.speed_mm_s == 200) & (table.force_n == 1)].item()
     rows = (tmp_path / "set" / dead).read_text().splitlines()

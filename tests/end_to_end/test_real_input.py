@@ -24,7 +24,7 @@ def vibration(speed_mm_s: float, force_n: float, *, rate_hz: float, seconds: flo
         "forces_n": np.array([force_n, force_n + 1]),
     }
     records = record_texture(
-        planted_texture("canvas", **grid), rate_hz=10_000.0, duration_s=seconds, seed=seed
+        planted_texture("canvas", **grid, rate_hz=10_000.0), duration_s=seconds, seed=seed
     )
     return records.recordings[0].samples[:: round(10_000 / rate_hz)]
 

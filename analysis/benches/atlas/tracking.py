@@ -53,7 +53,7 @@ def measured(
     for draw in range(DRAWS[estimator][full]):
         place = 1 + PLACE_RANGE * generator([SEED, draw]).uniform(-1, 1)
         truth = planted(frequency_hz * place, heights)
-        records = record_texture(truth, rate_hz=RATE_HZ, duration_s=DURATION_S, seed=draw)
+        records = record_texture(truth, duration_s=DURATION_S, seed=draw)
         layers = frequency_hz.shape[1] if estimator == "joint" else None
         figures.append(figure((truth, fit_texture(records, estimator=estimator, layers=layers))))
     return float(np.mean(figures))

@@ -65,7 +65,7 @@ def recorded_twice(textures: int, duration_s: float) -> tuple[Pair, ...]:
     for number in range(textures):
         truth = planted(generator([SEED, number]))
         first, second = (
-            fit_texture(record_texture(truth, rate_hz=RATE_HZ, duration_s=duration_s, seed=seed))
+            fit_texture(record_texture(truth, duration_s=duration_s, seed=seed))
             for seed in (2 * number, 2 * number + 1)
         )
         pairs.append((truth, (first, second)))

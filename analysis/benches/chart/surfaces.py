@@ -25,6 +25,7 @@ from rig.importing.hatt import HattTexture, load_hatt
 from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import (
     FORCES_N,
+    RECORDER_RATE_HZ,
     SPEEDS_MM_S,
     TEXTURES,
     PlantedSurface,
@@ -141,7 +142,7 @@ def _truth_and_records(source: Source) -> tuple[Truth, RecordingSet]:
         surface = draw_surface(source.seed)
         return surface, surface.record(duration_s=RECORD_S, seed=source.seed)
     if source.kind == "planted":
-        planted = planted_texture(source.name)
+        planted = planted_texture(source.name, rate_hz=RECORDER_RATE_HZ)
         records = record_texture(planted, duration_s=RECORD_S, seed=source.seed)
         return PlantedSurface(source.name), records
     assert source.path is not None, "a toolkit's texture is read from its file"

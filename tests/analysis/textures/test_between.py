@@ -73,7 +73,7 @@ def test_distances_to_truth_in_closed_form() -> None:
 
 def planted_records(speeds: Floats = SPEEDS, forces: Floats = FORCES) -> RecordingSet:
     texture = planted_texture("canvas", speeds_mm_s=speeds, forces_n=forces)
-    return record_texture(texture, rate_hz=5000.0, duration_s=1.0)
+    return record_texture(texture, duration_s=1.0)
 
 
 def test_the_truth_is_close_to_its_recordings_and_louder_is_louder() -> None:

@@ -126,7 +126,7 @@ def test_the_sensors_floor_is_subtracted_from_what_models_are_held_against():
     truth = planted_texture(
         "leather", speeds_mm_s=np.array([200.0, 350.0]), forces_n=np.array([1.0, 3.0])
     )
-    clean = record_texture(truth, rate_hz=5000.0, duration_s=1.0, seed=3)
+    clean = record_texture(truth, duration_s=1.0, seed=3)
     model = fit_texture(clean)
     noisy, still = with_sensor_noise(clean, 0.05, rng=np.random.default_rng(1))
     gfc30 = [

@@ -64,7 +64,7 @@ def test_peaks_and_levels_of_cut_strokes_are_those_of_steady_records(
         assert samples.size == RATE_HZ
         records.append(Recording(samples, RATE_HZ, *condition, texture, simulated=True))
     cut = fit_texture(RecordingSet(records))
-    steady = fit_texture(record_texture(truth, rate_hz=RATE_HZ, seed=1))
+    steady = fit_texture(record_texture(truth.at_rate(RATE_HZ), seed=1))
     for model in (cut, steady):
         errors = errors_db(model, truth)
         assert abs(errors.mean()) < 0.6

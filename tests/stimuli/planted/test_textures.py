@@ -12,7 +12,9 @@ from modeling import InputError, TextureModel, fit_texture, similarity, spectrum
 from modeling.recordings.spectrum import Spectrum, smooth
 from stimuli.planted.textures import (
     CATALOGUE,
+    RECORDER_RATE_HZ,
     TEXTURES,
+    PlantedSurface,
     planted_texture,
     record_texture,
     sensed,
@@ -103,8 +105,32 @@ def test_unknown_textures_are_refused() -> None:
         planted_texture("velvet")
 
 
+@pytest.mark.parametrize("name", TEXTURES)
+def test_truth_and_surface_agree_at_the_recorders_rate(name: str) -> None:
+    """Defined where it is recorded: the same at all frequencies, up to the unit of the gains."""
+    truth = planted_texture(name, rate_hz=RECORDER_RATE_HZ)
+    grid = np.arange(10.0, 2500.0, 5.0)
+    for speed, force in ((50.0, 0.5), (200.0, 2.0), (350.0, 3.5)):
+        expected = PlantedSurface(name).magnitude(grid, speed_mm_s=speed, force_n=force)
+        found = truth.peq(speed, force).response(grid) * np.sqrt(5000 / RECORDER_RATE_HZ)
+        assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate_hz", [5000.0, RECORDER_RATE_HZ])
+def test_centres_widths_and_peaks_are_the_same_at_every_rate(rate_hz: float) -> None:
+    """|H| is 1 at the centre and √½ at two places that lie one width apart."""
+    truth = planted_texture("MDF", rate_hz=rate_hz).with_layers([2])
+    peq = truth.peq(200.0, 2.0)
+    grid = np.arange(800.0, 1000.0, 0.01)
+    layer = np.abs(peq.complex_response(grid) - peq.noise_gain) / peq.gains[0]
+    assert grid[layer.argmax()] == pytest.approx(900.0, abs=0.01)
+    assert np.ptp(grid[layer > np.sqrt(0.5)]) == pytest.approx(150.0, abs=0.05)
+    at_5_khz = planted_texture("MDF").peq(200.0, 2.0).gains[2]
+    assert peq.gains[0] * np.sqrt(5000 / rate_hz) == pytest.approx(at_5_khz)
+
+
 def test_recording_is_complete_and_marked_simulated() -> None:
-    truth = planted_texture("MDF", **SMALL)
+    truth = planted_texture("MDF", **SMALL, rate_hz=RECORDER_RATE_HZ)
     recordings = record_texture(truth, duration_s=0.1, seed=3).recordings
     assert [r.condition for r in recordings] == [(100, 1), (100, 3), (300, 1), (300, 3)]
     for r in recordings:
@@ -158,7 +184,7 @@ def test_loud_recordings_clip_and_say_so() -> None:
 
 def test_recordings_have_the_truths_spectrum() -> None:
     """22.7 kHz record → 5 kHz spectrum: the response, level and shape, in 20 records."""
-    truth = planted_texture("canvas", **SMALL)
+    truth = planted_texture("canvas", **SMALL, rate_hz=RECORDER_RATE_HZ)
     recordings = [
         r
         for seed in range(5)
@@ -166,13 +192,13 @@ def test_recordings_have_the_truths_spectrum() -> None:
         if r.condition == (300.0, 3.0)
     ]
     found = np.mean([spectrum(r).magnitude for r in recordings], axis=0)
-    expected = truth.peq(300.0, 3.0).response(np.arange(2501.0))
-    bands = [(60, 100), (200, 300), (340, 440), (700, 860), (1000, 1500), (1500, 2000)]
+    surface = PlantedSurface("canvas")
+    expected = surface.magnitude(np.arange(2501.0), speed_mm_s=300.0, force_n=3.0)
+    bands = [(60, 100), (200, 300), (340, 440), (700, 860), (1000, 1500), (1500, 2450)]
     for low, high in bands:
-        assert found[low:high].mean() == pytest.approx(expected[low:high].mean(), rel=0.12)
-    report = similarity.report(
-        Spectrum(np.arange(2501.0), found, 5000.0, 5000), truth.peq(300.0, 3.0)
-    )
+        assert found[low:high].mean() == pytest.approx(expected[low:high].mean(), rel=0.1)
+    rendered = planted_texture("canvas", **SMALL).peq(300.0, 3.0)
+    report = similarity.report(Spectrum(np.arange(2501.0), found, 5000.0, 5000), rendered)
     assert report.gfc30 > 0.99
     assert abs(report.rms_error_db - 10 * np.log10(expected_power_ratio(5))) < 0.5
 
@@ -184,7 +210,7 @@ def expected_power_ratio(records: int) -> float:
 
 def test_slow_recorders_are_refused() -> None:
     with refused(InputError, expected=["frequency", "1…490 Hz", "1000 Hz"], got=869.343):
-        record_texture(planted_texture("MDF", **SMALL), rate_hz=1000.0)
+        planted_texture("MDF", **SMALL, rate_hz=1000.0)
 
 
 def test_fit_of_a_planted_texture_finds_its_loud_layers() -> None:
