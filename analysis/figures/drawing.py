@@ -15,6 +15,12 @@ LAYER_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
 LAYER_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 
 
+def series_style(number: int) -> tuple[str, str]:
+    """Colour and marker of the n-th layer or texture (from 0): 49 pairs before one repeats."""
+    turn, place = divmod(number, len(LAYER_COLOURS))
+    return LAYER_COLOURS[place], LAYER_MARKERS[(place + turn) % len(LAYER_MARKERS)]
+
+
 def shared_legend(
     figure: Figure, axes: Iterable[Axes], *, loc: Any = "outside upper center", ncols: int = 2
 ) -> None:

@@ -11,10 +11,9 @@ from matplotlib.ticker import LogLocator
 from analysis.figures.drawing import (
     BLACK,
     GREY,
-    LAYER_COLOURS,
-    LAYER_MARKERS,
     axes_or_new,
     finish_axes,
+    series_style,
     stamp_if_simulated,
 )
 from analysis.spectra.layers_over_grid import LayersOverGrid
@@ -70,7 +69,7 @@ def plot_layers_over_grid(layers: LayersOverGrid, *, quantity: str, ax: Axes | N
 def _plot_layer(layers: LayersOverGrid, *, quantity: str, layer: int, ax: Axes) -> None:
     """Lines of one layer, and marks on those of its points that are no measurements."""
     speeds = layers.speeds_mm_s
-    colour, marker = LAYER_COLOURS[layer % 7], LAYER_MARKERS[(layer + layer // 7) % 7]
+    colour, marker = series_style(layer)
     values = getattr(layers, quantity)[:, :, layer]
     ax.plot(speeds, values, color=colour, lw=0.7, alpha=0.35)
     mean = getattr(layers, f"mean_{quantity}")[:, layer]
@@ -96,17 +95,11 @@ def _marked(layers: LayersOverGrid) -> tuple[Bools, ...]:
 
 def _legend(layers: LayersOverGrid) -> list[Line2D]:
     """Layers by colour and marker, and what the marks mean as far as any are drawn."""
-    handles = [
-        Line2D(
-            [],
-            [],
-            color=LAYER_COLOURS[layer % 7],
-            marker=LAYER_MARKERS[(layer + layer // 7) % 7],
-            lw=2.0,
-            label=f"layer {layer + 1}, mean over forces",
-        )
-        for layer in range(layers.inherited.shape[2])
-    ]
+    handles = []
+    for layer in range(layers.inherited.shape[2]):
+        colour, marker = series_style(layer)
+        label = f"layer {layer + 1}, mean over forces"
+        handles.append(Line2D([], [], color=colour, marker=marker, lw=2.0, label=label))
     handles.append(Line2D([], [], color=GREY, lw=0.7, label="the same at each force"))
     for marked, (mark, filling, _, label) in zip(_marked(layers), MARKS, strict=True):
         if marked.any():

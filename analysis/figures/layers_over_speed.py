@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 
 from analysis.figures.drawing import (
     BLACK,
-    LAYER_COLOURS,
-    LAYER_MARKERS,
     axes_or_new,
     finish_axes,
+    series_style,
     shared_legend,
     stamp_if_simulated,
 )
@@ -45,11 +44,12 @@ def plot_layers_over_speed(
     for course, solid in zip(courses, (True, False), strict=False):
         values: Floats = getattr(course, quantity)
         for layer in range(values.shape[1]):
+            colour, marker = series_style(layer)
             ax.plot(
                 course.speeds_mm_s,
                 values[:, layer],
-                color=LAYER_COLOURS[layer % 7] if solid else BLACK,
-                marker=LAYER_MARKERS[(layer + layer // 7) % 7] if solid else "",
+                color=colour if solid else BLACK,
+                marker=marker if solid else "",
                 ls="-" if solid else "--",
                 lw=1.6 if solid else 0.9,
                 label=f"{course.label}, layer {layer + 1}" if solid or layer == 0 else None,

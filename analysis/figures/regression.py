@@ -9,10 +9,9 @@ from matplotlib.figure import Figure
 
 from analysis.figures.drawing import (
     GREY,
-    LAYER_COLOURS,
-    LAYER_MARKERS,
     axes_or_new,
     finish_axes,
+    series_style,
     shared_legend,
     stamp_if_simulated,
 )
@@ -37,13 +36,13 @@ def plot_centroid(courses: Sequence[CentroidOverSpeed], *, ax: Axes | None = Non
     """Mean over the forces with its standard deviation, and the regression on speed."""
     ax = axes_or_new(ax)
     for number, course in enumerate(courses):
-        colour = LAYER_COLOURS[number % 7]
+        colour, marker = series_style(number)
         ax.errorbar(
             course.speeds_mm_s,
             course.mean_hz,
             course.sd_hz,
             color=colour,
-            marker=LAYER_MARKERS[(number + number // 7) % 7],
+            marker=marker,
             lw=1.6,
             elinewidth=0.9,
             capsize=3,

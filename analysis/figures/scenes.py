@@ -18,6 +18,7 @@ from analysis.figures.drawing import (
     VERMILLION,
     axes_or_new,
     finish_axes,
+    series_style,
     stamp_if_simulated,
 )
 from modeling import CompiledScene
@@ -29,20 +30,23 @@ LABELS: dict[Cost, str] = {
     "bytes": "bytes of table and state",
 }
 HIGHEST_SHARE = 2.0  # beyond, a broken bound is drawn at the edge
-MOST_COLOURED = len(LAYER_COLOURS)
+PAIRS = len(LAYER_COLOURS) * len(LAYER_MARKERS)
+LINES = ("-", "--", "-.")
+LEGEND_COLUMNS, LEGEND_ROW_INCHES = 6, 0.22
 
 
 def figure_tradeoff(compiled: CompiledScene) -> Figure:
-    """Both costs along x, side by side."""
-    figure = Figure(figsize=(12, 5.4), layout="constrained")
+    """Both costs along x, side by side; every texture has an entry in the legend."""
+    handles = _legend(compiled.textures)
+    height = 5.0 + LEGEND_ROW_INCHES * -(-len(handles) // LEGEND_COLUMNS)
+    figure = Figure(figsize=(12, height), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     plot_tradeoff(compiled, "operations", ax=left)
     plot_tradeoff(compiled, "bytes", ax=right)
     right.set_ylabel("")
     figure.legend(
-        handles=_legend(compiled.textures), loc="outside upper center", ncols=6, frameon=False,
-        fontsize=9,
-    )  # fmt: skip
+        handles=handles, loc="outside upper center", ncols=LEGEND_COLUMNS, frameon=False, fontsize=9
+    )
     return figure
 
 
@@ -74,10 +78,10 @@ def plot_tradeoff(compiled: CompiledScene, cost: Cost, *, ax: Axes | None = None
 
 
 def _plot_texture(ax: Axes, texture: CompiledTexture, cost: Cost, number: int) -> None:
-    colour, marker = _style(number)
+    colour, marker, line = _style(number)
     costs = [getattr(step, cost) for step in texture.steps]
     shares = [min(step.share, HIGHEST_SHARE) for step in texture.steps]
-    ax.plot(costs, shares, color=colour, lw=1.2, alpha=0.8)
+    ax.plot(costs, shares, color=colour, ls=line, lw=1.2, alpha=0.8)
     ax.plot(costs[1:-1], shares[1:-1], color=colour, marker=marker, ms=3.5, lw=0)
     ax.plot(costs[:1], shares[:1], color=colour, marker=marker, ms=7, mfc="white", lw=0)
     ax.plot(costs[-1:], shares[-1:], color=colour, marker=marker, ms=8, mec=BLACK, lw=0)
@@ -88,18 +92,16 @@ def _plot_texture(ax: Axes, texture: CompiledTexture, cost: Cost, number: int) -
         ax.plot(*end, color=colour, marker="x", ms=6, lw=0, clip_on=False)
 
 
-def _style(number: int) -> tuple[str, str]:
-    return (
-        LAYER_COLOURS[number % len(LAYER_COLOURS)],
-        LAYER_MARKERS[number % len(LAYER_MARKERS)],
-    )
+def _style(number: int) -> tuple[str, str, str]:
+    """Colour, marker and line: 147 textures look different."""
+    return (*series_style(number), LINES[number // PAIRS % len(LINES)])
 
 
 def _legend(textures: Sequence[CompiledTexture]) -> list[Line2D]:
     handles = []
-    for number, texture in enumerate(textures[:MOST_COLOURED]):
-        colour, marker = _style(number)
-        handles.append(Line2D([], [], color=colour, marker=marker, label=texture.texture))
+    for number, texture in enumerate(textures):
+        colour, marker, line = _style(number)
+        handles.append(Line2D([], [], color=colour, marker=marker, ls=line, label=texture.texture))
     handles += [
         Line2D([], [], color=GREY, marker="o", mfc="white", lw=0, label="full model"),
         Line2D([], [], color=GREY, marker="o", mec=BLACK, ms=8, lw=0, label="least model"),

@@ -24,10 +24,13 @@ from analysis.figures.drawing import (
 )
 from analysis.labels import MODELS
 from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
+from modeling.recordings.spectrum import HIGH_PASS_HZ
 
 PANELS_IN_A_ROW = 3
 JUST_FELT_DASHES = (0, (1.2, 0.5))  # dense, since these lines are short
 LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side on a log axis
+# Recordings are modelled and drawn behind it, so a model drawn beside one has to be, too.
+BEHIND_HIGH_PASS = f"model, with the recording's {HIGH_PASS_HZ:g} Hz high-pass"
 AMPLITUDE_LABELS = {
     "energy": "amplitude of the sinusoid of equal power",
     "paper-fft": "single-sided FFT amplitude of the peak",
@@ -62,9 +65,17 @@ def plot_model_spectrum(
     """
     ax = axes_or_new(ax)
     frequency, response = comparison.frequency_hz, getattr(comparison, model)
-    if np.isfinite(comparison.recording).any():
+    recorded = bool(np.isfinite(comparison.recording).any())
+    if recorded:
         ax.plot(frequency, comparison.recording, color=GREY, lw=2.5, label="recording")
-    ax.plot(frequency, response, color=BLUE, lw=1.5, ls="--", label="model")
+    ax.plot(
+        frequency,
+        response,
+        color=BLUE,
+        lw=1.5,
+        ls="--",
+        label=BEHIND_HIGH_PASS if recorded else "model",
+    )
     labels = {False: "layer alone, not smoothed", True: "dropped layer alone"}
     for layer, dropped in enumerate(comparison.dropped):
         if dropped and model == "simplified":
@@ -212,7 +223,7 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
     )
     if panel.response.size:
         ax.plot(
-            panel.frequency_hz, panel.response, color=BLUE, lw=1.2, ls="--", label="model, smoothed"
+            panel.frequency_hz, panel.response, color=BLUE, lw=1.2, ls="--", label=BEHIND_HIGH_PASS
         )
     labelled = 0.0
     for x, y in zip(panel.layer_frequency_hz, panel.layer_height, strict=True):
@@ -227,7 +238,8 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
                 fontsize=8,
             )
     count = panel.layer_frequency_hz.size
-    ax.text(0.98, 0.9, f"{count} layer{'s' * (count != 1)}", transform=ax.transAxes, ha="right")
+    found = f"{count} layer{'s' * (count != 1)} found alone"
+    ax.text(0.98, 0.9, found, transform=ax.transAxes, ha="right", fontsize=8)
     log_frequency_axis(ax, panel.frequency_hz[-1])
     ax.set_yscale("log")
     # Few ticks: drawing them takes most of the time that a grid of 49 panels takes.

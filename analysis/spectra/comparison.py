@@ -24,7 +24,12 @@ from modeling.equalizer.bands import band_response
 from modeling.errors import shown
 from modeling.perception.simplification import layer_amplitudes_g
 from modeling.perception.verdicts import CriterionName
-from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
+from modeling.recordings.spectrum import (
+    SMOOTHING_HZ,
+    high_pass_response,
+    mean_spectrum,
+    smooth,
+)
 
 PANELS_PER_AXIS = 3
 THRESHOLD_REACH = 2**0.25  # a layer's threshold is drawn a quarter of an octave to both sides
@@ -44,8 +49,8 @@ class SpectrumComparison:
     frequency_hz : (n,) ndarray
         0 … rate/2.
     recording, full, simplified : (n,) ndarray
-        Magnitudes in g per unit noise, all smoothed alike (Gaussian, σ = 30 Hz); `recording` is
-        NaN where there is none.
+        Magnitudes in g per unit noise, all smoothed alike (Gaussian, σ = 30 Hz). `recording` is
+        NaN where there is none; where there is one, both models are behind its 10 Hz high-pass.
     layer_frequency_hz, layer_amplitude_g : (m,) ndarray
         Frequency and amplitude (g peak) of each layer of the full model here; the amplitude is
         the one that `criterion` compares with the threshold.
@@ -139,6 +144,7 @@ def compare_condition(
     _require_within_grid(full, speed_mm_s, force_n=force_n)
     frequency = np.arange(full.rate_hz // 2 + 1) if measured is None else measured.frequency_hz
     peq, fewer = (m.peq(speed_mm_s, force_n) for m in (full, simplification.model))
+    respond = _smoothed_response if measured is None else _prepared_response
     return SpectrumComparison(
         texture=full.texture,
         speed_mm_s=speed_mm_s,
@@ -146,8 +152,8 @@ def compare_condition(
         simulated=full.simulated,
         frequency_hz=frequency,
         recording=np.full(frequency.size, np.nan) if measured is None else measured.smoothed(),
-        full=_smoothed_response(peq, frequency),
-        simplified=_smoothed_response(fewer, frequency),
+        full=respond(peq, frequency),
+        simplified=respond(fewer, frequency),
         layer_frequency_hz=peq.frequencies_hz,
         layer_amplitude_g=layer_amplitudes_g(peq, criterion=simplification.criterion),
         layer_response=np.abs(peq.gains)[:, None] * np.abs(_bands(peq, frequency)),
@@ -163,6 +169,13 @@ def _smoothed_response(peq: PEQ, frequency_hz: Floats) -> Floats:
     """The model's response, smoothed as recordings are (Gaussian, σ = 30 Hz)."""
     step_hz = float(frequency_hz[1] - frequency_hz[0])
     return smooth(peq.response(frequency_hz), SMOOTHING_HZ, step_hz=step_hz)
+
+
+def _prepared_response(peq: PEQ, frequency_hz: Floats) -> Floats:
+    """The same behind the high-pass that recordings go through before they are modelled."""
+    step_hz = float(frequency_hz[1] - frequency_hz[0])
+    passed = high_pass_response(frequency_hz, rate_hz=peq.rate_hz)
+    return smooth(peq.response(frequency_hz) * passed, SMOOTHING_HZ, step_hz=step_hz)
 
 
 def _layer_thresholds(peq: PEQ, simplification: Simplification, *, frequency_hz: Floats) -> Floats:
@@ -211,7 +224,8 @@ class SpectrumPanel:
     layer_frequency_hz, layer_height : (m,) ndarray
         Where the layers are, and the smoothed spectrum's height there.
     response : (n,) ndarray
-        The fitted model's response, smoothed alike; empty where there is no model.
+        The fitted model's response behind the same 10 Hz high-pass, smoothed alike; empty where
+        there is no model.
     """
 
     title: str
@@ -271,7 +285,7 @@ def _panel(
     magnitude = measured.smoothed(SMOOTHING_HZ)
     response = np.zeros(0)
     if model is not None:
-        response = _smoothed_response(model.peq(*recording.condition), measured.frequency_hz)
+        response = _prepared_response(model.peq(*recording.condition), measured.frequency_hz)
     return SpectrumPanel(
         title=f"{recording.texture}, {recording.speed_mm_s:g} mm/s, {recording.force_n:g} N",
         unit=recording.unit,

@@ -251,7 +251,8 @@ def test_small_multiples_of_spectra_need_no_grid(results, count):
         assert "mm/s" in panel.title
         assert "SIMULATED" in texts(ax)
         assert ax.lines[1].get_xdata().tolist() == panel.layer_frequency_hz.tolist()
-        assert f"{panel.layer_frequency_hz.size} layer" in texts(ax)
+        count = panel.layer_frequency_hz.size
+        assert f"{count} layer{'s' * (count != 1)} found alone" in texts(ax)
     assert axes[0].get_ylabel() == "magnitude\n(g per unit noise)"
     assert axes[-1].get_xlabel() == "frequency (Hz)"
 

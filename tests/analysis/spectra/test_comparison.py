@@ -21,10 +21,12 @@ from analysis.figures.spectra import (
 )
 from analysis.spectra.comparison import compare_condition, compare_spectra, spectrum_panels
 from analysis.spectra.layers_over_grid import layers_over_grid
+from analysis.textures.results import TextureResult
 from modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify
 from modeling.estimation.estimators import find_layers
 from modeling.fitting.conditions import recording_spectra
-from modeling.recordings.spectrum import mean_spectrum, smooth
+from modeling.recordings.spectrum import high_pass_response, mean_spectrum, smooth
+from stimuli.planted.textures import record_texture
 from tests.refusals import refused
 
 pytestmark = pytest.mark.filterwarnings("error")
@@ -132,6 +134,18 @@ def test_recording_and_model_stand_in_one_picture(results) -> None:
     assert high > measured.max()
 
 
+def test_a_model_beside_a_recording_is_as_high_at_low_frequencies(model) -> None:
+    """Of white noise a recording lacks what lies below 10 Hz, and so do both models beside it."""
+    flat = replace(model, gains=np.zeros((2, 2, 3)), noise_gains=np.ones((2, 2)))
+    records = record_texture(flat, duration_s=20.0, seed=2)
+    result = TextureResult(records, flat, simplify(flat, Threshold.shipped("codec")))
+    shown = compare_spectra(result, speed_mm_s=100.0, force_n=1.0)
+    low = (shown.frequency_hz >= 10) & (shown.frequency_hz <= 30)
+    for model in (shown.full, shown.simplified):
+        assert (model / shown.recording)[low].mean() == pytest.approx(1.0, abs=0.04)
+        assert model[low].mean() < 0.9 * flat.noise_gains[0, 0]
+
+
 def marked_model(model: TextureModel) -> TextureModel:
     inherited = np.zeros(model.gains.shape, dtype=bool)
     unresolved, interpolated = inherited.copy(), np.zeros((2, 2), dtype=bool)
@@ -196,10 +210,11 @@ def test_panels_average_repeats_and_show_the_model_that_was_fitted(results) -> N
     alone = find_layers(measured[2][1], estimator="paper")
     assert np.array_equal(panels[1].layer_frequency_hz, alone.frequencies_hz)
     peq = model.peq(*first.condition)
-    expected = smooth(peq.response(mean.frequency_hz), 30.0, step_hz=2.0)
+    high_pass = high_pass_response(mean.frequency_hz, rate_hz=5000.0)
+    expected = smooth(peq.response(mean.frequency_hz) * high_pass, 30.0, step_hz=2.0)
     assert panels[0].response == pytest.approx(expected, rel=1e-12)
     figure = figure_spectra(panels)
     figure.draw_without_rendering()
-    assert "model, smoothed" in texts(figure)
+    assert "high-pass" in texts(figure)
     bare = figure_spectra(spectrum_panels(measured, estimator="paper"))
-    assert "model, smoothed" not in texts(bare)
+    assert "high-pass" not in texts(bare)

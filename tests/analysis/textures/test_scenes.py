@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pandas as pd
 import pytest
 
@@ -88,6 +90,27 @@ def test_the_picture_shows_every_texture_and_says_what_is_simulated(
     drawn = [line.get_xdata()[0] for line in figure.axes[0].lines if len(line.get_xdata())]
     assert compiled.textures[0].before.operations in drawn
     figure.canvas.draw()  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("count", [8, 100])
+def test_many_textures_look_different_and_all_are_in_the_legend(
+    compiled: CompiledScene, count: int
+) -> None:
+    first = compiled.textures[0]
+    # `texture` is the name of the full model.
+    many = tuple(
+        replace(first, full=replace(first.full, texture=f"wood {n}")) for n in range(count)
+    )
+    figure = figure_tradeoff(replace(compiled, textures=many))
+    entries = figure.legends[0].get_lines()[:count]
+    assert [line.get_label() for line in entries] == [f"wood {n}" for n in range(count)]
+    looks = {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in entries}
+    assert len(looks) == count
+    figure.draw_without_rendering()
+    legend = figure.legends[0].get_window_extent()
+    assert legend.x0 >= 0
+    assert legend.x1 <= figure.bbox.width
+    assert legend.y0 >= max(ax.get_window_extent().y1 for ax in figure.axes)
 
 
 def test_a_table_of_one_way_names_it(compiled: CompiledScene) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError, Recording, Spectrum, spectrum
 from modeling.recordings.spectrum import (
+    high_pass_response,
     mean_spectrum,
     prepare,
     smooth,
@@ -100,6 +101,16 @@ def test_high_pass_is_3_db_down_at_10_hz(make_recording: RecordingMaker) -> None
     # Fourth order: 24 dB an octave below, flat above (|H|² = 1/(1 + (10/f)⁸)).
     for f in (2.5, 5.0, 30.0, 90.0, 990.0):
         assert at(f) == pytest.approx(1 / np.sqrt(1 + (10 / f) ** 8), rel=2e-3)
+
+
+@pytest.mark.parametrize("rate_hz", [1000.0, 5000.0])
+def test_response_of_the_high_pass_is_butterworths(rate_hz: float) -> None:
+    """|H|² = 1/(1 + (tan(π·10/fs)/tan(πf/fs))⁸): order 4 through the bilinear transform."""
+    frequency = np.linspace(0.5, 0.49 * rate_hz, 200)
+    warped = np.tan(10 * np.pi / rate_hz) / np.tan(np.pi * frequency / rate_hz)
+    found = high_pass_response(frequency, rate_hz=rate_hz)
+    assert found == pytest.approx(1 / np.sqrt(1 + warped**8), rel=1e-6)
+    assert high_pass_response(np.array([0.0]), rate_hz=rate_hz) == pytest.approx(0, abs=1e-9)
 
 
 def test_mean_and_drift_are_removed(make_recording: RecordingMaker) -> None:
