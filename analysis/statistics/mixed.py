@@ -19,6 +19,7 @@ from analysis.statistics.design import MODEL, complete_participants, design
 from analysis.statistics.paired import CONFIDENCE, paired_test
 from modeling.arrays import Floats
 
+MOST_SIMPLEX_STEPS = 1000
 MIXED_MODEL, PAIRED = "mixed model", "paired t"
 MIXED_COLUMNS = (
     Column("term", is_name=True),
@@ -63,8 +64,8 @@ def fit_mixed(
 ) -> MixedFit | None:
     """Fit values = fixed effects + a random intercept and slope per person + noise.
 
-    Restricted maximum likelihood by `statsmodels.MixedLM`, from two starting points, of which the
-    fit with the higher likelihood is kept. docs/method/mixed-models.md#fitting
+    Restricted maximum likelihood by `statsmodels.MixedLM`: L-BFGS from two starting points, and
+    other optimizers from the better one. docs/method/mixed-models.md#fitting
 
     Parameters
     ----------
@@ -91,16 +92,10 @@ def fit_mixed(
         fe_params=np.zeros(fixed.shape[1]),
         cov_re=_random_covariance(values, fixed, random=random, people=people),
     )
-    fits = []
     # It warns of variances below 0.01, whatever their unit.
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        for start in (None, moments):
-            try:
-                fits.append(model.fit(start_params=start, method="lbfgs"))
-            except np.linalg.LinAlgError:
-                continue
-        best = max(fits, key=lambda each: float(each.llf), default=None)
+        best = _most_likely(model, starts=(None, moments))
         if best is None or not best.converged:
             return None
         errors = np.asarray(best.bse_fe, dtype=float)
@@ -115,6 +110,31 @@ def fit_mixed(
         slope_sd=slope_sd,
         residual_sd=float(np.sqrt(best.scale)),
     )
+
+
+def _most_likely(model: Any, *, starts: tuple[Any, ...]) -> Any:
+    """The fit with the highest likelihood, or None; Nelder and Mead only where BFGS fails, too."""
+    fits = [fit for start in starts if (fit := _fit(model, start, "lbfgs"))]
+    best = max(fits, key=_likelihood, default=None)
+    for method in ("bfgs", "nm"):
+        if best is None or (method == "nm" and best.converged):
+            break
+        polished = _fit(model, best.params_object, method)
+        # At one likelihood the last one counts: it says whether it has converged from there.
+        best = max(filter(None, (polished, best)), key=_likelihood)
+    return best
+
+
+def _fit(model: Any, start: Any, method: str) -> Any:
+    limits = {"maxiter": MOST_SIMPLEX_STEPS} if method == "nm" else {}
+    try:
+        return model.fit(start_params=start, method=method, **limits)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def _likelihood(fit: Any) -> float:
+    return float(fit.llf)
 
 
 def _random_covariance(
