@@ -125,7 +125,7 @@ def import_csv(
     labels : sequence of Label
         One per path.
     axis : {"x", "y", "z", "dft321"}, optional
-        Needed where a file has more than one column beside time.
+        Needed where a file has more than one column beside time, unless `named` names one axis.
     unit : {"g", "mg", "m/s2", "V", "mV", "arbitrary"}, optional
         Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
         `arbitrary`.
@@ -172,7 +172,7 @@ def import_csv_file(
     _check_unit(unit, "--unit")
     columns, warnings = _read_columns(path, named or {})
     time = _time_column(path, columns)
-    axes, found_unit = _chosen_axes(path, columns, axis)
+    axes, found_unit = _chosen_axes(path, columns, axis or _only_axis_of(named or {}))
     # Combined axes no longer show their limits, nor do resampled ones: they are looked for here.
     clipped_share = float(np.any([clipped_samples(one) for one in axes], axis=0).mean())
     rate_hz, axes, uneven, contradiction = _even(path, time, axes, columns, given_hz=rate_hz)
@@ -543,6 +543,12 @@ def _chosen_axes(path: Path, columns: dict[str, Floats], axis: Axis | None) -> t
             f"expected finite samples in {path.name}, got NaN or inf; repair or record again."
         )
     return samples, units.pop()
+
+
+def _only_axis_of(named: Mapping[str, str]) -> Axis | None:
+    """The axis whose column was named, where it is one: the others are other channels."""
+    axes = [axis for axis in AXES if axis in named]
+    return axes[0] if len(axes) == 1 else None
 
 
 def _names_of_axes(path: Path, names: Sequence[str], axis: Axis) -> list[str]:

@@ -25,7 +25,7 @@ from rig.importing.labels import Label, labels_from_table
 from tests.refusals import check_refusal, refused
 
 LABEL = Label("oak", 100.0, 1.0)
-CHANNEL_C = {"axis": "z", "mv_per_g": 1.0, "named": {"z": "Channel C"}}
+CHANNEL_C = {"mv_per_g": 1.0, "named": {"z": "Channel C"}}
 RATE_HZ = 3200.0
 
 
@@ -619,13 +619,15 @@ def test_a_sensitivity_of_what_is_no_voltage_is_refused(
         ),
         # PicoScope: units in a line of their own
         ("Time,Channel A,Channel B,Channel C\n(ms),(mV),(mV),(mV)\n", 1e3, "", CHANNEL_C),
+        # The same as its manual shows it: microseconds, blanks behind the separators
+        ("Time, Channel A, Channel B, Channel C\n(µs), (mV), (mV), (mV)\n", 1e6, "", CHANNEL_C),
         # WaveForms: comments, then the header
         (
             "#Digilent WaveForms Oscilloscope Acquisition\n#Device Name: Discovery2\n"
             "#Sample rate: 3200Hz\n\nTime (s),Channel 1 (V),Channel 2 (V),Channel 3 (V)",
             1.0,
             "",
-            {"axis": "z", "mv_per_g": 1000.0, "named": {"z": "Channel 3"}},
+            {"mv_per_g": 1000.0, "named": {"z": "Channel 3"}},
         ),
     ],
 )
