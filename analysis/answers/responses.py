@@ -70,7 +70,7 @@ class Responses:
     study_sha256 : str
         Of the study that was run; empty where the data do not say.
     planned : mapping of task to PlannedTask
-        How many are to take part, where the data set's description tells.
+        How many are to take part, where the data set's description states it.
     under_way : mapping of task to frozenset of str
         Participants with a session that lacks answers and may go on, as they have not dropped out.
     dropped_out : frozenset of str
@@ -179,7 +179,7 @@ def _done(answers: pd.DataFrame) -> PlannedTask:
 
 
 def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
-    """The answers without those of some participants, which `warnings` tell with the reasons.
+    """The answers without those of some participants, named in `warnings` with the reasons.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
         for kind in tables
     )
-    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
+    left_out = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
     return replace(
         responses,
         answers={task: table.reset_index(drop=True) for task, table in answers.items()},
@@ -222,7 +222,7 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
             for task, table in responses.answers.items()
         },
         under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
-        warnings=(*responses.warnings, *told),
+        warnings=(*responses.warnings, *left_out),
     )
 
 

@@ -1,6 +1,6 @@
-"""A bench: what rendering costs, beside what its users would run otherwise.
+"""A benchmark: the cost of rendering compared with alternatives.
 
-What came out: docs/method/rendering.md#cost.
+Results: docs/method/rendering.md#cost.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Effort:
 
     @property
     def parts(self) -> int:
-        """Parts of which progress is told: the turns, and the starts."""
+        """Parts of which progress is reported: the turns, and the starts."""
         return self.turns + 1
 
 
@@ -270,7 +270,7 @@ def bench_rendering(
     effort : Effort, optional
         How long to measure; the default takes about half a minute.
     progress : callable
-        Told each of the effort's `parts` that is done.
+        Called with each of the effort's `parts` when it is done.
 
     Raises
     ------

@@ -22,7 +22,7 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import MODELS
+from analysis.labels import MODELS, counted
 from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
 
 PANELS_IN_A_ROW = 3
@@ -83,7 +83,7 @@ def plot_model_spectrum(
             color=GREEN,
             lw=2.4,
             ls=JUST_FELT_DASHES,
-            label="" if layer else "gain at which the layer here would be just felt",
+            label="" if layer else "gain at which the layer would just be felt here",
         )
     # Far skirts of layers must not stretch the axis.
     lowest, highest = (
@@ -227,7 +227,7 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
                 fontsize=8,
             )
     count = panel.layer_frequency_hz.size
-    ax.text(0.98, 0.9, f"{count} layer{'s' * (count != 1)}", transform=ax.transAxes, ha="right")
+    ax.text(0.98, 0.9, counted(count, "layer"), transform=ax.transAxes, ha="right")
     log_frequency_axis(ax, panel.frequency_hz[-1])
     ax.set_yscale("log")
     # Few ticks: drawing them takes most of the time that a grid of 49 panels takes.

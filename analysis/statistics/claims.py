@@ -123,8 +123,8 @@ class Standing:
     highest_share_at_ends : float
         Above it no equality is concluded.
     sensitivity : str
-        `SHOWN` where the data show that people told surfaces apart that differ; `NOT_TESTED` where
-        nothing in them could; else how they failed.
+        `SHOWN` where the data show that participants told different surfaces apart;
+        `NOT_TESTED` where nothing in them could show it; else how they failed.
     unfinished : bool
         Whether participants or sessions are missing.
     """

@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
+from analysis.labels import counted
 from modeling import InputError
 from modeling.arrays import Floats
 
@@ -251,7 +252,7 @@ def without_rounding_noise(differences: Floats) -> Floats:
 def why_undefined(differences: Floats) -> str:
     """Why no t-test can be made of these differences; empty where one can."""
     if differences.size < 2:
-        return f"t undefined: {differences.size} participant(s)"
+        return f"t undefined: {counted(differences.size, 'participant')}"
     if np.ptp(differences) == 0:
         return "t undefined: no variation between participants"
     return ""

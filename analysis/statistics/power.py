@@ -160,11 +160,11 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
         came = {verdict for _, verdict in of_place} | {EQUIVALENT, INCONCLUSIVE}
         shown = {EQUIVALENT} if texture == EVERY_TEXTURE else came
         for n in sorted({n for n, _ in of_place}):
-            for told in (told for told in VERDICTS if told in shown):
-                hits = of_place.get((n, told), 0)
+            for verdict in (verdict for verdict in VERDICTS if verdict in shown):
+                hits = of_place.get((n, verdict), 0)
                 low, high = clopper_pearson(hits, simulations)
                 rows.append(
-                    (claim, texture, n, told, hits, simulations, hits / simulations, low, high)
+                    (claim, texture, n, verdict, hits, simulations, hits / simulations, low, high)
                 )
     return pd.DataFrame(rows, columns=names(POWER_COLUMNS))
 

@@ -14,11 +14,12 @@ import pandas as pd
 from scipy import stats
 
 from analysis.columns import Column, names
+from analysis.labels import counted
 from analysis.statistics.paired import ignoring_case, sign_flips_p
 from modeling.files.answer_tables import ENDS
 
 ALPHA = 0.05
-LEAST_ANSWERS = 5  # fewer tell nothing about how somebody answers
+LEAST_ANSWERS = 5  # fewer do not show how somebody answers
 
 AGREEMENT_COLUMNS = (
     Column("scale", is_name=True),
@@ -101,7 +102,7 @@ def agreement(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
 def _why_no_correlation(complete: pd.DataFrame) -> str:
     people, cells = complete.shape
     if people < 2 or cells < 2:
-        return f"undefined: {people} participant(s) with {cells} cell(s)"
+        return f"undefined: {counted(people, 'participant')} with {counted(cells, 'cell')}"
     values = complete.to_numpy(dtype=float)
     if np.ptp(values) == 0:
         return "undefined: all ratings are the same"
@@ -275,8 +276,8 @@ def answers_at_chance(
     for person, right, count, rate in people.itertuples(name=None):
         others = float(people["mean"].drop(person).mean())
         if not _differs(right, count, chance, "greater") and _differs(right, count, others, "less"):
-            told = f"{right:.0f} of {count:.0f} right ({rate:.0%}; chance {chance:.0%}, "
-            found.append((person, "right answers at chance", f"{told}the others {others:.0%})"))
+            rates = f"{right:.0f} of {count:.0f} right ({rate:.0%}; chance {chance:.0%}, "
+            found.append((person, "right answers at chance", f"{rates}the others {others:.0%})"))
     return _signs(found)
 
 

@@ -194,7 +194,7 @@ def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generat
 
 
 def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
-    """Whether people told surfaces apart that differ, as `Standing.sensitivity` says it.
+    """Whether participants told different surfaces apart, as `Standing.sensitivity` states it.
 
     Ratings show it by anchors, the forced choice by its reference; no other task can so far.
     """
@@ -246,7 +246,7 @@ def chance_of(task: str, answers: pd.DataFrame) -> float:
 
 
 def has_rates(task: str) -> bool:
-    """Whether shares of right answers with either model can be told: each trial has one of them."""
+    """Whether each model has a share of right answers: each trial has one of the models."""
     return "correct" in ANSWER_TABLES[task].measures and not ANSWER_TABLES[task].both_models
 
 

@@ -1,8 +1,8 @@
-"""The tests of answers in the atlas: what ceilings, careless raters and few subjects do to them.
+"""The tests of answers in the atlas: effects of ceilings, careless raters and few participants.
 
 Simulated are ratings of a full and a simplified model, one of each per rater, and answers of the
-forced choice; they go through the very functions of `analysis.statistics`. The same raters are
-drawn all along an axis, so that edges are clean.
+forced choice; they are analysed by the functions of `analysis.statistics` themselves. The same
+raters are drawn along the whole axis, so that edges are clean.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Test = Callable[[Floats], Floats]
 
 
 def ratings(studies: int, raters: int, *, mean: float, effect: float) -> tuple[Floats, Floats]:
-    """Latent ratings (studies, raters) of the full and of the simplified model, no end in sight."""
+    """Latent ratings (studies, raters) of the full and the simplified model, without a ceiling."""
     rng = generator([SEED, raters])
     person = mean + PERSON_SD * rng.standard_normal((studies, raters))
     noise = DIFFERENCE_SD / np.sqrt(2) * rng.standard_normal((2, studies, raters))
@@ -53,7 +53,7 @@ def ratings(studies: int, raters: int, *, mean: float, effect: float) -> tuple[F
 
 
 def careless(shape: tuple[int, ...], share: float) -> tuple[Bools, Floats]:
-    """Who answers without attending, (studies, raters), and their two answers, anywhere."""
+    """Who answers at random, (studies, raters), and their two answers, uniform on the scale."""
     rng = generator([SEED, 1, *shape])
     return rng.random(shape) < share, rng.uniform(0.0, HIGHEST, (2, *shape))
 
@@ -161,7 +161,7 @@ def _mean_near_the_end(share: float) -> float:
     return float(HIGHEST + _latent_sd() * stats.norm.ppf(share))
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def end_of_the_scale(column: float) -> float:
@@ -241,11 +241,11 @@ def never(column: float) -> float:
 
 
 # Bradley's (1978) liberal criterion of robustness: a nominal 5 % may be 2.5 to 7.5 %. Twice the
-# nominal level is called wrong.
+# nominal level counts as wrong.
 ALARMS, ALARMS_AT_MOST = 0.075, 0.1
-# Intervals of 95 %: one in ten that misses is twice what was promised, one in five four times.
+# Intervals of 95 %: one miss in ten is twice the nominal rate, one in five four times.
 MISSED, MISSED_AT_MOST = 0.1, 0.2
-# Of a power of 90 % as planned 80 % is what journals ask for at least, 50 % is a coin.
+# Planned power is 90 %; 80 % is the usual minimum, 50 % is a coin toss.
 POWER_LOST, POWER_LOST_AT_MOST = 0.1, 0.4
 # A difference that is understated by a tenth is within its usual standard error, by a third not.
 UNDERSTATED, UNDERSTATED_AT_MOST = 0.1, 0.33
@@ -259,8 +259,9 @@ FEW_JUDGES = Axis(name="participants", unit="", mild=30.0, severe=3.0, default=f
 # In the paper two of seven textures were recognised in about 60 % of the trials, one nearly always.
 ERRORS = Axis(name="wrong answers", unit="", mild=0.4, severe=0.002, default=0.4)
 A_CARELESS_ONE = (
-    "one rater of twenty who answers anywhere on the scale adds more variance than all others "
-    "have: leave such raters out by a rule that was fixed before, or look at the rank test beside"
+    "a single rater in twenty who answers at random adds more variance than all others together: "
+    "exclude such raters by a rule that was fixed beforehand, or consult the rank test reported "
+    "beside it"
 )
 
 
@@ -286,7 +287,7 @@ CASES: tuple[Case, ...] = (
         "difference of means",
         ENDS,
         measure=understated_at_the_end,
-        figure="share of the difference that is not seen",
+        figure="share of the difference that is missed",
         unit="",
         holds=UNDERSTATED,
         degrades=UNDERSTATED_AT_MOST,
@@ -313,11 +314,11 @@ CASES: tuple[Case, ...] = (
             method,
             FEW,
             measure=partial(false_alarms, test=test),
-            figure="differences found where there is none",
+            figure="differences found where none exists",
             unit="",
             holds=ALARMS,
             degrades=ALARMS_AT_MOST,
-            across="raters who answer anywhere",
+            across="raters who answer at random",
             columns={"none": NORMAL, "one in ten": WITH_CARELESS},
             theory=never,
             source="exact for symmetric differences"
@@ -368,7 +369,7 @@ CASES: tuple[Case, ...] = (
                 ERRORS,
                 rates_missed_near_one,
                 rate_of_no_interval,
-                "nobody errs: no interval",
+                "no errors, hence no interval",
             ),
         )
     ),

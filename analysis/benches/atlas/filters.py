@@ -36,7 +36,7 @@ from stimuli.planted.textures import CATALOGUE
 RATE_HZ = 5000.0
 CENTRE_HZ, WIDTH_HZ = 300.0, 40.0
 DURATION_S = {False: 0.25, True: 1.0}
-# People tell vibrations apart that differ by 1 to 2 dB in level.
+# People can tell vibrations apart that differ by 1 to 2 dB in level.
 HOLDS_DB, DEGRADES_DB = 1.0, 6.0
 # From the grid's lowest speed to its highest, 50 to 350 mm/s, are 2.8 octaves.
 STROKE_OCTAVES = 1.4

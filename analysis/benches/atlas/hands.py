@@ -1,4 +1,4 @@
-"""Renderings under a hand: late, noisy and unsigned readings, steps, other rates, crests.
+"""Renderings for a moving hand: late, noisy and unsigned readings, steps, other rates, crests.
 
 Theory and how to read it: docs/stability.md#hands.
 """
@@ -199,7 +199,7 @@ _click = partial(
 _error = partial(
     Case,
     family="hands",
-    figure="difference from a rendering that knows the hand",
+    figure="difference from a rendering with the exact hand movement",
     unit="dB",
     holds=HOLDS_ERROR_DB,
     degrades=DEGRADES_ERROR_DB,
@@ -212,7 +212,7 @@ CASES: tuple[Case, ...] = (
             method=read,
             ours=read == SIGNED,
             axis=_INTERVAL,
-            figure="error of the speed in force",
+            figure="error of the speed in use",
             unit="mm/s",
             holds=HOLDS_MM_S,
             degrades=DEGRADES_MM_S,
@@ -285,7 +285,7 @@ CASES: tuple[Case, ...] = (
         measure=at_rate,
         across="which level",
         columns={"whole level": WHOLE_LEVEL, "third octaves": THIRD_OCTAVES},
-        exception="skirts near the model's Nyquist frequency do not stay the same at other rates; "
+        exception="skirts near the model's Nyquist frequency change at other rates; "
         "stimulus sets render at the model's rate and resample",
     ),
     Case(
@@ -302,6 +302,6 @@ CASES: tuple[Case, ...] = (
         columns={"1 s": 1.0},
         theory=_peaky_edge_hz,
         source="excess kurtosis −1.2·1.5·πB/fs (Cornish & Fisher 1938)",
-        exception="lower peaks are no fault: the spectrum is the same, and less is clipped",
+        exception="lower peaks are not an error: the spectrum is the same and less is clipped",
     ),
 )

@@ -1,8 +1,8 @@
-"""Peak finding in the atlas: what the estimators make of spectra that are hard to read.
+"""Peak finding in the atlas: how the estimators perform on difficult spectra.
 
-Planted are layers that a user would expect to be found. Each trouble is a function that makes
-recordings of them, each figure one of what was planted and what was found; both see the same draws
-of layers and noise all along an axis, so that edges are clean.
+The planted layers are ones that a user would expect to be found. Each difficulty is a function that
+makes recordings of them, each figure compares planted with found layers; both use the same draws
+of layers and noise along the whole axis, so that edges are clean.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def measured(
     figure: Callable[[Found], float],
     draws: dict[bool, int] = DRAWS,
 ) -> float:
-    """The figure of what an estimator finds in recordings in such trouble."""
+    """The figure for what an estimator finds in recordings with this difficulty."""
     found = []
     for draw in range(draws[full]):
         truth, recordings = trouble(generator([SEED, draw]), value, column)
@@ -161,7 +161,7 @@ def slowing(rng: np.random.Generator, drift_percent: float, column: float) -> Sp
     return truth, [_recording(np.interp(at * RATE_HZ, np.arange(wide.size), wide))]
 
 
-# What is wrong with what was found.
+# Errors of the found layers.
 
 
 def wrong_share(found: Found) -> float:
@@ -222,7 +222,7 @@ def _levels_g(layers: PEQ) -> Floats:
     return band_rms(np.abs(layers.gains), layers.bandwidths_hz, rate_hz=RATE_HZ)
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def evidence(expected: Floats, without: Floats) -> float:
@@ -288,10 +288,10 @@ def rate_error_allowed(column: float) -> float:
     return FREQUENCY_PERCENT
 
 
-# A wrong layer is one more to be named, judged against a threshold and rendered; one in ten can be
-# looked at one by one, one in three makes the list useless.
+# Each wrong layer must be named, compared with a threshold and rendered; one in ten can be checked
+# individually, one in three makes the list useless.
 WRONG, WRONG_AT_MOST = 0.1, 0.33
-# People tell vibrations apart from a difference of about 1 dB; 3 dB are twice the power.
+# People can tell vibrations apart that differ by about 1 dB or more; 3 dB are twice the power.
 LEVEL_DB, LEVEL_DB_AT_MOST = 1.0, 3.0
 # Of vibrations at the fingertip, frequencies that differ by less than about 5 to 10 % feel alike;
 # 20 % is a sixth of an octave and more than any neighbour of a texture's layers moves by chance.
@@ -304,7 +304,7 @@ LENGTH = Axis(name="record length", unit="s", mild=2.0, severe=0.05, default=1.0
 SPACING = Axis(
     name="spacing of two layers", unit="widths", mild=8.0, severe=0.5, default=USUAL_SPACING
 )
-# Crests of a vibration are about four times its RMS; who sets the range so has them in it.
+# Crests of a vibration are about four times its RMS; a range set to that contains them.
 OVERLOAD = Axis(name="RMS over the sensor's limit", unit="", mild=0.1, severe=3.0, default=0.25)
 # Clocks of usual converters are within 0.01 %.
 WRONG_RATE = Axis(name="error of the declared rate", unit="%", mild=0.01, severe=50.0, default=0.01)
@@ -318,9 +318,9 @@ EITHER = "paper, either reading"  # both readings find the same peaks
 READINGS = {JOINT: "joint", "paper": "paper", "paper-consistent": "paper-consistent"}
 ESTIMATOR_OF = READINGS | {EITHER: "paper"}
 ONE_RECORD = (
-    "from one record of a second, layers 15 Hz wide that are less than about four widths apart are "
-    "read as one wider layer, since the choice of their number is cautious; give the number where "
-    "it is known"
+    "in a single record of one second, layers 15 Hz wide that are less than about four widths "
+    "apart are read as one wider layer, because the choice of the number of layers is cautious; "
+    "specify the number where it is known"
 )
 ASKED_FOR = "log likelihood that a layer of 20 Hz is expected to gain = that asked for (6)"
 

@@ -108,7 +108,7 @@ def neighbouring(spacing_widths: float, column: float) -> tuple[Floats, Floats]:
     return frequency, np.full(frequency.shape, HEIGHT)
 
 
-# What is wrong with what was found.
+# Errors of the tracked layers.
 
 
 def wrong_names(fitted: Fitted) -> float:
@@ -139,7 +139,7 @@ def changing_level_error_db(fitted: Fitted) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def half_the_gap(column: float) -> float:
@@ -152,9 +152,9 @@ def spacing_of_merging(column: float) -> float:
     return float(2 * np.hypot(SMOOTHING_HZ, WIDTH_HZ / BANDWIDTH_PER_S) / WIDTH_HZ)
 
 
-# One name in five is a slip that a look at the figure finds; two in five are two layers mixed up.
+# One wrong name in five is visible in the figure; two in five mean two layers are confused.
 WRONG, WRONG_AT_MOST = 0.2, 0.4
-# As for peaks: people tell vibrations apart from about 1 dB on; 3 dB are twice the power.
+# As for peaks: people can tell apart differences of about 1 dB or more; 3 dB are twice the power.
 LEVEL_DB, LEVEL_DB_AT_MOST = 1.0, 3.0
 
 JOINT, EITHER = "joint", "paper, either reading"  # both readings find and name the same peaks

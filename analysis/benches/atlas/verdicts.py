@@ -140,7 +140,7 @@ def _share(happened: Bools, counted: Bools) -> float:
     return float(happened[counted].mean()) if counted.any() else float("inf")
 
 
-# Where theory says that they should fail: levels with normal errors of the least deviation.
+# Where theory predicts failure: levels with normal errors of the least deviation.
 
 
 @lru_cache(maxsize=4)
@@ -207,10 +207,10 @@ def never(duration_s: float) -> float:
     return float("nan")
 
 
-# A layer that can be felt and is left out changes the texture: P(flip) promises one in twenty; one
-# in five would make simplified models guesswork.
+# Dropping a layer that can be felt changes the texture: P(flip) allows one in twenty; one in five
+# would make simplified models unreliable.
 WRONG, WRONG_AT_MOST = 0.05, 0.2
-# A layer that is kept in vain costs a filter and nothing that is felt, so more of it may pass.
+# A layer kept unnecessarily costs a filter and changes nothing that is felt, so limits are wider.
 IN_VAIN, IN_VAIN_AT_MOST = 0.2, 0.5
 
 ALL_RULES, BY_LEVEL = "all rules", "paper's rule"
