@@ -58,8 +58,9 @@ def simplification_outcomes(gfc: pd.DataFrame) -> list[Outcome]:
     simple = gfc[gfc["model"] == "simplified"].set_index("texture")
     dropped = full["layers"] - simple["layers"]
     loss = full["gfc30_mean"] - simple["gfc30_mean"]
+    layers = counted(int(full["layers"].sum()), "layer")
     sentences = [
-        f"Simplification dropped {dropped.sum()} of {counted(int(full['layers'].sum()), 'layer')}, in "
+        f"Simplification dropped {dropped.sum()} of {layers}, in "
         f"{(dropped > 0).sum()} of {counted(len(full), 'texture')}; the models need "
         f"{simple['parameters'].sum()} instead of {full['parameters'].sum()} numbers per "
         "condition.",
