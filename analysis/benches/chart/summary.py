@@ -209,7 +209,7 @@ class Comparison:
             farther += f", during strokes {self.stroking.text()} times"
         counted = f"{self.operations.text()} times the operations and " * self.is_counted_alike
         costs = f"{counted}{self.numbers.text()} times the numbers"
-        return f"{farther[:1].upper()}{farther[1:]}. It needs {costs}; {self.verdict}."
+        return f"{farther[:1].upper()}{farther[1:]}. {self.rival} needs {costs}; {self.verdict}."
 
 
 def _is_counted_alike(rival: str) -> bool:

@@ -593,7 +593,7 @@ def test_pilots_are_told(study_folder, write_task, absolute_rows):
     columns = [*_absolute_columns(), "pilot"]
     write_task("absolute", [[*row, "true"] for row in absolute_rows], columns=columns)
     among_others = load_responses(study_folder)
-    told = "sub-01 absolute ses-01 was a pilot; its answers are no data of the study"
+    told = "sub-01 absolute ses-01 was a pilot; its answers are not data of the study"
     assert among_others.warnings == (f"{told} and are left out.",)
     assert among_others.absolute.empty
     description = study_folder / "dataset_description.json"

@@ -166,7 +166,7 @@ def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan)
         "Claims fixed before the first answer: 1 (preregistration page: 0a0a0a0a0a0a…)."
     )
     assert sentences[1] == "Planned exclusion: Trials in which the rig failed are repeated."
-    assert "others ran under 0b0b0b0b0b0b…" in sentences[2]
+    assert "other sessions ran under 0b0b0b0b0b0b…" in sentences[2]
     assert sentences[3] == (
         "Exploratory, since not in the plan: rated similarity of frequency pattern; correct rate."
     )
