@@ -170,7 +170,7 @@ def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan)
     assert sentences[3] == (
         "Exploratory, since not in the plan: rated similarity of frequency pattern; correct rate."
     )
-    assert "answers: sub-05 (MDF)." in sentences[4]
+    assert "answers are incomplete: sub-05 (MDF)." in sentences[4]
     assert sentences[-1] == "On reading the answers: sub-09 relative ses-01 was a pilot."
 
 
