@@ -1,4 +1,4 @@
-"""How the hand moved while people judged: read from what sessions stored beside the answers.
+"""Hand movement during the trials, read from the files that sessions store beside the answers.
 
 docs/method/reliability.md#hand
 """

@@ -1,4 +1,4 @@
-"""Read what the experiments wrote: one folder of tab-separated files, checked before use."""
+"""Read the output of the experiments: one folder of tab-separated files, checked before use."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from modeling.files.tables import check_named_once, csv_cells, unguarded
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
-# What a session may differ in where its manifest records why, and under which word.
+# In what a session may differ if its manifest records the reason, and under which word.
 _MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
-# Times to the millisecond: nobody has as many of them in common with somebody else by chance.
+# Times to the millisecond: two participants do not have so many equal ones by chance.
 FEWEST_TIMES = 3
 _DERIVE = "delete it, and tactileq study status makes it again from the session's log"
 
@@ -234,7 +234,7 @@ def _json_object(path: Path) -> Mapping[str, object]:
 
 
 def _dropped_out(path: Path, *, simulated: bool) -> frozenset[str]:
-    """Who will not come again, by the list of participants, which is checked."""
+    """Participants who dropped out, from the list of participants, which is checked."""
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
     table = _read_lines(path)
@@ -397,7 +397,7 @@ def _overridden(sidecar: Mapping[str, object], what: str, *, warnings: list[str]
     records = [r for r in stated if isinstance(r, Mapping)] if isinstance(stated, list) else []
     for record in records:
         warnings.append(
-            f"{what} went on against a rule ({record.get('what')}): {record.get('reason')}."
+            f"{what} was continued against a rule ({record.get('what')}): {record.get('reason')}."
         )
     return frozenset(str(record.get("what")) for record in records)
 

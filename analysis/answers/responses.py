@@ -1,4 +1,4 @@
-"""The answers of a study as all else sees them: what is there, what is missing, who is left out."""
+"""The answers of a study as used by all analyses: present, missing and excluded answers."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Responses:
     simulated_participants : bool
         True where no person took part.
     simulated_rig : bool
-        True where no real rig was used, so that nobody felt a real surface.
+        True where no real rig was used, so that no participant felt a real surface.
     training : mapping of task to DataFrame
         The training trials, same columns; no statistic uses them.
     anchors : mapping of task to DataFrame
@@ -74,11 +74,11 @@ class Responses:
     under_way : mapping of task to frozenset of str
         Participants with a session that lacks answers and may go on, as they have not dropped out.
     dropped_out : frozenset of str
-        Participants who will not come again, and whose places others take.
+        Participants who will not return and are replaced by others.
     setups : int
-        How many ran the study, each as it was planned, all with the planned numbers together.
+        Number of set-ups that ran the study, each as planned, with the planned numbers in total.
     warnings : tuple of str
-        What was dropped on reading and why, and which sessions ended early, one sentence each.
+        What was dropped on reading and why, and which sessions ended early; one sentence each.
     """
 
     answers: Mapping[str, pd.DataFrame]

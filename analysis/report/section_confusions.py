@@ -40,7 +40,7 @@ INFORMATION_COLUMNS = (
     Column("trials"),
     Column("uncorrected", "as counted", "bit"),
     Column("bits", "corrected", "bit"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
 )
 CHANGE_COLUMNS = (

@@ -1,4 +1,4 @@
-"""How far answers can be relied on: agreement, repeatability, ends of the scale, carelessness.
+"""Reliability of the answers: agreement, repeatability, ends of the scale, carelessness.
 
 docs/method/reliability.md
 """
@@ -109,7 +109,7 @@ def _why_no_correlation(complete: pd.DataFrame) -> str:
     # Rounding noise of a perfect agreement would be divided by itself.
     residuals = values - values.mean(axis=0) - values.mean(axis=1, keepdims=True) + values.mean()
     if np.abs(residuals).max() < 1e-9:
-        return "undefined: participants differ in nothing but their mean"
+        return "undefined: participants differ only in their mean"
     return ""
 
 
@@ -133,7 +133,7 @@ def _correlations(complete: pd.DataFrame) -> dict[str, dict[str, float]]:
 
 
 def rater_table(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
-    """How each participant used a scale, and how far their repeated ratings lie apart.
+    """How each participant used a scale, and how much their repeated ratings differ.
 
     docs/method/reliability.md#repeatability
 
@@ -248,7 +248,7 @@ def answers_at_chance(
     """Participants who are not shown to be above chance where the group is.
 
     Their right answers are not above chance and below the others' mean rate (exact binomial tests,
-    each one-sided at 5 %), so that nobody is named for having had few trials; the group's rates are
+    each one-sided at 5 %), so that nobody is named because of few trials; the group's rates are
     above chance by sign flips (one-sided, 5 %).
 
     docs/method/reliability.md#careless-answers

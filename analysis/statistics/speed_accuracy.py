@@ -1,4 +1,4 @@
-"""Speed and accuracy of people: time against correctness, two models side by side.
+"""Speed and accuracy of answers: time against correctness, for two models.
 
 docs/method/speed-accuracy.md
 """
@@ -344,7 +344,7 @@ def _compared(values: Floats, as_ratio: bool, *, rng: np.random.Generator) -> di
 def right_and_wrong(
     answers: pd.DataFrame, *, models: Sequence[str], rng: np.random.Generator
 ) -> pd.DataFrame:
-    """Whether wrong answers take another time than right ones, paired over participants.
+    """Whether response times differ between wrong and right answers, paired over participants.
 
     docs/method/speed-accuracy.md#right-and-wrong-answers
 

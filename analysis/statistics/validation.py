@@ -1,4 +1,4 @@
-"""The procedures on planted truth: coverage, type I error and power, where they hold and where not.
+"""The procedures on planted truth: coverage, type I error and power in several situations.
 
 docs/method/validation.md
 """
@@ -51,7 +51,7 @@ VALIDATION_COLUMNS = (
     Column("planted"),
     Column("simulations"),
     Column("estimate", format=".3f"),
-    Column("ci_low", "95 % CI from", format=".3f"),
+    Column("ci_low", "95% CI from", format=".3f"),
     Column("ci_high", "to", format=".3f"),
     Column("nominal", format=".3f"),
     Column("within", "nominal within", is_name=True),
@@ -59,7 +59,7 @@ VALIDATION_COLUMNS = (
 )
 # What it means that the nominal value lies below the interval, and that it lies above it.
 MEANINGS = {
-    COVERAGE: ("covers more often than promised", "covers too rarely"),
+    COVERAGE: ("covers more often than nominal", "covers too rarely"),
     TYPE_I: ("errs too often", "errs less often than allowed"),
     POWER: ("finds it more often", "finds it less often"),
 }
@@ -162,7 +162,7 @@ def _each_size(values: Floats) -> Iterator[tuple[NDArray[np.intp], Floats]]:
 
 
 def _hits_of_rows(values: Floats, judge: Callable[[Floats], Hits]) -> Hits:
-    """What a procedure says of each row of (k, n) values; no where it can say nothing."""
+    """The result of a procedure for each row of (k, n) values; no where it has none."""
     hits = np.zeros(len(values), dtype=bool)
     for which, complete in _each_size(values):
         hits[which] = judge(complete)

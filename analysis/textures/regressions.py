@@ -1,4 +1,4 @@
-"""What the parameters say: tables 1 and 2 and figure 5 of the paper, and what regressions cost."""
+"""Regressions of the parameters: tables 1 and 2 and figure 5 of the paper, and their loss."""
 
 from __future__ import annotations
 
@@ -399,7 +399,7 @@ DRIVING_COLUMNS = (
 
 
 def driving_table(driven: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """What the grid's numbers buy: grid, regressions and centroid against the recordings.
+    """Grid, regressions and centroid compared with the recordings, with the numbers they need.
 
     Parameters
     ----------

@@ -583,7 +583,9 @@ def test_a_session_that_went_on_against_a_rule_is_told(
     record = {"what": what, "reason": "the disk was lost"}
     sidecar.write_text(json.dumps({key: value, "Overrides": [record]}))
     (told,) = load_responses(study_folder).warnings
-    assert told == (f"sub-01 absolute ses-01 went on against a rule ({what}): the disk was lost.")
+    assert told == (
+        f"sub-01 absolute ses-01 was continued against a rule ({what}): the disk was lost."
+    )
     sidecar.write_text(json.dumps({key: value, "Overrides": [{**record, "what": "same date"}]}))
     with refused(InputError, names=[key, sidecar, "dataset_description.json"]):
         load_responses(study_folder)
