@@ -71,6 +71,8 @@ class Column:
         if self.is_p_value:
             return p_value(value)
         shown = f"{value:{self.format}}" if self.format else _three_digits(value)
+        if not set(shown) & set("123456789"):
+            shown = shown.lstrip("-")  # a zero has no sign
         return shown.replace("-", "−")
 
     def tooltip(self, value: object) -> str:

@@ -15,7 +15,7 @@ from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import AT, BETWEEN, LOADED, STROKING
 from analysis.benches.chart.methods import OURS, TRUTH, WHITE
 from analysis.benches.chart.summary import competing, default_rows, front_of
-from analysis.benches.chart.surfaces import KINDS, Kind
+from analysis.benches.chart.surfaces import Kind, counted_kind
 from analysis.figures.drawing import (
     BLACK,
     BLUE,
@@ -90,9 +90,9 @@ def figure_chart(chart: Chart, kind: Kind) -> Figure:
     shared_legend(figure, [_keys(axes[0], summary)], ncols=5)
     count = int(summary["surfaces"].max())
     figure.supxlabel(
-        f"{count} {KINDS[kind]}; markers: medians with default rendering (updates each ms, FFT by "
-        "blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black line: "
-        "the front, which no variant beats in both; numbers: layers, orders;\noperations of "
+        f"{counted_kind(count, kind)}; markers: medians with default rendering (updates each ms, "
+        "FFT by blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black "
+        "line: the front, which no variant beats in both; numbers: layers, orders;\noperations of "
         "autoregressive filters include computing coefficients at every update; ours are read from "
         "a table",
         fontsize=8.5,

@@ -18,7 +18,7 @@ from analysis.benches.chart.summary import (
     comparison_table,
     default_rows,
 )
-from analysis.benches.chart.surfaces import KINDS
+from analysis.benches.chart.surfaces import KINDS, counted_kind
 from analysis.columns import names, without
 from analysis.figures.chart import STYLES, figure_chart
 from analysis.figures.saving import png_of, warn_of_missing_fonts
@@ -156,7 +156,7 @@ def chart_section(chart: Chart) -> Section:
 
 def _counted(chart: Chart) -> str:
     surfaces = chart.rows.groupby("kind", sort=False)["surface"].nunique()
-    return ", ".join(f"{surfaces[kind]} {KINDS[kind]}" for kind in chart.kinds)
+    return ", ".join(counted_kind(surfaces[kind], kind) for kind in chart.kinds)
 
 
 def chart_files(chart: Chart) -> dict[str, bytes]:

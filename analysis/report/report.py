@@ -56,9 +56,7 @@ from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.writing import write_text
 
-LEAD = (
-    "Surfaces recorded, modelled, simplified by detection thresholds, and judged by participants."
-)
+LEAD = "Surfaces recorded, modelled, simplified by detection thresholds, and judged."
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 

@@ -22,6 +22,7 @@ from analysis.benches.atlas.tables import (
 from analysis.columns import chosen, names, without
 from analysis.figures.atlas import figure_atlas
 from analysis.figures.saving import png_of, svg_of, warn_of_missing_fonts
+from analysis.labels import counted
 from analysis.report.findings import table_bytes
 from analysis.report.outcomes import Outcome
 from analysis.report.page import (
@@ -112,7 +113,7 @@ def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
     ] * bool(len(margins))
     sentences += [
         f"The default of {row['method']} ({row['family']}, {row['axis']}) {_how_close(row)}; "
-        f"{row['exception'] or 'unexplained'}."
+        f"{row['exception'] or 'this small margin is unexplained'}."
         for row in margins[~margins["enough"].astype(bool)].to_dict("records")
     ]
     factors = edges["disagreement"].to_numpy(dtype=np.float64)
@@ -120,8 +121,8 @@ def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
     if factors.size:
         off = np.exp(np.abs(np.log(factors)))
         sentences.append(
-            f"Where theory predicts up to where a method holds ({factors.size} edges), the "
-            f"measured edge deviates from it by a factor of {np.median(off):.2f} in the median and "
+            f"Where theory predicts an edge ({counted(factors.size, 'edge')}), the measured one "
+            f"deviates from it by a factor of {np.median(off):.2f} in the median and "
             f"{off.max():.2f} at worst."
         )
     return described(sentences)

@@ -283,7 +283,7 @@ CASES: tuple[Case, ...] = (
         holds=HOLDS_LEVEL_DB,
         degrades=DEGRADES_LEVEL_DB,
         measure=at_rate,
-        across="which level",
+        across="level",
         columns={"whole level": WHOLE_LEVEL, "third octaves": THIRD_OCTAVES},
         exception="skirts near the model's Nyquist frequency change at other rates; "
         "stimulus sets render at the model's rate and resample",

@@ -423,7 +423,7 @@ CASES: tuple[Case, ...] = (
         for method in (JOINT, EITHER)
     ),
     *(
-        _case(method, HUM, with_hum, across="recorded at", columns=SPEED_COLUMNS)
+        _case(method, HUM, with_hum, across="number of recorded speeds", columns=SPEED_COLUMNS)
         for method in (JOINT, EITHER)
     ),
     *(_case(method, FADING, fading) for method in (JOINT, EITHER)),

@@ -203,7 +203,7 @@ CASES: tuple[Case, ...] = (
     ),
     *(_case(method, CROSSING, crossing) for method in (JOINT, EITHER)),
     *(
-        _case(method, CHANGE, changing, across="the layer is", columns=DIRECTIONS)
+        _case(method, CHANGE, changing, across="where the layer is gone", columns=DIRECTIONS)
         for method in (JOINT, EITHER)
     ),
     _case(JOINT, SPACING, neighbouring),
