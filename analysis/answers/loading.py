@@ -132,7 +132,7 @@ def _description(folder: Path) -> Mapping[str, object]:
     design, stated = description.get("StudyDesign"), description.get("StudySHA256")
     if isinstance(design, dict) and stated not in (None, found := sha256_of_values(design)):
         raise InputError(
-            f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
+            f"expected the StudyDesign in {path} to have the StudySHA256 stored with it, "
             f"{shortened_hash(str(stated))}, got {shortened_hash(found)}; restore the file."
         )
     return description

@@ -192,7 +192,7 @@ class RenderingBench:
 
     @property
     def aims(self) -> pd.DataFrame:
-        """Every aim beside what was measured: what, where, aim, measured, met.
+        """Every target with its measurement: what, where, aim, measured, met.
 
         By the operations that each form needs (docs/method/rendering.md#cost).
         """
@@ -259,7 +259,7 @@ class Turn(NamedTuple):
 def bench_rendering(
     effort: Effort | None = None, *, progress: Callable[[str], None] = lambda part: None
 ) -> RenderingBench:
-    """Time the kernel beside its rivals, everything in turn, so that no disturbance hits only one.
+    """Time the kernel and its rivals, all in turn, so that disturbances affect all of them.
 
     What is timed as a whole takes about as long for a fast filter as for a slow one (many samples
     of a fast one, one block of a slow one): the longer it took, the more of other load it would

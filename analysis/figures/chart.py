@@ -177,7 +177,7 @@ def _name_points(usual: pd.DataFrame, cost: str, error: str, *, ax: Axes) -> Non
 
 
 def _short(method: str) -> str:
-    """What stands beside a marker: of a family's steps the number alone."""
+    """The label of a marker: for the steps of a family only the number."""
     number = re.search(r"\d+", method)
     is_step = method.startswith(("joint, ", "AR("))
     return number.group() if number and is_step else SHORT.get(method, method)

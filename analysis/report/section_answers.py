@@ -140,9 +140,9 @@ def _planted_table(
     return Table(
         "planted_effects",
         "Verdicts compared with the planted differences",
-        "Planted: by how many points simulated participants rate the other model higher; beside it "
-        "what the tests concluded from their answers. Undecided: inconclusive, or a verdict that "
-        "was withheld.",
+        "Planted: by how many points simulated participants rate the other model higher; the "
+        "verdict is based on their answers. Undecided: inconclusive, or a verdict that was "
+        "withheld.",
         planted_verdicts(found, planted or {}),
         PLANTED_COLUMNS,
         simulated=True,

@@ -117,9 +117,9 @@ def _picture(
     return Picture(
         f"hand_{task}",
         f"Speed and force of the hand by model, {TASKS[task]}",
-        "Points: participants, with a line between the two models of each; beside them the mean "
-        "with its 95% confidence interval. Means over the textures that a participant judged with "
-        "both models.",
+        "Points: participants, with a line between the two models of each, and the mean with its "
+        "95% confidence interval. Means over the textures that a participant judged with both "
+        "models.",
         figure_hand(means, models=models, simulated=simulated),
         simulated,
     )

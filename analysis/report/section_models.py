@@ -77,10 +77,10 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
     table = Table(
         "left_out",
         "Prediction of left-out conditions (cross-validation)",
-        "A hand is hardly ever exactly at a recorded condition. Every second condition was left "
-        "out and predicted from its neighbours, by the model and by an autoregressive model. Level "
-        "error (absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) are "
-        "relative to the left-out recording, whose own scatter they include.",
+        "A hand is rarely exactly at a recorded condition. Every second condition was left out and "
+        "predicted from its neighbours, by the model and by an autoregressive model. Level error "
+        "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) are relative "
+        "to the left-out recording, whose own scatter they include.",
         summary,
         LEFT_OUT_COLUMNS,
         simulated,

@@ -57,7 +57,7 @@ VALIDATION_COLUMNS = (
     Column("within", "nominal within", is_name=True),
     Column("meaning"),
 )
-# What it means that the nominal value lies below the interval, and that it lies above it.
+# What a nominal value below the interval means, and one above it.
 MEANINGS = {
     COVERAGE: ("covers more often than nominal", "covers too rarely"),
     TYPE_I: ("errs too often", "errs less often than allowed"),
@@ -103,7 +103,7 @@ def _ceiling(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> 
 
 
 def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Of some participants any rating is as likely as any other."""
+    """Some participants answer at random, uniformly over the scale."""
     ratings = _normal(rng, shape, truth)
     random = rng.random(shape) < CARELESS
     ratings[random] = rng.uniform(0, 100, (*shape, 2))[random]
@@ -111,7 +111,7 @@ def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) ->
 
 
 def _aborted(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Who does not finish has no complete cells, whatever the ratings would have been."""
+    """Participants who do not finish have no complete cells, independently of their ratings."""
     ratings = _normal(rng, shape, truth)
     ratings[rng.random(shape) < ABORTED] = np.nan
     return ratings

@@ -177,7 +177,7 @@ SUPPORT_COLUMNS = (
 
 
 def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
-    """Support ratings and mean adjusted R² beside the published ones (PAPER table 2, left half).
+    """Support ratings and mean adjusted R² with the published ones (PAPER table 2, left half).
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ COEFFICIENT_COLUMNS = (
 
 
 def coefficient_table(regressions: pd.DataFrame) -> pd.DataFrame:
-    """Mean coefficients beside the published ones (PAPER table 2, right half).
+    """Mean coefficients with the published ones (PAPER table 2, right half).
 
     Parameters
     ----------

@@ -102,7 +102,7 @@ def noisy(value: float, column: float, *, every: int, full: bool) -> float:
 
 
 def lifted(value: float, column: float, *, form: str, full: bool) -> float:
-    """What a sudden loss of this share of the level adds above 1 kHz (dB).
+    """The level added above 1 kHz by a sudden loss of this share of the level (dB).
 
     The hand's force goes from 0.5 N, below which levels fall with force, to so much less. `form`:
     how the band is realised where gains are switched; "" for the program's own renderer.
@@ -114,7 +114,7 @@ def lifted(value: float, column: float, *, form: str, full: bool) -> float:
 
 
 def shifted(value: float, column: float, *, form: str, full: bool) -> float:
-    """What a sudden shift of a layer's frequency by this ratio adds above 1 kHz (dB)."""
+    """The level added above 1 kHz by a sudden frequency shift of a layer by this ratio (dB)."""
     del column
     before = (STEP_FROM_MM_S, 2.0)
     after = (STEP_FROM_MM_S * value, 2.0)
@@ -143,7 +143,7 @@ def at_rate(value: float, column: float, *, full: bool) -> float:
 
 
 def peaky(value: float, column: float, *, full: bool) -> float:
-    """By how much (dB) uniform noise is less peaky than Gaussian noise in a layer so wide (Hz)."""
+    """By how much (dB) peaks of uniform noise are below Gaussian ones in a layer this wide (Hz)."""
     return crest_difference_db(value, duration_s=column, streams=2 * STREAMS[full])
 
 
@@ -151,7 +151,7 @@ def peaky(value: float, column: float, *, full: bool) -> float:
 
 
 def _followed_edge_ms(read: str, column: float) -> float:
-    """The interval (ms) up to which the speed at the end of an update is known well enough."""
+    """The interval (ms) up to which the speed at the end of an update is accurate enough."""
     del column
     omega = 2 * math.pi * STROKE_HZ
     sample_s, steepest = 1 / RATE_HZ, FASTEST_MM_S * omega

@@ -74,7 +74,7 @@ def measured(
 
 
 def planted(rng: np.random.Generator, *, floor: float = USUAL_FLOOR) -> RandomTruth:
-    """Three layers, of which the weakest may stand so far over the floor (floor/height)."""
+    """Three layers, with a given floor relative to the weakest one (floor/height)."""
     frequency = np.array([rng.uniform(*span) for span in RANGES_HZ])
     widths = np.array(WIDTHS_HZ) * WIDTH_FACTOR ** rng.uniform(-1, 1, len(WIDTHS_HZ))
     heights = NOISE_GAIN / USUAL_FLOOR * 10 ** (rng.uniform(*LEVELS_DB, len(WIDTHS_HZ)) / 20)
@@ -107,7 +107,7 @@ def short(rng: np.random.Generator, duration_s: float, column: float) -> Spoilt:
 
 
 def crowded(rng: np.random.Generator, spacing: float, width_hz: float) -> Spoilt:
-    """Two pairs of equal layers, so many widths apart within a pair; powers add, without notch."""
+    """Two pairs of equal layers, a number of widths apart; powers add, without notch."""
     middles = np.array(PAIRS_HZ) * (1 + PAIR_RANGE * rng.uniform(-1, 1, len(PAIRS_HZ)))
     frequency = (middles[:, None] + spacing * width_hz * np.array([-0.5, 0.5])).ravel()
     widths = np.full(frequency.size, width_hz)
@@ -125,7 +125,7 @@ def clipped(rng: np.random.Generator, overload: float, column: float) -> Spoilt:
 
 
 def at_wrong_rate(rng: np.random.Generator, error_percent: float, column: float) -> Spoilt:
-    """Declared is a sampling rate this much above the true one."""
+    """The declared sampling rate is this much above the true one."""
     truth = planted(rng)
     return truth, [_recording(truth.record(rng=rng), rate_hz=RATE_HZ * (1 + error_percent / 100))]
 
@@ -153,7 +153,7 @@ def fading(rng: np.random.Generator, factor: float, column: float) -> Spoilt:
 
 
 def slowing(rng: np.random.Generator, drift_percent: float, column: float) -> Spoilt:
-    """All frequencies fall by so much of their middle value, as on a table that slows down."""
+    """All frequencies fall by a share of their middle value, as on a slowing turntable."""
     truth, n = planted(rng), round(RATE_HZ)
     wide = truth.record(rng=rng, duration_s=1.5)
     share = np.arange(n) / n - 0.5
@@ -165,14 +165,14 @@ def slowing(rng: np.random.Generator, drift_percent: float, column: float) -> Sp
 
 
 def wrong_share(found: Found) -> float:
-    """1 − F1: layers missed and layers that nobody planted, over those planted and found."""
+    """1 − F1: layers missed and spurious layers, over those planted and found."""
     matched = sum(int((_partners(truth, layers) >= 0).sum()) for truth, layers in found)
     both = sum(truth.layers.gains.size + layers.gains.size for truth, layers in found)
     return 1 - 2 * matched / both
 
 
 def level_error_db(found: Found) -> float:
-    """RMS error of the levels of layers that are found; infinite where less than half of them is.
+    """RMS error of the levels of the layers found; infinite where fewer than half are found.
 
     A level is that of a layer's own power, whatever its width and height are made of.
     """
@@ -226,13 +226,13 @@ def _levels_g(layers: PEQ) -> Floats:
 
 
 def evidence(expected: Floats, without: Floats) -> float:
-    """Gain of log likelihood to be expected from the true power of each line instead of another."""
+    """Expected gain of log likelihood from the true power of each line instead of another."""
     ratio = expected / without
     return float(np.sum(ratio - 1 - np.log(ratio)))
 
 
 def floor_of_no_evidence(column: float) -> float:
-    """The floor (over the layer) at which a lone layer, 20 Hz wide, gains no more than is asked."""
+    """The floor (over the layer) at which a lone layer, 20 Hz wide, gains just the minimum."""
     band = _bands(np.array([np.mean(RANGES_HZ[0])]), WIDTHS_HZ[0])[0]
 
     def surplus(log_floor: float) -> float:
@@ -244,7 +244,7 @@ def floor_of_no_evidence(column: float) -> float:
 
 @lru_cache(maxsize=8)
 def spacing_of_no_evidence(width_hz: float) -> float:
-    """Widths at which two layers gain no more than is asked for over the one nearest to them."""
+    """Widths at which two layers gain just the minimum over the best single layer."""
 
     def surplus(spacing: float) -> float:
         places = PAIRS_HZ[0] + spacing * width_hz * np.array([-0.5, 0.5])

@@ -81,7 +81,7 @@ def planted(frequency_hz: Floats, heights: Floats) -> TextureModel:
 
 
 def moving(jump: float, column: float) -> tuple[Floats, Floats]:
-    """Two layers rise together, from one speed to the next by this share of their gap."""
+    """Two layers rise together, by this share of their gap from one speed to the next."""
     rise = jump * GAP_HZ * np.arange(2.0)
     frequency = LOWEST_HZ + rise[:, None] + np.array([0.0, GAP_HZ])
     return frequency, np.full(frequency.shape, HEIGHT)
@@ -95,14 +95,14 @@ def crossing(step_widths: float, column: float) -> tuple[Floats, Floats]:
 
 
 def changing(factor: float, direction: float) -> tuple[Floats, Floats]:
-    """One layer is so much lower at the highest speed (direction 1), or at the lowest (−1)."""
+    """One layer is lower by this factor at the highest speed (direction 1) or the lowest (−1)."""
     fall = factor ** -np.linspace(0.0, 1.0, 3)[:: int(direction)]
     frequency = np.tile([STEADY_HZ, CHANGING_HZ], (3, 1))
     return frequency, HEIGHT * np.column_stack((np.ones(3), fall))
 
 
 def neighbouring(spacing_widths: float, column: float) -> tuple[Floats, Floats]:
-    """Two layers so near to each other at both speeds."""
+    """Two layers at this spacing at both speeds."""
     apart = spacing_widths * WIDTH_HZ * np.array([-0.5, 0.5])
     frequency = np.tile(CROSSING_HZ + apart, (2, 1))
     return frequency, np.full(frequency.shape, HEIGHT)
@@ -112,7 +112,7 @@ def neighbouring(spacing_widths: float, column: float) -> tuple[Floats, Floats]:
 
 
 def wrong_names(fitted: Fitted) -> float:
-    """Share of layers and conditions in which a layer is not where its name is elsewhere."""
+    """Share of layers and conditions in which a layer has a different name from elsewhere."""
     truth, model = fitted
     named = np.zeros((truth.n_layers, max(model.n_layers, truth.n_layers)))
     for true_hz, width_hz, found_hz in zip(
@@ -143,7 +143,7 @@ def changing_level_error_db(fitted: Fitted) -> float:
 
 
 def half_the_gap(column: float) -> float:
-    """Names go to the nearest layer: past half of the gap that is the neighbour."""
+    """Names go to the nearest layer: beyond half of the gap that is the neighbour."""
     return 0.5
 
 
