@@ -1,4 +1,4 @@
-"""What a column of a table holds, declared beside the function that computes it.
+"""The content of a table's columns, declared beside the function that computes it.
 
 A declaration lists a table's columns in their order. The report shows all or some of them, in the
 words and with the digits that they carry.
@@ -22,13 +22,13 @@ SHA256 = re.compile(r"[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its name in the file, and how people read it.
+    """A column: its name in the file, and how it is shown.
 
     Parameters
     ----------
     name : str
     label : str
-        What stands above it, without the unit; where empty, the name in words.
+        The heading without the unit; where empty, the name in words.
     unit : str
         Empty where the values have none, or different ones.
     format : str
@@ -59,7 +59,7 @@ class Column:
         return f"{label} ({self.unit})" if self.unit else label
 
     def text(self, value: object) -> str:
-        """A value as people read it, `n/a` where there is none; the exact one is in the file."""
+        """A value as shown, `n/a` where there is none; the exact one is in the file."""
         if self.is_hash and isinstance(value, str):
             return shortened_hash(value)
         if not isinstance(value, float):
@@ -71,6 +71,8 @@ class Column:
         if self.is_p_value:
             return p_value(value)
         shown = f"{value:{self.format}}" if self.format else _three_digits(value)
+        if not set(shown) & set("123456789"):
+            shown = shown.lstrip("-")  # a zero has no sign
         return shown.replace("-", "−")
 
     def tooltip(self, value: object) -> str:
@@ -117,7 +119,7 @@ def _three_digits(value: float) -> str:
 
 
 def shortened_hash(text: str) -> str:
-    """The first digits of a SHA-256, as many as tell files apart; any other text as it is."""
+    """The first digits of a SHA-256, enough to distinguish files; any other text as it is."""
     return f"{text[:HASH_DIGITS]}…" if SHA256.fullmatch(text) else text
 
 

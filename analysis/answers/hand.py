@@ -1,4 +1,4 @@
-"""How the hand moved while people judged: read from what sessions stored beside the answers.
+"""Hand movement during the trials, read from the files that sessions store beside the answers.
 
 docs/method/reliability.md#hand
 """
@@ -150,7 +150,7 @@ def _readings(path: Path) -> tuple[pd.DataFrame, float, float]:
     surface = sidecar.get("surface")
     levels = surface.get("Levels") if isinstance(surface, Mapping) else None
     numbers = levels.items() if isinstance(levels, Mapping) else ()
-    found = [number for number, told in numbers if told == _VIRTUAL]
+    found = [number for number, level in numbers if level == _VIRTUAL]
     if len(found) != 1 or not found[0].isdecimal():
         raise InputError(
             f'expected one number for "{_VIRTUAL}" among the Levels of surface in {sidecar_path}, '
@@ -185,6 +185,6 @@ def _table(
         table = table.set_axis(list(columns), axis=1) if columns else table
         return table[list(needed)].astype(dict.fromkeys(numbers, float))
     except (OSError, EOFError, zlib.error, ValueError, KeyError, OverflowError) as error:
-        told = shown((str(error) or type(error).__name__).splitlines()[0])
+        got = shown((str(error) or type(error).__name__).splitlines()[0])
         expected = f"a table with {len(columns)} columns" if columns else f"{', '.join(needed)}"
-        raise InputError(f"expected {expected} in {path}, got {told}; {_ADVICE}.") from None
+        raise InputError(f"expected {expected} in {path}, got {got}; {_ADVICE}.") from None

@@ -411,5 +411,5 @@ def _check_twice(rows: pd.DataFrame, mapping: TableMap) -> None:
     for row in rows[again].head(1).to_dict("records"):
         raise InputError(
             f"expected each participant and condition once, got {row['participant_id']} again in "
-            f"{row['where']}; remove it, or name the column that tells them apart as a factor."
+            f"{row['where']}; remove it, or name the column that distinguishes them as a factor."
         )

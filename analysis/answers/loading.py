@@ -1,4 +1,4 @@
-"""Read what the experiments wrote: one folder of tab-separated files, checked before use."""
+"""Read the output of the experiments: one folder of tab-separated files, checked before use."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from modeling.files.tables import check_named_once, csv_cells, unguarded
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
-# What a session may differ in where its manifest records why, and under which word.
+# In what a session may differ if its manifest records the reason, and under which word.
 _MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
-# Times to the millisecond: nobody has as many of them in common with somebody else by chance.
+# Times to the millisecond: two participants do not have so many equal ones by chance.
 FEWEST_TIMES = 3
 _DERIVE = "delete it, and tactileq study status makes it again from the session's log"
 
@@ -132,7 +132,7 @@ def _description(folder: Path) -> Mapping[str, object]:
     design, stated = description.get("StudyDesign"), description.get("StudySHA256")
     if isinstance(design, dict) and stated not in (None, found := sha256_of_values(design)):
         raise InputError(
-            f"expected the StudyDesign in {path} to have the StudySHA256 that stands beside it, "
+            f"expected the StudyDesign in {path} to have the StudySHA256 stored with it, "
             f"{shortened_hash(str(stated))}, got {shortened_hash(found)}; restore the file."
         )
     return description
@@ -191,7 +191,7 @@ class _Gathered:
 
 
 def _plan(description: Mapping[str, object], hashes: Iterable[str], *, path: Path) -> AnalysisPlan:
-    """The claims of the study as it was first run; none where the data do not tell the study."""
+    """The claims of the study as it was first run; none where the data do not state the study."""
     design = description.get("StudyDesign")
     stated = design.get("plan", {}) if isinstance(design, dict) else {}
     return plan_from(stated, sha256=tuple(hashes), path=path)
@@ -200,7 +200,7 @@ def _plan(description: Mapping[str, object], hashes: Iterable[str], *, path: Pat
 def _planned(
     description: Mapping[str, object], path: Path, *, trials: Mapping[str, Collection[int]]
 ) -> dict[str, PlannedTask]:
-    """Participants and sessions of each task in the study's design; none where it is not told.
+    """Participants and sessions of each task in the study's design; none where it is not stated.
 
     `trials` are the numbers of main trials of sessions that were begun; where they have one number,
     all others have it, too.
@@ -234,7 +234,7 @@ def _json_object(path: Path) -> Mapping[str, object]:
 
 
 def _dropped_out(path: Path, *, simulated: bool) -> frozenset[str]:
-    """Who will not come again, by the list of participants, which is checked."""
+    """Participants who dropped out, from the list of participants, which is checked."""
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
     table = _read_lines(path)
@@ -325,13 +325,13 @@ def _load_session(
     gathered.add(sidecar)
     table = _valid(table, what, warnings=warnings)
     if (pilot := table["pilot"] == "true").any():
-        told = "its answers are no data of the study"
+        answers = "its answers are not data of the study"
         if not origin.get("Pilot", False):
             table = table[~pilot].reset_index(drop=True)
             gathered.pilots.add((task, participant, session))
-            told += " and are left out"
-        warnings.append(f"{what} was a pilot; {told}.")
-    # Where the order is not there, as in data that were published, the sidecar alone tells.
+            answers += " and are left out"
+        warnings.append(f"{what} was a pilot; {answers}.")
+    # Without the order, as in published data, only the sidecar says so.
     is_whole = not owed if planned else sidecar.get("Status", "complete") == "complete"
     if len(table) and not is_whole:
         gathered.under_way.setdefault(task, set()).add(participant)
@@ -355,7 +355,7 @@ def _planned_of(
 
 
 def _valid(table: pd.DataFrame, what: str, *, warnings: list[str]) -> pd.DataFrame:
-    """The answers to trials in which the rig presented what was planned; tells of the others."""
+    """The answers to trials in which the rig presented what was planned; warns of the others."""
     failed = table["valid"] == 0
     if failed.any():
         again = int((failed & table["trial"].isin(table["repeats"])).sum())
@@ -392,12 +392,12 @@ def _checked_sidecar(
 
 
 def _overridden(sidecar: Mapping[str, object], what: str, *, warnings: list[str]) -> frozenset[str]:
-    """The rules that a session went on against, each told with its reason."""
+    """The rules that a session overrode, each with its reason."""
     stated = sidecar.get("Overrides", [])
     records = [r for r in stated if isinstance(r, Mapping)] if isinstance(stated, list) else []
     for record in records:
         warnings.append(
-            f"{what} went on against a rule ({record.get('what')}): {record.get('reason')}."
+            f"{what} was continued against a rule ({record.get('what')}): {record.get('reason')}."
         )
     return frozenset(str(record.get("what")) for record in records)
 
@@ -415,7 +415,7 @@ def _damaged(sidecar: Mapping[str, object], what: str) -> list[str]:
 
 def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
     """A sentence for each session that was begun but whose answers are not there."""
-    told = []
+    sentences = []
     for manifest in sorted(folder.glob(f"sourcedata/sub-*/ses-*/*_task-{task}_manifest.json")):
         stem = manifest.name.removesuffix("manifest.json")
         participant, session = manifest.parts[-3:-1]
@@ -424,11 +424,11 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
         if participant in gathered.leaving_out:
             gathered.add_unread(task, participant, session=session)
         else:
-            told.append(
+            sentences.append(
                 f"{participant} {task} {session} was begun, but has no table of answers; it is "
                 "running, or tactileq study status makes one."
             )
-    return told
+    return sentences
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
@@ -477,7 +477,7 @@ def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path
 
 
 def _check_choices(table: pd.DataFrame, columns: Mapping[str, AnswerColumn], *, path: Path) -> None:
-    """Where there is a right answer: whether it is told rightly, and was among the buttons."""
+    """Where there is a right answer: whether `correct` agrees with it and it was on a button."""
     if not {"answer", "correct"} <= columns.keys():
         return
     answered = table[table["answer"].notna()]

@@ -1,4 +1,4 @@
-"""Whether answers are those to the trials that were planned (docs/method/protocols.md#order)."""
+"""Whether answers belong to the planned trials (docs/method/protocols.md#order)."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def told_of_unordered(sessions: Sequence[str]) -> list[str]:
 
 
 def told_of_open(table: pd.DataFrame, planned: Sequence[Planned]) -> str | None:
-    """How many main trials were answered, where some were not; a failed one is owed once more.
+    """How many main trials were answered, where some were not; a failed one must be repeated.
 
     Parameters
     ----------

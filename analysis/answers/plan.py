@@ -1,4 +1,4 @@
-"""What was claimed before the first answer, as the manifests of the sessions hold it."""
+"""The claims made before the first answer, as stored in the manifests of the sessions."""
 
 from __future__ import annotations
 

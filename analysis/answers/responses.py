@@ -1,4 +1,4 @@
-"""The answers of a study as all else sees them: what is there, what is missing, who is left out."""
+"""The answers of a study as used by all analyses: present, missing and excluded answers."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Responses:
     simulated_participants : bool
         True where no person took part.
     simulated_rig : bool
-        True where no real rig was used, so that nobody felt a real surface.
+        True where no real rig was used, so that no participant felt a real surface.
     training : mapping of task to DataFrame
         The training trials, same columns; no statistic uses them.
     anchors : mapping of task to DataFrame
@@ -70,15 +70,15 @@ class Responses:
     study_sha256 : str
         Of the study that was run; empty where the data do not say.
     planned : mapping of task to PlannedTask
-        How many are to take part, where the data set's description tells.
+        How many are to take part, where the data set's description states it.
     under_way : mapping of task to frozenset of str
         Participants with a session that lacks answers and may go on, as they have not dropped out.
     dropped_out : frozenset of str
-        Participants who will not come again, and whose places others take.
+        Participants who will not return and are replaced by others.
     setups : int
-        How many ran the study, each as it was planned, all with the planned numbers together.
+        Number of set-ups that ran the study, each as planned, with the planned numbers in total.
     warnings : tuple of str
-        What was dropped on reading and why, and which sessions ended early, one sentence each.
+        What was dropped on reading and why, and which sessions ended early; one sentence each.
     """
 
     answers: Mapping[str, pd.DataFrame]
@@ -179,7 +179,7 @@ def _done(answers: pd.DataFrame) -> PlannedTask:
 
 
 def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
-    """The answers without those of some participants, which `warnings` tell with the reasons.
+    """The answers without those of some participants, named in `warnings` with the reasons.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         {task: t[~t["participant_id"].isin(list(reasons))] for task, t in kind.items()}
         for kind in tables
     )
-    told = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
+    left_out = tuple(f"{who} was left out by hand: {why}." for who, why in reasons.items())
     return replace(
         responses,
         answers={task: table.reset_index(drop=True) for task, table in answers.items()},
@@ -222,7 +222,7 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
             for task, table in responses.answers.items()
         },
         under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
-        warnings=(*responses.warnings, *told),
+        warnings=(*responses.warnings, *left_out),
     )
 
 

@@ -62,7 +62,9 @@ def pool_setups(setups: Mapping[str, Responses]) -> Responses:
         dropped_out=_named({name: one.dropped_out for name, one in setups.items()}),
         setups=len(setups),
         plan=replace(first.plan, sha256=tuple(hashes)),
-        warnings=tuple(f"{name}: {told}" for name, one in setups.items() for told in one.warnings),
+        warnings=tuple(
+            f"{name}: {warning}" for name, one in setups.items() for warning in one.warnings
+        ),
     )
 
 

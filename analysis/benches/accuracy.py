@@ -1,4 +1,4 @@
-"""How exact a rendering is while the hand moves: late parameters, levels, and where it turns."""
+"""Accuracy of a rendering while the hand moves: late parameters, levels, and reversals."""
 
 from __future__ import annotations
 

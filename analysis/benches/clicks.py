@@ -1,4 +1,4 @@
-"""What a step of speed or force adds to a rendering: clicks, beside filters switched at once."""
+"""Clicks: what a step of speed or force adds, compared with filters switched at once."""
 
 from __future__ import annotations
 

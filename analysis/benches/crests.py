@@ -22,7 +22,7 @@ def crest_db(signals: Floats) -> Floats:
 def crest_difference_db(
     width_hz: float, *, duration_s: float, streams: int, seed: int = 0
 ) -> float:
-    """By how much the noise that is rendered, uniform, is less peaky than Gaussian noise (dB).
+    """By how much peaks of the rendered uniform noise are below those of Gaussian noise (dB).
 
     Mean crest factors behind a band of this width (NaN: of the broadband noise itself). Both noises
     are white and of unit variance, so their power spectra are equal, also behind a filter.

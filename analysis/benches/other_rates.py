@@ -35,7 +35,7 @@ class RateErrors(NamedTuple):
 
 
 def rate_errors(conditions: Sequence[PEQ], *, model_rate_hz: float, rate_hz: float) -> RateErrors:
-    """How far the levels of each condition are off when it is rendered at another rate.
+    """Level errors of each condition when it is rendered at another rate.
 
     Parameters
     ----------

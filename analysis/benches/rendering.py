@@ -1,6 +1,6 @@
-"""A bench: what rendering costs, beside what its users would run otherwise.
+"""A benchmark: the cost of rendering compared with alternatives.
 
-What came out: docs/method/rendering.md#cost.
+Results: docs/method/rendering.md#cost.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Effort:
 
     @property
     def parts(self) -> int:
-        """Parts of which progress is told: the turns, and the starts."""
+        """Parts of which progress is reported: the turns, and the starts."""
         return self.turns + 1
 
 
@@ -192,7 +192,7 @@ class RenderingBench:
 
     @property
     def aims(self) -> pd.DataFrame:
-        """Every aim beside what was measured: what, where, aim, measured, met.
+        """Every target with its measurement: what, where, aim, measured, met.
 
         By the operations that each form needs (docs/method/rendering.md#cost).
         """
@@ -259,7 +259,7 @@ class Turn(NamedTuple):
 def bench_rendering(
     effort: Effort | None = None, *, progress: Callable[[str], None] = lambda part: None
 ) -> RenderingBench:
-    """Time the kernel beside its rivals, everything in turn, so that no disturbance hits only one.
+    """Time the kernel and its rivals, all in turn, so that disturbances affect all of them.
 
     What is timed as a whole takes about as long for a fast filter as for a slow one (many samples
     of a fast one, one block of a slow one): the longer it took, the more of other load it would
@@ -270,7 +270,7 @@ def bench_rendering(
     effort : Effort, optional
         How long to measure; the default takes about half a minute.
     progress : callable
-        Told each of the effort's `parts` that is done.
+        Called with each of the effort's `parts` when it is done.
 
     Raises
     ------

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
+from analysis.labels import counted
 from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.arrays import Floats
 from modeling.fitting.autoregressive import fit_filter
@@ -59,7 +60,7 @@ def layered_texture(layers: int) -> TextureModel:
     signs = (-1.0) ** np.arange(layers)
     grid = np.ones((SPEEDS_MM_S.size, FORCES_N.size, layers))
     return TextureModel(
-        texture=f"{layers} layers",
+        texture=counted(layers, "layer"),
         rate_hz=RATE_HZ,
         speeds_mm_s=SPEEDS_MM_S,
         forces_n=FORCES_N,

@@ -1,7 +1,7 @@
-"""The shipped scenes, compiled: how much less they cost, at which loss, beside an AR model.
+"""The shipped scenes, compiled: reduction of cost and the loss, compared with an AR model.
 
-Losses are against the true surface, which no model knows, at all places of the scene, in the band
-that its actuator plays: those of the full model are those of the fit.
+Losses are relative to the true surface, which no model knows, at all conditions of the scene, in
+the band of its actuator: the losses of the full model are those of the fit.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ COMPARISON_COLUMNS = (
     Column("numbers"),
     Column("bytes"),
     Column("operations", "operations per sample", format=".1f"),
-    Column("fewer_numbers", "times fewer numbers than the full model", format=".1f"),
-    Column("fewer_operations", "times fewer operations", format=".1f"),
-    Column("gfc30", "GFC30 to the truth, mean", format=".3f"),
+    Column("fewer_numbers", "numbers, full model over this", format=".1f"),
+    Column("fewer_operations", "operations, full model over this", format=".1f"),
+    Column("gfc30", "GFC30 relative to the truth, mean", format=".3f"),
     Column("gfc30_worst", "worst", format=".3f"),
     Column("bands_db", "error in nine bands, RMS", "dB", format=".2f"),
     Column("bands_db_worst", "worst", "dB", format=".2f"),

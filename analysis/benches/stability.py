@@ -1,4 +1,4 @@
-"""How loud a filter becomes while its parameters move: exact variances, no random numbers.
+"""The level of a filter while its parameters move: exact variances, no random numbers.
 
 White noise of unit variance drives m bands of a PEQ whose parameters change at every sample. The
 covariance of all states together follows P′ = A·P·Aᵀ + b·bᵀ exactly, and with it the variance of

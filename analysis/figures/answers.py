@@ -28,7 +28,7 @@ ROLES = ("reference", "other")
 ROLE_COLOURS = {"reference": BLUE, "other": ORANGE}
 ROLE_HATCHES = {"reference": "", "other": "///"}
 LEGEND_OF_BARS = (
-    "bars: mean with 95 % confidence interval; points: participants, a line joins one person's\n"
+    "bars: mean with 95% confidence interval; points: participants, lines connect the same person\n"
     "* p < .05, ** p < .01, *** p < .001: paired t-test, Holm over the textures"
 )
 BAR_WIDTH = 0.42

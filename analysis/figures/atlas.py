@@ -65,8 +65,8 @@ def figure_atlas(examined: Sequence[Examined], *, columns: int = COLUMNS) -> Fig
     figure.text(
         0.5,
         0.1 / height,
-        "Simulated: every mark is a run on signals, hands and answers that were made up. "
-        "Easy on the left, hard on the right; bold: what the program does by default.",
+        "Simulated: every mark is a run on simulated signals, hand movements and answers. "
+        "Easy on the left, hard on the right; bold: the default of the program.",
         ha="center",
         fontsize=9,
         color=GREY,
@@ -222,7 +222,7 @@ def _legend() -> list[Line2D | Patch]:
             linestyle="",
             markersize=9,
             markeredgewidth=2,
-            label="holds to, by theory (arrow: throughout)",
+            label="edge by theory (arrow: holds throughout)",
         ),
         Line2D([], [], color=GREY, linestyle=(0, (2, 1)), label="the default"),
     ]

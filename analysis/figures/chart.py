@@ -15,7 +15,7 @@ from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import AT, BETWEEN, LOADED, STROKING
 from analysis.benches.chart.methods import OURS, TRUTH, WHITE
 from analysis.benches.chart.summary import competing, default_rows, front_of
-from analysis.benches.chart.surfaces import KINDS, Kind
+from analysis.benches.chart.surfaces import Kind, counted_kind
 from analysis.figures.drawing import (
     BLACK,
     BLUE,
@@ -71,7 +71,7 @@ OPERATIONS = "operations per sample at 5 kHz"
 PANELS = (
     Panel("operations", OPERATIONS, AT, "at the recorded conditions"),
     Panel("operations", OPERATIONS, BETWEEN, "between them"),
-    Panel("operations", OPERATIONS, STROKING, "while a hand strokes, any update interval"),
+    Panel("operations", OPERATIONS, STROKING, "during strokes, any update interval"),
     Panel("numbers", "numbers stored", BETWEEN, "between the conditions"),
 )
 
@@ -90,10 +90,11 @@ def figure_chart(chart: Chart, kind: Kind) -> Figure:
     shared_legend(figure, [_keys(axes[0], summary)], ncols=5)
     count = int(summary["surfaces"].max())
     figure.supxlabel(
-        f"{count} {KINDS[kind]}; markers: medians as rendered by default (updates each ms, FFT by "
-        "blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black line: "
-        "the front, which no variant beats in both; numbers: layers, orders;\noperations of "
-        "autoregressive filters hold coefficients made at every update, ours come from a table",
+        f"{counted_kind(count, kind)}; markers: medians with default rendering (updates each ms, "
+        "FFT by blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black "
+        "line: the front, which no variant beats in both; numbers: layers, orders;\noperations of "
+        "autoregressive filters include computing coefficients at every update; ours are read from "
+        "a table",
         fontsize=8.5,
         color=GREY,
     )
@@ -128,7 +129,7 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
         axis.set_minor_locator(NullLocator())
     ax.margins(0.09)
     ax.set_xlabel(panel.cost_label)
-    ax.set_ylabel("distance from the truth (dB)")
+    ax.set_ylabel("log-spectral distance from the truth (dB)")
     ax.set_title(panel.title, loc="left", fontsize=10)
     finish_axes(ax)
     return ax
@@ -176,7 +177,7 @@ def _name_points(usual: pd.DataFrame, cost: str, error: str, *, ax: Axes) -> Non
 
 
 def _short(method: str) -> str:
-    """What stands beside a marker: of a family's steps the number alone."""
+    """The label of a marker: for the steps of a family only the number."""
     number = re.search(r"\d+", method)
     is_step = method.startswith(("joint, ", "AR("))
     return number.group() if number and is_step else SHORT.get(method, method)

@@ -1,4 +1,4 @@
-"""Who was taken for whom, and how similar that makes them."""
+"""Which textures were taken for which, and the similarities that follow."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DARK = 65  # per cent above which text is white
 
 
 def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool) -> Figure:
-    """Who was taken for whom, a panel for each set of models (PAPER fig. 10).
+    """Which textures were taken for which, a panel for each set of models (PAPER fig. 10).
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def figure_confusion(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool
     bar = figure.colorbar(axes[-1].images[0], ax=axes, shrink=0.8, pad=0.01)
     bar.set_label("share of the row's answers (%)")
     figure.supxlabel(
-        f"rows: real surface presented; columns: virtual surface answered; each row adds up to "
+        f"rows: real surface presented; columns: virtual surface answered; each row sums to "
         f"100%; chance {1 / len(textures):.1%}; in brackets: number of answers",
         fontsize=9,
         color=GREY,

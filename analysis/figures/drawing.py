@@ -8,7 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, told apart by people with any colour vision.
+# Okabe and Ito's palette, distinguishable with any colour vision.
 BLUE, VERMILLION, GREEN, ORANGE = "#0072B2", "#D55E00", "#009E73", "#E69F00"
 PURPLE, SKY_BLUE, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#6E6E6E"
 LAYER_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY_BLUE, BLACK)
@@ -53,7 +53,7 @@ def finish_axes(ax: Axes) -> None:
 
 
 def stamp_if_simulated(ax: Axes, simulated: bool) -> None:
-    """Nobody may take a simulated result for a measured one, wherever the picture ends up."""
+    """Mark simulated results, so that they cannot be mistaken for measured ones anywhere."""
     if simulated:
         ax.text(
             1.0,

@@ -27,7 +27,7 @@ from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE,
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
 
-# Told apart by shape as well as by colour.
+# Distinguished by shape as well as by colour.
 MARKS = {
     EQUIVALENT: ("o", BLUE),
     DIFFERENT: ("D", VERMILLION),
@@ -115,8 +115,8 @@ def _legend(found: Sequence[ClaimFound]) -> list[Line2D | Patch]:
         if name in occurring
     ]
     handles += [
-        Line2D([], [], color=GREY, lw=3.5, label="90 % CI"),
-        Line2D([], [], color=GREY, lw=1.2, label="95 % CI"),
+        Line2D([], [], color=GREY, lw=3.5, label="90% CI"),
+        Line2D([], [], color=GREY, lw=1.2, label="95% CI"),
     ]
     if any(one.claim.bounds is not None for one in found):
         handles.append(Patch(color=GREY, alpha=0.15, label="bounds"))

@@ -29,7 +29,7 @@ from analysis.statistics.claims import BOUNDS_WITHHELD, WITHHELD
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.power import EVERY_TEXTURE, NO_VERDICT, TARGET
 
-# Told apart by colour, marker and kind of line.
+# Distinguished by colour, marker and line style.
 STYLES = {
     EQUIVALENT: (BLUE, "o", "-"),
     WITHIN_BOUNDS: (GREEN, "^", "-."),
@@ -78,7 +78,7 @@ def figure_power(table: pd.DataFrame) -> Figure:
         fontsize=9,
     )
     figure.supxlabel(
-        "bars: 95 % intervals over simulations (Clopper–Pearson); verdicts over all textures "
+        "bars: 95% intervals over simulations (Clopper–Pearson); verdicts over all textures "
         f"where no other is named; dotted line: {TARGET:.0%}",
         fontsize=9,
         color=GREY,

@@ -63,8 +63,8 @@ def figure_rendering(bench: RenderingBench) -> Figure:
         ax.set_title(f"from Python, an update every block of {block}", fontsize=10)
     plot_sweep(bench, ax=panels[2, 2])
     shared_legend(figure, [panels[0, 0], panels[2, 0]], ncols=8)
-    told = textwrap.fill(f"{bench.machine}; {bench.compiler}", 170)
-    figure.supxlabel(f"noise included; {told}", fontsize=7.5, color=GREY)
+    machine = textwrap.fill(f"{bench.machine}; {bench.compiler}", 170)
+    figure.supxlabel(f"noise included; {machine}", fontsize=7.5, color=GREY)
     return figure
 
 

@@ -1,4 +1,4 @@
-"""The trade-off that the scene compiler walked: cost against the share of the bound."""
+"""The trade-off found by the scene compiler: cost against the share of the bound."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def plot_tradeoff(compiled: CompiledScene, cost: Cost, *, ax: Axes | None = None
         _plot_texture(ax, texture, cost, number)
     ax.set_xscale("log")
     ax.set_xlabel(f"{LABELS[cost]} (logarithmic)")
-    ax.set_ylabel("largest share of the bound that is taken")
+    ax.set_ylabel("largest share of the bound that is used")
     ax.set_ylim(0, HIGHEST_SHARE)
     ax.xaxis.set_major_locator(LogLocator(base=10, subs=(1.0, 2.0, 5.0), numticks=12))
     ax.xaxis.set_major_formatter(ScalarFormatter())

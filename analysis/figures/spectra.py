@@ -22,7 +22,7 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import MODELS
+from analysis.labels import MODELS, counted
 from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
 from modeling.recordings.spectrum import HIGH_PASS_HZ
 
@@ -94,7 +94,7 @@ def plot_model_spectrum(
             color=GREEN,
             lw=2.4,
             ls=JUST_FELT_DASHES,
-            label="" if layer else "gain at which the layer here would be just felt",
+            label="" if layer else "gain at which the layer would just be felt here",
         )
     # Far skirts of layers must not stretch the axis.
     lowest, highest = (
@@ -238,7 +238,7 @@ def plot_spectrum_panel(panel: SpectrumPanel, *, ax: Axes | None = None) -> Axes
                 fontsize=8,
             )
     count = panel.layer_frequency_hz.size
-    found = f"{count} layer{'s' * (count != 1)} found alone"
+    found = f"{counted(count, 'layer')} found alone"
     ax.text(0.98, 0.9, found, transform=ax.transAxes, ha="right", fontsize=8)
     log_frequency_axis(ax, panel.frequency_hz[-1])
     ax.set_yscale("log")

@@ -49,10 +49,10 @@ def figure_speed_accuracy(
         scores, means, models=models, simulated=simulated, ax=figure.subplots()
     )
     shared_legend(figure, [ax], ncols=2)
-    joined = ", a line joins one person's" * (len(models) > 1)
+    joined = ", lines connect the same person" * (len(models) > 1)
     figure.supxlabel(
-        f"small: participants{joined}; large: mean with 95 % confidence interval in both "
-        "directions\nup: more often right; left: faster",
+        f"small: participants{joined}; large: mean with 95% confidence interval in both "
+        "directions\nup: more accurate; left: faster",
         fontsize=9,
         color=GREY,
     )
@@ -148,8 +148,8 @@ def figure_conditional_accuracy(
     stamp_if_simulated(ax, simulated)
     shared_legend(figure, [ax], ncols=3)
     figure.supxlabel(
-        "each participant's answers in groups of one size, from the fastest to the slowest; "
-        "means over participants\nwith 95 % confidence intervals",
+        "each participant's answers in groups of equal size, from the fastest to the slowest; "
+        "means over participants\nwith 95% confidence intervals",
         fontsize=9,
         color=GREY,
     )

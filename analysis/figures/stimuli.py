@@ -52,7 +52,7 @@ def figure_contact_sheet(sheet: ContactSheet) -> Figure:
 def _title(sheet: ContactSheet) -> str:
     lines = [f"Stimulus set {sheet.name}"]
     if sheet.compensated:
-        lines.append("compensated for its vibrator; levels are those meant at the hand")
+        lines.append("compensated for its vibrator; levels are those intended at the hand")
     unit = "1 g" if sheet.unit == "g" else "1, arbitrary unit"
     return "\n".join([*lines, f"numbers: RMS level (dB re {unit}), in the legend's order"])
 

@@ -22,21 +22,23 @@ from analysis.statistics.claims import (
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.verdicts import ClaimFound
 
-NOBODY_ASKED = "Nobody was asked: this report holds models and no answers."
+NOBODY_ASKED = "No participant was tested: this report contains models and no answers."
 WORDS = {
     EQUIVALENT: "equivalent in",
     WITHIN_BOUNDS: "different, but within the bounds, in",
     DIFFERENT: "different in",
     INCONCLUSIVE: "inconclusive in",
     WITHHELD: "not called equivalent in",
-    BOUNDS_WITHHELD: "different, without a word on the bounds, in",
+    BOUNDS_WITHHELD: "different, with no conclusion about the bounds, in",
     INTERIM: "no verdict before the study is complete on",
-    NO_TEST: "it cannot be told yet, for want of complete answers, in",
+    NO_TEST: "not tested, because answers are incomplete, in",
 }
 NOTHING_TO_CLAIM = "No models are compared: no task asked for ratings or right answers."
-NOTHING_ANSWERED = "Nothing to compare: no answers are there that the claims are about."
+NOTHING_ANSWERED = (
+    "Nothing to compare: there are no answers to the tasks that the claims are about."
+)
 IDENTICAL = "Nothing to compare: the models of all textures are identical."
-NO_BOUNDS = "no difference was shown, and without bounds no equality can be, in"
+NO_BOUNDS = "no difference was shown, and without bounds equivalence cannot be tested, in"
 
 
 def answer(found: Sequence[ClaimFound], responses: Responses | None) -> str:
@@ -59,26 +61,26 @@ def answer(found: Sequence[ClaimFound], responses: Responses | None) -> str:
     if not parts:
         return IDENTICAL if all(one.standing.identical for one in asked) else NOTHING_ANSWERED
     differing = _differing_textures(asked)
-    told = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
-    return f"{told[0].upper()}{told[1:]}"
+    sentence = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
+    return f"{sentence[0].upper()}{sentence[1:]}"
 
 
 def unfinished_tasks(responses: Responses) -> list[str]:
-    """For each task that has less than was planned: how much of it there is."""
-    told = []
+    """How much of each task that is not complete has been done."""
+    lines = []
     for task in responses.unfinished:
         done, planned = responses.done(task), responses.planned[task]
         under_way = ", ".join(sorted(responses.under_way.get(task, ())))
-        told.append(
+        lines.append(
             f"{TASKS[task]}: {done.participants} of {planned.participants} planned participants, "
             f"{done.sessions} of {planned.sessions} planned sessions"
             + (f"; answers are missing in sessions of {under_way}" if under_way else "")
         )
-    return told
+    return lines
 
 
 def _circumstances(responses: Responses) -> str:
-    """Nobody may take a simulated or an unfinished study for a finished one with people."""
+    """State that a study is simulated or unfinished, so that nobody overlooks it."""
     if responses.simulated_participants:
         where = "in a simulation without people, "
     elif responses.simulated_rig:
@@ -90,7 +92,7 @@ def _circumstances(responses: Responses) -> str:
 
 def _subject(found: Sequence[ClaimFound]) -> str:
     pairs = list(dict.fromkeys(one.claim.models for one in found))
-    names = " and ".join(f"{other} models against {reference} ones" for reference, other in pairs)
+    names = " and ".join(f"{other} compared with {reference} models" for reference, other in pairs)
     kind = "" if any(one.claim.planned for one in found) else " (exploratory: nothing was planned)"
     return f"{names}, over all textures{kind}"
 
@@ -106,18 +108,18 @@ def _parts(found: Sequence[ClaimFound]) -> list[str]:
         words = WORDS[verdict]
         if verdict == INCONCLUSIVE and one.claim.bounds is None:
             words = NO_BOUNDS
-        told = _what(one, found)
+        part = _what(one, found)
         if verdict != INTERIM:
             shown = "90%" if one.claim.bounds is not None else "95%"
-            told += f" {difference(one, row, confidence=shown)}"
+            part += f" {difference(one, row, confidence=shown)}"
         if verdict in WITHOUT_EQUALITY:
-            told += f", since {row['doubt']}"
-        groups.setdefault(words, []).append(told)
-    return [f"{words} {' and '.join(told)}" for words, told in groups.items()]
+            part += f", since {row['doubt']}"
+        groups.setdefault(words, []).append(part)
+    return [f"{words} {' and '.join(parts)}" for words, parts in groups.items()]
 
 
 def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
-    """The measure; with the task, or the pair, where another claim is about the same."""
+    """The measure, with its task or pair of models where several claims share the measure."""
     claim, what = one.claim, MEASURES[one.claim.measure]
     others = [each.claim for each in found if each.claim.measure == claim.measure]
     if len({each.task for each in others}) > 1:
@@ -128,7 +130,7 @@ def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:
 
 
 def _differing_textures(found: Sequence[ClaimFound]) -> str:
-    """Single textures whose models differ, whatever their mean says."""
+    """Single textures whose models differ, whatever the mean over textures."""
     named = {}
     for one in found:
         groups = by_verdict(one)

@@ -18,7 +18,7 @@ from analysis.benches.chart.summary import (
     comparison_table,
     default_rows,
 )
-from analysis.benches.chart.surfaces import KINDS
+from analysis.benches.chart.surfaces import KINDS, counted_kind
 from analysis.columns import names, without
 from analysis.figures.chart import STYLES, figure_chart
 from analysis.figures.saving import png_of, warn_of_missing_fonts
@@ -44,7 +44,7 @@ COSTS = (
     ("fit_ms", "fitting time per record (ms)"),
 )
 _PLACE_NAMES = dict(
-    zip(PLACES, ("at the conditions", "between them", "while stroking"), strict=True)
+    zip(PLACES, ("at the conditions", "between them", "during strokes"), strict=True)
 )
 _MEASURE_NAMES = {
     "distance_db": "log-spectral distance (dB)",
@@ -78,20 +78,22 @@ SHOWN_COMPARISONS = without(
     *("operations_low", "operations_high", "numbers_low", "numbers_high", "verdict", "sentence"),
 )
 METHODS_NOTE = (
-    "Medians over the surfaces, as the program renders by default: each method's own blending, "
-    "updates each millisecond (FFT-shaped noise by blocks), double precision. Operations are "
-    "counted at 5 kHz, updates included; at most: of a sample with an update. Layers: −1 where "
-    "there are none to count. Distances are log-spectral, from the known truth, or smoothed from "
-    "recordings; while stroking as the hand goes to and fro. Time: rendering alone, all methods in "
-    "turn in one process; FFT-shaped noise in NumPy. Operations and times of autoregressive "
-    "filters hold coefficients made anew at every update, which ours read from a table: they "
-    "do not compare."
+    "Medians over the surfaces for the default rendering: each method with its own blending "
+    "between conditions, parameter updates every millisecond (FFT-shaped noise: every block) and "
+    "double precision. Operations are counted at 5 kHz and include updates; at most: a sample with "
+    "an update. Layers: n/a for methods without layers. Distances are log-spectral distances from "
+    "the known truth or, for recordings, from their smoothed spectra; during strokes: while the "
+    "hand moves to and fro. Time: rendering alone, all methods in turn in one process; FFT-shaped "
+    "noise in NumPy. Operations and times of autoregressive filters include the computation of "
+    "their coefficients at every update, whereas ours read them from a table: the two cannot be "
+    "compared."
 )
 COMPARISON_NOTE = (
-    "The rival over joint, geometric means over surfaces, with Student's t intervals (95%) of the "
-    "logarithms. One dominates another if it takes no more operations and is nearer to the truth, "
-    "the upper ends of both intervals being at most 1. Operations of autoregressive filters are "
-    "not compared: they hold coefficients made anew at every update, which ours read from a table."
+    "Ratios of the rival to joint: geometric means over surfaces, with 95% intervals from "
+    "Student's t of the logarithms. One method dominates another if it needs no more operations "
+    "and is closer to the truth, with the upper limits of both intervals at most 1. Operations of "
+    "autoregressive filters are not compared: they include the computation of coefficients at "
+    "every update, whereas ours are read from a table."
 )
 
 
@@ -105,7 +107,7 @@ def chart_tables(chart: Chart) -> tuple[Table, Table]:
     return (
         Table(
             "chart_comparisons",
-            "Who dominates whom",
+            "Which method dominates which",
             COMPARISON_NOTE,
             comparison_table(chart.comparisons),
             SHOWN_COMPARISONS,
@@ -115,7 +117,7 @@ def chart_tables(chart: Chart) -> tuple[Table, Table]:
             "chart_methods",
             "All methods",
             METHODS_NOTE,
-            worst[names(METHOD_COLUMNS)],
+            worst.assign(layers=worst["layers"].where(worst["layers"] >= 0))[names(METHOD_COLUMNS)],
             METHOD_COLUMNS,
             simulated,
         ),
@@ -128,10 +130,10 @@ def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
         Picture(
             f"chart_{kind}",
             f"Speed against accuracy: {KINDS[kind]}",
-            "To the left is cheaper, below is nearer to the truth. The black line joins what no "
-            "other variant beats in both. Autoregressive filters stand too far to the right: their "
-            "coefficients are made anew at every update, ours read from a table. How to read it: "
-            "docs/chart.md.",
+            "Farther left is cheaper, lower is closer to the truth. The black line connects the "
+            "variants that no other variant beats in both. Autoregressive filters appear too far "
+            "to the right: their coefficients are computed at every update, whereas ours are read "
+            "from a table. How to read the chart: docs/chart.md.",
             figure_chart(chart, kind),
             bool(chart.summary["simulated"].any()),
         )
@@ -140,21 +142,21 @@ def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
 
 
 def chart_section(chart: Chart) -> Section:
-    """The section of the report: what the whole page says, without the interactive chart."""
+    """The section of the report: the content of the page without the interactive chart."""
     return Section(
         "chart",
         "Speed against accuracy",
         (*chart_pictures(chart), *chart_tables(chart)),
         done=(
             f"{_counted(chart)} were modelled by {chart.rows['method'].nunique()} methods, each "
-            "rendered in several ways and held against the truth.",
+            "rendered in several ways and compared with the truth.",
         ),
     )
 
 
 def _counted(chart: Chart) -> str:
     surfaces = chart.rows.groupby("kind", sort=False)["surface"].nunique()
-    return ", ".join(f"{surfaces[kind]} {KINDS[kind]}" for kind in chart.kinds)
+    return ", ".join(counted_kind(surfaces[kind], kind) for kind in chart.kinds)
 
 
 def chart_files(chart: Chart) -> dict[str, bytes]:
@@ -179,9 +181,9 @@ def chart_files(chart: Chart) -> dict[str, bytes]:
 
 
 def _page(chart: Chart, pictures: str) -> str:
-    """The page as HTML, which needs nothing but itself."""
+    """The page as self-contained HTML."""
     comparison, methods = chart_tables(chart)
-    told = grouped(
+    compared = grouped(
         {
             f"On {KINDS[kind]}": [c.sentence for c in chart.comparisons if c.kind == kind]
             for kind in chart.kinds
@@ -192,11 +194,13 @@ def _page(chart: Chart, pictures: str) -> str:
     return page(
         title="Speed against accuracy",
         answer=f"{_counted(chart)}: what each way to model and render a texture costs, and how "
-        "near it comes to the truth.",
-        lead=f"Counted operations do not depend on the machine; times are of {chart.machine}.",
-        banner=f"SIMULATED: recordings of {which} surfaces come from no rig." if which else "",
+        "close it comes to the truth.",
+        lead=f"Operation counts do not depend on the machine; times are those of {chart.machine}.",
+        banner=f"SIMULATED: recordings of {which} surfaces were not made with a rig."
+        if which
+        else "",
         sections=[
-            ("says", "Who dominates whom", told + table_html(comparison)),
+            ("says", "Which method dominates which", compared + table_html(comparison)),
             ("interactive", "Choose the axes", _interactive(chart)),
             ("pictures", "The charts", pictures),
             ("methods", "All methods", table_html(methods) + bullets(chart.warnings)),
@@ -231,7 +235,7 @@ def _select(name: str, label: str, options: Iterable[tuple[str, str]], *, chosen
 
 
 def _data(chart: Chart) -> dict[str, object]:
-    """What the script draws, with null for what is not known."""
+    """The data that the script draws, with null for unknown values."""
     summary = chart.summary
     usual = summary.index.isin(default_rows(summary).index)
     names = ["kind", "method", "family", "blending", "update_ms", "precision"]

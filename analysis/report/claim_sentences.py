@@ -28,7 +28,7 @@ NO_TEST = "no test"
 def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
     """For each claim a sentence on all textures together, and one on each of them.
 
-    Of an unfinished task one sentence alone, which tells no effect.
+    An unfinished task gets a single sentence, without an effect.
     """
     outcomes = []
     for one in found:
@@ -45,7 +45,7 @@ def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
 
 
 def overall_row(found: ClaimFound) -> Row | None:
-    """The row over all textures; None where all are identical."""
+    """The row over all textures; None where all models are identical."""
     rows = found.tests[found.tests["texture"] == ALL_TEXTURES].to_dict("records")
     return rows[0] if rows else None
 
@@ -66,7 +66,7 @@ def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
     ends = ("ci90_low", "ci90_high") if confidence == "90%" else ("ci_low", "ci_high")
     middle, low, high = (factor * row[name] for name in ("mean_difference", *ends))
     if np.isnan(middle):
-        return "(nobody answered completely)"
+        return "(no participant answered completely)"
     interval = f"{confidence} CI {signed(low, 1)} to {signed(high, 1)}"
     if np.isnan(low):
         interval = "no interval"
@@ -81,34 +81,34 @@ def comparison(found: ClaimFound) -> str:
     """What is subtracted from what."""
     reference, other = found.claim.models
     if ANSWER_TABLES[found.claim.task].both_models:
-        return f"right answers on {other} among {reference} and vice versa, from chance"
+        return f"right answers for {other} among {reference} and vice versa, minus chance"
     return f"{other} − {reference}"
 
 
 def _overall(found: ClaimFound, row: Row) -> str:
     verdict = row["verdict"] or NO_TEST
-    told = f"{found.claim.name} ({MEASURES[found.claim.measure]}, {comparison(found)}): {verdict}"
+    text = f"{found.claim.name} ({MEASURES[found.claim.measure]}, {comparison(found)}): {verdict}"
     if verdict in WITHOUT_EQUALITY:
-        told += f", since {row['doubt']}"
+        text += f", since {row['doubt']}"
     if verdict != INTERIM:
-        told += f"; {difference(found, row, confidence='90%')}{_tests(row)}"
-    return f"{told[0].upper()}{told[1:]} (participants: {row['n']})."
+        text += f"; {difference(found, row, confidence='90%')}{_tests(row)}"
+    return f"{text[0].upper()}{text[1:]} (participants: {row['n']})."
 
 
 def _tests(row: Row) -> str:
-    """The tests of a row; those that speak for equality only where no doubt stands against it."""
-    told = ""
+    """The tests of a row; those in favour of equivalence only where nothing casts doubt on it."""
+    text = ""
     if np.isfinite(row["t"]):
-        told += f", t({row['df']:.0f}) = {signed(row['t'], 2)}"
+        text += f", t({row['df']:.0f}) = {signed(row['t'], 2)}"
     if np.isfinite(row["p"]):
-        told += f", {_p(row['p'])}"
+        text += f", {_p(row['p'])}"
     if np.isfinite(row["p_equivalence"]) and not row["doubt"]:
-        told += f", TOST {_p(row['p_equivalence'])}"
+        text += f", TOST {_p(row['p_equivalence'])}"
     if np.isfinite(row["d_z"]):
-        told += f", d_z = {signed(row['d_z'], 2)}"
+        text += f", d_z = {signed(row['d_z'], 2)}"
         if not row["doubt"]:
-            told += f", BF₀₁ = {row['bf01']:.2g} (at most {row['bf01_highest']:.2g} with so many)"
-    return told
+            text += f", BF₀₁ = {row['bf01']:.2g} (maximum at this n: {row['bf01_highest']:.2g})"
+    return text
 
 
 def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
@@ -121,16 +121,16 @@ def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
                 for row in rows
             ]
         if verdict in WITHOUT_EQUALITY:
-            shown = [f"{told} ({row['doubt']})" for told, row in zip(shown, rows, strict=True)]
+            shown = [f"{text} ({row['doubt']})" for text, row in zip(shown, rows, strict=True)]
         apart = "; " if verdict in (*DIFFERENCES, *WITHOUT_EQUALITY) else ", "
         parts.append(f"{verdict}: {apart.join(shown)}")
     if found.claim.bounds is not None and all_equivalent(found.tests):
-        parts.append("every texture is equivalent at once (largest p of TOST below .05)")
+        parts.append("all textures jointly equivalent (largest p of TOST below .05)")
     same = found.tests[found.tests["note"] == IDENTICAL]["texture"]
     if len(same):
         parts.append(f"{IDENTICAL}: {', '.join(same)}")
-    told = f"{found.claim.name}, texture by texture: {'; '.join(parts) or 'nothing to compare'}."
-    return f"{told[0].upper()}{told[1:]}"
+    text = f"{found.claim.name}, texture by texture: {'; '.join(parts) or 'nothing to compare'}."
+    return f"{text[0].upper()}{text[1:]}"
 
 
 def _p(p: float) -> str:

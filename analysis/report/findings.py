@@ -1,4 +1,4 @@
-"""What the recordings of one texture say, and the files that hold it."""
+"""Findings from the recordings of one texture, and the files that contain them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
-# Of the names of all files that hold what was found in one texture's recordings.
+# Endings of the files with the findings from one texture's recordings.
 ENDINGS = (
     ".json",
     "_layers.tsv",
@@ -47,7 +47,7 @@ class Findings:
     measured : sequence of (Recording, Spectrum)
         Each recording with contact and its spectrum.
     alone : tuple of RecordingLayers
-        The layers found in each recording alone, where that was asked for or there is no model.
+        The layers found in each recording alone, where requested or where there is no model.
     model : TextureModel, optional
         Fitted where the recordings span a grid.
     why_not : str
@@ -56,7 +56,7 @@ class Findings:
         Level error and distance of the model to its recordings (`textures.between`); empty
         without a model.
     left_out : DataFrame, optional
-        The same of conditions that were left out and predicted, where that was asked for.
+        The same for conditions that were left out and predicted, where requested.
     """
 
     texture: str

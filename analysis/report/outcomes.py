@@ -1,4 +1,4 @@
-"""What came out, and how much it weighs."""
+"""Findings and their weight."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 
 
 class Weight(IntEnum):
-    """How near a finding is to the question of the study, from the nearest."""
+    """How closely a finding concerns the question of the study, the closest first."""
 
     OVERALL = 0
     TEXTURES = 1
@@ -33,7 +33,7 @@ class Outcome:
 
 
 def by_weight(outcomes: Iterable[Outcome]) -> dict[str, list[str]]:
-    """Heading to sentences, the weightiest first, each in the order given; no empty heading."""
+    """Heading to sentences, highest weight first, in the order given; no empty heading."""
     groups: dict[str, list[str]] = {}
     for outcome in sorted(outcomes, key=lambda each: each.weight):
         groups.setdefault(HEADINGS[outcome.weight], []).append(outcome.sentence)

@@ -1,4 +1,4 @@
-"""One HTML page that needs nothing but itself: style, tables and pictures inline, all escaped."""
+"""A self-contained HTML page: style, tables and pictures inline, all text escaped."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ details { border-top: 1px solid var(--line); padding: 10px 0; }
 summary { cursor: pointer; font-weight: 600; }
 footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--soft);
          font-size: 14px; }
-/* Paper lies across, since many tables have more columns than it is wide upright. */
+/* Landscape, since many tables are too wide for portrait pages. */
 @page { size: A4 landscape; margin: 12mm; }
 @page upright { size: A4 portrait; margin: 12mm; }
 @media print {
@@ -82,21 +82,21 @@ footer { max-width: 1240px; margin: 0 auto 40px; padding: 0 28px; color: var(--s
   table { width: 100%; font-size: 8pt; }
   .wide table { font-size: 7pt; }
   thead { display: table-header-group; }
-  /* Neither the beginning of a table stands alone on a page nor its end. */
+  /* Keep the first and the last rows of a table together on a page. */
   tbody tr:nth-child(-n + 3), tbody tr:nth-last-child(-n + 2) { break-before: avoid; }
   th, td { padding: 2px 6px 2px 0; }
   td.name { white-space: normal; }
-  /* Only what no line can hold is broken within a word, lest a column be cut. */
+  /* Break within a word only where it would not fit on a line, so that no column is cut. */
   td.long { overflow-wrap: anywhere; }
   caption, figcaption, p, ul, .answer { max-width: none; }
   caption, figcaption { font-size: 9pt; }
-  /* What is folded on the screen is unfolded on paper, where browsers can without a script. */
+  /* Unfold folded parts when printing, where the browser supports it without a script. */
   details::details-content { content-visibility: visible; display: block; block-size: auto; }
   summary { list-style: none; }
 }
 """
 
-# Browsers that do not know ::details-content print what is folded closed, unless it is opened.
+# Browsers without ::details-content would print folded parts closed, so they are opened.
 UNFOLD_FOR_PRINT = """
 const folds = document.getElementsByTagName("details");
 addEventListener("beforeprint", () => { for (const fold of folds) {
@@ -158,7 +158,7 @@ def bullets(sentences: Sequence[str]) -> str:
 
 def grouped(groups: Mapping[str, Sequence[str]]) -> str:
     """Lists of plain sentences, each below its heading."""
-    return "".join(f"<h4>{escape(head)}</h4>{bullets(told)}" for head, told in groups.items())
+    return "".join(f"<h4>{escape(head)}</h4>{bullets(said)}" for head, said in groups.items())
 
 
 def tiles(figures: Sequence[tuple[str, str]]) -> str:
@@ -223,7 +223,7 @@ def _classes(columns: Columns, rows: int) -> str:
 
 
 def _with_content(table: Table) -> Columns:
-    """A column of notes that nobody wrote only takes room."""
+    """Leave out columns of notes that are all empty."""
     frame = table.frame
     return tuple(
         column for column in table.columns if frame.empty or (frame[column.name] != "").any()

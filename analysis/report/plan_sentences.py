@@ -1,4 +1,4 @@
-"""The plan and what was done instead, in sentences; and the methods, as a paper tells them."""
+"""The plan and deviations from it in sentences, and the methods as a paper reports them."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ import numpy as np
 from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.answers.responses import Responses
 from analysis.columns import shortened_hash
-from analysis.labels import MEASURES, TASKS
+from analysis.labels import MEASURES, TASKS, counted
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, incomplete
 
 MOST_NAMED = 12
 
 
 def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
-    """What was planned, who and what was left out, and where the study went another way."""
+    """What was planned, what and who was left out, and how the study deviated from the plan."""
     return [
         _plan(responses),
         *(f"Planned exclusion: {sentence}" for sentence in responses.plan.exclusions),
@@ -28,26 +28,27 @@ def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
 
 
 def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
-    """The statistical methods of this report, to be put into a paper."""
+    """The statistical methods of this report, worded for a paper."""
     claims = [one.claim for one in found]
     sentences = [_who(responses, claims)]
     sentences.append(
-        "Each participant's answers were averaged per texture and model; a cell counts where all "
-        "planned repeats were answered. Two models were compared by paired t-tests over "
-        "participants, first on the mean over the textures whose models differ, each texture "
-        "counting once, then for each texture with Holm's correction over the textures."
+        "Each participant's answers were averaged per texture and model; a cell counts only where "
+        "all planned repeats were answered. Two models were compared by paired t-tests over "
+        "participants, first on the mean over the textures whose models differ, with equal weight "
+        "for each texture, then for each texture with Holm's correction over the textures."
     )
     sentences += _bounds(found)
     sentences.append(
         "Effect sizes are d_z with intervals from the noncentral t distribution (Steiger & "
         "Fouladi, 1997); Bayes factors are those of Rouder et al. (2009; r = 0.707). Wilcoxon's "
-        "signed-rank test and a permutation test that flips signs stand beside; the latter takes "
-        "the place of t where differences do not vary between participants."
+        "signed-rank test and a permutation test that flips signs are reported as well; the latter "
+        "replaces the t-test where differences do not vary between participants."
     )
     if any(_has_tested_rates(responses, claim.task) for claim in claims):
         sentences.append(
             "Correct rates were compared with chance by one-sample t-tests over participants; "
-            "their intervals are bias-corrected and accelerated bootstraps over participants."
+            "their confidence intervals are bias-corrected and accelerated bootstrap intervals "
+            "over participants."
         )
     return " ".join(sentences)
 
@@ -62,10 +63,10 @@ def _plan(responses: Responses) -> str:
     if not registered:
         return (
             "No claim was registered before the first answer: everything here is exploratory, and "
-            "nothing can be called equivalent without bounds that were fixed before."
+            "nothing can be called equivalent without bounds that were fixed beforehand."
         )
     pages = ", ".join(shortened_hash(sha256) for sha256 in plan.sha256[:1])
-    where = f" (page to preregister: {pages})" if pages else ""
+    where = f" (preregistration page: {pages})" if pages else ""
     return f"Claims fixed before the first answer: {len(registered)}{where}."
 
 
@@ -75,8 +76,8 @@ def _changed_plans(responses: Responses) -> list[str]:
         return []
     pages = ", ".join(shortened_hash(sha256) for sha256 in others)
     return [
-        f"The study was changed after the first session; others ran under {pages}. The claims "
-        "tested here are those of the first."
+        f"The study was changed after the first session; other sessions ran under {pages}. The "
+        "claims tested here are those of the first session."
     ]
 
 
@@ -86,8 +87,8 @@ def _not_planned(found: Sequence[ClaimFound]) -> list[str]:
 
 
 def _left_out(found: Sequence[ClaimFound]) -> list[str]:
-    """Of each claim the participants who lack answers, and to which textures."""
-    told = []
+    """The participants whose answers are incomplete for each claim, with the textures."""
+    sentences = []
     for one in found:
         lacking: dict[str, list[str]] = {}
         for participant, texture in incomplete(one):
@@ -96,28 +97,28 @@ def _left_out(found: Sequence[ClaimFound]) -> list[str]:
             named = [f"{who} ({', '.join(what)})" for who, what in lacking.items()][:MOST_NAMED]
             more = len(lacking) - len(named)
             rest = f" and {more} more" if more else ""
-            told.append(
-                f"Left out of {one.claim.name} over all textures, and of the textures named, for "
-                f"want of complete answers: {'; '.join(named)}{rest}."
+            sentences.append(
+                f"Left out of {one.claim.name} over all textures, and for the textures named, "
+                f"because answers are incomplete: {'; '.join(named)}{rest}."
             )
-    return told
+    return sentences
 
 
 def _who(responses: Responses, claims: Sequence[Claim]) -> str:
     tasks = dict.fromkeys(claim.task for claim in claims)
-    kind = "simulated participants" if responses.simulated_participants else "participants"
+    kind = "simulated participant" if responses.simulated_participants else "participant"
     rig = " at a simulated rig" if responses.simulated_rig else ""
     parts = [
-        f"{responses.done(task).participants} {kind}{rig} took part in the {TASKS[task]} of "
-        f"{responses.answers[task]['texture'].nunique()} textures"
+        f"{counted(responses.done(task).participants, kind)}{rig} took part in the {TASKS[task]} "
+        f"with {counted(responses.answers[task]['texture'].nunique(), 'texture')}"
         for task in tasks
     ]
-    told = "; ".join(parts)
-    return f"{told[:1].upper()}{told[1:]}."
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def _bounds(found: Sequence[ClaimFound]) -> list[str]:
-    """The smallest effects of interest, where some were fixed, and where equality could be said."""
+    """The smallest effects of interest, where fixed, and where equivalence could be concluded."""
     bounded = [one.claim for one in found if one.claim.bounds is not None]
     if not bounded:
         return []
@@ -129,23 +130,23 @@ def _bounds(found: Sequence[ClaimFound]) -> list[str]:
     planned = all(claim.planned and claim.test == EQUIVALENCE for claim in bounded)
     when = "fixed before the first answer" if planned else "some of them fixed after the data"
     return [
-        "Equivalence was tested by two one-sided t-tests (TOST; Schuirmann, 1987) at a level of "
-        f"5% with bounds {when} ({listed}), with Holm's correction of its own. A claim is called "
-        "equivalent where only the test of equivalence is significant, different where only that "
-        "of a difference is, different but within bounds where both are, and inconclusive where "
-        f"neither is. {_sensitivity(found)}"
+        "Equivalence was tested by two one-sided t-tests (TOST; Schuirmann, 1987) at a level of 5% "
+        f"with bounds {when} ({listed}), with a separate Holm correction. A claim is called "
+        "equivalent where only the test of equivalence is significant, different where only the "
+        "test of a difference is, different but within bounds where both are, and inconclusive "
+        f"where neither is. {_sensitivity(found)}"
     ]
 
 
 def _sensitivity(found: Sequence[ClaimFound]) -> str:
-    """Whether people were shown to tell surfaces apart, claim by claim."""
+    """Whether participants were shown to tell surfaces apart, claim by claim."""
     states = "; ".join(
         f"{one.claim.name}: {one.standing.sensitivity}"
         for one in found
         if one.claim.bounds is not None and not one.standing.unfinished
     )
     return (
-        "Words of equality were withheld where the data do not show that participants told "
+        "Equivalence was not concluded where the data do not show that participants could tell "
         "different surfaces apart (ratings: anchors rated lower than the textures' own models; "
         "forced choice: the reference recognised above chance) or where too many ratings lie at an "
         f"end of the scale{f' (sensitivity: {states})' if states else ''}."

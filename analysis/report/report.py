@@ -56,7 +56,7 @@ from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.writing import write_text
 
-LEAD = "Surfaces recorded, modelled, simplified by what can be felt, and judged."
+LEAD = "Surfaces recorded, modelled, simplified by detection thresholds, and judged."
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -81,24 +81,25 @@ def write_report(
     Parameters
     ----------
     path : str or Path
-        The report's file; folders are made as needed. The file needs nothing but itself.
+        The report's file, which is self-contained; folders are created as needed.
     responses : Responses, optional
-        Answers of the study; without them the report is on the models alone.
+        Answers of the study; without them the report covers the models alone.
     textures : sequence of TextureResult, optional
         Models, their simplification and, where known, the planted truth.
     benches : sequence of Section
-        What is said of methods, not of this study: speed against accuracy, where methods fail.
+        Results on methods rather than this study: speed against accuracy, where methods fail.
     provenance : mapping of str to object, optional
-        Versions, configuration, hashes of inputs; what is nested is unfolded.
+        Versions, configuration, hashes of inputs; nested values are flattened.
     title : str
     answered : str
-        The sentence on top, where `benches` hold the answers; computed from `responses` else.
+        The sentence at the top where `benches` contain the answers; otherwise computed from
+        `responses`.
     hand : DataFrame, optional
         How the hand moved with either model (`analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
         Differences that simulated participants were given (`verdicts.planted_verdicts`).
     seed : int
-        Of the bootstrap and of the draws behind the expected GFCs; shown with the provenance.
+        Seeds the bootstrap and the draws behind the expected GFCs; shown with the provenance.
     progress : callable, optional
         Called with the share done (0–1) and what comes next.
     mapped : callable
@@ -116,18 +117,19 @@ def write_report(
         Where there is nothing to report.
     """
     target = Path(path)
-    tell = progress or (lambda share, what: None)
+    report_progress = progress or (lambda share, what: None)
     rng = np.random.default_rng(seed)
     if responses is not None:
         responses = _with_identical(responses, textures)
     # Begun first: other processes compare models while this one analyses answers.
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
-    tell(0.0, "analysing answers")
+    report_progress(0.0, "analysing answers")
     found = [] if responses is None else claims_found(responses, rng=rng)
     people = []
     if responses is not None:
         people = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
-    sections = [*_model_sections(textures, compared, people=people, tell=tell), *benches]
+    models = _model_sections(textures, compared, people=people, progress=report_progress)
+    sections = [*models, *benches]
     if not sections:
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
@@ -137,7 +139,8 @@ def write_report(
     facts = {**(provenance or {}), "seed of this report": seed}
     files = _Files(target.parent)
     for number, (picture, (formats, lacking)) in enumerate(zip(pictures, drawn, strict=True)):
-        tell(1 - PICTURES_SHARE * (1 - number / len(pictures)), f"drawing {picture.title}")
+        share = 1 - PICTURES_SHARE * (1 - number / len(pictures))
+        report_progress(share, f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
     shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
@@ -161,7 +164,7 @@ def write_report(
     write_text(target, html)
     if undrawn:
         warnings.warn(undrawn, stacklevel=2)
-    tell(1.0, "done")
+    report_progress(1.0, "done")
     return target
 
 
@@ -170,7 +173,7 @@ def _model_sections(
     compared: Iterable[Comparison],
     *,
     people: Sequence[Section],
-    tell: Progress,
+    progress: Progress,
 ) -> list[Section]:
     """The sections on models, where there are some, around those on the answers."""
     if not textures:
@@ -179,10 +182,10 @@ def _model_sections(
     before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
         share = before + MODELS_SHARE * number / len(textures)
-        tell(share, f"comparing models of {result.texture}")
+        progress(share, f"comparing models of {result.texture}")
         gfc.append(comparison.gfc)
         driven.append(comparison.driven)
-    tell(1 - PICTURES_SHARE, "regressing parameters on speed and force")
+    progress(1 - PICTURES_SHARE, "regressing parameters on speed and force")
     models = model_section(textures, pd.concat(gfc, ignore_index=True))
     parameters = parameter_section(textures, driving_table(driven))
     truths = [result for result in textures if result.truth is not None]
@@ -206,9 +209,9 @@ def _answer_sections(
     planted: Mapping[str, Mapping[str, float]] | None,
     rng: np.random.Generator,
 ) -> list[Section]:
-    """What people answered, and how far that can be relied on.
+    """The answers, and how reliable they are.
 
-    Models are compared in no answers of an unfinished task.
+    Models are not compared by answers of an unfinished task.
     """
     shown = [one for one in found if len(one.tests)]
     others = tasks_without_chapter(responses)
@@ -233,7 +236,7 @@ def _answer_sections(
     for task in others:
         sections.append(task_section(responses, task, by_task.get(task, ()), rng=draws[task]))
     sections.append(mixed_section(responses, judged, rng=rng))
-    # Task by task, so that one more changes nothing of those before it.
+    # Task by task, so that a further task does not change the results of earlier ones.
     pairs = list(dict.fromkeys(one.claim.models for own in by_task.values() for one in own))
     speeds, hands = {}, {}
     for pair in pairs:
@@ -247,7 +250,7 @@ def _answer_sections(
     asked = {*(one.claim.task for one in shown), *others}
     tasks = {task: answers for task, answers in responses.answers.items() if task in asked}
     sections.append(
-        # Who answers at chance is told by a test of the share of right answers: an effect.
+        # Whether somebody answers at chance is tested on the share of right answers: an effect.
         reliability_section(
             tasks,
             chances=_chances({task: t for task, t in tasks.items() if task in finished}),
@@ -286,17 +289,17 @@ def _overview(
         unfinished=[] if responses is None else unfinished_tasks(responses),
     )
     outcomes = [outcome for section in sections for outcome in section.outcomes]
-    # A task that is not finished is told of by its own section and by that on the verdicts.
+    # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
     done = list(dict.fromkeys(sentence for section in sections for sentence in section.done))
-    done += [f"On drawing the pictures: {undrawn}"] * bool(undrawn)
+    done += [f"While drawing the figures: {undrawn}"] * bool(undrawn)
     otherwise = [] if responses is None else deviations(responses, found)
     planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
     return (
         tiles(tiles_once)
-        + "<h3>What came out</h3>"
+        + "<h3>Findings</h3>"
         + grouped(by_weight(outcomes))
-        + '<div class="caution"><h3>What may not be concluded</h3>'
+        + '<div class="caution"><h3>What must not be concluded</h3>'
         + bullets(warned)
         + "</div>"
         + planned * bool(otherwise)
@@ -310,11 +313,11 @@ def _banner(responses: Responses | None, textures: Sequence[TextureResult]) -> s
     simulated = [result.simulated for result in textures]
     if any(simulated):
         whose = "" if all(simulated) else f" of {sum(simulated)} of {len(simulated)} textures"
-        reasons.append(f"the recordings{whose} come from no real surface")
+        reasons.append(f"the recordings{whose} are not of real surfaces")
     if responses is not None and responses.simulated_participants:
         reasons.append("no person took part")
     elif responses is not None and responses.simulated_rig:
-        reasons.append("people took part, but at a simulated rig, where nobody felt a real surface")
+        reasons.append("people took part, but with a simulated rig, so nobody felt a real surface")
     return f"SIMULATED: {'; '.join(reasons)}." if reasons else ""
 
 

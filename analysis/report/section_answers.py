@@ -11,7 +11,7 @@ from analysis.answers.responses import Responses
 from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
-from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
+from analysis.labels import ALL_TEXTURES, MODELS, TASKS, counted, sentence_case
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
@@ -49,7 +49,7 @@ def verdict_section(
 ) -> Section:
     """Every claim with its tests; at least one. `planted` as in `verdicts.planted_verdicts`.
 
-    Of claims about unfinished tasks the tables tell how many took part, and no effect.
+    For claims about unfinished tasks the tables give the number of participants, and no effect.
     """
     simulated = responses.simulated
     judged = [one for one in found if not one.standing.unfinished]
@@ -59,13 +59,13 @@ def verdict_section(
     verdicts = Table(
         "claims",
         "Verdicts",
-        "First the mean over the textures whose models differ, each counting once, of participants "
-        "who answered completely; then each texture, a family of its own with Holm's correction "
-        "for tests of a difference and of equivalence (TOST) separately; identical models are "
-        "controls. Differences and bounds in points of the scale, or shares of right answers. "
-        "Nothing is called equal, nor within bounds, where the last column says why not, whatever "
-        "p is. Of a task that lacks participants or sessions no effect is shown. The tests "
-        "themselves are below.",
+        "First row: the mean over the textures whose models differ, with equal weight for each "
+        "texture, over participants who answered completely. Then each texture: a family of its "
+        "own, with Holm's correction separately for tests of a difference and of equivalence "
+        "(TOST); identical models are controls. Differences and bounds are in points of the scale, "
+        "or shares of right answers. Where the last column gives a reason, neither equivalence nor "
+        "a difference within the bounds is concluded, whatever p is. No effect is shown for a task "
+        "that lacks participants or sessions. The tests themselves are below.",
         tests[names(VERDICT_COLUMNS)],
         VERDICT_COLUMNS,
         simulated,
@@ -73,11 +73,12 @@ def verdict_section(
     detail = Table(
         "claim_tests",
         "Tests behind the verdicts",
-        "Paired t-tests over participants, intervals 95%. d_z: mean difference over the standard "
-        "deviation of the differences. BF₀₁: Bayes factor for no difference (JZS, r = 0.707). "
-        "Beside them Shapiro and Wilk's test of the differences, Wilcoxon's signed-rank test, and "
-        "a permutation test that flips signs; where nobody varies, p is that of the sign flips. "
-        "Where equality is withheld, neither TOST nor BF₀₁ speaks for it.",
+        "Paired t-tests over participants with 95% confidence intervals. d_z: mean difference "
+        "divided by the standard deviation of the differences. BF₀₁: Bayes factor for no "
+        "difference (JZS, r = 0.707). Also given: the Shapiro–Wilk test of the differences, "
+        "Wilcoxon's signed-rank test, and a permutation test that flips signs; where participants "
+        "do not vary, p is from the sign flips. Where equivalence is withheld, neither TOST nor "
+        "BF₀₁ is evidence for it.",
         tests,
         TESTS_SHOWN,
         simulated,
@@ -99,17 +100,17 @@ def verdict_section(
 
 
 def _forest(judged: Sequence[ClaimFound], *, simulated: bool) -> tuple[Picture, ...]:
-    """The picture of all claims that may be judged; none where there is none."""
+    """The picture of all claims with a verdict; none where there is no such claim."""
     if not judged:
         return ()
     picture = Picture(
         "forest",
         "Differences and their bounds",
         "Mean differences over participants with 90% and 95% confidence intervals. Where the 90% "
-        "interval lies inside the bounds (grey), a test of equivalence is significant, Holm's "
-        "correction left aside; where the 95% interval does not hold 0, a test of a difference is. "
-        "The verdict is told by the mark, as an interval inside the bounds is no equality where "
-        "people did not show that they tell surfaces apart.",
+        "interval lies within the bounds (grey), a test of equivalence is significant, apart from "
+        "Holm's correction; where the 95% interval excludes 0, a test of a difference is. The "
+        "marker shows the verdict: an interval within the bounds is not equivalence where "
+        "participants were not shown to tell surfaces apart.",
         figure_forest(judged, simulated=simulated),
         simulated,
     )
@@ -138,9 +139,10 @@ def _planted_table(
 ) -> Table:
     return Table(
         "planted_effects",
-        "Verdicts beside what was planted",
-        "Points that simulated participants rate the other model higher, and what the tests made "
-        "of their answers. Undecided: inconclusive, or a verdict that was withheld.",
+        "Verdicts compared with the planted differences",
+        "Planted: by how many points simulated participants rate the other model higher; the "
+        "verdict is based on their answers. Undecided: inconclusive, or a verdict that was "
+        "withheld.",
         planted_verdicts(found, planted or {}),
         PLANTED_COLUMNS,
         simulated=True,
@@ -156,7 +158,7 @@ def rating_section(responses: Responses, found: Sequence[ClaimFound]) -> Section
             _name("ratings", pair),
             f"Rated similarity of virtual and real surface, {pair[0]} and {pair[1]} models",
             "Bars: means over participants with 95% confidence intervals; points: participants. "
-            "Cf. the paper's figure 9, whose bars are standard errors.",
+            "Compare figure 9 of the paper, whose bars are standard errors.",
             figure_ratings(
                 [one for one in found if one.claim.models == pair], simulated=responses.simulated
             ),
@@ -209,7 +211,9 @@ def _name(what: str, pair: tuple[str, str]) -> str:
 def rates_picture(found: ClaimFound, name: str, *, chance: float, simulated: bool) -> Picture:
     """Shares of right answers with either model of a claim; `name` begins that of the file."""
     task, (reference, other) = found.claim.task, found.claim.models
-    paper = " Cf. the paper's figure 11, whose bars are standard errors." * (task == "relative")
+    paper = " Compare figure 11 of the paper, whose bars are standard errors." * (
+        task == "relative"
+    )
     line = f"; {UNKNOWN_CHANCE}." if np.isnan(chance) else "; dashed: chance."
     return Picture(
         _name(name, found.claim.models),
@@ -227,15 +231,15 @@ def rates_table(rates: pd.DataFrame, name: str, *, chance: float, simulated: boo
     if not np.isnan(chance):
         title = "Correct rates against chance"
         test = (
-            ", and a one-sample t-test against chance (sign flips where all have one rate) with "
-            "Holm over the textures of one model"
+            ", and a one-sample t-test against chance (sign flips where all have the same rate) "
+            "with Holm's correction over the textures of one model"
         )
     return Table(
         name,
         title,
         "Participants are the units: mean of their rates with a 95% interval (bias-corrected and "
-        f"accelerated bootstrap over participants){test}. The rows over all textures weigh "
-        "textures equally, and have complete participants only.",
+        f"accelerated bootstrap over participants){test}. The rows over all textures weight "
+        "textures equally and include complete participants only.",
         rates,
         CORRECT_RATES_SHOWN,
         simulated,
@@ -243,18 +247,21 @@ def rates_table(rates: pd.DataFrame, name: str, *, chance: float, simulated: boo
 
 
 def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]]:
-    """The sentence and the tile that say how many took part, of how many."""
+    """The sentence and the tile with the number of participants, out of those planned."""
     where = TASKS[task]
     done, planned = responses.done(task), responses.planned.get(task)
     people = str(done.participants)
-    who = "simulated participants" if responses.simulated_participants else "participants"
-    who += " at the simulated rig" if responses.simulated_rig else ""
-    trials = f"{len(responses.answers[task])} trials (training left out)"
+    kind = "simulated participant" if responses.simulated_participants else "participant"
+    rig = " with the simulated rig" if responses.simulated_rig else ""
+    trials = f"{counted(len(responses.answers[task]), 'trial')} (without training)"
     if planned is None:
-        return f"{sentence_case(where)}: {people} {who}, {trials}.", (people, f"{who}, {where}")
+        took_part = f"{counted(done.participants, kind)}{rig}"
+        sentence = f"{sentence_case(where)}: {took_part}, {trials}."
+        return sentence, (people, f"{took_part.removeprefix(people).strip()}, {where}")
     people += f" of {planned.participants}"
+    who = f"planned {kind}{'s' * (planned.participants != 1)}{rig}"
     sentence = (
-        f"{sentence_case(where)}: {people} planned {who}, {done.sessions} of {planned.sessions} "
-        f"planned sessions, {trials}."
+        f"{sentence_case(where)}: {people} {who}, {done.sessions} of "
+        f"{counted(planned.sessions, 'planned session')}, {trials}."
     )
-    return sentence, (people, f"planned {who}, {where}")
+    return sentence, (people, f"{who}, {where}")

@@ -1,4 +1,4 @@
-"""The section on confusions: who was taken for whom, and what that tells.
+"""The section on confusions: which textures were taken for which, and what follows from that.
 
 docs/method/confusions.md
 """
@@ -40,7 +40,7 @@ INFORMATION_COLUMNS = (
     Column("trials"),
     Column("uncorrected", "as counted", "bit"),
     Column("bits", "corrected", "bit"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
 )
 CHANGE_COLUMNS = (
@@ -55,13 +55,13 @@ SIMILARITY_COLUMNS = (
     Column("other", "and", is_name=True),
     Column("similarity"),
 )
-BIAS_COLUMNS = (MODEL, TEXTURE, Column("bias", "bias for its answer"))
+BIAS_COLUMNS = (MODEL, TEXTURE, Column("bias", "response bias"))
 FIT_COLUMNS = (
     MODEL,
     Column("deviance"),
     Column("df"),
     P,
-    Column("p_simulated", "p of drawn tables", is_p_value=True),
+    Column("p_simulated", "p of simulated tables", is_p_value=True),
 )
 
 
@@ -72,7 +72,7 @@ def confusion_section(
     simulated: bool,
     rng: np.random.Generator,
 ) -> Section:
-    """Who was taken for whom with each set of models, the reference first.
+    """Which textures were taken for which with each set of models, the reference first.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _changes(
 
 
 def _information(relative: pd.DataFrame, matrices: Mapping[str, ConfusionMatrix]) -> pd.DataFrame:
-    """Of each set of models that two people or more answered on."""
+    """For each set of models with answers of at least two participants."""
     rows = []
     for model, matrix in matrices.items():
         people, counts = participant_counts(relative, matrix)
@@ -153,9 +153,10 @@ def _picture(matrices: Mapping[str, ConfusionMatrix], *, simulated: bool) -> Pic
     chance = 1 / len(next(iter(matrices.values())).textures)
     return Picture(
         "confusion",
-        "Who was taken for whom",
-        "Rows: real surface presented; columns: virtual surface answered. Per cent of the row, in "
-        f"brackets the number of answers; chance is {chance:.1%}. Cf. the paper's figure 10.",
+        "Which texture was taken for which",
+        "Rows: real surface presented; columns: virtual surface answered. Percentage of the row, "
+        f"with the number of answers in brackets; chance is {chance:.1%}. Compare figure 10 of the "
+        "paper.",
         figure_confusion(matrices, simulated=simulated),
         simulated,
     )
@@ -165,8 +166,8 @@ def _change_table(change: pd.DataFrame, *, simulated: bool) -> Table:
     return Table(
         "confusion_change",
         "Are two models confused differently?",
-        "Permutation test: each participant's two matrices of row shares could as well have been "
-        "those of the other model. Participants who answered on both.",
+        "Permutation test that swaps the two models' matrices of row shares within participants. "
+        "Participants who answered with both models.",
         change,
         CHANGE_COLUMNS,
         simulated,
@@ -177,9 +178,9 @@ def _information_table(information: pd.DataFrame, *, simulated: bool) -> Table:
     return Table(
         "transferred_information",
         "Transferred information",
-        "Of all participants' answers in one matrix, corrected after Miller and Madow; intervals: "
-        "jackknife over participants. None for single persons: 21 trials read 1.27 bit at pure "
-        "chance.",
+        "All participants' answers pooled in one matrix, corrected after Miller and Madow; "
+        "intervals: jackknife over participants. Not given for single participants: 21 trials "
+        "yield 1.27 bit at pure chance.",
         information,
         INFORMATION_COLUMNS,
         simulated,
@@ -209,8 +210,8 @@ def _similarity_items(
     ]
     picture = Picture(
         "similarities",
-        "How similar the textures were taken to be",
-        "Similarities of Luce's choice model, which takes biases for answers out of the confusions "
+        "Perceived similarity of the textures",
+        "Similarities of Luce's choice model, which separates response biases from the confusions "
         "(0: never confused, 1: not told apart; –: never recognised).",
         figure_similarities(
             {model: choice.similarities for model, choice in choices.items()},
@@ -222,9 +223,9 @@ def _similarity_items(
     fitted = Table(
         "similarity_fit",
         "Does the similarity choice model hold?",
-        "Deviance of the quasi-symmetric log-linear model; a small p says that confusions are not "
-        "symmetric but for biases. p of drawn tables where counts are too few for χ². Answers of "
-        "one participant count as independent here, so that p is rather too small.",
+        "Deviance of the quasi-symmetric log-linear model; a small p means that confusions are "
+        "asymmetric beyond response biases. p of simulated tables where counts are too few for χ². "
+        "Answers of one participant are treated as independent here, so p tends to be too small.",
         fit,
         FIT_COLUMNS,
         simulated,
@@ -233,15 +234,15 @@ def _similarity_items(
         Table(
             "similarities",
             "Similarities",
-            "Of each pair of textures.",
+            "For each pair of textures.",
             pd.DataFrame(pairs, columns=names(SIMILARITY_COLUMNS)),
             SIMILARITY_COLUMNS,
             simulated,
         ),
         Table(
             "biases",
-            "Biases for answers",
-            "They add up to 1 with each model.",
+            "Response biases",
+            "They sum to 1 for each model.",
             pd.DataFrame(biases, columns=names(BIAS_COLUMNS)),
             BIAS_COLUMNS,
             simulated,
@@ -254,9 +255,9 @@ def _button_table(liked: ButtonPreference, *, simulated: bool) -> Table:
     return Table(
         "buttons",
         "Wrong answers by button",
-        "Expected: if every button but the right one's had been as likely. Preference that "
-        f"participants share: p {_p(liked.p_shared)}; preferences of their own: p "
-        f"{_p(liked.p_personal)} (layouts drawn again).",
+        "Expected: if every button except the right one had been equally likely. Preference shared "
+        f"by participants: p {_p(liked.p_shared)}; individual preferences: p "
+        f"{_p(liked.p_personal)} (redrawn layouts).",
         liked.table,
         BUTTON_COLUMNS,
         simulated,
@@ -271,16 +272,16 @@ def _counts_table(matrix: ConfusionMatrix, *, simulated: bool) -> Table:
 
 
 def _change_outcomes(change: pd.DataFrame) -> list[Outcome]:
-    told = []
+    sentences = []
     for row in change.to_dict("records"):
         if np.isfinite(row["p"]):
             differs = "were" if row["p"] < ALPHA else "were not shown to be"
-            told.append(
+            sentences.append(
                 f"Textures {differs} confused differently with {row['other']} than with "
                 f"{row['reference']} models (permutation test, p {_p(row['p'])}; participants: "
                 f"{row['participants']})."
             )
-    return [Outcome(Weight.SECONDARY, sentence) for sentence in told]
+    return [Outcome(Weight.SECONDARY, sentence) for sentence in sentences]
 
 
 def _button_outcomes(liked: ButtonPreference) -> list[Outcome]:
@@ -289,8 +290,9 @@ def _button_outcomes(liked: ButtonPreference) -> list[Outcome]:
     return [
         Outcome(
             Weight.SECONDARY,
-            "Caveat: some buttons were preferred, whatever lay on them (layouts drawn again, "
-            f"shared p {_p(liked.p_shared)}, personal p {_p(liked.p_personal)}).",
+            "Caveat: some buttons were preferred, whatever texture they held (redrawn layouts: "
+            f"shared preference p {_p(liked.p_shared)}, individual preferences p "
+            f"{_p(liked.p_personal)}).",
         )
     ]
 

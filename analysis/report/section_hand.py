@@ -39,7 +39,7 @@ MEASURES = {
 def hand_section(
     hand: pd.DataFrame, *, models: tuple[str, str], simulated: bool, rng: np.random.Generator
 ) -> Section | None:
-    """How the hand moved with either model; None where it was measured with both in no task.
+    """How the hand moved with each model; None where no task measured it with both.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def hand_section(
 
 
 def hand_caveat(tests: pd.DataFrame, *, models: tuple[str, str]) -> str:
-    """One sentence on what the hand did otherwise with the other model.
+    """One sentence on how the hand moved differently with the other model.
 
     Parameters
     ----------
@@ -87,17 +87,17 @@ def hand_caveat(tests: pd.DataFrame, *, models: tuple[str, str]) -> str:
     if apart.empty:
         main = compared[compared["measure"].isin(["speed_mm_s", "force_n"])]
         return (
-            f"No difference of the hand's movement between {reference} and {other} models was "
-            f"shown ({other} − {reference}: {_told(main)})."
+            f"No difference in hand movement between {reference} and {other} models was shown "
+            f"({other} − {reference}: {_listed(main)})."
         )
     return (
-        f"Caveat: the hand did otherwise with {other} than with {reference} models ({other} − "
-        f"{reference}: {_told(apart)}), so that a difference of the answers, or its absence, may "
-        "come from the hand and not from the models."
+        f"Caveat: the hand moved differently with {other} than with {reference} models ({other} − "
+        f"{reference}: {_listed(apart)}), so a difference in the answers, or its absence, may be "
+        "due to the hand rather than the models."
     )
 
 
-def _told(tests: pd.DataFrame) -> str:
+def _listed(tests: pd.DataFrame) -> str:
     return "; ".join(_difference(row) for row in tests.to_dict("records"))
 
 
@@ -117,8 +117,9 @@ def _picture(
     return Picture(
         f"hand_{task}",
         f"Speed and force of the hand by model, {TASKS[task]}",
-        "Points: participants, a line joins one person's; beside them the mean with its 95% "
-        "confidence interval. Means over the textures that a participant judged with both models.",
+        "Points: participants, with a line between the two models of each, and the mean with its "
+        "95% confidence interval. Means over the textures that a participant judged with both "
+        "models.",
         figure_hand(means, models=models, simulated=simulated),
         simulated,
     )
@@ -133,10 +134,10 @@ def _tables(
     }
     paired = Table(
         "hand_tests",
-        "The hand with either model",
+        "Hand movement with each model",
         f"Paired t-tests, {other} − {reference}. A participant's value is the mean over the "
-        "textures judged with both. Only virtual surfaces, and only trials that were answered. "
-        "Not corrected for the number of tests.",
+        "textures judged with both models. Only virtual surfaces, and only trials that were "
+        "answered. Not corrected for the number of tests.",
         tests.assign(measure=tests["measure"].map(labels), task=tests["task"].map(TASKS)),
         TESTS_SHOWN,
         simulated,
@@ -144,11 +145,11 @@ def _tables(
     participants = hand_by_participant(means)
     each = Table(
         "hand",
-        "The hand of each participant",
+        "Hand movement of each participant",
         f"Reference: {reference} models; other: {other} models. Means over the textures judged "
-        "with both. n/a: nothing measured it, or no session stored it.",
+        "with both. n/a: not measured, or not stored by any session.",
         participants.assign(task=participants["task"].map(TASKS)),
         PARTICIPANT_COLUMNS,
         simulated,
     )
-    return paired, Fold("The hand of each participant", (each,))
+    return paired, Fold("Hand movement of each participant", (each,))

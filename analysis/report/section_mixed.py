@@ -32,22 +32,22 @@ CLAIM_GEE_COLUMNS = (CLAIM, *GEE_COLUMNS)
 _MIXED = (
     "Ratings by a mixed model",
     "Texture × model, session and order, with a random intercept and slope of the model per "
-    "participant, in points; t with one degree of freedom less than participants. Where answers "
-    "are balanced it is the paired t-test. Not corrected for the number of tests; verdicts rest "
-    "on the paired tests.",
+    "participant, in points; the degrees of freedom of t are the number of participants minus 1. "
+    "For balanced answers this is the paired t-test. Not corrected for the number of tests; "
+    "verdicts rest on the paired tests.",
 )
 _GEE = (
     "Ratings and right answers by generalized estimating equations",
-    "Binomial, logit, clustered by participant, bias-reduced covariance; ratings as shares of 100. "
-    "Texture × model, session and order over all textures, which count alike. Where all answers "
-    "to a texture with a model lie at one end, odds are infinite and p is that of the "
-    "participants' sign flips. Not corrected for the number of tests; verdicts rest on the paired "
-    "tests.",
+    "Binomial with logit link, clustered by participant, bias-reduced covariance; ratings as "
+    "shares of 100. Texture × model, session and order over all textures, with equal weight for "
+    "each. Where all answers to a texture with a model lie at one end, odds are infinite and p is "
+    "from the participants' sign flips. Not corrected for the number of tests; verdicts rest on "
+    "the paired tests.",
 )
 
 
 class Said(NamedTuple):
-    """What a model of single answers says: direction of a significant effect, p, and in words."""
+    """The result of a model of single answers: direction of a significant effect, p, wording."""
 
     sign: int
     p: float
@@ -57,13 +57,13 @@ class Said(NamedTuple):
 def mixed_section(
     responses: Responses, found: Sequence[ClaimFound], *, rng: np.random.Generator
 ) -> Section | None:
-    """Every claim on two models by models of single answers; None where there is none.
+    """Every claim on two models, by models of single answers; None where there is no such claim.
 
     Parameters
     ----------
     responses : Responses
     found : sequence of ClaimFound
-        With tests, of any tasks. Claims about tasks whose trials hold both models are passed over.
+        With tests, of any tasks. Claims about tasks whose trials contain both models are skipped.
     rng : Generator
         Draws sign flips.
     """
@@ -91,8 +91,8 @@ def mixed_section(
         if all(np.isfinite(each.p) for each in said):
             outcomes.append(Outcome(Weight.SECONDARY, _beside_the_paired_test(one, said)))
     tables = [
-        Table(name, *told, pd.concat(frames)[names(columns)], columns, responses.simulated)
-        for name, told, frames, columns in (
+        Table(name, *caption, pd.concat(frames)[names(columns)], columns, responses.simulated)
+        for name, caption, frames, columns in (
             ("mixed_effects", _MIXED, mixed, CLAIM_MIXED_COLUMNS),
             ("gee_effects", _GEE, odds, CLAIM_GEE_COLUMNS),
         )
@@ -105,27 +105,27 @@ def mixed_section(
 
 def _mixed_said(row: Mapping[Hashable, Any]) -> Said:
     effect = _with_interval([f"{row[name]:+.1f}" for name in ("estimate", "ci_low", "ci_high")])
-    told = f"{row['method']} {effect} points, p = {p_value(row['p'])}"
-    return Said(_sign(row["estimate"], row["p"]), row["p"], told)
+    text = f"{row['method']} {effect} points, p = {p_value(row['p'])}"
+    return Said(_sign(row["estimate"], row["p"]), row["p"], text)
 
 
 def _gee_said(row: Mapping[Hashable, Any]) -> Said:
     sign = _sign(row["share_other"] - row["share_reference"], row["p"])
-    told = f"{row['method']} p = {p_value(row['p'])}"
+    text = f"{row['method']} p = {p_value(row['p'])}"
     if row["method"] == GEE:
         ratios = [f"{row[name]:.2f}" for name in ("odds_ratio", "ci_low", "ci_high")]
-        told = f"{row['method']} odds ratio {_with_interval(ratios)}, p = {p_value(row['p'])}"
-    return Said(sign, row["p"], told)
+        text = f"{row['method']} odds ratio {_with_interval(ratios)}, p = {p_value(row['p'])}"
+    return Said(sign, row["p"], text)
 
 
 def _beside_the_paired_test(one: ClaimFound, said: Sequence[Said]) -> str:
-    """Whether models of single answers say over all textures what the paired test says."""
+    """Whether models of single answers agree with the paired test over all textures."""
     paired = one.tests.to_dict("records")[0]
     sign = _sign(paired["mean_difference"], paired["p"])
     agree = "in agreement" if all(each.sign == sign for each in said) else "not in agreement"
-    told = "; ".join(each.sentence for each in said)
+    text = "; ".join(each.sentence for each in said)
     return (
-        f"Single answers, {one.claim.name}: {told}. This is {agree} with the paired test over "
+        f"Single answers, {one.claim.name}: {text}. This is {agree} with the paired test over "
         f"all textures (p = {p_value(paired['p'])})."
     ).replace("= <", "<")
 

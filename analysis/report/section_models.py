@@ -1,4 +1,4 @@
-"""The section on models: likeness, verdicts and pictures of each texture."""
+"""The section on models: spectral similarity, verdicts and pictures of each texture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.columns import chosen, without
 from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import figure_spectra_and_threshold
-from analysis.labels import MODELS
+from analysis.labels import MODELS, counted
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import described, left_out_outcomes, simplification_outcomes
@@ -34,7 +34,7 @@ VERDICTS_SHOWN = chosen(
 
 
 def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Section:
-    """Models, what was dropped, and how alike the spectra stay (PAPER V).
+    """Models, what was dropped, and how similar the spectra remain (PAPER V).
 
     Parameters
     ----------
@@ -47,11 +47,11 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     table = Table(
         "gfc",
         "Simplification rate and quality",
-        "Means over the recorded conditions. GFC30, GFC5: likeness of the model's response and the "
-        "recording's spectrum, both smoothed with σ = 30 or 5 Hz; floor: white noise of equal RMS; "
-        "expected: what the true spectrum scores on average, which a model fitted to the very "
-        "recordings may exceed. "
-        "RMS error and band energy error: means of absolute values. Cf. the paper's table 3.",
+        "Means over the recorded conditions. GFC30, GFC5: similarity of the model's response and "
+        "the recording's spectrum, both smoothed with σ = 30 or 5 Hz; floor: white noise of equal "
+        "RMS; expected: mean score of the true spectrum, which a model fitted to the same "
+        "recordings may exceed. RMS error and band energy error: means of absolute values. Compare "
+        "table 3 of the paper.",
         gfc,
         GFC_SHOWN,
         any(result.simulated for result in textures),
@@ -76,11 +76,11 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
         return ()
     table = Table(
         "left_out",
-        "Conditions predicted that the model was not shown",
-        "A hand is hardly ever at a recorded condition. Every second condition was left out and "
-        "predicted from its neighbours, by the model and by an autoregressive one. Level error "
-        "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) to the "
-        "recording that was left out, whose own scatter is in them.",
+        "Prediction of left-out conditions (cross-validation)",
+        "A hand is rarely exactly at a recorded condition. Every second condition was left out and "
+        "predicted from its neighbours, by the model and by an autoregressive model. Level error "
+        "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) are relative "
+        "to the left-out recording, whose own scatter they include.",
         summary,
         LEFT_OUT_COLUMNS,
         simulated,
@@ -95,18 +95,18 @@ def _models_done(textures: Sequence[TextureResult]) -> tuple[str, ...]:
     whose = "simulated " if simulated == len(contact) else ""
     part = f", {simulated} of them simulated" if simulated and not whose else ""
     fitted = (
-        f"Models of {len(textures)} texture{'s' * (len(textures) != 1)} were fitted to "
-        f"{len(contact)} {whose}recordings{part} (estimator {estimators})."
+        f"Models of {counted(len(textures), 'texture')} were fitted to "
+        f"{counted(len(contact), whose + 'recording')}{part} (estimator {estimators})."
     )
     return fitted, *_rules(textures), *_sources_of_thresholds(textures)
 
 
 def _rules(textures: Sequence[TextureResult]) -> list[str]:
-    """By which threshold, criterion and margin layers were dropped, a sentence for each of them."""
+    """A sentence for each threshold, criterion and margin by which layers were dropped."""
     by_rule: dict[str, list[str]] = {}
     for result in textures:
         made = result.simplification
-        above = "" if made.hold_above else ", nothing assumed above its table"
+        above = "" if made.hold_above else ", without assuming thresholds above its table"
         rule = (
             f"below the threshold “{made.threshold.name}”{above} in every condition (criterion "
             f"“{made.criterion}”, margin {made.margin_db:g} dB)."
@@ -136,8 +136,8 @@ def _model_tiles(gfc: pd.DataFrame) -> tuple[tuple[str, str], ...]:
         (f"{full['layers'].sum()} → {simple['layers'].sum()}", "layers, full → simplified"),
         (
             f"{full['gfc30_mean'].mean():.3f} → {simple['gfc30_mean'].mean():.3f}",
-            f"mean GFC30, full → simplified (floor {floor:.3f}, expected of the true one "
-            f"{expected:.3f})",
+            f"mean GFC30, full → simplified (floor {floor:.3f}, expected for the true "
+            f"spectrum {expected:.3f})",
         ),
     )
 
@@ -147,17 +147,18 @@ def _texture_fold(result: TextureResult, *, number: int) -> Fold:
     verdicts = Table(
         f"verdicts_{stem}",
         f"{result.texture}: verdict on each layer",
-        "Distance to the threshold in the condition where the layer stands highest against it "
-        "(+ above); flip probability: chance that the level's sampling error, which the records' "
-        "length leaves, would flip the verdict in other records; whether the estimator would find "
-        f"the layer again, and its bias, are not in it.{_unresolved_note(result)}",
+        "Distance to the threshold in the condition where the layer is highest relative to it (+ "
+        "above). Flip probability: the probability that the sampling error of the level, given the "
+        "length of the records, would reverse the verdict in other records; it does not include "
+        "whether the estimator would find the layer again, nor its "
+        f"bias.{_unresolved_note(result)}",
         simplification_table(result.simplification),
         VERDICTS_SHOWN,
         result.simulated,
     )
     kept, all_layers = result.simplification.model.n_layers, result.model.n_layers
     return Fold(
-        f"{result.texture}: {kept} of {all_layers} layers kept",
+        f"{result.texture}: {kept} of {counted(all_layers, 'layer')} kept",
         (verdicts, _threshold_picture(result, stem), _course_picture(result, stem)),
         opened=number == 0,
     )
@@ -179,11 +180,11 @@ def _threshold_picture(result: TextureResult, stem: str) -> Picture:
     return Picture(
         f"threshold_{stem}",
         f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
-        "Above: smoothed spectrum of the recording and of each model; thin lines: each layer "
-        "alone, and in green dashes the gain at which it would be just felt. Below: each layer's "
-        "amplitude by the criterion against the threshold; open crosses mark dropped layers. A "
-        "layer may lie below the threshold here and yet be kept, because another condition, its "
-        "uncertainty or the sum of the dropped layers decides. Cf. the paper's figure 6.",
+        "Top: smoothed spectrum of the recording and of each model; thin lines: each layer alone, "
+        "and green dashes: the gain at which it would just be felt. Bottom: amplitude of each "
+        "layer by the criterion, and the threshold; open crosses mark dropped layers. A layer may "
+        "lie below the threshold here and still be kept, because another condition, its "
+        "uncertainty or the sum of the dropped layers decides. Compare figure 6 of the paper.",
         figure_spectra_and_threshold(comparison),
         result.simulated,
     )
@@ -196,7 +197,7 @@ def _course_picture(result: TextureResult, stem: str) -> Picture:
     if result.truth is not None and force_n in result.truth.forces_n:
         truth = result.truth.at_rate(result.model.rate_hz)
         courses.append(layers_over_speed(truth, force_n=force_n))
-        note += " Dashed: what was planted."
+        note += " Dashed: the planted layers."
     return Picture(
         f"layers_{stem}",
         f"{result.texture}: layers over speed at {force_n:g} N",

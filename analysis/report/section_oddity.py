@@ -1,4 +1,4 @@
-"""The section on the odd one out: shares of right answers and the d′ that they mean.
+"""The section on the odd one out: shares of right answers and the corresponding d′.
 
 docs/method/speed-accuracy.md#odd-one-out
 """
@@ -53,10 +53,11 @@ def oddity_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section |
     table = Table(
         "oddity",
         "Right answers and d′",
-        "The one of three that differs was looked for; chance is 1/3. d′ by the decision model of "
-        "the task (the one farthest from the other two is chosen), its interval that of the mean "
-        "share. Who feels no difference is right by chance, so of the claim's bounds the upper one "
-        "counts; it is given as a share and as a d′. Verdicts rest on the tests of the shares.",
+        "The task is to find the one of three that differs; chance is 1/3. d′ follows from the "
+        "decision model of the task (the one farthest from the other two is chosen); its interval "
+        "is that of the mean share. Observers who feel no difference are right by chance, so only "
+        "the upper one of the claim's bounds matters; it is given as a share and as a d′. Verdicts "
+        "rest on the tests of the shares.",
         sensitivity,
         ODDITY_COLUMNS,
         simulated,
@@ -79,8 +80,8 @@ def oddity_sensitivity(found: ClaimFound) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        `ODDITY_COLUMNS`, a row for each row of its tests. Infinite where everybody was right, NaN
-        where there is no interval or no bound.
+        `ODDITY_COLUMNS`, a row for each row of its tests. Infinite where all answers were right,
+        NaN where there is no interval or no bound.
     """
     rows = [_sensitivity(row) for row in found.tests.to_dict("records")]
     return pd.DataFrame(rows, columns=names(ODDITY_COLUMNS))
@@ -110,13 +111,13 @@ def _told(row: Mapping[Hashable, Any]) -> str:
             f" (95% CI {row['share_low']:.1%} to {row['share_high']:.1%})",
             f" ({_number(row['d_prime_low'])} to {_number(row['d_prime_high'])})",
         )
-    told = (
+    text = (
         f"Odd one out, {row['claim']}: {row['share']:.1%} of the answers were right over all "
         f"textures{intervals[0]}, d′ {_number(row['d_prime'])}{intervals[1]}"
     )
     if np.isfinite(row["bound"]):
-        told += f"; upper bound {row['bound']:.1%}, d′ {_number(row['bound_d_prime'])}"
-    return f"{told}; {row['verdict'] or NO_TEST}."
+        text += f"; upper bound {row['bound']:.1%}, d′ {_number(row['bound_d_prime'])}"
+    return f"{text}; {row['verdict'] or NO_TEST}."
 
 
 def _number(d_prime: float) -> str:

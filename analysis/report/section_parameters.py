@@ -1,4 +1,4 @@
-"""What the report says about the parameters' response to speed and force (PAPER IV, IX-B)."""
+"""The section on the parameters' dependence on speed and force (PAPER IV, IX-B)."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ DRIVING_SHOWN = chosen(
     *("texture", "driven_by", "numbers", "gfc30_mean", "gfc30_floor", "gfc30_expected"),
     *("gfc30_deficit", "log_spectral_distance_db", "rms_error_db", "band_energy_error_db"),
 )
-NO_CORRECTION = "The paper corrects for no multiple testing, and neither does this table."
+NO_CORRECTION = "As in the paper, p values are not corrected for multiple testing."
 
 
 def parameter_section(textures: Sequence[TextureResult], driving: pd.DataFrame) -> Section:
-    """Regressions of the full models' parameters, and the models that they drive.
+    """Regressions of the full models' parameters, and the models driven by them.
 
     docs/method/regression.md
 
@@ -70,7 +70,7 @@ def parameter_section(textures: Sequence[TextureResult], driving: pd.DataFrame) 
     support = support_table(found)
     return Section(
         "parameters",
-        "What the parameters say",
+        "Dependence of the parameters on speed and force",
         (
             *_parameter_tables(found, support, simulated=simulated),
             *_centroid_items(models, simulated=simulated),
@@ -87,32 +87,33 @@ def _parameter_tables(
         "regressions",
         "Regressions of each parameter by peak",
         "P = β + α1·v + α2·F + α3·v·F by ordinary least squares over the recorded conditions; a "
-        "frequency that a condition inherited is a copy and left out of the frequency's. p: F test "
-        "of the model. * p < .05, ** p < .01, *** p < .001. Reduced: the terms that are left when "
-        "the least significant one is dropped until all have p < .05; an interaction may stay "
-        "without its main effects. n/a: nothing varies, or no residual degree of freedom. "
-        f"{NO_CORRECTION} Coefficients are in the file. Cf. the paper's table 1.",
+        "frequency that a condition inherited is a copy and is left out of the regression of the "
+        "frequency. p: F test of the model. * p < .05, ** p < .01, *** p < .001. Reduced: the "
+        "terms that remain after backward elimination, which drops the least significant term "
+        "until all have p < .05; an interaction may remain without its main effects. n/a: nothing "
+        f"varies, or no residual degree of freedom. {NO_CORRECTION} Coefficients are in the file. "
+        "Compare table 1 of the paper.",
         found.assign(parameter=found["parameter"].map(NAMES)),
         REGRESSIONS_SHOWN,
         simulated,
     )
     ratings = Table(
         "regression_support",
-        "Support ratings beside the published ones",
+        "Support ratings compared with the published ones",
         "Share of the layers (for the noise gain: of the textures) whose coefficient has p < .05 "
-        "in the full regression, and mean adjusted R². Published: from other surfaces, by the "
-        f"paper's own estimator. {NO_CORRECTION} Cf. the paper's table 2.",
+        "in the full regression, and mean adjusted R². Published: from other surfaces, with the "
+        f"paper's own estimator. {NO_CORRECTION} Compare table 2 of the paper.",
         support,
         SUPPORT_COLUMNS,
         simulated,
     )
     coefficients = Table(
         "regression_coefficients",
-        "Mean coefficients beside the published ones",
+        "Mean coefficients compared with the published ones",
         "Means over layers (for the noise gain: over textures) of the full regressions. Gains are "
-        "per unit noise. The published coefficients name no units; their sizes suggest forces in "
-        "mN, so the last column multiplies those of F and v·F by 1000; the unit of the published "
-        "amplitudes and noise gains is unknown. Cf. the paper's table 2.",
+        "per unit noise. The published coefficients are given without units; their magnitudes "
+        "suggest forces in mN, so the last column multiplies those of F and v·F by 1000; the unit "
+        "of the published amplitudes and noise gains is unknown. Compare table 2 of the paper.",
         coefficient_table(found),
         COEFFICIENT_COLUMNS,
         simulated,
@@ -129,7 +130,7 @@ def _centroid_items(models: Sequence[TextureModel], *, simulated: bool) -> tuple
         "centroid",
         "Response of the spectral centroid to the probing speed",
         "SC = Σ G²f / Σ G² over the layers; mean ± standard deviation over the forces at each "
-        "speed. Dashed: regression on speed alone. Cf. the paper's figure 5.",
+        "speed. Dashed: regression on speed alone. Compare figure 5 of the paper.",
         figure_centroid(courses),
         simulated,
     )
@@ -157,10 +158,10 @@ def _driving_table(driving: pd.DataFrame, *, simulated: bool) -> Table:
     return Table(
         "driving",
         "Models driven by the grid, by regressions and by the centroid",
-        "Numbers: stored in all; of regressions only the coefficients that are not 0. conditions: "
-        "reduced regressions on speed, force and their product. centroid: SC as a straight line in "
-        "speed and every parameter as one in SC (PAPER IX-B); force then changes nothing, nor does "
-        "speed where SC shows no significant response to it. All three are compared with the very "
+        "Numbers: total stored; for regressions only the coefficients that are not 0. conditions: "
+        "reduced regressions on speed, force and their product. centroid: SC is linear in speed "
+        "and every parameter is linear in SC (PAPER IX-B); force then has no effect, nor has speed "
+        "where SC does not depend significantly on it. All three are compared with the same "
         "recordings that they were fitted to. Measures as in the table of simplification rate and "
         "quality; deficit: 1 − GFC30/expected.",
         driving,

@@ -1,4 +1,4 @@
-"""The section on planted textures: what was found of the layers that are there."""
+"""The section on planted textures: which of the planted layers were found."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ def _planted_between(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
         "planted_between",
         "Distance to the planted spectrum at the conditions and between them",
         "RMS of the log ratio of the two responses over all conditions (15 Hz to 0.96 of the "
-        "Nyquist frequency, unsmoothed), at the recorded conditions and half-way between four of "
-        "them, where the truth is known by its formula; level errors are those half-way between.",
+        "Nyquist frequency, unsmoothed), at the recorded conditions and half-way between them, "
+        "where the truth is known in closed form; level errors are those half-way between.",
         planted_between_table(known),
         PLANTED_BETWEEN_COLUMNS,
         simulated=True,
@@ -66,12 +66,12 @@ def _planted_tables(score: pd.DataFrame, layers: pd.DataFrame) -> tuple[Item, ..
     found = Table(
         "planted_truth",
         "Planted layers found",
-        "Planted and estimated layers are paired one to one within max(B/2, 10 Hz) in every "
-        "condition. Precision: share of the estimated layers nearest to this planted layer that "
-        "have a partner; recall: share of the conditions in which it was found; medians over the "
-        "pairs and, beside each, the worst pair with its sign and place. Bandwidth ratio: "
-        "estimated over planted. Frequency errors are estimated − planted; their median is of "
-        "absolute values. Levels compare |G| at one rate. The truth is planted at the "
+        "Planted and estimated layers are matched one to one within max(B/2, 10 Hz) in every "
+        "condition. Precision: share of the estimated layers closest to this planted layer that "
+        "have a match; recall: share of the conditions in which it was found. Errors: medians over "
+        "the matched pairs and, beside each, the worst pair with its sign and place. Bandwidth "
+        "ratio: estimated over planted. Frequency errors are estimated − planted; their median is "
+        "of absolute values. Levels compare |G| at the same rate. The truth is planted at the "
         "recorder's rate, where skirts are wider than at the model's; noise gains are compared "
         "with the one that brings the planted layers, at the model's rate, closest to that truth.",
         score,

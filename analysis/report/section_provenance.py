@@ -1,4 +1,4 @@
-"""The section on where a report comes from."""
+"""The section on the provenance of a report."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ PROVENANCE_COLUMNS = (Column("what"), Column("value", is_hash=True))
 
 
 def provenance_table(facts: Mapping[str, object]) -> Table:
-    """What the report rests on, a row for each fact; what is nested is unfolded."""
+    """What the report is based on, a row for each fact; nested values are flattened."""
     return Table(
         "provenance",
-        "Where this report comes from",
-        "Exact tables are in tables/*.tsv, pictures in figures/*.png beside this file. Of a "
-        "SHA-256 hash the first digits are shown; point at it, or see the table's file, for all.",
+        "Provenance of this report",
+        "Exact tables are in tables/*.tsv and pictures in figures/*.png beside this file. Only the "
+        "first digits of SHA-256 hashes are shown; hover over them, or see the file of the table, "
+        "for all digits.",
         pd.DataFrame(unfolded(facts), columns=names(PROVENANCE_COLUMNS)),
         PROVENANCE_COLUMNS,
         simulated=False,

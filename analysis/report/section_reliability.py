@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import Column, names
-from analysis.labels import SCALES, TASKS
+from analysis.labels import SCALES, TASKS, counted
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Item, Table
 from analysis.report.sections import Section
@@ -29,7 +29,7 @@ from analysis.statistics.reliability import (
     within_participant_sd,
 )
 
-# Nobody moves over two surfaces, or over several, in less.
+# Exploring two or more surfaces takes longer.
 FASTEST_S = 2.0
 CARELESS_COLUMNS = (Column("task", is_name=True), *SIGN_COLUMNS)
 
@@ -41,7 +41,7 @@ def reliability_section(
     simulated: bool,
     rng: np.random.Generator,
 ) -> Section | None:
-    """How far the answers can be relied on; None where there are none.
+    """How reliable the answers are; None where there are none.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def reliability_section(
 def careless_signs(
     answers: Mapping[str, pd.DataFrame], *, chances: Mapping[str, float], rng: np.random.Generator
 ) -> pd.DataFrame:
-    """Whose answers look careless, and by what, in every task.
+    """Participants whose answers look careless, and why, in every task.
 
     docs/method/reliability.md#careless-answers
 
@@ -104,7 +104,7 @@ def careless_signs(
 
 
 def _scale_words(task: str, scale: str, given: Mapping[str, pd.DataFrame]) -> str:
-    """A scale in words, with the task unless it is the first that has the scale."""
+    """A scale in words, with the task unless it is the first one with this scale."""
     first = next(other for other, table in given.items() if scale in table)
     return SCALES[scale] + f" in the {TASKS[task]}" * (task != first)
 
@@ -122,11 +122,11 @@ def _rating_tables(agreed: pd.DataFrame, raters: pd.DataFrame, *, simulated: boo
     correlations = Table(
         "agreement",
         "Agreement of the participants' ratings",
-        "Intraclass correlations, two-way: what is rated are textures × models, raters are the "
-        "participants. Agreement: the ratings themselves; consistency: but for each participant's "
-        "own mean, which paired comparisons leave out too. One rating, or the mean of all "
-        "participants'. Where all surfaces are rated alike they are low, however well people "
-        "agree. Intervals: 95%.",
+        "Two-way intraclass correlations: the rated objects are textures × models, the raters are "
+        "the participants. Agreement: of the ratings themselves; consistency: without each "
+        "participant's own mean, which paired comparisons remove as well. For one rating, or the "
+        "mean of all participants' ratings. Where all surfaces are rated alike, correlations are "
+        "low however well participants agree. Intervals: 95%.",
         agreed,
         AGREEMENT_COLUMNS,
         simulated,
@@ -147,9 +147,9 @@ def _careless_table(careless: pd.DataFrame, *, simulated: bool) -> Table:
     return Table(
         "careless",
         "Answers that look careless" if len(careless) else "No answers look careless",
-        f"Described, never excluded: all ratings of a scale the same; every answer within "
-        f"{FASTEST_S:g} s; right answers not above chance and below the others' rate, while the "
-        "group is above chance. Of participants with at least five answers.",
+        f"Listed, never excluded: all ratings of a scale equal; every answer within {FASTEST_S:g} "
+        "s; right answers not above chance and below the rate of the others, while the group is "
+        "above chance. Participants with at least five answers.",
         careless.replace({"task": TASKS}),
         CARELESS_COLUMNS,
         simulated,
@@ -157,22 +157,22 @@ def _careless_table(careless: pd.DataFrame, *, simulated: bool) -> Table:
 
 
 def _outcomes(agreed: pd.DataFrame, raters: pd.DataFrame, careless: pd.DataFrame) -> list[Outcome]:
-    told = [_agreement_told(own, scale) for scale, own in _by_scale(agreed)]
-    told += [_repeats_told(own, scale) for scale, own in _by_scale(raters)]
+    sentences = [_agreement_sentence(own, scale) for scale, own in _by_scale(agreed)]
+    sentences += [_repeats_sentence(own, scale) for scale, own in _by_scale(raters)]
     people = sorted(set(careless["participant_id"]))
     if people:
-        told.append(
-            f"Answers of {len(people)} participant{'s' * (len(people) > 1)} look careless "
+        sentences.append(
+            f"Answers of {counted(len(people), 'participant')} look careless "
             f"({', '.join(people)}); they are not left out."
         )
-    return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in told if sentence]
+    return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences if sentence]
 
 
 def _by_scale(table: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     return [(str(s), own) for s, own in table.groupby("scale", sort=False)] if len(table) else []
 
 
-def _agreement_told(own: pd.DataFrame, scale: str) -> str:
+def _agreement_sentence(own: pd.DataFrame, scale: str) -> str:
     by_kind = {row["kind"]: row for row in own.to_dict("records")}
     one, all_ = by_kind["consistency, one rating"], by_kind["consistency, mean of all"]
     if np.isnan(one["icc"]):
@@ -189,7 +189,7 @@ def _with_interval(row: Mapping[Hashable, Any]) -> str:
     return f"{value} (95% CI {low} to {high})"
 
 
-def _repeats_told(own: pd.DataFrame, scale: str) -> str:
+def _repeats_sentence(own: pd.DataFrame, scale: str) -> str:
     spread = within_participant_sd(own)
     if np.isnan(spread):
         return ""

@@ -1,4 +1,4 @@
-"""The section on the shipped scenes: how much less they need, and at which loss."""
+"""The section on the shipped scenes: how much cheaper models become, and at what loss."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ Example = tuple[CompiledExample, Mapping[str, Surface]]
 
 
 def scene_section(examples: Sequence[Example]) -> Section:
-    """Shipped scenes that were compiled, one after the other; the first one is drawn.
+    """The shipped scenes as compiled; the first one is drawn.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def scene_section(examples: Sequence[Example]) -> Section:
     steps, textures = _step_table(examples, simulated), _texture_table(examples, simulated)
     return Section(
         "scenes",
-        "No more model than the scene needs",
+        "Models reduced to what a scene needs",
         (
             _picture(examples[0][0].compiled, simulated),
             _comparison(comparison, simulated),
@@ -73,10 +73,11 @@ def scene_section(examples: Sequence[Example]) -> Section:
 def _picture(compiled: CompiledScene, simulated: bool) -> Picture:
     return Picture(
         "scene_tradeoff",
-        f"What the compiler walked: {compiled.scene.name}",
-        "From the full model of each texture (open) by dropping layers that are not felt, thinning "
-        "the grid, a longer update interval and single precision to the least model (outlined), "
-        "which still keeps the bound. A cross: the next longer interval, which would break it.",
+        f"Steps of the scene compiler: {compiled.scene.name}",
+        "From the full model of each texture (open marker) to the least model (outlined), by "
+        "dropping layers that are not felt, thinning the grid, a longer update interval and single "
+        "precision; the least model still keeps the bound. Cross: the next longer interval, which "
+        "would break the bound.",
         figure_tradeoff(compiled),
         simulated,
     )
@@ -85,14 +86,15 @@ def _picture(compiled: CompiledScene, simulated: bool) -> Picture:
 def _comparison(comparison: pd.DataFrame, simulated: bool) -> Table:
     return Table(
         "scene_comparison",
-        "Full models, least ones and an AR model, scene by scene",
-        "Numbers and bytes of all textures, operations of the one that takes most. GFC and errors "
-        "are against the true surface at all places of the scene: layers that nobody feels there "
-        "are missing in the least models, which the GFC counts and a finger does not. The bound "
-        "itself is kept against what is felt of the full model; the last column counts the seconds "
-        f"of random strokes in which it was. {RIVAL} has its recorded conditions within the scene, "
-        "double precision and the update interval of the least model; its operations do not "
-        "compare with ours, as they hold coefficients made anew at every update.",
+        "Full models, least models and an AR model, scene by scene",
+        "Numbers and bytes are those of all textures, operations those of the most expensive "
+        "texture. GFC and errors are relative to the true surface at all conditions that the scene "
+        "visits: layers that cannot be felt there are absent from the least models, which lowers "
+        "their GFC but cannot be felt. The bound itself is kept relative to the part of the full "
+        "model that can be felt; the last column counts the seconds of random strokes in which it "
+        f"was kept. {RIVAL} has its recorded conditions within the scene, double precision and the "
+        "update interval of the least model; its operations cannot be compared with ours, because "
+        "they include the computation of coefficients at every update.",
         comparison,
         COMPARISON_COLUMNS[:-1],
         simulated,
@@ -103,9 +105,9 @@ def _step_table(examples: Sequence[Example], simulated: bool) -> Table:
     steps = _of_scenes(examples, steps_table)
     return Table(
         "scene_steps",
-        "What each step brings",
-        "All textures of a scene together, each step after those above it. The last column: the "
-        "largest share of the bound that is taken; 1 is all of it.",
+        "Effect of each step",
+        "All textures of a scene together; each step follows those above it. Last column: the "
+        "largest share of the bound that is used; 1 is the whole bound.",
         steps[steps["texture"] == ALL_TEXTURES],
         SHOWN_STEPS,
         simulated,
@@ -116,8 +118,9 @@ def _texture_table(examples: Sequence[Example], simulated: bool) -> Table:
     return Table(
         "scene_textures",
         "Each texture in each scene",
-        "Bounds: GFC30 ≥ 0.95 of the attainable, error in nine bands and level error ≤ 1 dB unless "
-        "the scene says otherwise; each worst value has late updates and precision in it.",
+        "Bounds: GFC30 ≥ 0.95 of the attainable value, error in nine bands and level error ≤ 1 dB "
+        "unless the scene specifies others; the worst values include the effects of late updates "
+        "and of precision.",
         _of_scenes(examples, before_after_table),
         SHOWN_TEXTURES,
         simulated,
@@ -137,20 +140,15 @@ def _outcomes(comparison: pd.DataFrame) -> list[Outcome]:
     sentences = []
     for scene, rows in comparison.groupby("scene", sort=False):
         full, least, rival = (rows[rows["method"] == m].iloc[0] for m in (FULL, LEAST, RIVAL))
-        numbers = least["fewer_numbers"]
-        counted = (
-            f"{numbers:.1f} times fewer numbers"
-            if numbers >= 1
-            else f"{1 / numbers:.1f} times more numbers"
-        )
         sentences.append(
-            f"Scene {scene}: the least models take {counted} ({least['numbers']} instead "
-            f"of {full['numbers']}), {full['bytes'] / least['bytes']:.1f} times fewer bytes and "
-            f"{least['fewer_operations']:.1f} times fewer operations than the full ones; the bound "
-            f"was kept in {least['windows']} seconds of random strokes. {RIVAL} takes "
-            f"{rival['numbers'] / least['numbers']:.1f} times the numbers of the least ones, with "
-            f"a GFC30 to the truth of {rival['gfc30']:.3f} against "
-            f"{least['gfc30']:.3f}, and {rival['bands_db']:.2f} against {least['bands_db']:.2f} dB "
-            "in nine bands."
+            f"Scene {scene}: the least models need {least['numbers'] / full['numbers']:.0%} of the "
+            f"numbers of the full ones ({least['numbers']} instead of {full['numbers']}), "
+            f"{least['bytes'] / full['bytes']:.0%} of the bytes and "
+            f"{least['operations'] / full['operations']:.0%} of the operations; the bound was kept "
+            f"in {least['windows']} seconds of random strokes. {RIVAL} needs "
+            f"{rival['numbers'] / least['numbers']:.1f} times the numbers of the least models; its "
+            f"GFC30 relative to the true surface is {rival['gfc30']:.3f} (least models "
+            f"{least['gfc30']:.3f}), its error in nine bands {rival['bands_db']:.2f} dB (least "
+            f"models {least['bands_db']:.2f} dB)."
         )
     return described(sentences)

@@ -1,4 +1,4 @@
-"""The section on speed and accuracy: time against right answers, with either model.
+"""The section on speed and accuracy: time against right answers, with each model.
 
 docs/method/speed-accuracy.md
 """
@@ -45,7 +45,7 @@ _DETAILS = {
     ),
     "scores": (
         "Time and accuracy of each participant",
-        "Over the textures judged with all models shown, each counting once; LISAS over trials.",
+        "Over the textures judged with all models shown, weighted equally; LISAS over trials.",
         SCORE_COLUMNS,
     ),
     "cells": ("By texture and model", "Median times.", CELL_COLUMNS),
@@ -64,9 +64,9 @@ def speed_accuracy_section(
     simulated: bool,
     rng: np.random.Generator,
 ) -> Section | None:
-    """How fast and how often right people answered; None where nothing can be right or timed.
+    """How fast and how accurate answers were; None where answers are not scored or timed.
 
-    In the odd-one-out task both models are in every trial, so that they are not compared.
+    In the odd-one-out task both models are in every trial, so they are not compared.
 
     Parameters
     ----------
@@ -105,9 +105,9 @@ def _pictures(
     points = Picture(
         f"speed_accuracy_{task}",
         f"Time against right answers, {TASKS[task]}",
-        "Faster is left, more often right is up: down and to the left is a speed–accuracy "
-        "trade-off, no advantage. Means over the textures judged with all models shown, each "
-        "counting once.",
+        "Farther left is faster, higher is more accurate: lower and farther left is a "
+        "speed–accuracy trade-off, not an advantage. Means over the textures judged with all "
+        "models shown, with equal weight for each texture.",
         figure_speed_accuracy(scores, score_means(scores), models=models, simulated=simulated),
         simulated,
     )
@@ -118,7 +118,8 @@ def _pictures(
         f"conditional_accuracy_{task}",
         f"Right answers by response time, {TASKS[task]}",
         "Conditional accuracy: each participant's answers from the fastest to the slowest group. "
-        "All textures are in one, so hard and therefore slow ones let the line fall.",
+        "All textures are pooled, so textures that are difficult and therefore slow make the line "
+        "fall.",
         figure_conditional_accuracy(by_time, models=models, chance=chance, simulated=simulated),
         simulated,
     )
@@ -132,17 +133,18 @@ def _compared(
     simulated: bool,
     rng: np.random.Generator,
 ) -> tuple[list[Item], list[Outcome]]:
-    """What two models do to time, accuracy and both together."""
+    """The effect of two models on time, accuracy and both together."""
     reference, other = models
     comparison = compare_models(answers, models=models, rng=rng)
     ratios = time_ratios(answers, models=models, rng=rng)
     paired = Table(
         "speed_accuracy",
         "Time, accuracy and both together",
-        f"Paired t-tests over participants, {other} to {reference} models; time is tested in "
-        "logarithms, its effect is a ratio. LISAS: mean time of right answers plus weighted share "
-        "of wrong ones (Vandierendonck 2017), low where answers are fast and right; it does not "
-        "settle a trade-off. Not corrected for the number of tests; no claim rests on them.",
+        f"Paired t-tests over participants, {other} compared with {reference} models; time is "
+        "tested in logarithms, so its effect is a ratio. LISAS: mean time of right answers plus "
+        "the weighted share of wrong ones (Vandierendonck 2017), low where answers are fast and "
+        "right; it does not settle a trade-off. Not corrected for the number of tests; no claim "
+        "rests on them.",
         comparison.replace({"measure": MEASURES}),
         COMPARISON_COLUMNS,
         simulated,
@@ -151,23 +153,24 @@ def _compared(
         "time_ratio",
         "Response time by a mixed model",
         "Log time by texture × model, session and order, with a random intercept and slope of the "
-        "model per participant; t with one degree of freedom less than participants.",
+        "model per participant; the degrees of freedom of t are the number of participants minus "
+        "1.",
         ratios,
         TIME_RATIO_COLUMNS,
         simulated,
     )
-    told = [trade_off_sentence(comparison, models=models), *_ratio_told(ratios, models)]
-    return [paired, mixed], [Outcome(Weight.SECONDARY, sentence) for sentence in told]
+    sentences = [trade_off_sentence(comparison, models=models), *_ratio_sentences(ratios, models)]
+    return [paired, mixed], [Outcome(Weight.SECONDARY, sentence) for sentence in sentences]
 
 
-def _ratio_told(ratios: pd.DataFrame, models: tuple[str, str]) -> list[str]:
+def _ratio_sentences(ratios: pd.DataFrame, models: tuple[str, str]) -> list[str]:
     found = ratios.to_dict("records")[0]
     if not np.isfinite(found["ci_low"]):
         return []
     how = "; ".join(filter(None, [f"{found['method']} of log time", found["note"]]))
     return [
         f"Answers with {models[1]} models took {found['ratio']:.2f} times as long as with "
-        f"{models[0]} ones (95% CI {found['ci_low']:.2f} to {found['ci_high']:.2f}; {how})."
+        f"{models[0]} models (95% CI {found['ci_low']:.2f} to {found['ci_high']:.2f}; {how})."
     ]
 
 

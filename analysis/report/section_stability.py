@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,6 +22,7 @@ from analysis.benches.atlas.tables import (
 from analysis.columns import chosen, names, without
 from analysis.figures.atlas import figure_atlas
 from analysis.figures.saving import png_of, svg_of, warn_of_missing_fonts
+from analysis.labels import counted
 from analysis.report.findings import table_bytes
 from analysis.report.outcomes import Outcome
 from analysis.report.page import (
@@ -39,8 +41,8 @@ from analysis.report.section_provenance import PROVENANCE_COLUMNS, unfolded
 from analysis.report.sections import Section
 from analysis.report.sentences import described
 
-BANNER = "SIMULATED: every run is on signals, hands, recordings and answers that were made up."
-# What matters first; sentences have their place above the tables, and in the files.
+BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
+# The most important columns first; sentences are above the tables, and in the files.
 SHOWN_MARGINS = chosen(
     MARGIN_COLUMNS,
     *("family", "method", "axis", "default", "unit", "margin", "at_least", "verdict"),
@@ -55,23 +57,24 @@ SHOWN_CELLS = without(CELL_COLUMNS, "simulated")
 
 
 def stability_section(examined: Sequence[Examined]) -> Section:
-    """Where methods hold, degrade and fail, and how far our defaults are from there."""
+    """Where methods hold, degrade and fail, and how far our defaults are from the edges."""
     margins, edges = margin_table(examined), edge_table(examined)
     picture = Picture(
         "stability",
         "Where methods hold, degrade and fail",
-        "A row per method, a mark per run. Bars change colour at the edges, which were sought by "
-        "bisection from the easy end (left). Black: to where theory lets a method hold. Dashed: "
-        "where the program, or a usual hand, is by default.",
+        "A row per method, a mark per run. Bars change colour at the edges, which were located by "
+        "bisection starting at the easy end (left). Black: how far theory expects a method to "
+        "hold. Dashed: the default of the program, or a typical hand movement.",
         figure_atlas(examined),
         simulated=True,
     )
     near = Table(
         "stability_margins",
         "How far our defaults are from the nearest edge",
-        "The factor by which the nearest edge is more severe than the default; "
-        f"{LEAST_MARGIN:g} or more is asked for, or a reason. Where there was no edge, to the end "
-        "of what was tried.",
+        "The factor by which the nearest edge is more severe than the default; it should be "
+        f"{LEAST_MARGIN:g} or more, or the exception is explained. Where no edge was found, the "
+        "factor to the end of the range. Edges are located to 1/256 of their axis (1/8 in the "
+        "reduced atlas) and placed on the mild side, so that factors tend to be too small.",
         margins,
         SHOWN_MARGINS,
         simulated=True,
@@ -79,8 +82,9 @@ def stability_section(examined: Sequence[Examined]) -> Section:
     every = Table(
         "stability_edges",
         "Every edge",
-        "To where each method holds and from where on it fails (n/a: nowhere within what was "
-        "tried), beside theory, whose sources are in the file.",
+        "The value up to which each method holds and the value from which it fails (n/a: none "
+        "within the range), with the edge expected by theory, whose sources are given in the "
+        "file.",
         edges,
         SHOWN_EDGES,
         simulated=True,
@@ -88,21 +92,28 @@ def stability_section(examined: Sequence[Examined]) -> Section:
     return Section(
         "stability",
         "Where methods fail",
-        (picture, near, Fold("Every edge, and what theory says", (every,))),
+        (picture, near, Fold("All edges, measured and expected by theory", (every,))),
         outcomes=tuple(_outcomes(margins, edges)),
-        done=tuple(f"Not examined yet, {name}: {why}." for name, why in TO_COME.items()),
+        done=tuple(f"Not in the atlas yet: {name}, {why}." for name, why in TO_COME.items()),
     )
+
+
+def _how_close(row: Mapping[Hashable, Any]) -> str:
+    """How far a default is from its nearest edge, which it may be beyond."""
+    if row["margin"] < 1:
+        return f"is beyond its nearest edge (factor {row['margin']:.2g})"
+    return f"is only a factor of {row['margin']:.3g} away from its nearest edge"
 
 
 def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
     enough = int(margins["enough"].sum())
     sentences = [
-        f"{enough} of {len(margins)} defaults are a factor of {LEAST_MARGIN:g} or more away from "
-        "where they stop to hold."
+        f"{enough} of {len(margins)} defaults are at least a factor of {LEAST_MARGIN:g} away from "
+        "the nearest edge, where a method ceases to hold."
     ] * bool(len(margins))
     sentences += [
-        f"Nearer is {row['method']} ({row['family']}, {row['axis']}): a factor of "
-        f"{row['margin']:.2g}; {row['exception'] or 'no reason is known'}."
+        f"The default of {row['method']} ({row['family']}, {row['axis']}) {_how_close(row)}; "
+        f"{row['exception'] or 'this small margin is unexplained'}."
         for row in margins[~margins["enough"].astype(bool)].to_dict("records")
     ]
     factors = edges["disagreement"].to_numpy(dtype=np.float64)
@@ -110,15 +121,15 @@ def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
     if factors.size:
         off = np.exp(np.abs(np.log(factors)))
         sentences.append(
-            f"Where theory says to where a method holds ({factors.size} edges), the measured "
-            f"edge is off by a factor of {np.median(off):.2f} in the median and {off.max():.2f} at "
-            "worst."
+            f"Where theory predicts an edge ({counted(factors.size, 'edge')}), the measured one "
+            f"deviates from it by a factor of {np.median(off):.2f} in the median and "
+            f"{off.max():.2f} at worst."
         )
     return described(sentences)
 
 
 def atlas_files(examined: Sequence[Examined], provenance: Mapping[str, object]) -> dict[str, bytes]:
-    """The whole atlas by file name: tables, its picture, and a page that holds all of it."""
+    """The whole atlas by file name: tables, picture, and a page with all of it."""
     section = stability_section(examined)
     picture = section.items[0]
     assert isinstance(picture, Picture)
@@ -143,21 +154,21 @@ def _page(
     runs = Table("cells", "Every run", "All marks of the picture.", cells, SHOWN_CELLS, True)
     origin = Table(
         "provenance",
-        "Where this page comes from",
+        "Provenance of this page",
         "Exact tables are in the TSV files beside it.",
         pd.DataFrame(unfolded(provenance), columns=names(PROVENANCE_COLUMNS)),
         PROVENANCE_COLUMNS,
         simulated=False,
     )
-    told = [outcome.sentence for outcome in section.outcomes]
+    outcomes = [outcome.sentence for outcome in section.outcomes]
     items = (*section.items, Fold("Every run", (runs,)))
     return page(
         title="Where do methods fail?",
-        answer=told[0] if told else "No default was examined.",
+        answer=outcomes[0] if outcomes else "No default was examined.",
         lead="Methods of modelling, rendering and analysis, from easy cases to hard ones.",
         banner=BANNER,
         sections=[
-            ("overview", "At a glance", bullets([*told[1:], *section.done])),
+            ("overview", "At a glance", bullets([*outcomes[1:], *section.done])),
             (section.anchor, section.heading, "".join(_item_html(item, png) for item in items)),
             ("origin", "Provenance", table_html(origin)),
         ],

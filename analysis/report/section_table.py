@@ -13,6 +13,7 @@ from analysis.answers.imported import Imported
 from analysis.columns import p_value
 from analysis.figures.confusions import plot_confusion
 from analysis.figures.factorial import figure_factorial
+from analysis.labels import counted
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
@@ -100,13 +101,16 @@ def _condition_section(imported: Imported, cells: pd.DataFrame) -> Section:
     )
     people = cells["participant_id"].nunique()
     trials = int(imported.answers["count"].sum())
-    missed = f"; {imported.missed} without an answer are left out" if imported.missed else ""
+    missed = f"; left out without an answer: {imported.missed}" if imported.missed else ""
     return Section(
         "conditions",
         f"{word.capitalize()} by condition",
         (*_pictures(imported, cells, means), table, Fold("Each participant", (own,))),
         outcomes=(Outcome(Weight.OVERALL, answer_of_table(imported)),),
-        done=(f"Tables: {people} participants, {trials} answered trials{missed}.",),
+        done=(
+            f"Tables: {counted(people, 'participant')}, "
+            f"{counted(trials, 'answered trial')}{missed}.",
+        ),
         tiles=((str(people), "participants"), (str(trials), "answered trials")),
     )
 
@@ -126,13 +130,14 @@ def _anova_section(complete: CompleteCells, measure: str, *, rng: np.random.Gene
     anova, pairs = repeated_measures_anova(complete), pairwise_tests(complete, rng=rng)
     left_out = ""
     if complete.excluded:
-        left_out = f" Left out, without answers in every condition: {', '.join(complete.excluded)}."
+        names = ", ".join(complete.excluded)
+        left_out = f" Left out because answers are missing in some condition: {names}."
     tables = (
         Table(
             "anova",
             "Repeated-measures analysis of variance",
-            f"Of each participant's {WORDS[measure]} per condition. ε: Greenhouse and Geisser; "
-            f"effects with one degree of freedom need none.{left_out}",
+            f"Of each participant's {WORDS[measure]} per condition. ε: Greenhouse–Geisser "
+            f"correction; not needed for effects with one degree of freedom.{left_out}",
             anova,
             ANOVA_COLUMNS,
             False,
@@ -174,9 +179,9 @@ def _confusion_section(imported: Imported) -> Section:
     pictures = tuple(
         Picture(
             f"confusion_{number}",
-            f"Who was taken for whom: {matrix.model}",
-            "Rows: presented; columns: answered. Per cent of the row, in brackets the number of "
-            "answers of all participants.",
+            f"Which class was taken for which: {matrix.model}",
+            "Rows: presented; columns: answered. Percentage of the row, with the number of answers "
+            "of all participants in brackets.",
             _figure_of(matrix),
             False,
         )

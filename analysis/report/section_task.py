@@ -1,4 +1,4 @@
-"""The section on a task that has no chapter of its own: as far as its declared columns tell.
+"""The section on a task without a chapter of its own, based on its declared columns.
 
 docs/own-protocol.md
 """
@@ -22,7 +22,7 @@ from analysis.statistics.claims import CLAIM_COLUMNS
 from analysis.statistics.rates import correct_rates
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, models_of
 
-# Tasks with a chapter of their own; thresholds are told by tactileq threshold.
+# Tasks with a chapter of their own; thresholds are reported by tactileq threshold.
 WITH_CHAPTER = ("absolute", "relative", "oddity", "threshold")
 ASKED_COLUMNS = (
     Column("what", " ", is_name=True),
@@ -45,7 +45,7 @@ def tasks_without_chapter(responses: Responses) -> list[str]:
 def task_section(
     responses: Responses, task: str, found: Sequence[ClaimFound], *, rng: np.random.Generator
 ) -> Section:
-    """How much of a task was asked, what its claims came to, and how often answers were right.
+    """How much of a task was completed, the results of its claims, and the rate of right answers.
 
     Parameters
     ----------
@@ -95,13 +95,13 @@ def _asked_table(responses: Responses, task: str) -> Table:
     counts = {
         "participants": (done.participants, planned and planned.participants),
         "sessions": (done.sessions, planned and planned.sessions),
-        "trials (training left out)": (responses.trials_done(task), planned and planned.trials),
+        "trials (without training)": (responses.trials_done(task), planned and planned.trials),
     }
     rows = [(what, there, wanted or np.nan) for what, (there, wanted) in counts.items()]
     return Table(
         f"asked_{task}",
-        f"The {TASKS[task]}: what was done of what was planned",
-        "Without those who dropped out. n/a: the data do not say.",
+        f"The {TASKS[task]}: completed and planned",
+        "Without participants who dropped out. n/a: not stated in the data.",
         pd.DataFrame(rows, columns=names(ASKED_COLUMNS)),
         ASKED_COLUMNS,
         responses.simulated,
@@ -114,7 +114,7 @@ def _claims_table(found: Sequence[ClaimFound], task: str, *, simulated: bool) ->
         f"claims_{task}",
         f"Claims about the {TASKS[task]}",
         "The rows of this task in the table of verdicts, with the means of both models. Where "
-        "trials hold both models the reference is chance.",
+        "trials contain both models, the reference is chance.",
         tests[names(TASK_CLAIM_COLUMNS)],
         TASK_CLAIM_COLUMNS,
         simulated,

@@ -1,4 +1,4 @@
-"""The appendix on the procedures themselves: what they do where the truth is planted."""
+"""The appendix on the procedures themselves: their performance where the truth is planted."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from analysis.report.sections import Section
 from analysis.statistics.validation import VALIDATION_COLUMNS
 
 NOTE = (
-    "Each row: simulated studies of n participants in which the truth is planted; how often the "
+    "Each row: simulated studies with n participants in which the truth is planted; how often the "
     "procedure covered it (coverage) or rejected (type I error, power), with a 95% interval "
-    "(Clopper–Pearson) and the value that holds where differences are normal and everybody "
-    "answers. What is planted is the latent difference in points, or the rate, of people who "
-    "attend. About one row in twenty says no by chance alone."
+    "(Clopper–Pearson), and the nominal value for normal differences without careless answers or "
+    "dropout. The planted value is the latent difference in points, or the rate, of attentive "
+    "participants. About one row in twenty says no by chance alone."
 )
 
 
@@ -36,8 +36,9 @@ def validation_section(table: pd.DataFrame) -> Section:
     columns = tuple(column for column in VALIDATION_COLUMNS if column.name in short)
     summary = Table(
         "validation_apart",
-        "Where a procedure does not do what its name promises",
-        "Rows of the table below whose interval does not hold the nominal value, by participants.",
+        "Where a procedure misses its nominal value",
+        "Rows of the table below whose interval does not contain the nominal value, by number of "
+        "participants.",
         short,
         columns,
         True,
@@ -52,7 +53,7 @@ def validation_section(table: pd.DataFrame) -> Section:
         "Appendix: the procedures on planted truth",
         (summary, Fold("All procedures in all situations", (whole,))),
         done=(
-            f"Procedures were tried on planted truth ({most} simulations a row): {held} of "
-            f"{len(table)} rows hold their nominal value (appendix).",
+            f"Procedures were tested on planted truth ({most} simulations per row): {held} of "
+            f"{len(table)} rows contain their nominal value (appendix).",
         ),
     )

@@ -1,4 +1,4 @@
-"""What a section of the report is made of."""
+"""The parts of a section of the report."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Section:
     items : tuple of Table, Picture or Fold
         In the order of the page.
     outcomes : tuple of Outcome
-        What came out, computed from the numbers.
+        Findings, computed from the numbers.
     done : tuple of str
         What was done.
     tiles : tuple of (str, str)
@@ -38,12 +38,12 @@ class Section:
 
 
 def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | None:
-    """One section of those that are about pairs of models; what is in it says which pair.
+    """One section from those about pairs of models; its items state which pair.
 
     Parameters
     ----------
     sections : mapping of (reference, other) to Section or None
-        One that has only one pair stays as it is.
+        A single section is returned unchanged.
     """
     kept = {pair: section for pair, section in sections.items() if section is not None}
     first = next(iter(kept.values()), None)
@@ -52,19 +52,19 @@ def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | No
     return replace(
         first,
         items=tuple(_of_pair(item, pair) for pair, each in kept.items() for item in each.items),
-        outcomes=tuple(dict.fromkeys(told for each in kept.values() for told in each.outcomes)),
+        outcomes=tuple(dict.fromkeys(one for each in kept.values() for one in each.outcomes)),
     )
 
 
 def _of_pair(item: Item, pair: tuple[str, str]) -> Item:
     reference, other = pair
-    told = f": {other} against {reference} models"
+    compared = f": {other} compared with {reference} models"
 
     def named(single: Table | Picture) -> Table | Picture:
         name = file_stem(f"{single.name}_{other}_{reference}")
-        return replace(single, name=name, title=single.title + told)
+        return replace(single, name=name, title=single.title + compared)
 
     if isinstance(item, Fold):
         inner = tuple(named(each) for each in item.items)
-        return replace(item, summary=item.summary + told, items=inner)
+        return replace(item, summary=item.summary + compared, items=inner)
     return named(item)

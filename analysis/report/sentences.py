@@ -1,4 +1,4 @@
-"""What the tables say, in sentences."""
+"""The tables' results in sentences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from analysis.labels import ALL_LAYERS, ALL_TEXTURES, IDENTICAL, TASKS, sentence_case
+from analysis.labels import (
+    ALL_LAYERS,
+    ALL_TEXTURES,
+    IDENTICAL,
+    TASKS,
+    counted,
+    sentence_case,
+)
 from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 from analysis.statistics.rates import UNKNOWN_CHANCE
@@ -19,7 +26,7 @@ ALPHA = 0.05
 def rate_outcomes(rates: pd.DataFrame, task: str, *, chance: float) -> list[Outcome]:
     """A sentence on each model's correct rates against chance, from `rates.correct_rates`.
 
-    Of a chance that is not known (NaN) it says so, and compares nothing with it.
+    If chance is not known (NaN), it says so and tests nothing against it.
     """
     compared = _described_rate if np.isnan(chance) else partial(_against_chance, chance=chance)
     return [
@@ -41,19 +48,20 @@ def confusion_outcomes(matrices: Mapping[str, ConfusionMatrix]) -> list[Outcome]
 
 
 def described(sentences: Iterable[str]) -> list[Outcome]:
-    """These sentences as findings that describe and test nothing."""
+    """These sentences as descriptive findings, without tests."""
     return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences]
 
 
 def simplification_outcomes(gfc: pd.DataFrame) -> list[Outcome]:
-    """Sentences on what was dropped and what it cost, from `likeness.gfc_table` rows."""
+    """Sentences on the dropped layers and the loss, from `likeness.gfc_table` rows."""
     full = gfc[gfc["model"] == "full"].set_index("texture")
     simple = gfc[gfc["model"] == "simplified"].set_index("texture")
     dropped = full["layers"] - simple["layers"]
     loss = full["gfc30_mean"] - simple["gfc30_mean"]
+    layers = counted(int(full["layers"].sum()), "layer")
     sentences = [
-        f"Simplification dropped {dropped.sum()} of {full['layers'].sum()} layers, in "
-        f"{(dropped > 0).sum()} of {len(full)} textures; the models need "
+        f"Simplification dropped {dropped.sum()} of {layers}, in "
+        f"{(dropped > 0).sum()} of {counted(len(full), 'texture')}; the models need "
         f"{simple['parameters'].sum()} instead of {full['parameters'].sum()} numbers per "
         "condition.",
         f"GFC30 (mean over conditions and textures) is {full['gfc30_mean'].mean():.4f} with the "
@@ -79,7 +87,7 @@ def left_out_outcomes(summary: pd.DataFrame) -> list[str]:
     for name, rows in summary.groupby("foretold_by", sort=False) if len(summary) else ():
         worst = rows.iloc[int(rows["worst_level_error_db"].abs().to_numpy().argmax())]
         sentences.append(
-            f"Conditions that were left out are predicted by {name} with a level error of "
+            f"Left-out conditions are predicted by {name} with a level error of "
             f"{rows['median_level_error_db'].median():.2f} dB (median over textures; at worst "
             f"{signed(float(worst['worst_level_error_db']), 1)} dB, {worst['texture']} at "
             f"{worst['worst_level_error_at']}) and a log-spectral distance of "
@@ -99,21 +107,21 @@ def regression_outcomes(support: pd.DataFrame) -> list[str]:
     if not explained:
         return []
     return [
-        "Regressions on speed, force and their product: mean adjusted R² (in brackets the "
-        f"published one) {explained}."
+        "Regressions on speed, force and their product: mean adjusted R² (published values in "
+        f"brackets) {explained}."
     ]
 
 
 def driving_outcomes(driving: pd.DataFrame) -> list[str]:
-    """What the grid's numbers buy, from `regressions.driving_table`; means over the textures."""
+    """Accuracy by way of driving, from `regressions.driving_table`; means over the textures."""
     overall = driving[driving["texture"] == ALL_TEXTURES]
     ways = {"grid": "the grid", "conditions": "regressions", "centroid": "the centroid alone"}
     shown = [
-        f"{ways[row['driven_by']]} {row['numbers']:.0f} numbers, GFC30 {row['gfc30_mean']:.4f}, "
+        f"{ways[row['driven_by']]}: {row['numbers']:.0f} numbers, GFC30 {row['gfc30_mean']:.4f}, "
         f"log-spectral distance {row['log_spectral_distance_db']:.2f} dB"
         for row in overall.to_dict("records")
     ]
-    return [f"A full model driven by (means over the textures): {'; '.join(shown)}."] * bool(shown)
+    return [f"Full models (means over the textures) driven by {'; by '.join(shown)}."] * bool(shown)
 
 
 def planted_outcomes(planted: pd.DataFrame) -> list[str]:
@@ -135,7 +143,7 @@ def _planted_outcome(estimator: str, rows: pd.DataFrame) -> str:
         f"{rows['median_bandwidth_ratio'].mean():.2f} in bandwidth, "
         f"{signed(rows['median_level_error_db'].mean(), 1)} dB in level, "
         f"{signed(rows['median_noise_gain_error_db'].mean(), 1)} dB in noise gain (medians over "
-        f"the conditions, averaged over {len(rows)} texture{'s' * (len(rows) != 1)}); at worst "
+        f"the conditions, averaged over {counted(len(rows), 'texture')}); at worst "
         f"{_worst_of(rows, 'frequency_error', digits=1, unit='_hz')}, a factor of "
         f"{_worst_of(rows, 'bandwidth_ratio', digits=2)} and "
         f"{_worst_of(rows, 'level_error', digits=1, unit='_db')}."
@@ -161,7 +169,7 @@ def cautions(
     inconclusive: bool,
     unfinished: Sequence[str] = (),
 ) -> list[str]:
-    """What may not be concluded.
+    """What must not be concluded.
 
     Parameters
     ----------
@@ -170,20 +178,21 @@ def cautions(
     models : bool
         Whether the report shows likeness of spectra.
     inconclusive : bool
-        Whether some test shows neither a difference nor equality.
+        Whether some test shows neither a difference nor equivalence.
     unfinished : sequence of str
-        For each task with less than was planned: how much of it there is.
+        For each incomplete task: how much of it has been done.
     """
     sentences = []
     if unfinished:
         sentences.append(
-            f"The study is not complete ({'; '.join(unfinished)}): of its claims there is neither "
-            "an effect nor a test before it is, since who sees them may stop or go on by them."
+            f"The study is not complete ({'; '.join(unfinished)}): neither effects nor tests of "
+            "its claims are shown before it is complete, because seeing them could influence "
+            "whether it is stopped or continued."
         )
     if simulated_participants:
         sentences.append(
-            "Simulated participants follow a model that was written down beforehand: their "
-            "answers test the procedure and say nothing about what people feel."
+            "Simulated participants follow a model that was specified beforehand: their answers "
+            "test the procedure and say nothing about what people feel."
         )
     elif simulated_rig:
         sentences.append(
@@ -192,14 +201,15 @@ def cautions(
         )
     if inconclusive:
         sentences.append(
-            "Inconclusive means neither: a test of a difference that is not significant does not "
-            "show that two models are equal; only a test of equivalence with bounds that were "
-            "fixed before the data does."
+            "Inconclusive means neither different nor equivalent: a test of a difference that is "
+            "not significant does not show that two models are equivalent; only an equivalence "
+            "test with bounds fixed before data collection can show that."
         )
     if models:
         sentences.append(
-            "GFC judges the shape of a spectrum, not its level, and even white noise scores high: "
-            "read it beside its floor, its expected value and the distances in dB."
+            "GFC measures the shape of a spectrum, not its level, and even white noise scores "
+            "high: interpret it together with its floor, its expected value and the distances in "
+            "dB."
         )
     return sentences
 
@@ -209,11 +219,11 @@ def _described_rate(rates: pd.DataFrame) -> str:
 
 
 def _overall_rate(rates: pd.DataFrame) -> str:
-    """Of how many answers over all textures were right; its bracket is left open."""
+    """The share of right answers over all textures; the closing bracket is left out."""
     overall = rates[rates["texture"] == ALL_TEXTURES].iloc[0]
     if not overall["participants"]:
-        return "no participant has answered all textures (no share over all of them"
-    interval = "no interval, for want of variation between participants"
+        return "no participant has answered all textures (no overall share"
+    interval = "no interval, because participants do not vary"
     if np.isfinite(overall["ci_low"]):
         interval = f"95% bootstrap CI {overall['ci_low']:.1%} to {overall['ci_high']:.1%}"
     return (
@@ -228,14 +238,14 @@ def _against_chance(rates: pd.DataFrame, *, chance: float) -> str:
     above = family[significant & (family["mean"] > chance)]
     below = family[significant & (family["mean"] < chance)]
     text = (
-        f"{_overall_rate(rates)}; chance {chance:.1%}); above chance after Holm: "
+        f"{_overall_rate(rates)}; chance {chance:.1%}); above chance (Holm): "
         f"{_names(above['texture'])}"
     )
     if not below.empty:
         text += f"; below chance: {_names(below['texture'])}"
     unclear = family[~significant & family["p_holm"].notna()]
     if not unclear.empty:
-        text += f"; not told from chance: {_names(unclear['texture'])}"
+        text += f"; not distinguished from chance: {_names(unclear['texture'])}"
     undefined = family[family["p_holm"].isna()]
     if not undefined.empty:
         text += f"; test undefined (see the notes): {_names(undefined['texture'])}"
@@ -261,5 +271,5 @@ def _names(textures: Sequence[str] | pd.Series) -> str:
 
 
 def signed(value: float, digits: int) -> str:
-    """A number with its sign, as people write it."""
+    """A number with its sign, with a true minus sign."""
     return f"{value:+.{digits}f}".replace("-", "−")

@@ -1,4 +1,4 @@
-"""What the spectral figures show, computed beforehand: figures only draw."""
+"""The content of the spectral figures, computed beforehand: figures only draw."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class LayersOverGrid:
 
 
 def layers_over_grid(model: TextureModel) -> LayersOverGrid:
-    """What a model's layers do over its grid."""
+    """The layers of a model over its grid."""
     amplitude = layer_amplitudes_g(model, criterion="energy")
     return LayersOverGrid(
         texture=model.texture,

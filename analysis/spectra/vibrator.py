@@ -1,4 +1,4 @@
-"""A vibrator before and after its compensation, and what is left where they do not match."""
+"""A vibrator before and after its compensation, and the residue where they do not match."""
 
 from __future__ import annotations
 

@@ -40,8 +40,8 @@ class ButtonPreference:
 def button_preference(relative: pd.DataFrame, *, rng: np.random.Generator) -> ButtonPreference:
     """Whether wrong answers fell on some buttons more often than layouts explain.
 
-    A right answer lies where the layout put it and tells nothing. Of a wrong one any button but
-    the right one's was as likely, had the layout been drawn again.
+    The place of a right answer follows from the layout and is not informative. A wrong answer could
+    as well have been on any button but the right one, had the layout been drawn again.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ from modeling.arrays import Floats
 
 WITHHELD = "equivalence withheld"
 BOUNDS_WITHHELD = "different, bounds withheld"
-# What is left of a verdict that says equality, where no equality may be concluded.
+# What remains of a verdict of equivalence where equivalence must not be concluded.
 _WITHOUT_EQUALITY = {EQUIVALENT: WITHHELD, WITHIN_BOUNDS: BOUNDS_WITHHELD}
 WITHOUT_EQUALITY = tuple(_WITHOUT_EQUALITY.values())
 DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
@@ -59,9 +59,9 @@ CLAIM_COLUMNS = (
     Column("mean_other", "mean of other"),
     Column("se_other", "SE"),
     Column("mean_difference", "difference"),
-    Column("ci90_low", "90 % CI from"),
+    Column("ci90_low", "90% CI from"),
     Column("ci90_high", "to"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
     Column("bound_low", "bounds from"),
     Column("bound_high", "to"),
@@ -81,7 +81,7 @@ CLAIM_COLUMNS = (
     Column("wilcoxon_p", "Wilcoxon p", is_p_value=True),
     Column("sign_flips_p", "sign flips p", is_p_value=True),
     Column("share_at_ends", "share at ends"),
-    Column("doubt", "no equality, since"),
+    Column("doubt", "no equivalence because"),
     Column("excluded"),
     Column("note"),
 )
@@ -91,7 +91,7 @@ VERDICT_COLUMNS = chosen(
     *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
     *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends", "doubt"),
 )
-# Of a claim whose data are not complete: how many there are and how good, and no effect.
+# For a claim with incomplete data: amount and quality of the data, and no effect.
 _INTERIM = ("texture", "verdict", "n", "share_at_ends", "excluded")
 
 
@@ -114,17 +114,17 @@ class Values:
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """What stands against a verdict, whatever the tests say.
+    """Doubts about a verdict, whatever the tests show.
 
     Parameters
     ----------
     identical : collection of str
         Textures whose two models are the same: controls, described but never tested.
     highest_share_at_ends : float
-        Above it no equality is concluded.
+        Above it equivalence is not concluded.
     sensitivity : str
-        `SHOWN` where the data show that people told surfaces apart that differ; `NOT_TESTED` where
-        nothing in them could; else how they failed.
+        `SHOWN` where the data show that participants told different surfaces apart;
+        `NOT_TESTED` where nothing in them could show it; else how they failed.
     unfinished : bool
         Whether participants or sessions are missing.
     """
@@ -135,7 +135,7 @@ class Standing:
     unfinished: bool = False
 
     def doubt(self, share_at_ends: float) -> str:
-        """Why no equality may be concluded, whatever the tests say; empty where it may.
+        """Why equivalence must not be concluded, whatever the tests show; empty where it may be.
 
         docs/method/statistics.md#withheld
 
@@ -156,7 +156,7 @@ class Standing:
     def verdict(
         self, p_difference: float, p_equivalence: float, *, share_at_ends: float = np.nan
     ) -> str:
-        """The verdict of two tests, without words of equality where there is doubt.
+        """The verdict of two tests, without equivalence where there is doubt.
 
         Parameters
         ----------
@@ -240,7 +240,7 @@ def _tests(
 
 
 def _without_effects(table: pd.DataFrame) -> pd.DataFrame:
-    """The rows of an unfinished task: who looks at a difference before the end may stop by it."""
+    """The rows of an unfinished task, without effects, to prevent optional stopping."""
     notes = table["note"].where(table["note"] == IDENTICAL, "")
     return table[list(_INTERIM)].assign(note=notes).reindex(columns=names(CLAIM_COLUMNS))
 
@@ -274,7 +274,7 @@ def every_equivalent(p_equivalence: Floats, *, doubts: Iterable[str]) -> bool:
 
 
 def _over_textures(compared: pd.DataFrame) -> pd.DataFrame:
-    """Means over the textures of each participant; NaN of who is not complete in all of them."""
+    """Means over the textures of each participant; NaN if incomplete in any of them."""
     lacking = compared[["reference", "other"]].isna().any(axis=1)
     means = compared.groupby("participant_id")[["reference", "other"]].mean()
     means[means.index.isin(compared["participant_id"][lacking])] = np.nan

@@ -43,7 +43,7 @@ class ConfusionMatrix:
 def confusion_matrices(
     relative: pd.DataFrame, models: tuple[str, ...] = MODELS
 ) -> dict[str, ConfusionMatrix]:
-    """Count who was taken for whom, with each set of models (PAPER fig. 10).
+    """Count which texture was taken for which, with each set of models (PAPER fig. 10).
 
     Parameters
     ----------

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.labels import counted
 from analysis.statistics.paired import participant_means
 from modeling.arrays import Floats
 
@@ -55,11 +56,11 @@ class Design:
     def unfit(self) -> str:
         """Why no model can be fitted; empty where one can."""
         if self.participants < 2:
-            return f"{self.participants} participant(s)"
+            return counted(self.participants, "participant")
         if np.ptp(self.values) == 0:
             return "all answers are the same"
         if np.linalg.matrix_rank(self.columns) < self.columns.shape[1]:
-            return "models cannot be told from textures, sessions or order"
+            return "the effect of the model cannot be separated from textures, sessions or order"
         return ""
 
 

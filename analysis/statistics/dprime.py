@@ -68,7 +68,7 @@ def m_afc_d_prime(share: float, *, alternatives: int) -> float:
 def oddity_d_prime(share: float) -> float:
     """d′ at which `oddity_share` is this share; 0 at and below chance (1/3), infinite for 1.
 
-    Less than chance carries no sign here: who confuses the odd one with others feels no less.
+    Shares below chance count as chance: sensitivity cannot be less than none.
     """
     if 0 <= share <= 1 / 3:
         return 0.0
@@ -76,7 +76,7 @@ def oddity_d_prime(share: float) -> float:
 
 
 def same_different_d_prime(hits: float, false_alarms: float) -> float:
-    """d′ of who judges the two surfaces of a trial one by one: independent observations.
+    """d′ of observers who judge the two surfaces of a trial one by one: independent observations.
 
     Infinite for hits of 1 or false alarms of 0 (Macmillan and Creelman 2005, ch. 9).
     docs/method/speed-accuracy.md#same-or-different
@@ -95,7 +95,7 @@ def same_different_d_prime(hits: float, false_alarms: float) -> float:
 
 
 def same_different_differencing_d_prime(hits: float, false_alarms: float) -> float:
-    """d′ of who answers by the difference of what was felt in a trial: differencing.
+    """d′ of observers who answer by the difference between the two percepts: differencing.
 
     Parameters and limits as in `same_different_d_prime`.
     docs/method/speed-accuracy.md#same-or-different

@@ -9,7 +9,7 @@ from modeling.seeds import generator
 
 
 def generators(rng: np.random.Generator) -> dict[str, np.random.Generator]:
-    """A generator for each task, so that what is drawn for one changes no figure of another.
+    """A generator for each task, so that draws for one do not change the results of another.
 
     Parameters
     ----------

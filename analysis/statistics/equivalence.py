@@ -1,4 +1,4 @@
-"""No difference as a claim: two one-sided tests against bounds, and what both tests say."""
+"""Equivalence tests: two one-sided tests against bounds, and the combined verdict."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def one_sided_tests(differences: Floats, bounds: Bounds) -> tuple[Floats, Floats
 
 
 def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) -> str:
-    """What a test of a difference and one of equivalence say together.
+    """The combined verdict of a test of a difference and one of equivalence.
 
     Empty where the former could not be made; the latter is NaN where there are no bounds.
     docs/method/statistics.md#verdicts
@@ -106,7 +106,7 @@ def verdict(p_difference: float, p_equivalence: float, *, alpha: float = ALPHA) 
 
 
 def bayes_factor_null(t: float, n: int) -> float:
-    """How much likelier the data are without a difference than with one (JZS, r = 0.707).
+    """How much more likely the data are without a difference than with one (JZS, r = 0.707).
 
     NaN where t is. docs/method/statistics.md#bayes-factor
 

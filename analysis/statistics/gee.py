@@ -147,5 +147,5 @@ def _row(
 def _separated(cells: pd.Series) -> str:
     """Which answers are all 0, or all the largest; empty where none are."""
     ends = cells.index[cells.isin([0.0, 1.0])]
-    told = [f"{texture} with {model}" for texture, model in ends]
-    return f"separated: all answers alike at an end of the scale ({', '.join(told)})" * bool(told)
+    named = [f"{texture} with {model}" for texture, model in ends]
+    return f"separated: all answers alike at an end of the scale ({', '.join(named)})" * bool(named)

@@ -1,4 +1,4 @@
-"""Whether the hand moved otherwise with one model than with the other.
+"""Whether the hand moved differently with one model than with the other.
 
 docs/method/reliability.md#hand
 """
@@ -116,8 +116,8 @@ def hand_tests(
     -------
     DataFrame
         `HAND_TEST_COLUMNS`, a row per task and measure; differences are other − reference. Not
-        corrected for their number: a doubt is rather told once too often. Participants without a
-        texture that was measured with both models are left out and named under `excluded`.
+        corrected for their number, so that a doubt is reported rather than missed. Participants
+        without a texture measured with both models are left out and named under `excluded`.
     """
     rows = []
     draws = generators(rng)

@@ -1,4 +1,4 @@
-"""Transferred information: how many bits the answers tell about what was presented."""
+"""Transferred information: how many bits the answers carry about what was presented."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two models compared within participants: paired t-test, effect size, tests beside it."""
+"""Two models compared within participants: paired t-test, effect size, alternative tests."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy import special, stats
 
+from analysis.labels import counted
 from modeling import InputError
 from modeling.arrays import Floats
 
@@ -144,7 +145,7 @@ def holm(p_values: ArrayLike) -> Floats:
 
 
 def participant_means(table: pd.DataFrame, column: str) -> pd.DataFrame:
-    """What each participant's answers on each texture average to, with each model.
+    """The mean of each participant's answers on each texture with each model.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def wilcoxon(differences: Floats, *, rng: np.random.Generator) -> tuple[float, f
 def sign_flips_p(
     differences: Floats, *, rng: np.random.Generator, alternative: Alternative = "two-sided"
 ) -> float:
-    """p of the mean when each participant's difference could as well have the other sign.
+    """p of the mean when the sign of each participant's difference is random.
 
     Exact up to 13 participants, else from 9999 draws; of one participant 1, of none NaN.
     docs/method/statistics.md#sign-flips
@@ -251,7 +252,7 @@ def without_rounding_noise(differences: Floats) -> Floats:
 def why_undefined(differences: Floats) -> str:
     """Why no t-test can be made of these differences; empty where one can."""
     if differences.size < 2:
-        return f"t undefined: {differences.size} participant(s)"
+        return f"t undefined: {counted(differences.size, 'participant')}"
     if np.ptp(differences) == 0:
         return "t undefined: no variation between participants"
     return ""

@@ -56,14 +56,14 @@ POWER_COLUMNS = (
     Column("hits"),
     Column("simulations"),
     Column("chance", format=".3f"),
-    Column("ci_low", "95 % CI from", format=".3f"),
+    Column("ci_low", "95% CI from", format=".3f"),
     Column("ci_high", "to", format=".3f"),
 )
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What one simulated study of n participants says of one claim and texture."""
+    """The verdict of one simulated study of n participants on one claim and texture."""
 
     claim: str
     texture: str
@@ -134,7 +134,7 @@ def _p_values(
 
 
 def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
-    """How often each verdict came, with its 95 % interval (Clopper–Pearson).
+    """How often each verdict occurred, with its 95 % interval (Clopper–Pearson).
 
     Parameters
     ----------
@@ -160,19 +160,19 @@ def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
         came = {verdict for _, verdict in of_place} | {EQUIVALENT, INCONCLUSIVE}
         shown = {EQUIVALENT} if texture == EVERY_TEXTURE else came
         for n in sorted({n for n, _ in of_place}):
-            for told in (told for told in VERDICTS if told in shown):
-                hits = of_place.get((n, told), 0)
+            for verdict in (verdict for verdict in VERDICTS if verdict in shown):
+                hits = of_place.get((n, verdict), 0)
                 low, high = clopper_pearson(hits, simulations)
                 rows.append(
-                    (claim, texture, n, told, hits, simulations, hits / simulations, low, high)
+                    (claim, texture, n, verdict, hits, simulations, hits / simulations, low, high)
                 )
     return pd.DataFrame(rows, columns=names(POWER_COLUMNS))
 
 
 def power_sentences(table: pd.DataFrame, *, claims: Sequence[Claim]) -> list[str]:
-    """One line for each claim: the fewest people with enough power over all textures.
+    """One line for each claim: the smallest n with sufficient power over all textures.
 
-    Where no n has, the line is that of the most people, and says so.
+    Where no n suffices, the line is for the largest n and states so.
 
     Parameters
     ----------

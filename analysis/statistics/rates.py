@@ -34,7 +34,7 @@ CORRECT_RATE_COLUMNS = (
     Column("trials"),
     Column("mean"),
     Column("se", "SE"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
     Column("t"),
     Column("df"),

@@ -1,4 +1,4 @@
-"""How far answers can be relied on: agreement, repeatability, ends of the scale, carelessness.
+"""Reliability of the answers: agreement, repeatability, ends of the scale, carelessness.
 
 docs/method/reliability.md
 """
@@ -14,11 +14,12 @@ import pandas as pd
 from scipy import stats
 
 from analysis.columns import Column, names
+from analysis.labels import counted
 from analysis.statistics.paired import ignoring_case, sign_flips_p
 from modeling.files.answer_tables import ENDS
 
 ALPHA = 0.05
-LEAST_ANSWERS = 5  # fewer tell nothing about how somebody answers
+LEAST_ANSWERS = 5  # fewer do not show how somebody answers
 
 AGREEMENT_COLUMNS = (
     Column("scale", is_name=True),
@@ -101,14 +102,14 @@ def agreement(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
 def _why_no_correlation(complete: pd.DataFrame) -> str:
     people, cells = complete.shape
     if people < 2 or cells < 2:
-        return f"undefined: {people} participant(s) with {cells} cell(s)"
+        return f"undefined: {counted(people, 'participant')} with {counted(cells, 'cell')}"
     values = complete.to_numpy(dtype=float)
     if np.ptp(values) == 0:
         return "undefined: all ratings are the same"
     # Rounding noise of a perfect agreement would be divided by itself.
     residuals = values - values.mean(axis=0) - values.mean(axis=1, keepdims=True) + values.mean()
     if np.abs(residuals).max() < 1e-9:
-        return "undefined: participants differ in nothing but their mean"
+        return "undefined: participants differ only in their mean"
     return ""
 
 
@@ -132,7 +133,7 @@ def _correlations(complete: pd.DataFrame) -> dict[str, dict[str, float]]:
 
 
 def rater_table(ratings: pd.DataFrame, scale: str) -> pd.DataFrame:
-    """How each participant used a scale, and how far their repeated ratings lie apart.
+    """How each participant used a scale, and how much their repeated ratings differ.
 
     docs/method/reliability.md#repeatability
 
@@ -247,7 +248,7 @@ def answers_at_chance(
     """Participants who are not shown to be above chance where the group is.
 
     Their right answers are not above chance and below the others' mean rate (exact binomial tests,
-    each one-sided at 5 %), so that nobody is named for having had few trials; the group's rates are
+    each one-sided at 5 %), so that nobody is named because of few trials; the group's rates are
     above chance by sign flips (one-sided, 5 %).
 
     docs/method/reliability.md#careless-answers
@@ -275,8 +276,8 @@ def answers_at_chance(
     for person, right, count, rate in people.itertuples(name=None):
         others = float(people["mean"].drop(person).mean())
         if not _differs(right, count, chance, "greater") and _differs(right, count, others, "less"):
-            told = f"{right:.0f} of {count:.0f} right ({rate:.0%}; chance {chance:.0%}, "
-            found.append((person, "right answers at chance", f"{told}the others {others:.0%})"))
+            rates = f"{right:.0f} of {count:.0f} right ({rate:.0%}; chance {chance:.0%}, "
+            found.append((person, "right answers at chance", f"{rates}the others {others:.0%})"))
     return _signs(found)
 
 

@@ -119,7 +119,7 @@ def _fit(table: Floats) -> tuple[Floats, Floats]:
         ],
         axis=1,
     )
-    kept = (rows == columns) | (pair >= 0)  # pairs that nobody confused are fitted by 0
+    kept = (rows == columns) | (pair >= 0)  # pairs that were never confused are fitted by 0
     with warnings.catch_warnings():
         # Few counts may be fitted exactly, or by several parameters alike: the fitted counts, which
         # alone are used, are the same.

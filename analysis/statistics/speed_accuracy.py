@@ -1,4 +1,4 @@
-"""Speed and accuracy of people: time against correctness, two models side by side.
+"""Speed and accuracy of answers: time against correctness, for two models.
 
 docs/method/speed-accuracy.md
 """
@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import MODEL, TEXTURE, Column, P, names
+from analysis.labels import counted
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.mixed import mixed_effects
 from analysis.statistics.paired import (
@@ -114,7 +115,7 @@ _TRADE_OFFS = {
     (1, 1): "slower and more accurate: a speed–accuracy trade-off",
     (-1, 1): "faster and more accurate: no speed–accuracy trade-off",
     (1, -1): "slower and less accurate: no speed–accuracy trade-off",
-    (0, 0): "neither a difference of time nor one of accuracy was shown",
+    (0, 0): "no difference in time or accuracy was shown",
 }
 _ONE_SIDED = {
     (-1, 0): "faster",
@@ -343,7 +344,7 @@ def _compared(values: Floats, as_ratio: bool, *, rng: np.random.Generator) -> di
 def right_and_wrong(
     answers: pd.DataFrame, *, models: Sequence[str], rng: np.random.Generator
 ) -> pd.DataFrame:
-    """Whether wrong answers take another time than right ones, paired over participants.
+    """Whether response times differ between wrong and right answers, paired over participants.
 
     docs/method/speed-accuracy.md#right-and-wrong-answers
 
@@ -407,7 +408,7 @@ def time_ratios(
 
 
 def trade_off_sentence(comparison: pd.DataFrame, *, models: tuple[str, str]) -> str:
-    """What time and accuracy say together; a gain in one is never told without the other.
+    """The joint result of time and accuracy; a gain in one is never reported without the other.
 
     docs/method/speed-accuracy.md#trade-off
 
@@ -421,21 +422,22 @@ def trade_off_sentence(comparison: pd.DataFrame, *, models: tuple[str, str]) -> 
     by_measure = {row["measure"]: row for row in comparison.to_dict("records")}
     time, share = by_measure["time_s"], by_measure["share_correct"]
     reference, other = models
-    about = f"Speed and accuracy, {other} against {reference} models"
+    about = f"Speed and accuracy, {other} compared with {reference} models"
     if share["n"] < 2:
-        return f"{about}: not compared, since {share['n']} participant(s) answered with both."
+        who = counted(share["n"], "participant")
+        return f"{about}: not compared, because {who} answered with both."
     signs = (
         _direction(np.log(time["estimate"]), time["p"]),
         _direction(share["estimate"], share["p"]),
     )
-    told = _TRADE_OFFS.get(signs) or (
-        f"{_ONE_SIDED[signs]}; a difference of {'accuracy' if signs[0] else 'time'} was not shown, "
-        "which does not rule a speed–accuracy trade-off out"
+    result = _TRADE_OFFS.get(signs) or (
+        f"{_ONE_SIDED[signs]}; a difference in {'accuracy' if signs[0] else 'time'} was not shown, "
+        "so a speed–accuracy trade-off is not ruled out"
     )
     points = [_signed(100 * share[name]) for name in ("estimate", "ci_low", "ci_high")]
     ratios = [f"{time[name]:.2f}" for name in ("estimate", "ci_low", "ci_high")]
     return (
-        f"{about}: {told} (times as long: {_with_interval(ratios)}; right answers: "
+        f"{about}: {result} (times as long: {_with_interval(ratios)}; right answers: "
         f"{_with_interval(points, unit=' percentage points')})."
     )
 

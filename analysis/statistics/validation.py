@@ -1,4 +1,4 @@
-"""The procedures on planted truth: coverage, type I error and power, where they hold and where not.
+"""The procedures on planted truth: coverage, type I error and power in several situations.
 
 docs/method/validation.md
 """
@@ -51,15 +51,15 @@ VALIDATION_COLUMNS = (
     Column("planted"),
     Column("simulations"),
     Column("estimate", format=".3f"),
-    Column("ci_low", "95 % CI from", format=".3f"),
+    Column("ci_low", "95% CI from", format=".3f"),
     Column("ci_high", "to", format=".3f"),
     Column("nominal", format=".3f"),
     Column("within", "nominal within", is_name=True),
     Column("meaning"),
 )
-# What it means that the nominal value lies below the interval, and that it lies above it.
+# What a nominal value below the interval means, and one above it.
 MEANINGS = {
-    COVERAGE: ("covers more often than promised", "covers too rarely"),
+    COVERAGE: ("covers more often than nominal", "covers too rarely"),
     TYPE_I: ("errs too often", "errs less often than allowed"),
     POWER: ("finds it more often", "finds it less often"),
 }
@@ -103,7 +103,7 @@ def _ceiling(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> 
 
 
 def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Of some participants any rating is as likely as any other."""
+    """Some participants answer at random, uniformly over the scale."""
     ratings = _normal(rng, shape, truth)
     random = rng.random(shape) < CARELESS
     ratings[random] = rng.uniform(0, 100, (*shape, 2))[random]
@@ -111,7 +111,7 @@ def _careless(rng: np.random.Generator, shape: tuple[int, int], truth: float) ->
 
 
 def _aborted(rng: np.random.Generator, shape: tuple[int, int], truth: float) -> Floats:
-    """Who does not finish has no complete cells, whatever the ratings would have been."""
+    """Participants who do not finish have no complete cells, independently of their ratings."""
     ratings = _normal(rng, shape, truth)
     ratings[rng.random(shape) < ABORTED] = np.nan
     return ratings
@@ -161,11 +161,11 @@ def _each_size(values: Floats) -> Iterator[tuple[NDArray[np.intp], Floats]]:
         yield which, values[which][complete[which]].reshape(which.size, count)
 
 
-def _told(values: Floats, told: Callable[[Floats], Hits]) -> Hits:
-    """What a procedure says of each row of (k, n) values; no where it can say nothing."""
+def _hits_of_rows(values: Floats, judge: Callable[[Floats], Hits]) -> Hits:
+    """The result of a procedure for each row of (k, n) values; no where it has none."""
     hits = np.zeros(len(values), dtype=bool)
     for which, complete in _each_size(values):
-        hits[which] = told(complete)
+        hits[which] = judge(complete)
     return hits
 
 
@@ -174,15 +174,15 @@ def _differences(ratings: Floats) -> Floats:
 
 
 def _t_covers(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    def told(differences: Floats) -> Hits:
+    def judge(differences: Floats) -> Hits:
         *_, low, high = t_tests(differences)
         return (low <= truth) & (truth <= high)
 
-    return _told(_differences(ratings), told)
+    return _hits_of_rows(_differences(ratings), judge)
 
 
 def _t_rejects(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    return _told(_differences(ratings), lambda each: t_tests(each)[1] < ALPHA)
+    return _hits_of_rows(_differences(ratings), lambda each: t_tests(each)[1] < ALPHA)
 
 
 def _family_rejects(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
@@ -195,12 +195,12 @@ def _family_rejects(ratings: Floats, truth: float, rng: np.random.Generator) -> 
 
 
 def _equivalent(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    def told(differences: Floats) -> Hits:
+    def judge(differences: Floats) -> Hits:
         _, p_low, _, p_high = one_sided_tests(differences, BOUNDS)
         equal: Hits = np.maximum(p_low, p_high) < ALPHA
         return equal
 
-    return _told(_differences(ratings), told)
+    return _hits_of_rows(_differences(ratings), judge)
 
 
 def _equivalent_by_guard(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
@@ -208,29 +208,29 @@ def _equivalent_by_guard(ratings: Floats, truth: float, rng: np.random.Generator
     at_end = (ratings <= 0) | (ratings >= 100)
     answered = np.isfinite(ratings).sum(axis=(1, 2))
     few = at_end.sum(axis=(1, 2)) <= HIGHEST_SHARE_AT_ENDS * answered
-    told: Hits = _equivalent(ratings, truth, rng) & few
-    return told
+    found: Hits = _equivalent(ratings, truth, rng) & few
+    return found
 
 
 def _d_z_covers(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    def told(differences: Floats) -> Hits:
+    def judge(differences: Floats) -> Hits:
         n = differences.shape[1]
         limits = np.array([d_z_interval(float(t), n) for t in t_tests(differences)[0]])
         d_z = truth / DIFFERENCE_SD
         return (limits[:, 0] <= d_z) & (d_z <= limits[:, 1])
 
-    return _told(_differences(ratings), told)
+    return _hits_of_rows(_differences(ratings), judge)
 
 
 def _flips_reject(ratings: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    return _told(
+    return _hits_of_rows(
         _differences(ratings),
         lambda each: np.array([sign_flips_p(one, rng=rng) < ALPHA for one in each]),
     )
 
 
 def _bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> Hits:
-    def told(complete: Floats) -> Hits:
+    def judge(complete: Floats) -> Hits:
         hits = np.zeros(len(complete), dtype=bool)
         vary = np.ptp(complete, axis=1) > 0
         if vary.any():
@@ -238,7 +238,7 @@ def _bootstrap_covers(rates: Floats, truth: float, rng: np.random.Generator) -> 
             hits[vary] = (low <= truth) & (truth <= high)
         return hits
 
-    return _told(rates, told)
+    return _hits_of_rows(rates, judge)
 
 
 def _confusions(
@@ -350,8 +350,8 @@ def equivalence_power(
 
     Notes
     -----
-    Phillips (1990): given the sampled SD, the mean has to lie as far within the bounds as t tells;
-    integrated over the distribution of the SD.
+    Phillips (1990): given the sampled SD, the mean must lie as far within the bounds as t
+    requires; integrated over the distribution of the SD.
     """
     root, error = sqrt(n - 1), sd / sqrt(n)
     inward = float(stats.t.ppf(1 - ALPHA, n - 1))

@@ -1,4 +1,4 @@
-"""From answers to verdicts: what each claim is about, and what stands against its verdict.
+"""From answers to verdicts: the values of each claim, and doubts about its verdict.
 
 docs/method/statistics.md#verdicts
 """
@@ -42,7 +42,7 @@ from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ClaimFound:
-    """One claim with its tests and what they rest on.
+    """One claim with its tests and their data.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def models_of(responses: Responses, task: str) -> tuple[str, ...]:
 
 
 def claim_values(responses: Responses, claim: Claim) -> Values:
-    """What every participant gave for each texture, with either model; complete cells only.
+    """The values of every participant for each texture with each model; complete cells only.
 
     In a task whose trials hold both models the reference is chance.
     """
@@ -181,7 +181,7 @@ def repeats_of(responses: Responses, task: str) -> int:
 
 
 def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> Standing:
-    """What stands against a verdict on a claim.
+    """Doubts about a verdict on a claim.
 
     docs/method/statistics.md#withheld
     """
@@ -194,7 +194,7 @@ def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generat
 
 
 def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
-    """Whether people told surfaces apart that differ, as `Standing.sensitivity` says it.
+    """Whether participants told different surfaces apart, as `Standing.sensitivity` states it.
 
     Ratings show it by anchors, the forced choice by its reference; no other task can so far.
     """
@@ -246,12 +246,12 @@ def chance_of(task: str, answers: pd.DataFrame) -> float:
 
 
 def has_rates(task: str) -> bool:
-    """Whether shares of right answers with either model can be told: each trial has one of them."""
+    """Whether each model has a share of right answers: each trial has one of the models."""
     return "correct" in ANSWER_TABLES[task].measures and not ANSWER_TABLES[task].both_models
 
 
 def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:
-    """p of the claim that a mean is above 0; 1 where nobody has a value."""
+    """One-sided p of a mean above 0; 1 where there is no value."""
     numbers: Floats = without_rounding_noise(values.to_numpy(dtype=float))
     if not numbers.size:
         return 1.0
@@ -265,7 +265,7 @@ SETUP_COLUMNS = (
     Column("setup", "set-up", is_name=True),
     Column("n"),
     Column("mean_difference", "difference"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
 )
 
@@ -299,7 +299,7 @@ PLANTED_COLUMNS = (
     TEXTURE,
     Column("planted"),
     Column("mean_difference", "difference"),
-    Column("ci_low", "95 % CI from"),
+    Column("ci_low", "95% CI from"),
     Column("ci_high", "to"),
     Column("verdict", is_name=True),
     Column("agreement"),
@@ -309,7 +309,7 @@ PLANTED_COLUMNS = (
 def planted_verdicts(
     found: Sequence[ClaimFound], planted: Mapping[str, Mapping[str, float]]
 ) -> pd.DataFrame:
-    """Verdicts beside the differences that simulated participants were given.
+    """Verdicts compared with the differences planted in simulated participants.
 
     Parameters
     ----------
@@ -320,9 +320,9 @@ def planted_verdicts(
     Returns
     -------
     DataFrame
-        `PLANTED_COLUMNS`. A verdict agrees where it says what was planted, contradicts where it
-        says the opposite (a difference where none was planted, equality where the planted one
-        reaches a bound), and is undecided else.
+        `PLANTED_COLUMNS`. A verdict agrees where it matches the planted difference,
+        contradicts where it states the opposite (a difference where none was planted, equivalence
+        where the planted one reaches a bound), and is otherwise undecided.
     """
     rows = []
     for one in found:

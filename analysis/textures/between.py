@@ -1,7 +1,7 @@
-"""How close models are at recorded conditions, and between them, where a hand really is.
+"""How close models are at recorded conditions and between them, where a hand mostly is.
 
-Truths in closed form are known anywhere; of recordings, conditions are left out and predicted from
-the others.
+Truths in closed form are known anywhere; for recordings, conditions are left out and predicted
+from the others.
 """
 
 from __future__ import annotations
@@ -139,8 +139,8 @@ def ar_fit(order: int) -> Fit:
 def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
     """Conditions predicted by a model that was fitted without them.
 
-    Twice, every second condition is left out like the squares of one colour on a chessboard (but
-    the corners of the grid, beyond which nothing is known), and predicted from the others.
+    Twice, every second condition is left out like the squares of one colour on a chessboard
+    (except the corners of the grid, to avoid extrapolation), and predicted from the others.
 
     Parameters
     ----------
@@ -258,7 +258,7 @@ LEFT_OUT_COLUMNS = (
 
 
 def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:
-    """Per texture and model: how well conditions are predicted that it was not shown.
+    """Per texture and model: how well left-out conditions are predicted.
 
     Returns
     -------
@@ -278,8 +278,8 @@ def left_out_summary(results: Sequence[TextureResult]) -> pd.DataFrame:
 PLANTED_BETWEEN_COLUMNS = (
     TEXTURE,
     ESTIMATOR,
-    Column("distance_at_db", "distance at", "dB"),
-    Column("distance_between_db", "distance between", "dB"),
+    Column("distance_at_db", "distance at conditions", "dB"),
+    Column("distance_between_db", "distance between conditions", "dB"),
     Column("median_level_error_between_db", "absolute level error between, median", "dB"),
     Column("worst_level_error_between_db", "worst", "dB"),
 )

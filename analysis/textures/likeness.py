@@ -1,4 +1,4 @@
-"""How alike models are to recordings, by texture."""
+"""Similarity of models to recordings, by texture."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MEASURE_COLUMNS = (
     Column("log_spectral_distance_db", "log-spectral distance", "dB"),
     Column("rms_error_db", "RMS error", "dB"),
     Column("band_energy_error_db", "band energy error", "dB"),
-    Column("gfc30_deficit", format=".4f"),
+    Column("gfc30_deficit", "GFC30 deficit", format=".4f"),
 )
 GFC_COLUMNS = (
     TEXTURE,
@@ -113,7 +113,7 @@ def gfc_table(
 def likeness_table(
     targets: Sequence[ConditionTarget], models: Mapping[str, TextureModel | RegressedModel]
 ) -> pd.DataFrame:
-    """How alike recordings and each of these models of one texture are, one row per model.
+    """Similarity of the recordings and each of these models of one texture, one row per model.
 
     Parameters and columns as in `gfc_table`, but for `parameters`.
     """

@@ -1,4 +1,4 @@
-"""How well an estimated model finds what was planted: layers matched one to one."""
+"""How well an estimated model recovers the planted one: layers matched one to one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the parameters say: tables 1 and 2 and figure 5 of the paper, and what regressions cost."""
+"""Regressions of the parameters: tables 1 and 2 and figure 5 of the paper, and their loss."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ SUPPORT_COLUMNS = (
 
 
 def support_table(regressions: pd.DataFrame) -> pd.DataFrame:
-    """Support ratings and mean adjusted R² beside the published ones (PAPER table 2, left half).
+    """Support ratings and mean adjusted R² with the published ones (PAPER table 2, left half).
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ COEFFICIENT_COLUMNS = (
 
 
 def coefficient_table(regressions: pd.DataFrame) -> pd.DataFrame:
-    """Mean coefficients beside the published ones (PAPER table 2, right half).
+    """Mean coefficients with the published ones (PAPER table 2, right half).
 
     Parameters
     ----------
@@ -399,7 +399,7 @@ DRIVING_COLUMNS = (
 
 
 def driving_table(driven: Sequence[pd.DataFrame]) -> pd.DataFrame:
-    """What the grid's numbers buy: grid, regressions and centroid against the recordings.
+    """Grid, regressions and centroid compared with the recordings, with the numbers they need.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Tables of a compiled scene: what became of each texture, and what each step brought."""
+"""Tables of a compiled scene: the result for each texture, and the effect of each step."""
 
 from __future__ import annotations
 
@@ -41,7 +41,9 @@ BEFORE_AFTER_COLUMNS = (
             Column(f"{name}_mean", f"{label}, mean over the hand's time", unit, format=".3f"),
             Column(f"{name}_worst", f"{label}, worst", unit, format=".3f"),
             Column(f"{name}_place", f"{label}, worst at"),
-            Column(f"{name}_of_full", f"{label}, worst to the full model", unit, format=".3f"),
+            Column(
+                f"{name}_of_full", f"{label}, worst relative to the full model", unit, format=".3f"
+            ),
         )
     ),
     Column("full_sha256", "SHA-256 of the full model", is_hash=True),
@@ -62,14 +64,14 @@ SHARED = "shared between textures"
 
 
 def before_after_table(compiled: CompiledScene) -> pd.DataFrame:
-    """What became of each texture, and of all together.
+    """The result for each texture, and for all together.
 
     Returns
     -------
     DataFrame
-        The columns of `BEFORE_AFTER_COLUMNS`, a row per texture and one for all of them: sums, what
-        textures share counted once; operations are those of the texture that takes most; of each
-        measure the worst.
+        The columns of `BEFORE_AFTER_COLUMNS`, a row per texture and one for all of them: sums, with
+        shared parts counted once; operations of the most expensive texture; the worst value of
+        each measure.
     """
     rows = [_row(compiled, texture) for texture in compiled.textures]
     total = {
@@ -124,7 +126,7 @@ def driven_by(texture: CompiledTexture) -> str:
 
 
 def steps_table(compiled: CompiledScene) -> pd.DataFrame:
-    """What each step of the compiler brought, each after those before it.
+    """The effect of each step of the compiler, each after the previous ones.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""How well planted detection thresholds are found again, by trials, beside a staircase.
+"""How well planted detection thresholds are recovered, by trials, compared with a staircase.
 
 Simulated: observers with random smooth thresholds at the eight frequencies of the task answer as
 `experiments.tasks.threshold` asks (QUEST+), and as a 3-down 1-up staircase of PsychoPy asks.
@@ -126,7 +126,7 @@ def staircase_errors(
 def staircase(
     kind: Kind, threshold_db: float, rng: np.random.Generator
 ) -> Iterator[tuple[int, float]]:
-    """What a staircase finds after so many trials: the mean of its reversals in steps of 2 dB."""
+    """The estimate of a staircase after a number of trials: the mean reversal in steps of 2 dB."""
     from psychopy.data import StairHandler
 
     stairs = StairHandler(

@@ -53,7 +53,7 @@ SERVER = "tactileq-faults"
 
 
 def session(rig_file: Path) -> None:
-    """Present a texture and look after it, until told to hang or killed."""
+    """Present a texture and keep its session alive, until ordered to hang or killed."""
     with DeskRig(RigFile.load(rig_file)) as rig:
         rig.present_model(planted_texture(TEXTURE))
         pids = {"main": os.getpid(), "sound": rig.parts.sound.pid, "hand": rig.parts.reader.pid}
@@ -84,14 +84,14 @@ def listen(target: Path) -> None:
 
 
 def begun(*words: object) -> subprocess.Popen[str]:
-    """This file as another process, once it has said its first word."""
+    """This file as another process, once it has written its first line."""
     command = [sys.executable, __file__, *map(str, words)]
     pipes: dict[str, Any] = dict.fromkeys(("stdin", "stdout"), subprocess.PIPE)
     return subprocess.Popen(command, text=True, **pipes)
 
 
 class Board:
-    """A micro-controller that says every 2 ms where it is, at the end of a pseudo-terminal."""
+    """A micro-controller that reports its position every 2 ms through a pseudo-terminal."""
 
     def __init__(self) -> None:
         self._master, self._slave = os.openpty()
@@ -119,7 +119,7 @@ class Board:
         self._thread.join()
 
     def unplug(self) -> None:
-        """Pull its plug."""
+        """Unplug it."""
         self.freeze()
         for end in (self._master, self._slave):
             with suppress(OSError):
@@ -192,7 +192,7 @@ def audio_server() -> Iterator[subprocess.Popen[bytes]]:
 
 
 def rig_text(board: Board) -> str:
-    """The shipped rig with a serial sensor, on a card that is none."""
+    """The shipped rig with a serial sensor, on a dummy sound card."""
     lines = SHIPPED_RIG_FILE.read_text(encoding="utf-8").splitlines()
     kept = "\n".join(line for line in lines if not line.startswith("pressure_curve"))
     kept = kept.replace('kind = "tablet"', f'kind = "serial"\ndevice = "{board.path}"')

@@ -85,7 +85,7 @@ def main() -> None:
         if any(step < at < step + STROKE_S for at in heard)
     ]
     print(
-        f"{len(delays)} of {steps} steps heard: median {np.median(delays):.1f} ms, "
+        f"{len(delays)} of {steps} steps captured: median {np.median(delays):.1f} ms, "
         f"95 % within {np.quantile(delays, 0.95):.1f} ms"
     )
 

@@ -1,4 +1,4 @@
-"""What a block of sound costs, and what a busy session does to it: two ways to play under a hand.
+"""Processor time of audio blocks and the effect of a busy session: two ways to play under a hand.
 
 Simulated: JACK's dummy driver instead of a sound card, a planted texture (wall paper), a hand that
 strokes to and fro. *C callback*: `rig.sound`, a process of its own. *Python callback*: what one
@@ -48,7 +48,7 @@ def stroke(at_s: float) -> tuple[float, float]:
 
 
 def hold_lock(seconds: float) -> None:
-    """Stand still with Python's lock held."""
+    """Block while holding Python's global interpreter lock."""
     ctypes.PyDLL(None).usleep(int(seconds * 1e6))
 
 

@@ -1,4 +1,4 @@
-"""Which layers go, by criterion, threshold table, and what is taken for known above its end.
+"""Layers dropped, by criterion, threshold table, and assumption above its end.
 
 Simulated: random planted textures with six layers each, one per band from 20 Hz to 2 kHz.
 

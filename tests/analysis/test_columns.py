@@ -25,6 +25,8 @@ COLUMNS = (PLAIN, P, EXACT)
         (PLAIN, 1234.5, "1234"),
         (PLAIN, 0.00012, "1.2e−04"),
         (PLAIN, 1e-16, "0.000"),
+        (PLAIN, -1e-16, "0.000"),
+        (EXACT, -0.00001, "0.0000"),
         (PLAIN, np.float64(0.5), "0.500"),
         (PLAIN, np.nan, "n/a"),
         (PLAIN, np.inf, "∞"),

@@ -130,7 +130,7 @@ def test_claims_are_those_of_the_study_and_others_exploratory(
     assert "Planned exclusion: Whoever presses nothing." in page
     manifests = list(data.rglob("*_manifest.json"))
     plan_sha256 = json.loads(manifests[0].read_text())["plan_sha256"]
-    assert f"page to preregister: {plan_sha256[:12]}" in page
+    assert f"preregistration page: {plan_sha256[:12]}" in page
 
     later = data.parent / "later.toml"
     later.write_text(LATER)

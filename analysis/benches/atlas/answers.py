@@ -1,8 +1,8 @@
-"""The tests of answers in the atlas: what ceilings, careless raters and few subjects do to them.
+"""The tests of answers in the atlas: effects of ceilings, careless raters and few participants.
 
 Simulated are ratings of a full and a simplified model, one of each per rater, and answers of the
-forced choice; they go through the very functions of `analysis.statistics`. The same raters are
-drawn all along an axis, so that edges are clean.
+forced choice; they are analysed by the functions of `analysis.statistics` themselves. The same
+raters are drawn along the whole axis, so that edges are clean.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ Test = Callable[[Floats], Floats]
 
 
 def ratings(studies: int, raters: int, *, mean: float, effect: float) -> tuple[Floats, Floats]:
-    """Latent ratings (studies, raters) of the full and of the simplified model, no end in sight."""
+    """Latent ratings (studies, raters) of the full and the simplified model, without a ceiling."""
     rng = generator([SEED, raters])
     person = mean + PERSON_SD * rng.standard_normal((studies, raters))
     noise = DIFFERENCE_SD / np.sqrt(2) * rng.standard_normal((2, studies, raters))
@@ -53,7 +53,7 @@ def ratings(studies: int, raters: int, *, mean: float, effect: float) -> tuple[F
 
 
 def careless(shape: tuple[int, ...], share: float) -> tuple[Bools, Floats]:
-    """Who answers without attending, (studies, raters), and their two answers, anywhere."""
+    """Who answers at random, (studies, raters), and their two answers, uniform on the scale."""
     rng = generator([SEED, 1, *shape])
     return rng.random(shape) < share, rng.uniform(0.0, HIGHEST, (2, *shape))
 
@@ -67,7 +67,7 @@ def t_p(differences: Floats) -> Floats:
 
 
 def wilcoxon_p(differences: Floats) -> Floats:
-    """p of the signed-rank test in each row; NaN where nobody sees a difference."""
+    """p of the signed-rank test in each row; NaN where all differences are 0."""
     p = np.full(len(differences), np.nan)
     zeros = (differences == 0).sum(axis=1)
     # SciPy takes one distribution for all rows, and another one where a difference is 0.
@@ -84,21 +84,21 @@ def _found(test: Test, full: Floats, simplified: Floats) -> float:
 
 
 def power_lost_at_the_end(share: float, column: float, *, full: bool, test: Test) -> float:
-    """How many more studies would find the difference if the scale had no end."""
+    """The loss of power due to the end of the scale."""
     latent = ratings(STUDIES[full], RATERS, mean=_mean_near_the_end(share), effect=EFFECT)
     seen = [np.minimum(one, HIGHEST) for one in latent]
     return _found(test, *latent) - _found(test, *seen)
 
 
 def understated_at_the_end(share: float, column: float, *, full: bool) -> float:
-    """Share by which the difference of means falls short of that of the latent ratings."""
+    """Share by which the difference of means is smaller than that of the latent ratings."""
     latent = ratings(STUDIES[full], RATERS, mean=_mean_near_the_end(share), effect=EFFECT)
     seen = [np.minimum(one, HIGHEST) for one in latent]
     return float(1 - (seen[1] - seen[0]).mean() / (latent[1] - latent[0]).mean())
 
 
 def power_lost_to_carelessness(share: float, column: float, *, full: bool, test: Test) -> float:
-    """How many more studies would find the difference if all attended."""
+    """The loss of power due to careless raters."""
     latent = ratings(STUDIES[full], RATERS, mean=MEAN, effect=EFFECT)
     who, answers = careless(latent[0].shape, share)
     seen = [np.where(who, random, one) for random, one in zip(answers, latent, strict=True)]
@@ -106,7 +106,7 @@ def power_lost_to_carelessness(share: float, column: float, *, full: bool, test:
 
 
 def false_alarms(count: float, careless_share: float, *, full: bool, test: Test) -> float:
-    """Share of studies that find a difference where there is none."""
+    """Share of studies that find a difference where none exists."""
     latent = ratings(STUDIES[full], round(count), mean=MEAN, effect=0.0)
     who, answers = careless(latent[0].shape, careless_share)
     seen = [np.where(who, random, one) for random, one in zip(answers, latent, strict=True)]
@@ -114,13 +114,13 @@ def false_alarms(count: float, careless_share: float, *, full: bool, test: Test)
 
 
 def clear_effects_missed(count: float, column: float, *, full: bool, test: Test) -> float:
-    """Share of studies that do not find a difference of twice its own scatter."""
+    """Share of studies that miss a difference of twice its standard deviation."""
     latent = ratings(STUDIES[full], round(count), mean=MEAN, effect=CLEAR_EFFECT)
     return 1 - _found(test, *latent)
 
 
 def effect_sizes_missed(count: float, column: float, *, full: bool) -> float:
-    """Share of the intervals of d_z that do not hold the true one."""
+    """Share of the intervals of d_z that do not contain the true value."""
     n = round(count)
     latent = ratings(STUDIES[full] // 4, n, mean=MEAN, effect=-EFFECT)
     limits = [d_z_interval(t, n) for t in t_tests(latent[1] - latent[0])[0].tolist()]
@@ -130,7 +130,7 @@ def effect_sizes_missed(count: float, column: float, *, full: bool) -> float:
 
 
 def rates_missed_with_few(count: float, column: float, *, full: bool) -> float:
-    """Share of the intervals of a correct rate that miss it, or cannot be made: few judges."""
+    """Share of intervals that miss the correct rate or are missing: few participants."""
     return _rates_missed(USUAL_RATE, round(count), full=full)
 
 
@@ -140,7 +140,7 @@ def rates_missed_near_one(error_rate: float, column: float, *, full: bool) -> fl
 
 
 def _rates_missed(rate: float, judges: int, *, full: bool) -> float:
-    # Of one uniform number each, so that a judge gets no worse where the rate rises.
+    # From one uniform number each, so that no participant gets worse as the rate rises.
     uniform = generator([SEED, 2, judges]).random((INTERVALS[full], judges, REPEATS))
     rates = (uniform < rate).mean(axis=2)
     held = np.zeros(len(rates), dtype=np.bool_)
@@ -161,7 +161,7 @@ def _mean_near_the_end(share: float) -> float:
     return float(HIGHEST + _latent_sd() * stats.norm.ppf(share))
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def end_of_the_scale(column: float) -> float:
@@ -179,7 +179,7 @@ def end_of_the_scale(column: float) -> float:
 
 
 def power(effect: float, variance: float, count: float) -> float:
-    """Of a paired t-test of normal differences (noncentral t)."""
+    """Power of a paired t-test of normal differences (noncentral t)."""
     shift = effect * np.sqrt(count / variance)
     limit = stats.t.isf(ALPHA / 2, count - 1)
     tails = stats.nct.sf(limit, count - 1, shift) + stats.nct.cdf(-limit, count - 1, shift)
@@ -188,7 +188,7 @@ def power(effect: float, variance: float, count: float) -> float:
 
 @lru_cache(maxsize=1)
 def careless_share(column: float) -> float:
-    """Where the power of a t-test has fallen, careless answers taken as more variance."""
+    """Where the power of a t-test has dropped, careless answers modelled as variance."""
     random = HIGHEST**2 / 6  # of the difference of two answers anywhere
 
     def lost(share: float) -> float:
@@ -206,7 +206,7 @@ def careless_share(column: float) -> float:
 
 
 def fewest_for_t(column: float) -> float:
-    """Number of raters at which a t-test still has the power that is asked for."""
+    """Number of raters at which a t-test still has the required power."""
 
     def surplus(count: float) -> float:
         return power(CLEAR_EFFECT, DIFFERENCE_SD**2, count) - (1 - POWER_LOST)
@@ -231,7 +231,7 @@ def fewest_for_the_bootstrap(column: float) -> float:
 
 
 def rate_of_no_interval(column: float) -> float:
-    """Error rate at which everybody is right in so many studies that the intervals are missing."""
+    """Error rate at which intervals are missing too often because all answers are right."""
     return float(1 - MISSED ** (1 / (JUDGES * REPEATS)))
 
 
@@ -241,13 +241,13 @@ def never(column: float) -> float:
 
 
 # Bradley's (1978) liberal criterion of robustness: a nominal 5 % may be 2.5 to 7.5 %. Twice the
-# nominal level is called wrong.
+# nominal level counts as wrong.
 ALARMS, ALARMS_AT_MOST = 0.075, 0.1
-# Intervals of 95 %: one in ten that misses is twice what was promised, one in five four times.
+# Intervals of 95 %: one miss in ten is twice the nominal rate, one in five four times.
 MISSED, MISSED_AT_MOST = 0.1, 0.2
-# Of a power of 90 % as planned 80 % is what journals ask for at least, 50 % is a coin.
+# Planned power is 90 %; 80 % is the usual minimum, 50 % is a coin toss.
 POWER_LOST, POWER_LOST_AT_MOST = 0.1, 0.4
-# A difference that is understated by a tenth is within its usual standard error, by a third not.
+# An underestimate of a tenth is within the usual standard error, one of a third is not.
 UNDERSTATED, UNDERSTATED_AT_MOST = 0.1, 0.33
 
 T, RANKS, BOOTSTRAP, D_Z = "paired t-test", "Wilcoxon", "bootstrap (BCa)", "interval of d_z"
@@ -259,8 +259,9 @@ FEW_JUDGES = Axis(name="participants", unit="", mild=30.0, severe=3.0, default=f
 # In the paper two of seven textures were recognised in about 60 % of the trials, one nearly always.
 ERRORS = Axis(name="wrong answers", unit="", mild=0.4, severe=0.002, default=0.4)
 A_CARELESS_ONE = (
-    "one rater of twenty who answers anywhere on the scale adds more variance than all others "
-    "have: leave such raters out by a rule that was fixed before, or look at the rank test beside"
+    "a single rater in twenty who answers at random adds more variance than all others together: "
+    "exclude such raters by a rule that was fixed beforehand, or consult the rank test reported "
+    "beside it"
 )
 
 
@@ -286,7 +287,7 @@ CASES: tuple[Case, ...] = (
         "difference of means",
         ENDS,
         measure=understated_at_the_end,
-        figure="share of the difference that is not seen",
+        figure="share of the difference that is missed",
         unit="",
         holds=UNDERSTATED,
         degrades=UNDERSTATED_AT_MOST,
@@ -313,11 +314,11 @@ CASES: tuple[Case, ...] = (
             method,
             FEW,
             measure=partial(false_alarms, test=test),
-            figure="differences found where there is none",
+            figure="differences found where none exists",
             unit="",
             holds=ALARMS,
             degrades=ALARMS_AT_MOST,
-            across="raters who answer anywhere",
+            across="raters who answer at random",
             columns={"none": NORMAL, "one in ten": WITH_CARELESS},
             theory=never,
             source="exact for symmetric differences"
@@ -368,7 +369,7 @@ CASES: tuple[Case, ...] = (
                 ERRORS,
                 rates_missed_near_one,
                 rate_of_no_interval,
-                "nobody errs: no interval",
+                "no errors, hence no interval",
             ),
         )
     ),

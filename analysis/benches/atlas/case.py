@@ -1,6 +1,6 @@
-"""A case of the atlas: a method, what makes it difficult, and what tells that it fails.
+"""A case of the atlas: a method, a difficulty, and the measure that shows failure.
 
-How to read what comes out: docs/stability.md.
+How to read the results: docs/stability.md.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ ALONE = {"": np.nan}
 
 
 class Measure(Protocol):
-    """A run of a case: the figure that tells how bad it is; larger is worse, inf is worst.
+    """A run of a case: the figure of merit; larger is worse, inf is the worst.
 
-    `value` is on the case's axis, `column` one of its columns' numbers (NaN where there is one
-    column alone). `full`: with all the repeats of the full atlas, not the few of the reduced one.
-    Same arguments, same figure: what is random is seeded within.
+    `value` is on the case's axis, `column` one of its columns' numbers (NaN where there is only one
+    column). `full`: with all repeats of the full atlas instead of the few of the reduced one.
+    The same arguments give the same figure: random numbers are seeded within.
     """
 
     def __call__(self, value: float, column: float, *, full: bool) -> float: ...
@@ -42,7 +42,7 @@ class Axis:
     mild, severe : float
         Ends of the range, in either order; above 0 on a logarithmic axis.
     default : float, optional
-        Where the program or its usual user is; None where there is no such value.
+        The default of the program or its typical use; None where there is no such value.
     logarithmic : bool
     """
 
@@ -54,7 +54,7 @@ class Axis:
     logarithmic: bool = True
 
     def at(self, share: float) -> float:
-        """The value that lies this share (0–1) of the way from mild to severe."""
+        """The value at this share (0–1) of the way from mild to severe."""
         if not self.logarithmic:
             return self.mild + share * (self.severe - self.mild)
         return float(self.mild * (self.severe / self.mild) ** share)
@@ -91,7 +91,7 @@ class Case:
     family : str
         Cases that are drawn together: "filters", "peak finding", …
     method : str
-        Whose edge it is: "direct form", "unit covariance", …
+        The method whose edge is sought: "direct form", "unit covariance", …
     ours : bool
         Whether it is what the program does by default.
     axis : Axis
@@ -99,7 +99,7 @@ class Case:
     figure, unit : str
         What `measure` gives, in words, and its unit.
     holds, degrades : float
-        The largest figure with which the method holds; with which it has not failed yet.
+        The largest figure with which the method holds, and with which it has not failed yet.
     measure : Measure
         A function of a module (it is sent to other processes).
     across : str
@@ -112,7 +112,7 @@ class Case:
         says. `source` says which formula that is.
     source : str
     exception : str
-        Why the default may be nearer than a factor of 2 to the nearest edge; "" where it may not.
+        Why the default may be within a factor of 2 of the nearest edge; "" where it may not.
     """
 
     family: str
@@ -132,11 +132,11 @@ class Case:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """By what it is known: family, method, what is varied, and what is measured."""
+        """Its identity: family, method, what is varied, and what is measured."""
         return self.family, self.method, self.axis.name, self.figure
 
     def verdict(self, figure: float) -> Verdict:
-        """What a figure says of the method; one that is not a number has failed."""
+        """The verdict on a figure; one that is not a number counts as failed."""
         if figure <= self.holds:
             return HOLDS
         return DEGRADES if figure <= self.degrades else FAILS

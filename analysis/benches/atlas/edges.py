@@ -1,4 +1,4 @@
-"""Where a method stops to hold: a few runs along the axis, then bisection between two of them."""
+"""Where a method ceases to hold: a few runs along the axis, then bisection between two."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ BISECTIONS = {False: 2, True: 6}
 
 @dataclass(frozen=True)
 class Cell:
-    """One run: where on the axis, and what came out."""
+    """One run: its place on the axis, and its result."""
 
     value: float
     figure: float
@@ -29,16 +29,16 @@ class Examined:
     cells : tuple of Cell
         Evenly along the axis, from mild to severe.
     at_default : Cell or None
-        The run where the default lies.
+        The run at the default.
     holds_to : float
         The most severe value, from the mild end on, with which the method holds; NaN where it does
         not even hold there. The severe end of the axis where it holds throughout.
     fails_from : float
         The value from which on it fails; NaN where it does not within the axis.
     returns : bool
-        Whether it holds again at some cell beyond `holds_to`: the edge is then not the only one.
+        Whether it holds again at some cell beyond `holds_to`, so that there are several edges.
     runs : int
-        How often the case was run.
+        Number of runs of the case.
     """
 
     case: Case
@@ -59,9 +59,9 @@ class Examined:
 def examine(case: Case, column: str, *, full: bool) -> Examined:
     """Cells and edges of one column of a case.
 
-    Between the first cell that holds no more and the one before it the edge is bisected, so that it
-    is known to 1/256 of the axis (1/8 in the reduced atlas); likewise for failure. An edge is the
-    value before which the runs were right: at most that much too mild.
+    The edge is located by bisection between the first cell that no longer holds and the one before
+    it, to 1/256 of the axis (1/8 in the reduced atlas); likewise for failure. An edge is the most
+    severe value at which the runs still held, so it is too mild by that much at most.
     """
     probe = _Probe(case, column, full=full)
     count = CELLS[full]
@@ -99,7 +99,7 @@ def examine(case: Case, column: str, *, full: bool) -> Examined:
 
 
 class _Probe:
-    """Runs of one column; none is done twice."""
+    """Runs of one column; none is repeated."""
 
     def __init__(self, case: Case, column: str, *, full: bool) -> None:
         self._case, self._column, self._full = case, case.columns[column], full

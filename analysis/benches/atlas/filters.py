@@ -36,7 +36,7 @@ from stimuli.planted.textures import CATALOGUE
 RATE_HZ = 5000.0
 CENTRE_HZ, WIDTH_HZ = 300.0, 40.0
 DURATION_S = {False: 0.25, True: 1.0}
-# People tell vibrations apart that differ by 1 to 2 dB in level.
+# People can tell vibrations apart that differ by 1 to 2 dB in level.
 HOLDS_DB, DEGRADES_DB = 1.0, 6.0
 # From the grid's lowest speed to its highest, 50 to 350 mm/s, are 2.8 octaves.
 STROKE_OCTAVES = 1.4
@@ -57,7 +57,7 @@ SPACING = {"float32": 2.0**-23, "float64": 2.0**-52}
 def modulated(
     speed_hz: float, depth_octaves: float, *, width_hz: float = WIDTH_HZ, full: bool
 ) -> Parameters:
-    """One band around 300 Hz whose frequency goes up and down; at random where the speed is inf."""
+    """One band around 300 Hz whose frequency oscillates; at random where the speed is inf."""
     samples = round(DURATION_S[full] * RATE_HZ)
     if speed_hz == AT_RANDOM:
         octaves = np.random.default_rng(0).standard_normal(samples)
@@ -112,12 +112,12 @@ def sum_faster(value: float, column: float, *, full: bool) -> float:
 def _edge_hz(form: str, depth_octaves: float, *, width_hz: float) -> float:
     """The speed of modulation from which a band is off by more than `HOLDS_DB`.
 
-    The variance of a band forgets with the time constant 1/(2πB); meanwhile a motion that is slow
-    beside f keeps what a lossless filter keeps. That makes the level follow log f^c behind a
-    high-pass of the first order at B, with c = 2 for the state-variable filter (its state's norm is
-    kept, its output is that times 1/f) and −1 for the direct form (f times the squared output is
-    kept). The direct form is also a parametric amplifier near twice its frequency (Landau and
-    Lifshitz, Mechanics, § 27).
+    The variance of a band decays with the time constant 1/(2πB); within it a motion that is slow
+    compared with f preserves what a lossless filter preserves. The level therefore follows log f^c
+    behind a high-pass of the first order at B, with c = 2 for the state-variable filter (its
+    state's norm is kept, its output is that times 1/f) and −1 for the direct form (f times the
+    squared output is kept). The direct form is also a parametric amplifier near twice its
+    frequency (Landau and Lifshitz, Mechanics, § 27).
     """
     if form == OURS:
         return math.inf

@@ -1,4 +1,4 @@
-"""Renderings under a hand: late, noisy and unsigned readings, steps, other rates, crests.
+"""Renderings for a moving hand: late, noisy and unsigned readings, steps, other rates, crests.
 
 Theory and how to read it: docs/stability.md#hands.
 """
@@ -102,7 +102,7 @@ def noisy(value: float, column: float, *, every: int, full: bool) -> float:
 
 
 def lifted(value: float, column: float, *, form: str, full: bool) -> float:
-    """What a sudden loss of this share of the level adds above 1 kHz (dB).
+    """The level added above 1 kHz by a sudden loss of this share of the level (dB).
 
     The hand's force goes from 0.5 N, below which levels fall with force, to so much less. `form`:
     how the band is realised where gains are switched; "" for the program's own renderer.
@@ -114,7 +114,7 @@ def lifted(value: float, column: float, *, form: str, full: bool) -> float:
 
 
 def shifted(value: float, column: float, *, form: str, full: bool) -> float:
-    """What a sudden shift of a layer's frequency by this ratio adds above 1 kHz (dB)."""
+    """The level added above 1 kHz by a sudden frequency shift of a layer by this ratio (dB)."""
     del column
     before = (STEP_FROM_MM_S, 2.0)
     after = (STEP_FROM_MM_S * value, 2.0)
@@ -143,7 +143,7 @@ def at_rate(value: float, column: float, *, full: bool) -> float:
 
 
 def peaky(value: float, column: float, *, full: bool) -> float:
-    """By how much (dB) uniform noise is less peaky than Gaussian noise in a layer so wide (Hz)."""
+    """By how much (dB) peaks of uniform noise are below Gaussian ones in a layer this wide (Hz)."""
     return crest_difference_db(value, duration_s=column, streams=2 * STREAMS[full])
 
 
@@ -151,7 +151,7 @@ def peaky(value: float, column: float, *, full: bool) -> float:
 
 
 def _followed_edge_ms(read: str, column: float) -> float:
-    """The interval (ms) up to which the speed at the end of an update is known well enough."""
+    """The interval (ms) up to which the speed at the end of an update is accurate enough."""
     del column
     omega = 2 * math.pi * STROKE_HZ
     sample_s, steepest = 1 / RATE_HZ, FASTEST_MM_S * omega
@@ -199,7 +199,7 @@ _click = partial(
 _error = partial(
     Case,
     family="hands",
-    figure="difference from a rendering that knows the hand",
+    figure="difference from a rendering with the exact hand movement",
     unit="dB",
     holds=HOLDS_ERROR_DB,
     degrades=DEGRADES_ERROR_DB,
@@ -212,7 +212,7 @@ CASES: tuple[Case, ...] = (
             method=read,
             ours=read == SIGNED,
             axis=_INTERVAL,
-            figure="error of the speed in force",
+            figure="error of the speed in use",
             unit="mm/s",
             holds=HOLDS_MM_S,
             degrades=DEGRADES_MM_S,
@@ -283,9 +283,9 @@ CASES: tuple[Case, ...] = (
         holds=HOLDS_LEVEL_DB,
         degrades=DEGRADES_LEVEL_DB,
         measure=at_rate,
-        across="which level",
+        across="level",
         columns={"whole level": WHOLE_LEVEL, "third octaves": THIRD_OCTAVES},
-        exception="skirts near the model's Nyquist frequency do not stay the same at other rates; "
+        exception="skirts near the model's Nyquist frequency change at other rates; "
         "stimulus sets render at the model's rate and resample",
     ),
     Case(
@@ -302,6 +302,6 @@ CASES: tuple[Case, ...] = (
         columns={"1 s": 1.0},
         theory=_peaky_edge_hz,
         source="excess kurtosis −1.2·1.5·πB/fs (Cornish & Fisher 1938)",
-        exception="lower peaks are no fault: the spectrum is the same, and less is clipped",
+        exception="lower peaks are not an error: the spectrum is the same and less is clipped",
     ),
 )

@@ -1,8 +1,8 @@
-"""Peak finding in the atlas: what the estimators make of spectra that are hard to read.
+"""Peak finding in the atlas: how the estimators perform on difficult spectra.
 
-Planted are layers that a user would expect to be found. Each trouble is a function that makes
-recordings of them, each figure one of what was planted and what was found; both see the same draws
-of layers and noise all along an axis, so that edges are clean.
+The planted layers are ones that a user would expect to be found. Each difficulty is a function that
+makes recordings of them, each figure compares planted with found layers; both use the same draws
+of layers and noise along the whole axis, so that edges are clean.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def measured(
     figure: Callable[[Found], float],
     draws: dict[bool, int] = DRAWS,
 ) -> float:
-    """The figure of what an estimator finds in recordings in such trouble."""
+    """The figure for what an estimator finds in recordings with this difficulty."""
     found = []
     for draw in range(draws[full]):
         truth, recordings = trouble(generator([SEED, draw]), value, column)
@@ -74,7 +74,7 @@ def measured(
 
 
 def planted(rng: np.random.Generator, *, floor: float = USUAL_FLOOR) -> RandomTruth:
-    """Three layers, of which the weakest may stand so far over the floor (floor/height)."""
+    """Three layers, with a given floor relative to the weakest one (floor/height)."""
     frequency = np.array([rng.uniform(*span) for span in RANGES_HZ])
     widths = np.array(WIDTHS_HZ) * WIDTH_FACTOR ** rng.uniform(-1, 1, len(WIDTHS_HZ))
     heights = NOISE_GAIN / USUAL_FLOOR * 10 ** (rng.uniform(*LEVELS_DB, len(WIDTHS_HZ)) / 20)
@@ -107,7 +107,7 @@ def short(rng: np.random.Generator, duration_s: float, column: float) -> Spoilt:
 
 
 def crowded(rng: np.random.Generator, spacing: float, width_hz: float) -> Spoilt:
-    """Two pairs of equal layers, so many widths apart within a pair; powers add, without notch."""
+    """Two pairs of equal layers, a number of widths apart; powers add, without notch."""
     middles = np.array(PAIRS_HZ) * (1 + PAIR_RANGE * rng.uniform(-1, 1, len(PAIRS_HZ)))
     frequency = (middles[:, None] + spacing * width_hz * np.array([-0.5, 0.5])).ravel()
     widths = np.full(frequency.size, width_hz)
@@ -125,7 +125,7 @@ def clipped(rng: np.random.Generator, overload: float, column: float) -> Spoilt:
 
 
 def at_wrong_rate(rng: np.random.Generator, error_percent: float, column: float) -> Spoilt:
-    """Declared is a sampling rate this much above the true one."""
+    """The declared sampling rate is this much above the true one."""
     truth = planted(rng)
     return truth, [_recording(truth.record(rng=rng), rate_hz=RATE_HZ * (1 + error_percent / 100))]
 
@@ -153,7 +153,7 @@ def fading(rng: np.random.Generator, factor: float, column: float) -> Spoilt:
 
 
 def slowing(rng: np.random.Generator, drift_percent: float, column: float) -> Spoilt:
-    """All frequencies fall by so much of their middle value, as on a table that slows down."""
+    """All frequencies fall by a share of their middle value, as on a slowing turntable."""
     truth, n = planted(rng), round(RATE_HZ)
     wide = truth.record(rng=rng, duration_s=1.5)
     share = np.arange(n) / n - 0.5
@@ -161,18 +161,18 @@ def slowing(rng: np.random.Generator, drift_percent: float, column: float) -> Sp
     return truth, [_recording(np.interp(at * RATE_HZ, np.arange(wide.size), wide))]
 
 
-# What is wrong with what was found.
+# Errors of the found layers.
 
 
 def wrong_share(found: Found) -> float:
-    """1 − F1: layers missed and layers that nobody planted, over those planted and found."""
+    """1 − F1: layers missed and spurious layers, over those planted and found."""
     matched = sum(int((_partners(truth, layers) >= 0).sum()) for truth, layers in found)
     both = sum(truth.layers.gains.size + layers.gains.size for truth, layers in found)
     return 1 - 2 * matched / both
 
 
 def level_error_db(found: Found) -> float:
-    """RMS error of the levels of layers that are found; infinite where less than half of them is.
+    """RMS error of the levels of the layers found; infinite where fewer than half are found.
 
     A level is that of a layer's own power, whatever its width and height are made of.
     """
@@ -222,17 +222,17 @@ def _levels_g(layers: PEQ) -> Floats:
     return band_rms(np.abs(layers.gains), layers.bandwidths_hz, rate_hz=RATE_HZ)
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def evidence(expected: Floats, without: Floats) -> float:
-    """Gain of log likelihood to be expected from the true power of each line instead of another."""
+    """Expected gain of log likelihood from the true power of each line instead of another."""
     ratio = expected / without
     return float(np.sum(ratio - 1 - np.log(ratio)))
 
 
 def floor_of_no_evidence(column: float) -> float:
-    """The floor (over the layer) at which a lone layer, 20 Hz wide, gains no more than is asked."""
+    """The floor (over the layer) at which a lone layer, 20 Hz wide, gains just the minimum."""
     band = _bands(np.array([np.mean(RANGES_HZ[0])]), WIDTHS_HZ[0])[0]
 
     def surplus(log_floor: float) -> float:
@@ -244,7 +244,7 @@ def floor_of_no_evidence(column: float) -> float:
 
 @lru_cache(maxsize=8)
 def spacing_of_no_evidence(width_hz: float) -> float:
-    """Widths at which two layers gain no more than is asked for over the one nearest to them."""
+    """Widths at which two layers gain just the minimum over the best single layer."""
 
     def surplus(spacing: float) -> float:
         places = PAIRS_HZ[0] + spacing * width_hz * np.array([-0.5, 0.5])
@@ -288,10 +288,10 @@ def rate_error_allowed(column: float) -> float:
     return FREQUENCY_PERCENT
 
 
-# A wrong layer is one more to be named, judged against a threshold and rendered; one in ten can be
-# looked at one by one, one in three makes the list useless.
+# Each wrong layer must be named, compared with a threshold and rendered; one in ten can be checked
+# individually, one in three makes the list useless.
 WRONG, WRONG_AT_MOST = 0.1, 0.33
-# People tell vibrations apart from a difference of about 1 dB; 3 dB are twice the power.
+# People can tell vibrations apart that differ by about 1 dB or more; 3 dB are twice the power.
 LEVEL_DB, LEVEL_DB_AT_MOST = 1.0, 3.0
 # Of vibrations at the fingertip, frequencies that differ by less than about 5 to 10 % feel alike;
 # 20 % is a sixth of an octave and more than any neighbour of a texture's layers moves by chance.
@@ -304,7 +304,7 @@ LENGTH = Axis(name="record length", unit="s", mild=2.0, severe=0.05, default=1.0
 SPACING = Axis(
     name="spacing of two layers", unit="widths", mild=8.0, severe=0.5, default=USUAL_SPACING
 )
-# Crests of a vibration are about four times its RMS; who sets the range so has them in it.
+# Crests of a vibration are about four times its RMS; a range set to that contains them.
 OVERLOAD = Axis(name="RMS over the sensor's limit", unit="", mild=0.1, severe=3.0, default=0.25)
 # Clocks of usual converters are within 0.01 %.
 WRONG_RATE = Axis(name="error of the declared rate", unit="%", mild=0.01, severe=50.0, default=0.01)
@@ -318,9 +318,9 @@ EITHER = "paper, either reading"  # both readings find the same peaks
 READINGS = {JOINT: "joint", "paper": "paper", "paper-consistent": "paper-consistent"}
 ESTIMATOR_OF = READINGS | {EITHER: "paper"}
 ONE_RECORD = (
-    "from one record of a second, layers 15 Hz wide that are less than about four widths apart are "
-    "read as one wider layer, since the choice of their number is cautious; give the number where "
-    "it is known"
+    "in a single record of one second, layers 15 Hz wide that are less than about four widths "
+    "apart are read as one wider layer, because the choice of the number of layers is cautious; "
+    "specify the number where it is known"
 )
 ASKED_FOR = "log likelihood that a layer of 20 Hz is expected to gain = that asked for (6)"
 
@@ -423,7 +423,7 @@ CASES: tuple[Case, ...] = (
         for method in (JOINT, EITHER)
     ),
     *(
-        _case(method, HUM, with_hum, across="recorded at", columns=SPEED_COLUMNS)
+        _case(method, HUM, with_hum, across="number of recorded speeds", columns=SPEED_COLUMNS)
         for method in (JOINT, EITHER)
     ),
     *(_case(method, FADING, fading) for method in (JOINT, EITHER)),

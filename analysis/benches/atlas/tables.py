@@ -1,4 +1,4 @@
-"""What the atlas found, as three tables: every run, the edges, and how far our defaults are off."""
+"""The results of the atlas as three tables: all runs, the edges, the margins of our defaults."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ EDGE_COLUMNS = (
     Column("fails_from", format=".4g"),
     Column("theory", "holds to, by theory", format=".4g"),
     Column("disagreement", "measured over theory", format=".3g"),
-    Column("returns", "holds again farther on"),
+    Column("returns", "holds again beyond"),
     Column("runs"),
     Column("source", "theory from"),
     SIMULATED,
@@ -67,9 +67,9 @@ MARGIN_COLUMNS = (
     Column("nearest_edge", format=".4g"),
     _COLUMN,
     Column("margin", "distance (factor)", format=".3g"),
-    Column("at_least", "no edge so far"),
+    Column("at_least", "no edge found"),
     Column("enough", f"{LEAST_MARGIN:g} or more"),
-    Column("exception", "why it may be less"),
+    Column("exception", "why it is less"),
     SIMULATED,
 )
 
@@ -150,7 +150,7 @@ def _margin_row(columns: Sequence[Examined]) -> dict[str, object]:
 
 
 def _margin(one: Examined) -> float:
-    """0 where it holds nowhere; never above 1 where the default itself does not hold."""
+    """0 where it holds nowhere; at most 1 where the default itself does not hold."""
     margin = one.case.axis.margin(one.holds_to)
     margin = 0.0 if math.isnan(margin) else margin
     holds = one.at_default is not None and one.at_default.verdict == HOLDS
@@ -158,7 +158,7 @@ def _margin(one: Examined) -> float:
 
 
 def theory_of(one: Examined) -> float:
-    """To where a method should hold, within the axis; NaN where no formula says."""
+    """Up to where a method should hold, within the axis; NaN without a formula."""
     case = one.case
     if case.theory is None:
         return math.nan
@@ -172,7 +172,7 @@ def theory_of(one: Examined) -> float:
 def disagreement(axis: Axis, holds_to: float, theory: float) -> float:
     """Measured over expected edge: a factor, or on a linear axis a difference in its unit.
 
-    A method that does not hold even at the mild end counts as holding to there.
+    A method that does not hold even at the mild end counts as holding up to there.
     """
     measured = axis.mild if math.isnan(holds_to) else holds_to
     return measured / theory if axis.logarithmic else measured - theory

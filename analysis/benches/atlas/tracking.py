@@ -81,7 +81,7 @@ def planted(frequency_hz: Floats, heights: Floats) -> TextureModel:
 
 
 def moving(jump: float, column: float) -> tuple[Floats, Floats]:
-    """Two layers rise together, from one speed to the next by this share of their gap."""
+    """Two layers rise together, by this share of their gap from one speed to the next."""
     rise = jump * GAP_HZ * np.arange(2.0)
     frequency = LOWEST_HZ + rise[:, None] + np.array([0.0, GAP_HZ])
     return frequency, np.full(frequency.shape, HEIGHT)
@@ -95,24 +95,24 @@ def crossing(step_widths: float, column: float) -> tuple[Floats, Floats]:
 
 
 def changing(factor: float, direction: float) -> tuple[Floats, Floats]:
-    """One layer is so much lower at the highest speed (direction 1), or at the lowest (−1)."""
+    """One layer is lower by this factor at the highest speed (direction 1) or the lowest (−1)."""
     fall = factor ** -np.linspace(0.0, 1.0, 3)[:: int(direction)]
     frequency = np.tile([STEADY_HZ, CHANGING_HZ], (3, 1))
     return frequency, HEIGHT * np.column_stack((np.ones(3), fall))
 
 
 def neighbouring(spacing_widths: float, column: float) -> tuple[Floats, Floats]:
-    """Two layers so near to each other at both speeds."""
+    """Two layers at this spacing at both speeds."""
     apart = spacing_widths * WIDTH_HZ * np.array([-0.5, 0.5])
     frequency = np.tile(CROSSING_HZ + apart, (2, 1))
     return frequency, np.full(frequency.shape, HEIGHT)
 
 
-# What is wrong with what was found.
+# Errors of the tracked layers.
 
 
 def wrong_names(fitted: Fitted) -> float:
-    """Share of layers and conditions in which a layer is not where its name is elsewhere."""
+    """Share of layers and conditions in which a layer has a different name from elsewhere."""
     truth, model = fitted
     named = np.zeros((truth.n_layers, max(model.n_layers, truth.n_layers)))
     for true_hz, width_hz, found_hz in zip(
@@ -139,11 +139,11 @@ def changing_level_error_db(fitted: Fitted) -> float:
     return float(np.sqrt(np.mean(np.square(errors))))
 
 
-# Where theory says that they should fail.
+# Where theory predicts failure.
 
 
 def half_the_gap(column: float) -> float:
-    """Names go to the nearest layer: past half of the gap that is the neighbour."""
+    """Names go to the nearest layer: beyond half of the gap that is the neighbour."""
     return 0.5
 
 
@@ -152,9 +152,9 @@ def spacing_of_merging(column: float) -> float:
     return float(2 * np.hypot(SMOOTHING_HZ, WIDTH_HZ / BANDWIDTH_PER_S) / WIDTH_HZ)
 
 
-# One name in five is a slip that a look at the figure finds; two in five are two layers mixed up.
+# One wrong name in five is visible in the figure; two in five mean two layers are confused.
 WRONG, WRONG_AT_MOST = 0.2, 0.4
-# As for peaks: people tell vibrations apart from about 1 dB on; 3 dB are twice the power.
+# As for peaks: people can tell apart differences of about 1 dB or more; 3 dB are twice the power.
 LEVEL_DB, LEVEL_DB_AT_MOST = 1.0, 3.0
 
 JOINT, EITHER = "joint", "paper, either reading"  # both readings find and name the same peaks
@@ -203,7 +203,7 @@ CASES: tuple[Case, ...] = (
     ),
     *(_case(method, CROSSING, crossing) for method in (JOINT, EITHER)),
     *(
-        _case(method, CHANGE, changing, across="the layer is", columns=DIRECTIONS)
+        _case(method, CHANGE, changing, across="where the layer is gone", columns=DIRECTIONS)
         for method in (JOINT, EITHER)
     ),
     _case(JOINT, SPACING, neighbouring),

@@ -1,4 +1,4 @@
-"""Verdicts of simplification in the atlas: how near the threshold, and how short a record.
+"""Verdicts of simplification in the atlas: distance to the threshold and record length.
 
 Textures whose layers are known are recorded twice and modelled; the threshold lies so far from the
 true level of one layer and far below the others. Textures have one condition: over a grid a layer
@@ -93,7 +93,7 @@ def dropped_by_level(model: TextureModel, layer: int, threshold: Threshold) -> b
 
 
 def threshold_at(truth: TextureModel, layer: int, distance_db: float) -> Threshold:
-    """One that the layer's true level exceeds by so much, flat half-way to its neighbours."""
+    """A threshold that the true level exceeds by a margin, flat half-way to the neighbours."""
     frequency = truth.frequencies_hz[0, 0]
     borders = np.concatenate(([1.0], np.sqrt(frequency[1:] * frequency[:-1]), [2450.0]))
     amplitude = layer_amplitudes_g(truth, criterion="energy")[0, 0]
@@ -117,12 +117,12 @@ def dropped(pairs: tuple[Pair, ...], distance_db: float, *, rule: Rule) -> tuple
 
 
 def wrongly_dropped(distance_db: float, duration_s: float, *, full: bool, rule: Rule) -> float:
-    """Share of layers that are dropped though they are above the threshold by so much."""
+    """Share of layers dropped although above the threshold by this much."""
     return _share(*dropped(recorded_twice(TEXTURES[full], duration_s), distance_db, rule=rule))
 
 
 def kept_in_vain(distance_db: float, duration_s: float, *, full: bool, rule: Rule) -> float:
-    """Share of layers that are kept though they are below the threshold by so much."""
+    """Share of layers kept although below the threshold by this much."""
     gone, found = dropped(recorded_twice(TEXTURES[full], duration_s), -distance_db, rule=rule)
     return _share(~gone, found)
 
@@ -140,7 +140,7 @@ def _share(happened: Bools, counted: Bools) -> float:
     return float(happened[counted].mean()) if counted.any() else float("inf")
 
 
-# Where theory says that they should fail: levels with normal errors of the least deviation.
+# Where theory predicts failure: levels with normal errors of the least deviation.
 
 
 @lru_cache(maxsize=4)
@@ -207,10 +207,10 @@ def never(duration_s: float) -> float:
     return float("nan")
 
 
-# A layer that can be felt and is left out changes the texture: P(flip) promises one in twenty; one
-# in five would make simplified models guesswork.
+# Dropping a layer that can be felt changes the texture: P(flip) allows one in twenty; one in five
+# would make simplified models unreliable.
 WRONG, WRONG_AT_MOST = 0.05, 0.2
-# A layer that is kept in vain costs a filter and nothing that is felt, so more of it may pass.
+# A layer kept unnecessarily costs a filter and changes nothing that is felt, so limits are wider.
 IN_VAIN, IN_VAIN_AT_MOST = 0.2, 0.5
 
 ALL_RULES, BY_LEVEL = "all rules", "paper's rule"

@@ -1,4 +1,4 @@
-"""What compensating a vibrator's resonance leaves: mistuned, of any quality, badly measured.
+"""Residue after compensating a resonance: mistuned, of any quality, with a noisy test.
 
 Theory and how to read it: docs/stability.md#vibrators.
 """
@@ -46,7 +46,7 @@ def _identified(quality: float) -> Vibrator:
 
 
 def _layer(quality: float) -> Vibrator:
-    """A vibrator of one layer that is known exactly, so many times as high as its flat part."""
+    """A vibrator of one exactly known layer, its height relative to the flat part given."""
     planted = planted_vibrator(RESONANCE_HZ, RESONANCE_HZ / quality)
     return replace(planted, rate_hz=RATE_HZ, height=quality)
 

@@ -1,6 +1,6 @@
-"""The speed–accuracy chart: what every method costs, and how near it is to the truth.
+"""The speed–accuracy chart: what every method costs, and how close it is to the truth.
 
-How to read it, and what it says: docs/chart.md.
+How to read it, and its results: docs/chart.md.
 """
 
 from __future__ import annotations

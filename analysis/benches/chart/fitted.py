@@ -1,4 +1,4 @@
-"""What the chart asks of a fitted method: filters at rest and in motion, numbers, cost."""
+"""What the chart needs from a fitted method: filters at rest and in motion, numbers, cost."""
 
 from __future__ import annotations
 
@@ -190,7 +190,7 @@ class Shaped:
 
 @dataclass(frozen=True, eq=False)
 class Itself:
-    """The truth: what a method could be at best; late parameters are all that is wrong with it."""
+    """The truth as the best possible method; its only error is late parameters."""
 
     truth: Truth
     rate_hz: float

@@ -38,7 +38,7 @@ LOADED = "models given"
 
 @dataclass(frozen=True)
 class Judged:
-    """What came out for one texture.
+    """The results for one texture.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How near a response is to the truth, or to a recording's spectrum: the chart's five measures."""
+"""How close a response is to the truth or to a recording's spectrum: the chart's five measures."""
 
 from __future__ import annotations
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.benches.chart.fitted import Fitted, Itself, Layered, Predictor, Shaped, block_samples
 from analysis.benches.chart.shaped_noise import fit_shaped_noise
+from analysis.labels import counted
 from analysis.textures.between import Measured, Truth
 from modeling import InputError, Spectrum, TextureModel, Threshold, regressed, simplify
 from modeling.errors import shown
@@ -148,7 +149,7 @@ def _truth(subject: Subject) -> Fitted:
 def _methods() -> Iterable[Method]:
     yield Method(OURS, "joint", _joint)
     for count in range(1, MOST_LAYERS + 1):
-        name = f"joint, {count} layer{'s' * (count > 1)}"
+        name = f"joint, {counted(count, 'layer')}"
         yield Method(name, "joint, given layers", partial(_layers, count=count))
     for criterion in CRITERIA:
         fit = partial(_simplified, criterion=criterion)

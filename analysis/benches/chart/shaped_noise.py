@@ -1,4 +1,4 @@
-"""A rival: noise shaped by FFT, block by block, whose spectrum may be any.
+"""A rival: noise with an arbitrary spectrum, shaped by FFT block by block.
 
 Each block is the inverse FFT of random numbers times the spectrum that was recorded, faded in and
 out by a sine window and added to the block before, which it overlaps by half.
@@ -20,7 +20,7 @@ from modeling.recordings.spectrum import Spectrum, mean_spectrum
 
 @dataclass(frozen=True, eq=False)
 class ShapedFilter:
-    """What one spectrum sounds like in blocks: magnitudes (n/2 + 1,) in g per unit noise."""
+    """One spectrum rendered in blocks: magnitudes (n/2 + 1,) in g per unit noise."""
 
     magnitude: Floats
     rate_hz: float

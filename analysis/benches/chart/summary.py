@@ -1,4 +1,4 @@
-"""From the rows of all textures to the chart: medians, fronts, and who dominates whom."""
+"""From the rows of all textures to the chart: medians, fronts, and dominance."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_m
 COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers")
 MEASURES = tuple(f"{place}_{name}" for place in PLACES for name in SUMMARIES)
 CONFIDENCE = 0.95
-# They are charged for making coefficients at every update, which ours read from a table.
+# Their operations include computing coefficients at every update; ours are read from a table.
 COUNTED_OTHERWISE = "autoregressive"
 FEWEST_SURFACES = 3
 
@@ -29,20 +29,20 @@ FEWEST_SURFACES = 3
 METHOD_COLUMNS: Columns = (
     Column("kind", "surfaces", is_name=True),
     Column("method", is_name=True),
-    Column("layers"),
+    Column("layers", format="g"),
     Column("numbers", "numbers stored"),
     Column("operations", "operations per sample"),
-    Column("most_operations", "at most"),
+    Column("most_operations", "operations, at most"),
     Column("bytes"),
     Column("ns", "time per sample", "ns"),
-    Column("fit_ms", "fitting per record", "ms"),
-    Column("at_gfc30", "GFC30 at", format=".4f"),
-    Column("at_distance_db", "distance at", "dB"),
-    Column("between_distance_db", "between", "dB"),
-    Column("between_distance_db_worst", "between, worst surface", "dB"),
-    Column("stroking_distance_db", "while stroking", "dB"),
-    Column("between_worst_level_db", "worst level between", "dB"),
-    Column("single_error_db", "single precision", "dB"),
+    Column("fit_ms", "fitting time per record", "ms"),
+    Column("at_gfc30", "GFC30 at conditions", format=".4f"),
+    Column("at_distance_db", "distance at conditions", "dB"),
+    Column("between_distance_db", "distance between conditions", "dB"),
+    Column("between_distance_db_worst", "distance between, worst surface", "dB"),
+    Column("stroking_distance_db", "distance during strokes", "dB"),
+    Column("between_worst_level_db", "worst level error between", "dB"),
+    Column("single_error_db", "error of single precision", "dB"),
 )
 
 
@@ -74,7 +74,7 @@ def summarised(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def on_front(cost: Floats, error: Floats) -> Bools:
-    """Which of n points no other one beats: cheaper or equal, nearer or equal, and one of them so.
+    """Which of n points are not dominated: none is at least as cheap and close, and better in one.
 
     Points with a NaN are never on the front.
     """
@@ -136,14 +136,14 @@ class Variant:
 
 @dataclass(frozen=True)
 class Dominating:
-    """A variant that takes no more operations and is nearer, beyond the doubt of the interval."""
+    """A variant with no more operations and a smaller distance, confirmed by both intervals."""
 
     variant: Variant
     operations: Ratio
     distance: Ratio
 
     def text(self) -> str:
-        """What it is, and by which factors."""
+        """The variant with its ratios."""
         return (
             f"{self.variant.text()}, {self.operations.text()} times the operations and "
             f"{self.distance.text()} times the distance"
@@ -162,9 +162,9 @@ class Comparison:
         The rival's distance from the truth over ours.
     surfaces : int
     dominated_by : Dominating or None
-        The nearest of our variants that dominates the rival.
+        The closest to the truth of our variants that dominate the rival.
     dominates_by : Dominating or None
-        The nearest of the rival's variants that dominates our default.
+        The closest to the truth of the rival's variants that dominate our default.
     """
 
     kind: str
@@ -184,31 +184,32 @@ class Comparison:
 
     @property
     def verdict(self) -> str:
-        """Who dominates whom: with no more operations nearer, beyond the doubt of the interval."""
+        """Which dominates: no more operations and a smaller distance, by both intervals."""
         if not self.is_counted_alike:
             return (
-                "who dominates is not said, since its coefficients are made anew at every update "
+                "dominance is not assessed, because its coefficients are computed at every update "
                 "and ours are read from a table"
             )
         if self.dominates_by is not None:
-            return f"{self.rival} dominates joint as {self.dominates_by.text()}"
+            return f"{self.rival} dominates joint: {self.dominates_by.text()}"
         if self.dominated_by is not None:
             return f"it is dominated by {self.dominated_by.text()}"
         if self.surfaces < FEWEST_SURFACES:
-            return f"too few surfaces to say who dominates, {FEWEST_SURFACES} are needed"
+            return f"too few surfaces to assess dominance, {FEWEST_SURFACES} are needed"
         return "neither dominates the other"
 
     @property
     def sentence(self) -> str:
         """The comparison in words."""
         farther = (
-            f"{self.rival} is {self.between.text()} times as far from the truth as joint between "
-            "the conditions"
+            f"between the conditions the log-spectral distance of {self.rival} from the truth is "
+            f"{self.between.text()} times that of joint"
         )
         if np.isfinite(self.stroking.mean):
-            farther += f" and {self.stroking.text()} times while stroking"
+            farther += f", during strokes {self.stroking.text()} times"
         counted = f"{self.operations.text()} times the operations and " * self.is_counted_alike
-        return f"{farther}, for {counted}{self.numbers.text()} times the numbers; {self.verdict}."
+        costs = f"{counted}{self.numbers.text()} times the numbers"
+        return f"{farther[:1].upper()}{farther[1:]}. {self.rival} needs {costs}; {self.verdict}."
 
 
 def _is_counted_alike(rival: str) -> bool:
@@ -218,7 +219,7 @@ def _is_counted_alike(rival: str) -> bool:
 def comparisons(rows: pd.DataFrame) -> list[Comparison]:
     """Our default against every rival, surface by surface, for each kind of surface."""
     found = []
-    # Of recordings whose halves were held out in turn a surface has two rows, which are one case.
+    # Recordings whose halves were held out in turn give two rows per surface, averaged as one case.
     by_surface = rows[rows["precision"] == DOUBLE].groupby([*VARIANT, "surface"], sort=False)
     cases = by_surface.mean(numeric_only=True).reset_index()
     for kind, of_kind in cases.groupby("kind", sort=False):
@@ -257,9 +258,10 @@ def _comparison(
 
 
 def _dominating(variants: pd.DataFrame, target: pd.DataFrame) -> Dominating | None:
-    """The nearest of some variants that dominates a target, whose index are surfaces.
+    """The closest to the truth of the variants that dominate a target indexed by surface.
 
-    While stroking, where that is known, since there the update interval counts; else between.
+    Judged during strokes where that is known, since the update interval matters there; otherwise
+    between the conditions.
     """
     moving = target[f"{STROKING}_distance_db"].notna().all()
     column = f"{STROKING if moving else BETWEEN}_distance_db"
@@ -299,14 +301,14 @@ def default_rows(rows: pd.DataFrame) -> pd.DataFrame:
 def competing(of_kind: pd.DataFrame, place: str) -> pd.DataFrame:
     """The variants that compete at a place, of rows of one kind.
 
-    At and between the conditions the hand rests, and a method is taken at its usual interval; while
-    stroking all intervals compete.
+    At and between the conditions the hand rests, and each method has its usual interval; during
+    strokes all intervals compete.
     """
     return of_kind if place == STROKING else default_rows(of_kind)
 
 
 def front_of(variants: pd.DataFrame, *, cost: str, error: str) -> pd.DataFrame:
-    """The rows on the front of two columns, cheapest first; of those that coincide the first."""
+    """The rows on the front of two columns, cheapest first; the first of coinciding ones."""
     front = variants[on_front(variants[cost].to_numpy(), variants[error].to_numpy())]
     return front.drop_duplicates([cost, error]).sort_values(cost)
 
@@ -331,24 +333,24 @@ def front_table(summary: pd.DataFrame) -> pd.DataFrame:
 
 
 def _ratio_columns(name: str, label: str) -> Columns:
-    return Column(name, label), Column(f"{name}_low", "95% from"), Column(f"{name}_high", "to")
+    return Column(name, label), Column(f"{name}_low", "95% CI from"), Column(f"{name}_high", "to")
 
 
 COMPARISON_COLUMNS: Columns = (
     Column("kind", "surfaces", is_name=True),
     Column("rival", is_name=True),
-    Column("surfaces", "number of them"),
-    *_ratio_columns("operations", "operations, times ours"),
-    *_ratio_columns("numbers", "numbers stored, times ours"),
-    *_ratio_columns(BETWEEN, "distance between, times ours"),
-    *_ratio_columns(STROKING, "while stroking, times ours"),
+    Column("surfaces", "number of surfaces"),
+    *_ratio_columns("operations", "operations, ratio to joint"),
+    *_ratio_columns("numbers", "numbers stored, ratio to joint"),
+    *_ratio_columns(BETWEEN, "distance between, ratio to joint"),
+    *_ratio_columns(STROKING, "distance during strokes, ratio to joint"),
     Column("verdict"),
     Column("sentence"),
 )
 
 
 def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
-    """The comparisons as a table: ratios with their intervals, and the sentence."""
+    """The comparisons as a table: ratios with their intervals, verdict and sentence."""
     rows = []
     for one in found:
         ratios = (one.operations, one.numbers, one.between, one.stroking)

@@ -40,8 +40,20 @@ KINDS: dict[Kind, str] = {
     "toolkit": "models of the Penn Haptic Texture Toolkit (simulated recordings)",
     "recorded": "recordings, conditions held out",
 }
+_ONE_OF: dict[Kind, str] = {
+    "drawn": "surface drawn from the statistics of 100 real ones (simulated)",
+    "planted": "planted texture (simulated)",
+    "toolkit": "model of the Penn Haptic Texture Toolkit (simulated recordings)",
+    "recorded": "recording, conditions held out",
+}
 FIRST_SURFACE = 1000  # surfaces that no constant of the estimator was chosen by
 RECORD_S = 1.0
+
+
+def counted_kind(count: int, kind: Kind) -> str:
+    """A number of surfaces of a kind: `1 planted texture (simulated)`."""
+    return f"{count} {(_ONE_OF if count == 1 else KINDS)[kind]}"
+
 
 # A stroke over half of which filters are judged; it starts from rest, where no slope is known.
 STROKE_S, JUDGED_FROM_S = 0.75, 0.25

@@ -583,7 +583,9 @@ def test_a_session_that_went_on_against_a_rule_is_told(
     record = {"what": what, "reason": "the disk was lost"}
     sidecar.write_text(json.dumps({key: value, "Overrides": [record]}))
     (told,) = load_responses(study_folder).warnings
-    assert told == (f"sub-01 absolute ses-01 went on against a rule ({what}): the disk was lost.")
+    assert told == (
+        f"sub-01 absolute ses-01 was continued against a rule ({what}): the disk was lost."
+    )
     sidecar.write_text(json.dumps({key: value, "Overrides": [{**record, "what": "same date"}]}))
     with refused(InputError, names=[key, sidecar, "dataset_description.json"]):
         load_responses(study_folder)
@@ -593,7 +595,7 @@ def test_pilots_are_told(study_folder, write_task, absolute_rows):
     columns = [*_absolute_columns(), "pilot"]
     write_task("absolute", [[*row, "true"] for row in absolute_rows], columns=columns)
     among_others = load_responses(study_folder)
-    told = "sub-01 absolute ses-01 was a pilot; its answers are no data of the study"
+    told = "sub-01 absolute ses-01 was a pilot; its answers are not data of the study"
     assert among_others.warnings == (f"{told} and are left out.",)
     assert among_others.absolute.empty
     description = study_folder / "dataset_description.json"

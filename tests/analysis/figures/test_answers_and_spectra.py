@@ -105,7 +105,7 @@ def test_ratings(found):
         assert "***" in texts(ax)  # the planted effect on PVC
         assert len(ax.patches) >= 14
         assert "wall paper" in [label.get_text() for label in ax.get_xticklabels()]
-    for words in ("full model", "simplified model", "95 % confidence interval", "Holm"):
+    for words in ("full model", "simplified model", "95% confidence interval", "Holm"):
         assert words in texts(figure)
 
 
@@ -142,7 +142,7 @@ def test_lines_of_thresholds_are_told_apart_by_colour_and_by_dashes(results):
     axes = drawn(figure_spectra_and_threshold(comparison))
     lines = {str(line.get_label()): line for ax in axes for line in ax.lines}
     names = (
-        "gain at which the layer here would be just felt",
+        "gain at which the layer would just be felt here",
         "detection threshold (codec)",
         "assumed lower bound of the threshold",
     )
@@ -175,7 +175,7 @@ def test_differences_stand_beside_their_bounds(found: list[ClaimFound]):
         assert ax.get_xlabel() == f"simplified − full ({unit})"
         assert "SIMULATED" in texts(ax)
     shown = texts(axes[0].figure)
-    for verdict in set(found[0].tests["verdict"]) | {"90 % CI", "95 % CI", "bounds"}:
+    for verdict in set(found[0].tests["verdict"]) | {"90% CI", "95% CI", "bounds"}:
         assert verdict in shown
 
 

@@ -79,7 +79,7 @@ def test_the_page_holds_picture_tables_and_what_is_to_come() -> None:
     found = examined(made_up(), made_up(method="theirs", edge=20.0))
     section = stability_section(found)
     told = [outcome.sentence for outcome in section.outcomes]
-    assert told[0].startswith("1 of 1 defaults are a factor of 2 or more away")
+    assert told[0].startswith("1 of 1 defaults are at least a factor of 2 away")
     assert "(2 edges)" in told[-1]
     files = atlas_files(found, {"command": "tactileq stability"})
     for part in ("SIMULATED", "data:image/png;base64", "by decree", "wall"):

@@ -54,7 +54,7 @@ def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
 
 def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
     sentence = answer(own, people)
-    assert sentence.startswith("Simplified models against full ones, over all textures: ")
+    assert sentence.startswith("Simplified compared with full models, over all textures: ")
     assert sentence.count(".") == sentence.replace(". ", "").count(".")  # one sentence
     for one in own:
         row = overall_row(one)
@@ -77,7 +77,7 @@ def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
         ("different but within bounds", "different, but within the bounds, in rated"),
         ("inconclusive", "inconclusive in rated similarity"),
         ("interim, no verdict", "no verdict before the study is complete on rated"),
-        ("", "it cannot be told yet, for want of complete answers, in rated"),
+        ("", "not tested, because answers are incomplete, in rated"),
     ],
 )
 def test_each_verdict_has_its_words(people, found, verdict, words):
@@ -103,14 +103,14 @@ def test_without_a_plan_nothing_is_called_equal(people):
     assert "(exploratory: nothing was planned)" in sentence
     assert "equivalent" not in sentence
     assert "95% CI" in sentence
-    assert "bounds" not in sentence.replace("without bounds no equality can be", "")
+    assert "bounds" not in sentence.replace("without bounds equivalence cannot be tested", "")
     [first, *_] = deviations(bare, analysed(bare))
     assert first.startswith("No claim was registered before the first answer")
 
 
 def test_who_did_not_feel_a_surface_is_said_first(people, own):
     assert answer(own, replace(people, simulated_participants=True)).startswith(
-        "In a simulation without people, simplified models"
+        "In a simulation without people, simplified compared with full models"
     )
     assert answer(own, replace(people, simulated_rig=True)).startswith(
         "At a simulated rig, where nobody felt a real surface, simplified"
@@ -120,7 +120,7 @@ def test_who_did_not_feel_a_surface_is_said_first(people, own):
 def test_an_unfinished_study_answers_so_far(people):
     begun = replace(people, planned={"relative": PlannedTask(24, 48, repeats=3)})
     sentence = told(begun)
-    assert sentence.startswith("So far, simplified models")
+    assert sentence.startswith("So far, simplified compared with full models")
     assert "no verdict before the study is complete on the correct rate" in sentence
     assert unfinished_tasks(begun) == [
         "forced choice: 16 of 24 planned participants, 16 of 48 planned sessions"
@@ -135,7 +135,7 @@ def test_nothing_is_answered_where_nothing_can_be(people, choices):
     same = {texture: [("full", "simplified")] for texture in people.textures}
     assert "are identical" in told(replace(people, equal=same))
     one_model = replace(people, answers={"relative": choices[choices["model"] == "full"]})
-    assert "for want of complete answers" in told(one_model)
+    assert "answers are incomplete" in told(one_model)
 
 
 def test_every_texture_is_told_with_its_verdict(people):
@@ -163,22 +163,22 @@ def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan)
     )
     sentences = deviations(cut, analysed(cut))
     assert sentences[0] == (
-        "Claims fixed before the first answer: 1 (page to preregister: 0a0a0a0a0a0a…)."
+        "Claims fixed before the first answer: 1 (preregistration page: 0a0a0a0a0a0a…)."
     )
     assert sentences[1] == "Planned exclusion: Trials in which the rig failed are repeated."
-    assert "others ran under 0b0b0b0b0b0b…" in sentences[2]
+    assert "other sessions ran under 0b0b0b0b0b0b…" in sentences[2]
     assert sentences[3] == (
         "Exploratory, since not in the plan: rated similarity of frequency pattern; correct rate."
     )
-    assert "answers: sub-05 (MDF)." in sentences[4]
+    assert "answers are incomplete: sub-05 (MDF)." in sentences[4]
     assert sentences[-1] == "On reading the answers: sub-09 relative ses-01 was a pilot."
 
 
-def test_the_methods_are_told_as_a_paper_tells_them(people, own):
+def test_the_methods_are_reported_as_in_a_paper(people, own):
     text = methods_paragraph(people, own)
     assert text.startswith(
-        "16 participants took part in the absolute evaluation of 7 textures; 16 participants took "
-        "part in the forced choice of 7 textures."
+        "16 participants took part in the absolute evaluation with 7 textures; 16 participants "
+        "took part in the forced choice with 7 textures."
     )
     assert "rated similarity of vibration magnitude −7.5 to +7.5" in text
     assert "bounds fixed before the first answer" in text

@@ -177,8 +177,8 @@ def test_many_columns_are_set_smaller_on_paper(folder):
 
 def test_the_answer_comes_first(folder, shown):
     html = (folder / "report.html").read_text(encoding="utf-8")
-    told = "In a simulation without people, simplified models against full ones, over all textures"
-    assert html.index("</h1>") < html.index(told) < html.index("<nav>")
+    answer = "In a simulation without people, simplified compared with full models, over all"
+    assert html.index("</h1>") < html.index(answer) < html.index("<nav>")
     overall = shown.text.index("(rated similarity of vibration magnitude, simplified − full):")
     textures = shown.text.index("different: PVC −")
     assert overall < textures < shown.text.index("Simplification dropped")
@@ -196,9 +196,9 @@ def test_an_interrupted_study_says_how_much_was_planned(tmp_path, ratings, choic
     assert "Forced choice: 16 of 24 planned participants, 16 of 48 planned sessions" in shown.text
     assert (
         "The study is not complete (forced choice: 16 of 24 planned participants, 16 of 48 "
-        "planned sessions): of its claims there is neither an effect nor a test"
+        "planned sessions): neither effects nor tests of its claims are shown"
     ) in shown.text
-    assert "So far, simplified models against full ones" in shown.text
+    assert "So far, simplified compared with full models" in shown.text
     assert "Ratings by a mixed model" in shown.text  # of the finished task
 
 
@@ -314,9 +314,9 @@ def test_tables_beside_the_report_are_exact(folder, ratings):
 def test_simulated_results_are_called_so(shown):
     assert shown.text.count("SIMULATED") > 15
     assert (
-        BANNER.format("the recordings come from no real surface; no person took part") in shown.text
+        BANNER.format("the recordings are not of real surfaces; no person took part") in shown.text
     )
-    assert "16 simulated participants at the simulated rig" in shown.text
+    assert "16 simulated participants with the simulated rig" in shown.text
     assert "say nothing about what people feel" in shown.text
 
 
@@ -332,7 +332,7 @@ def test_what_others_wrote_is_escaped(folder, shown):
 
 def test_outcomes_are_computed_and_bounded(shown, ratings):
     assert "different: PVC −" in shown.text
-    assert "does not show that two models are equal" in shown.text
+    assert "does not show that two models are equivalent" in shown.text
     assert "chance 14.3%" in shown.text
     assert "of the planted layers" in shown.text
     assert "seed of this report" in shown.text
@@ -355,10 +355,10 @@ def test_a_report_of_real_answers_alone(tmp_path, ratings, choices):
 def test_a_person_at_the_simulated_rig_is_a_person(tmp_path, ratings, choices):
     people = responses_of(of_six(ratings), of_six(choices), simulated=False, rig=True)
     shown = Page(write_report(tmp_path / "report.html", responses=people).read_text("utf-8"))
-    told = "people took part, but at a simulated rig, where nobody felt a real surface"
+    told = "people took part, but with a simulated rig, so nobody felt a real surface"
     assert BANNER.format(told) in shown.text
-    assert "Absolute evaluation: 6 participants at the simulated rig, 84 trials" in shown.text
-    assert "6participants at the simulated rig, forced choice" in shown.text
+    assert "Absolute evaluation: 6 participants with the simulated rig, 84 trials" in shown.text
+    assert "6participants with the simulated rig, forced choice" in shown.text
     assert "The participants are people, but the rig was simulated" in shown.text
     assert "(SIMULATED)" in shown.text
     assert "simulated participants" not in shown.text.lower()
@@ -385,13 +385,16 @@ def test_simulated_and_real_recordings_are_told_apart(tmp_path, results):
     )
     path = write_report(tmp_path / "report.html", textures=[results[0], measured])
     shown = Page(path.read_text(encoding="utf-8"))
-    told = "the recordings of 1 of 2 textures come from no real surface"
+    told = "the recordings of 1 of 2 textures are not of real surfaces"
     assert BANNER.format(told) in shown.text
     assert "fitted to 8 recordings, 4 of them simulated (" in shown.text
 
 
 def test_the_flip_probability_says_what_it_covers(shown):
-    assert "in other records; whether the estimator would find the layer again" in shown.text
+    assert (
+        "in other records; it does not include whether the estimator would find the layer again"
+        in shown.text
+    )
 
 
 @pytest.mark.parametrize("marked", [0, 3])
@@ -408,7 +411,7 @@ def test_unresolved_layers_are_counted(tmp_path, results, marked):
 def test_a_report_of_models_alone(tmp_path, results):
     path = write_report(tmp_path / "report.html", textures=results[:1])
     shown = Page(path.read_text(encoding="utf-8"))
-    assert BANNER.format("the recordings come from no real surface") in shown.text
+    assert BANNER.format("the recordings are not of real surfaces") in shown.text
     assert "t-test" not in shown.text
 
 
@@ -468,6 +471,6 @@ def test_every_pair_of_three_sets_has_its_times(tmp_path, choices):
     page = Page(write_report(tmp_path / "report.html", responses=responses).read_text("utf-8"))
     for other in ("simplified", "AR"):
         assert (tmp_path / "tables" / f"speed_accuracy_{other}_full.tsv").exists()
-        assert f"Time, accuracy and both together: {other} against full models" in page.text
-        assert f"Speed and accuracy, {other} against full models" in page.text
+        assert f"Time, accuracy and both together: {other} compared with full models" in page.text
+        assert f"Speed and accuracy, {other} compared with full models" in page.text
     assert len(page.identifiers) == len(set(page.identifiers))

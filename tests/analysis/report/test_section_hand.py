@@ -44,21 +44,21 @@ def section_of(hand: pd.DataFrame, *, simulated: bool = False) -> Section:
     return section
 
 
-def test_a_hand_that_moved_otherwise_is_a_caveat_in_one_sentence():
+def test_a_hand_that_moved_differently_is_a_caveat_in_one_sentence():
     section = section_of(hand_of(faster=12.0))
     (outcome,) = section.outcomes
     assert outcome.sentence == (
-        "Caveat: the hand did otherwise with simplified than with full models (simplified − full: "
-        "speed while touching in the absolute evaluation +12.0 mm/s (95% CI +11.2 to +12.8)), so "
-        "that a difference of the answers, or its absence, may come from the hand and not from the "
-        "models."
+        "Caveat: the hand moved differently with simplified than with full models (simplified − "
+        "full: speed while touching in the absolute evaluation +12.0 mm/s (95% CI +11.2 to "
+        "+12.8)), so a difference in the answers, or its absence, may be due to the hand rather "
+        "than the models."
     )
 
 
-def test_without_a_difference_the_intervals_are_told():
+def test_without_a_difference_the_intervals_are_stated():
     (outcome,) = section_of(hand_of()).outcomes
     assert outcome.sentence == (
-        "No difference of the hand's movement between full and simplified models was shown "
+        "No difference in hand movement between full and simplified models was shown "
         "(simplified − full: speed while touching in the absolute evaluation +0.0 mm/s (95% CI "
         "−0.8 to +0.8); force while touching in the absolute evaluation +0.00 N (95% CI −0.04 to "
         "+0.04))."

@@ -103,7 +103,7 @@ def test_choices_alone_and_one_rater_are_no_reason_to_stop():
     assert one.outcomes == ()
     agreement = one.items[0]
     assert isinstance(agreement, Table)
-    assert (agreement.frame["note"] == "undefined: 1 participant(s) with 6 cell(s)").all()
+    assert (agreement.frame["note"] == "undefined: 1 participant with 6 cells").all()
 
 
 def test_without_answers_there_is_no_section():

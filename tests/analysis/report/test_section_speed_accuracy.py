@@ -73,7 +73,7 @@ def test_the_forced_choice_is_compared_and_the_odd_one_out_pooled(choices):
 def test_a_planted_ratio_is_told_without_praise(choices):
     section = section_of({"relative": timed(choices, ratio=0.5)})
     told = [outcome.sentence for outcome in section.outcomes]
-    assert told[0].startswith("Speed and accuracy, simplified against full models: faster; a diff")
+    assert told[0].startswith("Speed and accuracy, simplified compared with full models: faster; ")
     assert told[1].startswith("Answers with simplified models took 0.")
     assert told[1].endswith("mixed model of log time).")
     assert {outcome.weight for outcome in section.outcomes} == {Weight.SECONDARY}
@@ -101,7 +101,7 @@ def test_one_participant_is_described_and_not_compared(choices):
     one = timed(choices)
     section = section_of({"relative": one[one["participant_id"] == "sub-01"]})
     (told,) = (outcome.sentence for outcome in section.outcomes)
-    assert told.endswith("not compared, since 1 participant(s) answered with both.")
+    assert told.endswith("not compared, because 1 participant answered with both.")
 
 
 def test_one_model_alone_is_no_comparison(choices):

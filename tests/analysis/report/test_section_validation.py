@@ -33,7 +33,7 @@ def test_what_does_not_hold_stands_on_top_and_everything_below():
     assert whole.frame is table
     assert apart.simulated
     assert whole.simulated
-    assert "2 of 4 rows hold" in section.done[0]
+    assert "2 of 4 rows contain" in section.done[0]
     assert "200 simulations" in section.done[0]
 
 

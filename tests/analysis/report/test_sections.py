@@ -37,10 +37,10 @@ def test_names_and_titles_of_several_pairs_differ():
     assert isinstance(first, Picture)
     assert isinstance(second, Picture)
     assert (first.name, second.name) == ("p_simplified_full", "p_AR-20_full")
-    assert second.title == "Points: AR 20 against full models"
+    assert second.title == "Points: AR 20 compared with full models"
     assert isinstance(first_fold, Fold)
     assert isinstance(second_fold, Fold)
-    assert second_fold.summary == "Details: AR 20 against full models"
+    assert second_fold.summary == "Details: AR 20 compared with full models"
     tables = [first_fold.items[0], second_fold.items[0]]
     assert [table.name for table in tables] == ["t_simplified_full", "t_AR-20_full"]
     assert [told.sentence for told in both.outcomes] == ["a", "always", "b"]

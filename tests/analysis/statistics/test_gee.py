@@ -154,7 +154,7 @@ def test_nobody_and_one_participant():
     assert (nobody["n"], nobody["answers"]) == (0, 0)
     assert np.isnan(nobody["p"])
     one = effects(table[table["participant_id"] == "sub-00"]).loc[ALL_TEXTURES]
-    assert (one["n"], one["method"], one["note"]) == (1, SIGN_FLIPS, "1 participant(s)")
+    assert (one["n"], one["method"], one["note"]) == (1, SIGN_FLIPS, "1 participant")
 
 
 def test_two_participants_may_leave_the_limits_open():

@@ -121,7 +121,7 @@ def test_tasks_are_compared_apart_and_other_models_left_out(rng):
 def test_one_participant_and_an_absent_model_are_told_not_tested(rng):
     one = hand_tests(hand_of(rng, people=1), models=PAIR, rng=rng)
     assert one["t"].isna().all()
-    assert (one["note"] == "t undefined: 1 participant(s)").all()
+    assert (one["note"] == "t undefined: 1 participant").all()
     absent = hand_tests(hand_of(rng), models=("full", "elsewhere"), rng=rng)
     assert (absent["n"] == 0).all()
     assert absent["p"].isna().all()

@@ -195,7 +195,10 @@ def test_a_model_per_session_cannot_be_told_from_the_session():
     apart = answers[(answers["model"] == "full") == (answers["session"] == "ses-1")]
     row = model_row(apart)
     assert row["method"] == PAIRED
-    assert row["note"] == ("no mixed model: models cannot be told from textures, sessions or order")
+    assert row["note"] == (
+        "no mixed model: the effect of the model cannot be separated from textures, sessions or "
+        "order"
+    )
     whole = complete_participants(apart, "rating", models=MODELS)
     paired = paired_test(whole["full"], whole["simplified"], rng=rng())
     shown = row[["estimate", "t", "p"]].astype(float)

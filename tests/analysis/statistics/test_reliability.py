@@ -100,7 +100,7 @@ def test_somebody_without_any_rating_is_named_too():
     ("values", "why"),
     [
         (np.full((4, 3), 7.0), "all ratings are the same"),
-        (np.arange(4.0)[:, None] + [0.1, 0.2, 0.3], "nothing but their mean"),
+        (np.arange(4.0)[:, None] + [0.1, 0.2, 0.3], "only in their mean"),
         (SHROUT_FLEISS[:, :1], "1 participant"),
         (SHROUT_FLEISS[:1], "1 cell"),
         (np.full((3, 3), np.nan), "0 participant"),

@@ -314,9 +314,9 @@ def test_one_participant_and_nobody():
     one = planted(people=1)
     alone = time_ratios(one, models=MODELS, rng=rng()).iloc[0]
     assert (alone["n"], alone["method"]) == (1, PAIRED)
-    assert alone["note"].startswith("no mixed model: 1 participant(s)")
+    assert alone["note"].startswith("no mixed model: 1 participant")
     told = trade_off_sentence(compare_models(one, models=MODELS, rng=rng()), models=MODELS)
-    assert told.endswith("not compared, since 1 participant(s) answered with both.")
+    assert told.endswith("not compared, because 1 participant answered with both.")
     nobody = one.iloc[:0]
     assert speed_and_accuracy(nobody, models=MODELS).empty
     assert participant_scores(nobody, models=MODELS).empty
@@ -342,14 +342,14 @@ def comparison(ratio: float, change: float, *, p: tuple[float, float]) -> pd.Dat
         (1.2, 0.1, (0.01, 0.01), "slower and more accurate: a speed–accuracy trade-off"),
         (0.8, 0.1, (0.01, 0.01), "faster and more accurate: no speed–accuracy trade-off"),
         (1.2, -0.1, (0.01, 0.01), "slower and less accurate: no speed–accuracy trade-off"),
-        (0.8, -0.1, (0.01, 0.2), "faster; a difference of accuracy was not shown, which does not"),
-        (1.2, -0.1, (0.2, 0.01), "less accurate; a difference of time was not shown, which does"),
-        (1.2, -0.1, (0.2, 0.2), "neither a difference of time nor one of accuracy was shown"),
+        (0.8, -0.1, (0.01, 0.2), "faster; a difference in accuracy was not shown, so a speed"),
+        (1.2, -0.1, (0.2, 0.01), "less accurate; a difference in time was not shown, so a speed"),
+        (1.2, -0.1, (0.2, 0.2), "no difference in time or accuracy was shown"),
     ],
 )
 def test_faster_and_less_accurate_is_never_called_better(ratio, change, p, words):
     told = trade_off_sentence(comparison(ratio, change, p=p), models=MODELS)
-    assert f"simplified against full models: {words}" in told
+    assert f"simplified compared with full models: {words}" in told
     assert not {"better", "worse", "advantage", "superior"} & set(told.split())
 
 

@@ -287,6 +287,6 @@ def test_the_section_reports_published_values_beside_ours(models, results) -> No
         in section.outcomes[0].sentence
     )
     tables = {item.name: item for item in section.items if hasattr(item, "frame")}
-    assert "corrects for no multiple testing" in tables["regression_support"].note
+    assert "not corrected for multiple testing" in tables["regression_support"].note
     assert "forces in mN" in tables["regression_coefficients"].note
     assert isinstance(tables["driving"].frame, pd.DataFrame)

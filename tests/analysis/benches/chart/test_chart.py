@@ -11,9 +11,10 @@ import pytest
 
 from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import Judged
+from analysis.benches.chart.surfaces import counted_kind
 from analysis.benches.chart.timing import stream_of, time_table
 from analysis.figures.chart import PANELS, figure_chart
-from analysis.report.chart_page import COSTS, MEASURES, chart_files, chart_section
+from analysis.report.chart_page import COSTS, MEASURES, chart_files, chart_section, chart_tables
 
 
 def test_rendering_is_timed_in_turn_and_what_cannot_be_is_not(chart: Chart) -> None:
@@ -99,3 +100,14 @@ def test_the_section_of_a_report_has_picture_and_tables(chart: Chart) -> None:
         "chart_comparisons",
         "chart_methods",
     ]
+
+
+def test_numbers_of_layers_and_surfaces_are_readable(chart: Chart) -> None:
+    _, methods = chart_tables(chart)
+    [column] = [column for column in methods.columns if column.name == "layers"]
+    shown = dict(
+        zip(methods.frame["method"], map(column.text, methods.frame["layers"]), strict=True)
+    )
+    assert (shown["joint, 1 layer"], shown["AR(6)"]) == ("1", "n/a")
+    assert counted_kind(1, "planted") == "1 planted texture (simulated)"
+    assert counted_kind(2, "planted") == "2 planted textures (simulated)"

@@ -122,7 +122,7 @@ def test_it_is_said_where_a_rival_dominates_ours() -> None:
     [one] = comparisons(rows)
     assert one.between.high < 1
     assert one.sentence.endswith(
-        "paper dominates joint as paper (linear, every 1 ms), 1 (1–1) times the operations and "
+        "paper dominates joint: paper (linear, every 1 ms), 1 (1–1) times the operations and "
         f"{one.dominates_by.distance.text()} times the distance."
     )
 
