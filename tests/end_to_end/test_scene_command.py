@@ -124,7 +124,7 @@ def test_there_is_no_header_of_models_of_different_rates(main, place: Path) -> N
     (place / "light.toml").write_text(SCENE.replace('["MDF"]', '["MDF", "PVC"]'))
     made = main("scene", "light.toml")
     assert made.returncode == 0, made.stderr
-    assert "note: no header in C: models of different rates need a rate_hz" in made.stdout
+    assert "note: no C header: models of different rates need a rate_hz" in made.stdout
     assert not list((place / "scene").glob("*.h"))
     (place / "light.toml").write_text(
         SCENE.replace('["MDF"]', '["MDF", "PVC"]') + "actuator.rate_hz = 8000\n"

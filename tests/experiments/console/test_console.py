@@ -218,7 +218,7 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
         person.say("ready")
 
         person.wait_for_page("rate")
-        assert begins_with_its_page(person, "virtual", "How alike are the two surfaces?")
+        assert begins_with_its_page(person, "virtual", "How similar are the two surfaces?")
         person.keys("Tab", "Return")
         assert person.wait_for("presented") == "real"
         person.keys("v")

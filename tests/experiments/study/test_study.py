@@ -119,7 +119,7 @@ def test_a_changed_file_is_followed(tmp_path: Path) -> None:
 
 def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
     text = SHIPPED_STUDY.read_text(encoding="utf-8")
-    asked = "# [oddity]                # three", "[oddity] # three"
+    asked = "# [oddity]                # which of three", "[oddity] # which of three"
     text = text.replace("repeats = 3\n", "").replace(*asked)
     text = text.replace(
         '# participants = 24\n# schedule = "inter', 'participants = 24\nschedule = "inter'
