@@ -48,8 +48,7 @@ def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(
     refused = main("study", "init", "a.toml")
     assert refused.returncode == 1
     assert refused.stderr == (
-        "error: expected a new file at a.toml, got one that is there already; choose another "
-        "name.\n"
+        "error: expected a new file at a.toml, got an existing one; choose another name.\n"
     )
     assert Study.load(tmp_path / "a.toml") == first
 
@@ -104,7 +103,7 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
         "10 to 10 of 20",
         "12 to 12 of 24",
         "claims: 3",
-        "as well: No equality unless full models are recognised above chance",
+        "equally well: No equality unless full models are recognised above chance",
         "magnitude feels the same: No equality unless the anchors are rated lower",
     ):
         assert told in done.stdout
