@@ -1,6 +1,6 @@
 """Recordings whose labels, unit or scale cannot be meant, and what else they may mean.
 
-docs/method/recordings.md#imports-that-cannot-be-meant
+docs/method/recordings.md#implausible-imports
 """
 
 from __future__ import annotations
