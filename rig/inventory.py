@@ -14,7 +14,7 @@ from math import log10
 from pathlib import Path
 from typing import Literal
 
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.files.provenance import version_of
 from modeling.rendering.compiled import is_compiled
 from rig.hand.devices import connected_devices
@@ -35,7 +35,7 @@ State = Literal["ok", "note", "fault"]
 PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 OLD_DAYS = 90  # a study may ask for less
-_WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a fault by itself, told once
+_WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def connected_input() -> list[Finding]:
 def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
     """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
     if not file.exists():
-        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and correct what is yours."
+        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
         return None, [Finding(str(file), told, "fault")]
     try:
         rig = RigFile.load(file)
@@ -114,7 +114,7 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
     ]
     assumed = rig.assumed()
     if assumed:
-        told = f"{len(assumed)} of {len(rig.figures())} figures are assumed, see below"
+        told = f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
         found.append(Finding("figures", told, "note"))
     return rig, found
 
@@ -244,7 +244,7 @@ def _latency(rig: RigFile, today: datetime.date) -> Finding:
         return Finding("latency", "never measured (tactileq rig latency)", "note")
     told = f"median {done.median_ms.value:.1f} ms, 95 % within {done.p95_ms.value:.1f} ms"
     if done.measured_on is None:
-        return Finding("latency", f"{told}, of no known day", "note")
+        return Finding("latency", f"{told}, date unknown", "note")
     aged = _aged("latency", done.measured_on, today)
     return Finding("latency", f"{told}, {aged.told}", aged.state)
 

@@ -108,7 +108,7 @@ class SimulatedRig:
         self._faults.append(Fault(self.now_s(), told, invalidates=True))
 
     def take_faults(self) -> tuple[Fault, ...]:
-        """What `break_down` was told since the last call."""
+        """What `break_down` was given since the last call."""
         taken, self._faults = tuple(self._faults), []
         return taken
 

@@ -78,7 +78,7 @@ class Page:
             self._focus.key(key)
 
     def let_go(self) -> None:
-        """Forget a press that has not ended; its end will not be told."""
+        """Forget a press that has not ended; its end will not be reported."""
         if self._held is not None:
             self._held.cancel()
         self._held = None

@@ -41,7 +41,7 @@ class PageRunner(Parts):
     stamp : str
         What every page is stamped with, in the participant's language.
     on_page : callable, optional
-        Told of each page that has come up.
+        Called with each page that is shown.
     """
 
     def __init__(self, window: Any, texts: Texts, *, stamp: str, on_page: PageHook | None) -> None:

@@ -98,7 +98,7 @@ def demonstration(vibrator: Vibrator | None = None) -> Iterator[LiveRig]:
 def _usual_sound(
     live: Live, vibrator: Vibrator | None, opened: ExitStack
 ) -> tuple[SoundOutput | None, str]:
-    """The open sound output, None where none can be opened, and what a visitor is told of it."""
+    """The open sound output, None if none can be opened, and the note about it for visitors."""
     try:
         device = find_device(None, "output")
     except InputError:

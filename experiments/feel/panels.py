@@ -31,6 +31,7 @@ from experiments.feel.view import (
     level_words,
     short,
 )
+from modeling.errors import counted
 
 Box = tuple[float, float, float, float]
 
@@ -149,9 +150,11 @@ class SpectrumPanel:
     def tell(self, texture: Texture) -> None:
         """Name what is drawn."""
         fewer = texture.simplified
-        self._legend[0].show(f"full model, {texture.full.n_layers} layers")
+        self._legend[0].show(f"full model, {counted(texture.full.n_layers, 'layer')}")
         self._legend[1].show(
-            "no simplified model" if fewer is None else f"simplified model, {fewer.n_layers} layers"
+            "no simplified model"
+            if fewer is None
+            else f"simplified model, {counted(fewer.n_layers, 'layer')}"
         )
 
     def draw(self, now: Now, *, plays: ModelNow | None) -> None:

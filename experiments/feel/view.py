@@ -15,6 +15,7 @@ from experiments.feel.rigs import HandNow, OutputNow
 from experiments.feel.textures import Texture
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
+from modeling.errors import counted
 from modeling.models.loading import Layered
 from modeling.perception.simplification import layer_amplitudes_g
 from modeling.perception.thresholds import Threshold
@@ -197,7 +198,7 @@ def short(name: str, longest: int) -> str:
 def felt_words(layers: FeltLayers) -> str:
     """How many layers are felt, in words."""
     count, felt, unknown = layers.felt.size, int(layers.felt.sum()), int(layers.unknown.sum())
-    words = f"{felt} of {count} layers"
+    words = f"{felt} of {counted(count, 'layer')}"
     return f"{words}, {unknown} unknown" if unknown else words
 
 

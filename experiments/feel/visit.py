@@ -82,9 +82,9 @@ class Visit:
 
     def take_faults(self) -> tuple[str, ...]:
         """What went wrong at the rig since the last call; what it has halted does not play."""
-        told = self.rig.take_faults()
+        faults = self.rig.take_faults()
         self.playing = self.playing and not self.rig.halted
-        return told
+        return faults
 
     def press(self, key: str) -> None:
         """Act on a key by PsychoPy's name for it; other keys have no effect."""

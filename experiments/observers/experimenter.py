@@ -13,7 +13,7 @@ class SimulatedExperimenter:
     asked : list of str
         The trays that were asked for, in order.
     calls : list of str
-        What was told to have failed.
+        What was reported to have failed.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class SimulatedExperimenter:
         return True
 
     def tell(self, standing: Standing) -> None:
-        """Needs to be told nothing."""
+        """Needs no information."""
 
     def page(self, name: str) -> None:
         """Nor this."""

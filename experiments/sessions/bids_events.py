@@ -62,7 +62,7 @@ _OWN: dict[str, dict[str, Any]] = {
         },
     },
     "by": {"Description": "Who or what ended it"},
-    "told": {"Description": "What was told: a fault, a reason, an advice"},
+    "told": {"Description": "What was reported: a fault, a reason, an advice"},
     "invalidates": {
         "Description": "Whether the participant cannot have felt what was planned",
         "Levels": {"true": "the trial is not valid", "false": "nothing follows"},
@@ -107,7 +107,7 @@ def event_rows(
 def onsets_s(events: Sequence[Event]) -> list[float]:
     """When each event happened, in seconds since the first one (its run's clock, then UTC's).
 
-    Within a run the monotonic clock counts; where a run begins is told by the date and time, but
+    Within a run the monotonic clock counts; the start of a run is given by the date and time, but
     is never before the end of the last one.
     """
     onsets: list[float] = []

@@ -24,7 +24,7 @@ _SESSION_COLUMNS: dict[str, dict[str, Any]] = {
     "session_id": {"Description": "Session (day)"},
     "day": {
         "Description": "Whole days since the participant's first session; the dates themselves are "
-        "left out, since they may tell who it was",
+        "left out, since they may identify the person",
         "Units": "day",
     },
     **{

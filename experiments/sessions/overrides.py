@@ -16,7 +16,7 @@ class Overrides:
     reason : str, optional
         Printable text; without one nothing is allowed.
     tell : callable, optional
-        Told each rule that is broken, in one sentence.
+        Called with each rule that is broken, in one sentence.
 
     Raises
     ------

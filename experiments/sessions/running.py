@@ -41,7 +41,7 @@ class Circumstances:
     override : str, optional
         Reason to go on where a rule is broken; stored.
     tell : callable, optional
-        Told each rule that is broken for that reason.
+        Called with each rule that is broken for that reason.
     resume : bool
         Whether to go on with a session that was aborted or broke off.
     sources : mapping of set of models to path

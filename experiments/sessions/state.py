@@ -1,4 +1,4 @@
-"""How a session stands, as its log tells."""
+"""The state of a session, according to its log."""
 
 from __future__ import annotations
 

@@ -325,7 +325,7 @@ class Respondent(Protocol):
         ...
 
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
-        """Be told where events outside trials go, and who follows which page is shown."""
+        """Receive the log for events outside trials, and the follower of the pages shown."""
         ...
 
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
@@ -387,7 +387,7 @@ class Experimenter(Protocol):
         ...
 
     def call(self, told: str) -> None:
-        """Tell what failed, and ask to mend it."""
+        """Report what failed, and ask to repair it."""
         ...
 
     def go_on(self) -> None:

@@ -357,7 +357,7 @@ class _Running:
         }
 
     def _trace(self, trial: Trial, faults: Sequence[Fault]) -> None:
-        """Store what the hand did and felt; tell the participant who mostly stroked outside."""
+        """Store what the hand did and felt; advise a participant who mostly stroked outside."""
         rows, shown = self._keep(trial.trial, faults)
         advice = advice_on(outside_grid(rows, shown))
         self._inside = advice is None

@@ -23,7 +23,7 @@ SAFE = "what was answered before is safe: make room, then go on with --resume"
 
 
 def store_error(error: OSError, path: Path, advice: str = SAFE) -> StoreError:
-    """What is told about a disk that took nothing; `advice` says what is safe, and what to do."""
+    """The error for a disk that stored nothing; `advice` says what is safe, and what to do."""
     return StoreError(f"expected to write to {path}, got {reason_of(error)}; {advice}.")
 
 

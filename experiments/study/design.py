@@ -171,7 +171,7 @@ def models_of_session(study: Study, *, task: str, slot: int, session: int) -> tu
 
     By day, as many neighbouring slots as there are models do them in the rows of a cyclic Latin
     square of a random order, dealt at random: exactly as many begin with each model, and a number
-    does not tell which.
+    does not reveal which.
     """
     models = study.models_of(task)
     if study.plan_of(task).schedule == "interleaved":

@@ -130,7 +130,7 @@ class ModelSets:
         ----------
         study : Study
         allow : callable
-            Told what could go on for a reason ("exchanged models") and the sentence against it.
+            Called with what may be overridden ("exchanged models") and the error against it.
 
         Raises
         ------
@@ -203,7 +203,7 @@ def load_model_sets(
     overriding : mapping of set to path, optional
         Other places than the study's; relative to where the program runs.
     progress : callable
-        Told the share that is done, and the texture that was done last, where a scene is compiled.
+        Called with the share that is done, and the last texture, when a scene is compiled.
 
     Raises
     ------

@@ -41,7 +41,7 @@ SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Everything that fixes the order of all trials, and what is told about the circumstances.
+    """Everything that fixes the order of all trials, and what is stated about the circumstances.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 Three buttons present virtual surfaces of one texture: two render one model, the third the other.
 Which is the odd one out? Nobody has to name a texture or to find a number for a likeness, so this
-most sharply tells whether anybody feels the difference.
+shows most directly whether anybody feels the difference.
 """
 
 from __future__ import annotations

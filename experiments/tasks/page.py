@@ -173,7 +173,7 @@ def _randomisation(study: Study) -> Iterator[str]:
     yield (
         "Orders are Fisher–Yates shuffles within the balanced design, from the seed in the study "
         f"file (SHA-256 of the study: `{study.sha256}`), and are stored before the first trial of "
-        "each session. The seed is not told here, since orders could be foretold from it."
+        "each session. The seed is not stated here, since orders could be predicted from it."
     )
 
 

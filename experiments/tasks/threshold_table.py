@@ -15,6 +15,7 @@ import numpy as np
 from experiments.tasks.threshold import DURATION_S
 from experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
 from modeling import InputError
+from modeling.errors import counted
 from modeling.files.tables import read_table, table_text
 
 READ = ("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid")
@@ -192,7 +193,7 @@ def _factor(count: int) -> float:
 
 def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bool) -> str:
     """The table as a TSV with its source and caveat; `Threshold.load` reads it."""
-    who = f"{people} {'person' if people == 1 else 'people'}{' (simulated)' if simulated else ''}"
+    who = f"{counted(people, 'person', 'people')}{' (simulated)' if simulated else ''}"
     bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.note]
     caveat = "felt with a pen held still; a hand that strokes feels less"
     if bounds:

@@ -187,7 +187,7 @@ def _put_back(old: Path, target: Path) -> None:
 
 
 def _kept(folder: Path, target: Path) -> Path:
-    """Move a hidden folder to a visible place beside `target`, and tell which."""
+    """Move a hidden folder to a visible place beside `target`; return that place."""
     names = (f"{target.name}-{number}" for number in itertools.count(2))
     place = next(p for name in names if not os.path.lexists(p := target.with_name(name)))
     folder.rename(place)

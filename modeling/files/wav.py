@@ -10,7 +10,7 @@ from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.files.reading import check_file
 
-# The beginnings of sound files. In others libsndfile would look for MP3, and tell of it on stderr.
+# The first bytes of sound files. In others libsndfile would look for MP3 and report it on stderr.
 _FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")
 
 

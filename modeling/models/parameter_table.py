@@ -1,4 +1,4 @@
-"""What a layered model tells the renderer: parameters over a grid, and how to read between.
+"""A layered model as the renderer sees it: parameters over a grid, and how to interpolate.
 
 Between its nodes a table is read linearly, whatever the model. A model that blends in logarithms
 gives a table with more nodes, as many as it takes to be close to its own laws: nothing that reads

@@ -11,7 +11,7 @@ from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response, band_rms
 from modeling.equalizer.peq import PEQ
 from modeling.equalizer.signs import neighbouring_patterns
-from modeling.errors import InputError, shown
+from modeling.errors import InputError, counted, shown
 from modeling.models.own_peaks import own_peaks
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold
@@ -244,11 +244,11 @@ def _decide_alone(
     if (level >= 0).any():
         above = int((level >= 0).sum())
         what = f"not {margin_db:g} dB below threshold" if margin_db else "above threshold"
-        return True, f"{what} in {above} of {level.size} conditions"
+        return True, f"{what} in {above} of {counted(level.size, 'condition')}"
     if np.isnan(level).any():
         outside = int(np.isnan(level).sum())
         known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
-        where = f"{outside} of {level.size} conditions"
+        where = f"{outside} of {counted(level.size, 'condition')}"
         return True, f"no threshold known in {where} ({threshold.name} covers {known})"
     if flip >= HIGHEST_FLIP_PROBABILITY:
         return True, "below threshold, but the records are too short to be sure"

@@ -184,7 +184,7 @@ def _told(target: Path) -> Iterator[None]:
 
 
 def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
-    """Refuse a second recording of a condition; told by the index, no samples are read."""
+    """Refuse a second recording of a condition, by the index; no samples are read."""
     taken = {
         (
             row["texture"],

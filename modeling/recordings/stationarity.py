@@ -111,8 +111,8 @@ def _information_share(log_power: Floats) -> Floats:
 
     slope = np.gradient(uniform_filter1d(log_power, SMOOTHED_CELLS, mode="nearest"))
     square = uniform_filter1d(slope, SMOOTHED_CELLS, mode="nearest") ** 2
-    telling: Floats = square / (square + CLEAR_SLOPE**2)
-    return telling
+    weights: Floats = square / (square + CLEAR_SLOPE**2)
+    return weights
 
 
 def _level_change_db(power: Floats) -> float:

@@ -30,7 +30,7 @@ def is_compiled() -> bool:
             "expected the compiled rendering kernel, got none; rendering goes on in Python with "
             "the same numbers, some hundred times slower: install a C compiler, then tactileq.",
             RuntimeWarning,
-            stacklevel=1,  # from one place, so that Python tells it once
+            stacklevel=1,  # from one place, so that Python shows it once
         )
     return Call is not None and not os.environ.get(SWITCH)
 

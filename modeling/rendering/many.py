@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.hand import Hand
 from modeling.models.ar_model import ARModel
 from modeling.models.parameter_table import ParameterTable
@@ -82,8 +82,9 @@ def render_many(
     if not len(models) == len(hands) == len(seeds) == len(streams):
         raise InputError(
             "expected as many hands, seeds and streams as models, got "
-            f"{len(models)} models, {len(hands)} hands, {len(seeds)} seeds and {len(streams)} "
-            "streams; give one of each for every signal."
+            f"{counted(len(models), 'model')}, {counted(len(hands), 'hand')}, "
+            f"{counted(len(seeds), 'seed')} and "
+            f"{counted(len(streams), 'stream')}; give one of each for every signal."
         )
     options = {
         "rate_hz": rate_hz,

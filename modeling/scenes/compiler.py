@@ -35,7 +35,7 @@ def compile_scene(
         Full models by the name of their texture, in g; those that the scene does not name are not
         used.
     progress : callable
-        Told the name of each texture as it is done.
+        Called with the name of each texture when it is done.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def compile_scenes(
 ) -> list[CompiledScene]:
     """`compile_scene` of several scenes, which share what is known of the models' errors.
 
-    Parameters and errors as there; `progress` is told the scene, too.
+    Parameters and errors as there; `progress` is also called with the scene.
     """
     known = Known()
     return [_compiled(scene, models, known, progress=partial(progress, scene)) for scene in scenes]

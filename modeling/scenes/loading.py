@@ -56,7 +56,7 @@ def scene_models(
         The full models of today; without them a scene file is compiled from the models that it
         names, and a folder is taken as it is.
     progress : callable
-        Told the share that is done and the texture that was done last.
+        Called with the share that is done and the texture that was done last.
 
     Raises
     ------

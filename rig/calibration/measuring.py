@@ -142,8 +142,8 @@ class Accelerometer:
 def gaps(late_s: Floats) -> list[int]:
     """Before which blocks samples were lost.
 
-    A system that is busy tells the time of single blocks too late, but some soon after are told
-    in time. Where samples are missing, all that follow are late. Of the last ten nothing is known.
+    A busy system reports the time of single blocks too late, but of some soon after in time. If
+    samples are missing, all following blocks are late. The last ten blocks cannot be judged.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.files.writing import write_text
 from modeling.vibrators.identification import identify_vibrator
 from modeling.vibrators.vibrator import Vibrator
@@ -168,7 +168,7 @@ def pressure_figures(
 ) -> dict[str, object]:
     """The pen's force over pressure."""
     source = (
-        f"weights laid on, {today.isoformat()}: {len(curve.points)} weights, residual "
+        f"weights laid on, {today.isoformat()}: {counted(len(curve.points), 'weight')}, residual "
         f"{curve.residual_n:.3f} N{_note(rig)}"
     )
     return {"hand.pressure_curve": Curve(curve.points, "N", False, source)}
@@ -178,7 +178,7 @@ def latency_figures(
     rig: RigFile, summary: LatencySummary, *, how: str, accepted: str | None, today: datetime.date
 ) -> dict[str, object]:
     """What was measured from hand to vibration; `accepted` says why more than 40 ms may be."""
-    source = f"{how}, {today.isoformat()}: {summary.trials} trials{_note(rig)}"
+    source = f"{how}, {today.isoformat()}: {counted(summary.trials, 'trial')}{_note(rig)}"
     if accepted:
         source += f"; accepted: {accepted}"
     return {

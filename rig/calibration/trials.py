@@ -92,7 +92,7 @@ class Watched:
 def watched(
     live: Live, accelerometer: Accelerometer, seconds: float, *, tick: Callable[[float], None]
 ) -> Watched:
-    """Log everything for some time and look after what plays; `tick` is told the share over."""
+    """Log everything for some time and keep the rig playing; `tick` gets the share elapsed."""
     accelerometer.forget()
     reading, block = live.readings_written, live.blocks_written
     readings, blocks = [], []

@@ -20,7 +20,7 @@ from rig.live.memory import FORCE_ASSUMED, SIMULATED
 
 PERCENTILES = (5, 25, 50, 75, 95)
 LEAST_S = 5.0
-# Steps of the grid are rounded to these, so that they can be read and told.
+# Steps of the grid are rounded to these, so that they are easy to read and to communicate.
 _SPEED_STEP_MM_S = 5.0
 _FORCE_STEP_N = 0.05
 

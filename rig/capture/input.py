@@ -231,7 +231,7 @@ class _Timeline:
         return InputBlock(position, call.samples, began_s + behind_s, lost=lost or slipped)
 
     def _jumps(self, measured_s: float) -> bool:
-        """Whether the stream's clock tells of a whole block that did not come."""
+        """Whether the stream's clock shows that a whole block is missing."""
         return self._expected_s is not None and measured_s > self._expected_s + 0.95 * BLOCK_S
 
 

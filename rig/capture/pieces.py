@@ -197,8 +197,8 @@ class PieceStore:
             write_files({note: self._note(about)})
 
     def _note(self, about: Mapping[str, Any] | None = None) -> bytes:
-        told = {**self._provenance, "pieces": dict(self.counts), **(about or {})}
-        return provenance_text(told).encode()
+        stated = {**self._provenance, "pieces": dict(self.counts), **(about or {})}
+        return provenance_text(stated).encode()
 
     def _begin_index(self) -> None:
         """Make the folder a recording set, as yet of none, so that recordings can be added."""

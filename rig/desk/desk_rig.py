@@ -62,8 +62,8 @@ class Parts:
 class DeskRig:
     """A rig of parts on a desk; implements `rig.interface.TextureRig`.
 
-    What fails while it is open is told by `take_faults`, and what was lost is started again by what
-    is presented next. `read` and `take_faults` look after what plays: see `TextureRig`.
+    What fails while it is open is reported by `take_faults`, and what was lost is started again by
+    what is presented next. `read` and `take_faults` look after what plays: see `TextureRig`.
 
     Parameters
     ----------
@@ -341,7 +341,7 @@ class DeskRig:
                 f"{played.stale} blocks, in which nothing was felt; check what reads the hand."
             )
 
-    # --- What it tells ----------------------------------------------------------------------
+    # --- What it reports --------------------------------------------------------------------
 
     def read(self) -> RigReading:
         """The hand as it is now; at rest in the air where nothing is read."""

@@ -123,13 +123,13 @@ def _answer(
 
 def _saved(pieces: list[list[InputBlock]], source: AudioInput, folder: Path) -> list[Any]:
     """Each piece as a file of numbers in g, and when it begins."""
-    told = []
+    written = []
     for number, piece in enumerate(pieces):
         samples = np.concatenate([block.samples for block in piece])
         path = folder / f"{number}.npy"
         np.save(path, (samples * source.settings.g_per_fullscale).astype(np.float32))
-        told.append({"file": str(path), "start_s": piece[0].time_s})
-    return told
+        written.append({"file": str(path), "start_s": piece[0].time_s})
+    return written
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ class HandLoop:
         self._told = ""  # the last fault, until a sample passes
         self._counts: dict[str, int] = {}
         self._counts_s = 0.0
-        self._late = 0  # of the counts, those that were told
+        self._late = 0  # of the counts, those that were reported
         self._firmware = ""
         self.unplugged = False  # on request: as if the plug were pulled
 

@@ -79,11 +79,11 @@ class HandReader:
         ]
         for thread in self._threads:
             thread.start()
-        told = self._wait_for_first()
-        if "ready" not in told:
+        message = self._wait_for_first()
+        if "ready" not in message:
             self.close()
-            raise InputError(told["error"])
-        self.device_name = told["ready"]
+            raise InputError(message["error"])
+        self.device_name = message["ready"]
         self._ready_s = now_s()
 
     def close(self) -> None:
@@ -212,20 +212,20 @@ class HandReader:
             _end(process)
         return process
 
-    def _hear(self, told: dict[str, Any]) -> None:
-        if "fault" in told:
-            self._add_fault(told["fault"])
-        if "counts" in told:
+    def _hear(self, message: dict[str, Any]) -> None:
+        if "fault" in message:
+            self._add_fault(message["fault"])
+        if "counts" in message:
             with self._lock:
-                self._counts = told["counts"]
-        if "firmware" in told:
+                self._counts = message["counts"]
+        if "firmware" in message:
             with self._lock:
-                self._firmware = told["firmware"]
+                self._firmware = message["firmware"]
             self._has_firmware.set()
         self._alive_s = min(self._alive_s, now_s())
-        if "ready" in told or "error" in told:
-            self._was_ready = self._was_ready or "ready" in told
-            self._first.put(told)
+        if "ready" in message or "error" in message:
+            self._was_ready = self._was_ready or "ready" in message
+            self._first.put(message)
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""

@@ -73,7 +73,7 @@ def doubts_about(
     found.append("" if g_per_fullscale is None else _of_scale(g_per_fullscale))
     if recording.unit == "g" and not found[-1]:
         found.append(_of_level(recording, unit, g_per_fullscale) or _of_gravity(recording, unit))
-    return tuple(f"{name}: {told}" for told in found if told)
+    return tuple(f"{name}: {doubt}" for doubt in found if doubt)
 
 
 def _of_condition(speed_mm_s: float, force_n: float) -> str:

@@ -20,6 +20,6 @@ def settings_from_parent() -> dict[str, Any]:
 
 
 def tell(line: Mapping[str, Any]) -> None:
-    """Tell the parent."""
+    """Send a line to the parent."""
     sys.stdout.write(json.dumps(line) + "\n")
     sys.stdout.flush()

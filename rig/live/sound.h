@@ -160,7 +160,7 @@ TQ_INLINE void tq_sound_mind(tq_sound *s, double now_s)
     s->halted = s->halted_s == asked_s;
 }
 
-/* Tells the player what is wanted, which is silence while a signal plays. */
+/* Sets what the player has to play, which is silence while a signal plays. */
 TQ_INLINE void tq_sound_tell(tq_sound *s)
 {
     tq_surface *u = s->halted || TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);

@@ -61,7 +61,7 @@ class SoundOutput:
     """A sound card with a vibrator, played by a process of its own.
 
     The process may be killed and its sound server may die: what is asked for next starts another
-    one, and `faults` tells of it.
+    one, and `faults` reports it.
 
     While something plays `faults` has to be called, best ten times a second: where nobody calls it
     for a second what plays is halted, and stays so (docs/method/live.md#heartbeat).
@@ -184,7 +184,7 @@ class SoundOutput:
 
     @property
     def misses(self) -> int:
-        """Blocks so far that came too late, as the driver told."""
+        """Blocks so far that came too late, according to the driver."""
         self._look()
         return self._misses
 
@@ -358,7 +358,7 @@ class SoundOutput:
         return rows
 
     def _follow_halts(self, halted: NDArray[np.bool_]) -> None:
-        """Tell once of each halt; (n,), whether it holds in each block."""
+        """Report each halt once; (n,), whether it holds in each block."""
         before = np.concatenate(([self._halted], halted[:-1]))
         self._faults += [_HALTED] * int(np.count_nonzero(halted & ~before))
         self._halted = bool(halted[-1])

@@ -108,8 +108,8 @@ def restraints(plan: RenderPlan, unit: str) -> str:
         vibrator = f"Compensated for a vibrator with a resonance at {notch.frequency_hz:g} Hz."
     found = {"peak": (limits.peak, unit), "RMS": (limits.rms, unit)}
     found["duration"] = (limits.duration_s, "s")
-    told = [f"{what} {value:g} {of}" for what, (value, of) in found.items() if np.isfinite(value)]
-    return f"{vibrator} Limits: {', '.join(told) or 'none'}. Both are fields of tq_texture."
+    stated = [f"{what} {value:g} {of}" for what, (value, of) in found.items() if np.isfinite(value)]
+    return f"{vibrator} Limits: {', '.join(stated) or 'none'}. Both are fields of tq_texture."
 
 
 def quoted(text: str) -> str:

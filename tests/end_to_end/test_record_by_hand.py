@@ -174,9 +174,7 @@ def test_the_accelerometer_of_a_rig_file_gives_way_to_options(tmp_path: Path, ca
     given = InputOptions("other", 1, 48000.0, 8.0)
     assert input_from(rig, given) == InputSettings(8.0, "other", 1, 48000.0)
     tell_assumed(rig)
-    assert (
-        "50 g per full scale is assumed (data sheet)" in capsys.readouterr().out
-    )
+    assert "50 g per full scale is assumed (data sheet)" in capsys.readouterr().out
 
 
 def test_a_rig_without_an_accelerometer_needs_g_per_full_scale(main, tmp_path: Path) -> None:

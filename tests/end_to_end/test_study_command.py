@@ -97,7 +97,8 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
     assert done.returncode == 0, done.stderr
     for told in (
         "full and simplified are identical for MDF",
-        "absolute: 20 participants, 1 session each, 2 training + 16 main trials per session; about 20 min",
+        "absolute: 20 participants, 1 session each, 2 training + 16 main trials per "
+        "session; about 20 min",
         "relative: 24 participants, 2 sessions each, 2 training + 21 main trials",
         "(an estimate)",
         "10 to 10 of 20",
