@@ -204,7 +204,7 @@ def _present(what: str, file: Path, told: str, *, group: str) -> Finding:
     if not file.exists():
         return Finding(what, f"expected {file}, got no such device; connect it.", "fault")
     if not os.access(file, os.R_OK):
-        told = f"expected to read {file}, got no permission; have the group {group}."
+        told = f"expected to read {file}, got no permission; join the group {group}."
         return Finding(what, told, "fault")
     return Finding(what, told)
 
@@ -226,7 +226,7 @@ def _accelerometer(rig: RigFile) -> Finding:
 def _calibration(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.calibration
     if done is None or rig.vibrator.g_per_volt.assumed:
-        told = "never: levels are assumed (tactileq rig calibrate level)"
+        told = "never calibrated: levels are assumed (tactileq rig calibrate level)"
         return Finding("calibration", told, "note")
     now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
     if now != then:

@@ -74,7 +74,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
         window.close()
     return Timing(
         name="frames",
-        meaning="from one frame to the next",
+        meaning="interval between frames",
         milliseconds=(1e3 * np.diff(shown)).tolist(),
         limit_ms=25.0,
     )
@@ -119,7 +119,7 @@ def time_syncs(folder: Path) -> Timing:
 
         taken = [_duration_ms(keep) for _ in range(SYNCS)]
     return Timing(
-        name="answers", meaning="to keep an answer on the disk", milliseconds=taken, limit_ms=50.0
+        name="answers", meaning="to store an answer on the disk", milliseconds=taken, limit_ms=50.0
     )
 
 

@@ -37,7 +37,7 @@ POINTER_S = 0.005
 WORDS_S = 0.1  # words that change faster cannot be read, and cost the most to draw
 MOST_BUTTONS = 9
 LONGEST_LABEL, LONGEST_TITLE, LONGEST_FAULT = 14, 18, 240  # characters
-LEAD = "Stroke: the spectrum follows your hand. Filled layers are felt, hollow ones are not."
+LEAD = "Stroke: the spectrum follows your hand. Filled layers can be felt, hollow ones cannot."
 KEYS = (
     "1–9 or arrow keys: texture     F: full or simplified     Space: stop or play     "
     "M: masking noise     Esc: end"

@@ -152,7 +152,7 @@ class Psychometrics:
             if not isinstance(effects, Mapping):
                 raise InputError(
                     f"expected points by {', '.join(EFFECTS)} planted for {texture}, got "
-                    f"{shown(effects)}; name what they are planted in."
+                    f"{shown(effects)}; name what they apply to."
                 )
             planted[texture] = self._checked(texture, effects)
         object.__setattr__(self, "planted", planted)

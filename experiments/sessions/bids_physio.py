@@ -38,7 +38,7 @@ COLUMNS: dict[str, dict[str, Any]] = {
         "Units": "N",
     },
     "surface": {
-        "Description": "What was presented at the last reading",
+        "Description": "Surface presented at the last reading",
         "Levels": {
             str(SURFACES.index("none")): "nothing",
             str(SURFACES.index("real")): "the mounted real surface",

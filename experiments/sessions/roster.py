@@ -26,7 +26,7 @@ from modeling.files.writing import write_bytes
 
 # Easy to say and to hear apart in English and in Japanese: TAKI-46.
 _SYLLABLES = tuple(consonant + vowel for consonant in "KMNRST" for vowel in "AEIO")
-_ADVICE = "make room or choose another data folder"
+_ADVICE = "free disk space or choose another data folder"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -242,7 +242,8 @@ class Roster:
         if listed.damaged:
             raise InputError(
                 "expected a roster that can be read before somebody new gets a number and a slot, "
-                f"got {listed.damaged}, which may be another one's; restore the file from a copy."
+                f"got {listed.damaged}, which may belong to another person; restore "
+                "the file from a copy."
             )
 
     def _not_there(self, subject: int, listed: Listed) -> InputError:

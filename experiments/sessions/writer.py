@@ -19,7 +19,7 @@ class StoreError(OSError):
     """The disk did not take a file or a line; the message is one sentence for the user."""
 
 
-SAFE = "what was answered before is safe: make room, then go on with --resume"
+SAFE = "what was answered before is safe: free disk space, then continue with --resume"
 
 
 def store_error(error: OSError, path: Path, advice: str = SAFE) -> StoreError:

@@ -152,8 +152,7 @@ class ModelSets:
             allow(
                 "exchanged models",
                 "expected models to be made from those of a set that is named before theirs, got "
-                f"the {earlier} model of {texture}, made from the {later} one; exchange the two "
-                "sets.",
+                f"the {earlier} model of {texture}, made from the {later} one; swap the two sets.",
             )
 
     def _require_all(self, study: Study) -> None:

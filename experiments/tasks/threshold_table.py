@@ -195,12 +195,12 @@ def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bo
     """The table as a TSV with its source and caveat; `Threshold.load` reads it."""
     who = f"{counted(people, 'person', 'people')}{' (simulated)' if simulated else ''}"
     bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.note]
-    caveat = "felt with a pen held still; a hand that strokes feels less"
+    caveat = "measured with a pen held still; a stroking hand is less sensitive"
     if bounds:
         caveat += f"; at {', '.join(bounds)} only a bound (see note)"
     notes = (
         f"# source: tactileq threshold, {who}: two-interval forced choice (QUEST+) of bursts of "
-        f"{DURATION_S:g} s, 75 % right with lapses left out\n# caveat: {caveat}\n"
+        f"{DURATION_S:g} s, 75 % correct, lapses excluded\n# caveat: {caveat}\n"
     )
     return notes + table_text(COLUMNS, [_cells(one) for one in means])
 

@@ -174,7 +174,8 @@ def _check_same(now: Contents, before: Contents, target: Path) -> None:
     if changed:
         raise InputError(
             f"expected {target} as it was before the run, got {changed[0]}, which was added, "
-            "changed or removed meanwhile, so all of it stays; move one of the two folders away."
+            "changed or removed in the meantime, so all of it stays; move one of the "
+            "two folders away."
         )
 
 
@@ -249,5 +250,5 @@ def listed_file(folder: Path, name: str, *, index_name: str) -> Path:
             "lies outside; copy the file into the folder."
         )
     path = folder / name
-    check_file(path, "the file", advice=f"restore it, or take it out of {index_name}")
+    check_file(path, "the file", advice=f"restore it, or remove it from {index_name}")
     return path

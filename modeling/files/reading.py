@@ -12,7 +12,7 @@ LONGEST_PATH = 200
 _REASONS = {
     errno.ENOENT: "nothing there",
     errno.ENOTDIR: "nothing there",
-    errno.ELOOP: "a link that leads back to itself",
+    errno.ELOOP: "a link that points back to itself",
     errno.EACCES: "no permission",
     errno.EPERM: "no permission",
     errno.ENAMETOOLONG: "a name that is too long",
@@ -20,7 +20,7 @@ _REASONS = {
     errno.EEXIST: "a file in the way",
     errno.EFBIG: "a file that is larger than it may be",
     errno.ENOSPC: "a full disk",
-    errno.EROFS: "a disk that takes nothing",
+    errno.EROFS: "a full disk or one that refuses writes",
     errno.EIO: "a disk that fails",
 }
 

@@ -76,7 +76,7 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
         ) from None
     except MemoryError:
         raise InputError(
-            f"expected a WAV file that fits the memory, got {path}; cut it into parts."
+            f"expected a WAV file that fits into memory, got {path}; cut it into parts."
         ) from None
     # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
     if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:

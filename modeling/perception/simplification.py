@@ -251,7 +251,7 @@ def _decide_alone(
         where = f"{outside} of {counted(level.size, 'condition')}"
         return True, f"no threshold known in {where} ({threshold.name} covers {known})"
     if flip >= HIGHEST_FLIP_PROBABILITY:
-        return True, "below threshold, but the records are too short to be sure"
+        return True, "below threshold, but the records are too short to be certain"
     by = f"{margin_db:g} dB " if margin_db else ""
     return False, f"{by}below threshold in every condition"
 

@@ -72,7 +72,7 @@ def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
     nearest = _nearest_bound(searches, scene)
     advice = "raise the budget, or take fewer textures"
     if nearest is not None:
-        advice = f"the nearest bound that fits is {_told(nearest)}"
+        advice = f"the closest bound that fits is {_told(nearest)}"
     return (
         f"expected the scene {scene.name} within {' and '.join(asked)}, got one that takes "
         f"{operations:.1f} operations per sample and {_bytes(smallest)} bytes at least to keep its "

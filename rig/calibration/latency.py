@@ -210,7 +210,7 @@ def check_latency(summary: LatencySummary, *, accepted: str | None) -> None:
     if summary.p95_ms > MOST_MS and not accepted:
         raise InputError(
             f"expected a latency of at most {MOST_MS:g} ms in 95 % of trials, got "
-            f"{summary.p95_ms:.1f} ms, at which textures are felt to change; take smaller blocks, "
+            f"{summary.p95_ms:.1f} ms, at which textures feel different; use smaller blocks, "
             "or accept it with --accept and a reason, which is kept in the rig file."
         )
 

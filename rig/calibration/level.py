@@ -158,8 +158,8 @@ def level_of(gains: Sequence[float]) -> Level:
 
     if len(gains) < LEAST_PLACEMENTS:
         raise InputError(
-            f"expected at least {LEAST_PLACEMENTS} placements of the pen, got {len(gains)}; hold "
-            "it anew each time."
+            f"expected at least {LEAST_PLACEMENTS} placements of the pen, got "
+            f"{len(gains)}; pick it up again each time."
         )
     logs = np.log(gains)
     spread = float(logs.std(ddof=1))

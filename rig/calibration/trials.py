@@ -172,8 +172,8 @@ def stroke_latencies_s(seen: Watched, *, floor_g2: float) -> list[float | None]:
                 latencies.append(lag)
     if not latencies:
         raise InputError(
-            "expected a hand that strokes to and fro, got none; press, and stroke about 10 cm "
-            "wide, once a second."
+            "expected a hand that strokes back and forth, got none; press, and stroke "
+            "about 10 cm, once a second."
         )
     return latencies
 

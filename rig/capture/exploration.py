@@ -86,7 +86,7 @@ def explored(readings: Readings) -> Exploration:
     if seconds < LEAST_S:
         raise InputError(
             f"expected a hand that strokes the surface for {LEAST_S:g} s at least, got "
-            f"{seconds:.1f} s; stroke it as you would to find out what it is, and for longer."
+            f"{seconds:.1f} s; stroke it as if to find out what it is, and for longer."
         )
     # Devices report more often while the hand moves, so each reading counts by its time.
     even = np.searchsorted(np.cumsum(steps[moving]), np.arange(0.0, seconds, 0.005), side="right")

@@ -207,8 +207,8 @@ class PieceStore:
         if lost := sorted(path.name for path in self.folder.glob("[0-9]*.wav")):
             self.damaged.append(
                 f"expected {INDEX_NAME} beside {lost[0]} in {self.folder}, got none, so no "
-                "recording there counts; restore it from a copy, or what there are pieces of is "
-                "recorded again under new names."
+                "recording there counts; restore it from a copy, or what there are "
+                "pieces of is recorded again under new names."
             )
         with locked(self.folder / INDEX_NAME) as index:
             write_table(index, INDEX_COLUMNS, [])

@@ -51,7 +51,7 @@ _SCALES_IN_G = {
     "per count of 16 bits": 2.0**15,
     "per count of 24 bits": 2.0**23,
 }
-GO_ON = "or give --yes where it is meant (in Python take import_wav_file or import_csv_file)"
+GO_ON = "or give --yes if it is intended (in Python take import_wav_file or import_csv_file)"
 
 
 def doubts_about(
@@ -80,7 +80,7 @@ def _of_condition(speed_mm_s: float, force_n: float) -> str:
     if _is_condition(speed_mm_s, force_n):
         return ""
     others = {
-        "with the columns exchanged": (force_n, speed_mm_s),
+        "with the columns swapped": (force_n, speed_mm_s),
         "with the speed in m/s": (1000 * speed_mm_s, force_n),
         "with the force in mN": (speed_mm_s, force_n / 1000),
         "with m/s and mN": (1000 * speed_mm_s, force_n / 1000),
@@ -144,7 +144,7 @@ def _of_gravity(recording: Recording, unit: str) -> str:
     if unit != "g" or not is_constant or not GRAVITIES_M_S2.holds(constant_g):
         return ""
     return (
-        f"expected a constant part of at most {HIGHEST_GRAVITY_G:g} g, as gravity has, got "
+        f"expected a constant part of at most {HIGHEST_GRAVITY_G:g} g, as gravity gives, got "
         f"{constant_g:.3g} g with its numbers in g, or {constant_g * G_PER_UNIT['m/s2']:.3g} g "
         f"with them in m/s²; correct the unit in the header or --unit, {GO_ON}."
     )

@@ -128,7 +128,7 @@ class TimeColumn:
         return (
             f"{self.file}: expected a --rate that agrees with the time column, got {rate_hz:g} Hz "
             f"and by its column {shown(self.name)} {by_column}; leave --rate out, or give --yes "
-            "where the column is wrong."
+            "if the column is wrong."
         )
 
     def _rates_hz(self, step: float) -> dict[str, float]:

@@ -40,8 +40,8 @@ class SimulatedCard:
             self._child = Child("rig.simulated.process", settings)
         except ChildLost as lost:
             raise InputError(
-                f"expected the simulated vibrator to start, got: {lost}; look whether a JACK "
-                "server runs."
+                f"expected the simulated vibrator to start, got: {lost}; check that a "
+                "JACK server is running."
             ) from None
 
     def close(self) -> None:

@@ -31,7 +31,7 @@ LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63
 _POLL_S = 0.001
 _HALTED = (
-    f"expected the program to look after what plays at least every {HEARTBEAT_S:g} s, got a longer "
+    f"expected the program to poll the rig at least every {HEARTBEAT_S:g} s, got a longer "
     "time without; the vibration was stopped, and nothing is felt until something is presented "
     "again."
 )
@@ -342,7 +342,7 @@ class SoundOutput:
         if self._child is not None and not self._child.runs:
             self._lose("it has ended")
         elif self._child is not None and now_s() - self._last_block_s > STALLED_S:
-            self._lose(f"no block for {STALLED_S:g} s, so its server is gone or stands still")
+            self._lose(f"no block for {STALLED_S:g} s, so its server is gone or suspended")
         told, self._faults = tuple(self._faults), []
         return told
 

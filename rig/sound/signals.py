@@ -162,7 +162,7 @@ def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:
     if found != row["sha256"]:
         raise InputError(
             f"expected {path} with the SHA-256 {row['sha256'][:8]}… of its manifest, got "
-            f"{found[:8]}…; make the set anew."
+            f"{found[:8]}…; make the set again."
         )
     if row["unit"] != "g":
         raise InputError(

@@ -152,8 +152,8 @@ def _check_lasts(trajectory: Trajectory, recipe: Recipe) -> None:
     if round(trajectory.duration_s * slowest) < 1:
         raise InputError(
             f"expected a trajectory of at least one sample at {slowest} Hz, got "
-            f"{trajectory.duration_s:g} s in {shown(trajectory.name)}; see whether its times are "
-            "in seconds."
+            f"{trajectory.duration_s:g} s in {shown(trajectory.name)}; check that its "
+            "times are in seconds."
         )
 
 

@@ -124,7 +124,7 @@ def test_what_cannot_be_meant_is_refused_and_taken_where_it_is(main, tmp_path: P
     refused = main(*words, "--g-per-fullscale", 4)
     assert refused.returncode == 1
     assert "got 1.5 mm/s and 160 N, or 160 mm/s and 1.5 N with the columns" in refused.stderr
-    assert "--yes where it is meant" in refused.stderr
+    assert "--yes if it is intended" in refused.stderr
     assert refused.stderr.endswith(" (1 more like it).\n")
     assert not (tmp_path / "set").exists()
     taken = main(*words, "--g-per-fullscale", 4, "--yes")

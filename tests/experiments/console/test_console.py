@@ -341,7 +341,7 @@ def test_a_screen_that_is_not_there_is_refused(consoles: Driven) -> None:
         too_high, too_low, there = session.wait_for("result")
     for refusal, number in ((too_high, 2), (too_low, -1)):
         assert refusal == (
-            f"expected the number of a screen (0 to 1, of 2), got {number}; choose one that is "
-            "there, or connect another."
+            f"expected the number of a screen (0 to 1, of 2), got {number}; choose an existing "
+            "one, or connect another."
         )
     assert there == "open"

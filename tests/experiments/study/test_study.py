@@ -187,7 +187,7 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ("longest_gap_min = 30 ", "longest_gap_min = -1 ", "for longest_gap_min, got -1"),
         ("# [consent]\n# version", "[consent]\nwording", "got wording"),
         ("# [consent]\n# version = ", "[consent]\nversion = 3 #", "text for version in"),
-        ('name = "sex"', 'name = "Sex"', "a name of small letters"),
+        ('name = "sex"', 'name = "Sex"', "a name of lower-case letters"),
         ('name = "sex"', 'name = "code"', "another name than"),
         ('name = "sex"', 'name = "age"', "different questions"),
         ('name = "sex"', 'name = "mood"', "expected the question mood in en, ja"),
