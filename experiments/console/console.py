@@ -95,7 +95,7 @@ class Console:
         return intake_pages.welcome(self._runner, intake)
 
     def announce(self, page: str, **values: object) -> None:
-        """Show the page of this key until the participant goes on."""
+        """Show the page of this key until the participant continues."""
         intake_pages.message(self._runner, page, values=values)
 
     def wait(self, until: Callable[[], bool]) -> None:

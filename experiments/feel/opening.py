@@ -32,7 +32,7 @@ NO_SOUND = "no sound device: nothing is played"
 
 @contextmanager
 def desk(path: Path) -> Iterator[LiveRig]:
-    """The rig of a rig file, which nobody else uses meanwhile.
+    """The rig of a rig file, which no other program uses at the same time.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class SimulatedExperimenter:
         self.asked.append(tray)
 
     def call(self, told: str) -> None:
-        """What failed is mended at once."""
+        """What failed is repaired at once."""
         self.calls.append(told)
 
     def go_on(self) -> None:

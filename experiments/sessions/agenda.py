@@ -67,7 +67,7 @@ class Agenda:
 
     @property
     def trained(self) -> int:
-        """Training trials answered already, in the training that goes on."""
+        """Training trials answered already, in the training that continues."""
         if self.training_again:
             return 0
         return sum(row["phase"] == "training" and not row["repeats"] for row in self.rows)

@@ -96,8 +96,8 @@ def event_rows(
         The rows of the session's table of presentations, as text.
     """
     onsets = onsets_s(events)
-    # By start of the session too: a trial that broke off is presented again in a later one, whose
-    # rig has a clock of its own.
+    # By start of the session too: a trial that was interrupted is presented again in a later one,
+    # whose rig has a clock of its own.
     shown: dict[tuple[str, str], list[Mapping[str, str]]] = {}
     for row in presentations:
         shown.setdefault((row["run"], row["trial"]), []).append(row)

@@ -76,7 +76,7 @@ def people_files(
     roster : mapping of subject to mapping
         As `Roster.subjects` gives it.
     rows_kept : collection of str
-        Participants whose row stays as it stands there, since what it follows from is damaged.
+        Participants whose row stays as it is there, since what it follows from is damaged.
     kept : collection of str
         Participants whose sessions.tsv is left alone for that reason.
     """

@@ -97,7 +97,7 @@ class Roster:
         Parameters
         ----------
         subject : int, optional
-            ≥ 1; without it the lowest number that nobody has had.
+            ≥ 1; without it the lowest number that has not been used.
         participants : int
             How many slots the task's design has.
         simulated, pilot : bool
@@ -142,7 +142,7 @@ class Roster:
         Raises
         ------
         InputError
-            If nobody of that number takes part.
+            If nobody with that number takes part.
         StoreError
             If the disk does not take it.
         """
@@ -157,7 +157,7 @@ class Roster:
         Raises
         ------
         InputError
-            If nobody of that number was enrolled, or the data are deleted already, or the line
+            If nobody with that number was enrolled, or the data are deleted already, or the line
             that says so cannot be read.
         StoreError
             If the disk does not take it.

@@ -39,11 +39,11 @@ class Circumstances:
     language : str
         One of the study's; empty for its first.
     override : str, optional
-        Reason to go on where a rule is broken; stored.
+        Reason to continue where a rule is broken; stored.
     tell : callable, optional
         Called with each rule that is broken for that reason.
     resume : bool
-        Whether to go on with a session that was aborted or broke off.
+        Whether to continue with a session that was aborted or interrupted.
     sources : mapping of set of models to path
         Where the models came from.
 

@@ -294,7 +294,7 @@ class SessionStore:
         *,
         overrides: Overrides | None = None,
     ) -> SessionStore:
-        """Go on with a session that was aborted, or broke off.
+        """Continue with a session that was aborted or interrupted.
 
         Parameters
         ----------
@@ -392,7 +392,7 @@ class SessionStore:
         for piece in pieces:
             number += 1
             while (path := self.files.named(f"trial-{trial:03d}_pen-{number}.wav")).exists():
-                number += 1  # of a run that broke off in this trial
+                number += 1  # of a run that was interrupted in this trial
             try:
                 write_bytes(path, pen_file(piece))
             except OSError as error:

@@ -333,7 +333,7 @@ class Respondent(Protocol):
         ...
 
     def announce(self, page: str, **values: object) -> None:
-        """Show a text, by its key, until the participant goes on."""
+        """Show a text, by its key, until the participant continues."""
         ...
 
     def wait(self, until: Callable[[], bool]) -> None:

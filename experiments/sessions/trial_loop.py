@@ -132,7 +132,7 @@ def _ending_of(error: BaseException) -> tuple[str, str, str]:
 
 
 class _Running:
-    """A session that goes on: what takes part in it, and how far it has come."""
+    """A session that continues: what takes part in it, and how far it has come."""
 
     def __init__(
         self,

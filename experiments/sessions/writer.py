@@ -133,7 +133,7 @@ class LogWriter:
                 )
                 lines = [line_of(event) for event in numbered]
                 safe = self._append(lines)
-        except Exception as error:  # whatever it is: who waits must not wait for ever
+        except Exception as error:  # whatever it is: who waits must not wait indefinitely
             self._error = self._error or StoreError(
                 f"expected to write to {self._path}, got {error!r}; report this as an error."
             )

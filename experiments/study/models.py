@@ -20,12 +20,12 @@ from rig.interface import Presentable, Stimulus
 from rig.sound.signals import MANIFEST as STIMULI
 from rig.sound.signals import stimuli_of_surfaces
 
-# What may go on where a reason is given: a word for what, and the sentence that refuses it.
+# What may continue where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
 
 
 def refuse(what: str, sentence: str) -> NoReturn:
-    """Go on with nothing."""
+    """Continue with nothing."""
     raise InputError(sentence)
 
 

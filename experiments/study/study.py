@@ -66,7 +66,7 @@ class Study:
     plan : Plan
         Claims and exclusions.
     longest_gap_min : float
-        A session that goes on after a longer gap begins with training again, minutes.
+        A session that continues after a longer gap begins with training again, minutes.
     masking : str
         How the sound of the device was masked.
     surface_visible : str

@@ -74,7 +74,7 @@ def _positions(occasion: Occasion, order: Order) -> dict[tuple[str, str], list[i
     rng, place = occasion.block(BUTTONS, f"odd position, {occasion.phase}")
     positions, begun = {}, 0
     for pair in fisher_yates(pairs, rng):
-        # Each pair goes on where the one before stopped, so that all buttons come in turn.
+        # Each pair continues where the one before stopped, so that all buttons come in turn.
         turns = [(begun + n + place) % BUTTONS + 1 for n in range(counts[pair])]
         begun += counts[pair]
         positions[pair] = fisher_yates(turns, occasion.rng)

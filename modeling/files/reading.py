@@ -28,7 +28,7 @@ _REASONS = {
 def check_file(path: Path, what: str, *, advice: str = "give its path") -> None:
     """Refuse anything but a regular file, or a link to one, before it is opened.
 
-    A pipe would wait for its other end for ever, and a device may never end.
+    A pipe would wait for its other end indefinitely, and a device may never end.
 
     Parameters
     ----------

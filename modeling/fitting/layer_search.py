@@ -175,7 +175,7 @@ class _Pool:
 def _grow(pool: _Pool) -> None:
     """Independent layers, one by one, along laws over the grid; each number of them with signs.
 
-    Where coherent layers cancel or add up, independent ones go on growing for ever; it ends
+    Where coherent layers cancel or add up, independent ones go on growing indefinitely; it ends
     when two more have not made the coherent solution any better.
     """
     grid = pool.grid

@@ -140,7 +140,7 @@ def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> d
 
 
 def missing_conditions(model: TextureModel) -> list[Condition]:
-    """(speed, force) of the conditions that were interpolated for want of a recording."""
+    """(speed, force) of the conditions that were interpolated because there is no recording."""
     return [
         (float(model.speeds_mm_s[i]), float(model.forces_n[j]))
         for i, j in np.argwhere(model.interpolated)

@@ -318,7 +318,7 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
 }
 
 /* Speeds, forces and their changes below a billionth of the grid's lowest count as 0: what dies away
-   exponentially would stay among the subnormal numbers for ever, which some processors compute at a
+   exponentially would stay among the subnormal numbers indefinitely, which some processors compute at a
    fraction of their speed. */
 TQ_INLINE tq_real tq_settled(tq_real x, tq_real lowest)
 {
@@ -553,7 +553,7 @@ static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *lowpa
     return wide + half;
 }
 
-/* Eq. 7: out - share * band-pass(out). What is not finite would stay in the state for ever and counts
+/* Eq. 7: out - share * band-pass(out). What is not finite would stay in the state indefinitely and counts
    as silence; what has died away is not left to ring among the smallest numbers. */
 static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int count)
 {

@@ -12,14 +12,14 @@
    starts, fading in as long. So the new voice's first sample is at most one block and one fade late.
    Whatever is wanted meanwhile counts as soon as it is noticed: the voice that fades out rises again
    when it is wanted again, a voice that fades in falls again when it is not. After a stop the output is
-   exactly 0 and costs a memset. A voice that is wanted again without being prepared again goes on where
+   exactly 0 and costs a memset. A voice that is wanted again without being prepared again continues where
    it stopped.
 
    A hand is held for a block. Output depends on the blocks by nothing else: with equal hands, and
    changes between blocks at equal samples, it has equal bits. A voice between its fades is what
    tq_render or tq_lattice_render_held makes, rounded to single precision.
 
-   Every sample is rendered by one voice at most. So the dearest block costs what rendering needs for
+   Every sample is rendered by one voice at most. So the most expensive block costs what rendering needs for
    it and, where a voice begins, up to 64 squarings more. Stack: 4 TQ_CHUNK reals.
 
    All voices of a player must have the same rate, peak, mean_square, mean_share, longest, pause and

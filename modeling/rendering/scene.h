@@ -6,7 +6,7 @@
    out as if the hand had lifted off: every gain is at 0 after 5 ms or one parameter update, whichever is
    longer. Then the next texture starts, in silence for one parameter update, and its gains rise from 0
    to those of the hand, the largest of them in 5 ms again. So it is heard after 6 ms with updates every
-   millisecond. In between nobody plays: a state renders one texture at a time, and the dearest sample
+   millisecond. In between nobody plays: a state renders one texture at a time, and the most expensive sample
    costs what tq_start and tq_render need for it.
 
    All textures of a scene must have the same rate, compensation and limits. What the limits remember and

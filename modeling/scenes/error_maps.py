@@ -4,7 +4,7 @@ docs/method/scenes.md#errors
 
 Errors do not depend on the scene, but only on the model and the actuator's band: a scene chooses
 the places that count and how large an error may be there. That is why a narrower scene never needs
-a dearer model.
+a more expensive model.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ A scene is a TOML file; its paths are relative to it, and unknown keys are refus
     [hand]                         # one of three: a range,
     speed_mm_s = [50, 150]         #   speeds; each place of a range may be where the hand stays
     force_n = [0.5, 1.0]           #   forces; "recorded": all at which a texture was recorded
-    stroke_hz = 2.0                #   how often a second the hand goes to and fro (2)
+    stroke_hz = 2.0                #   how often a second the hand goes back and forth (2)
     file = "hand.csv"              # a recorded hand: time_s, speed_mm_s, force_n,
     [[hand.place]]                 # or a distribution: places with their shares of the time
     speed_mm_s = 100
@@ -100,7 +100,7 @@ class HandRange:
     speed_mm_s, force_n : (float, float) or "recorded"
         Lowest and highest, 0 < lowest ≤ highest; or all at which a texture was recorded.
     stroke_hz : float
-        How often a second it goes to and fro, up to the highest speed, and presses up and down
+        How often a second it goes back and forth, up to the highest speed, and presses up and down
         through all forces: what a parameter update comes too late for. 0 … 20.
     """
 

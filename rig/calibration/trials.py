@@ -59,7 +59,7 @@ def probe_texture(rms_g: float) -> TextureModel:
 
 
 def write_steps(path: Path, trials: int, *, seed: int) -> float:
-    """A table for a scripted hand: a fifth more steps than so many, to and fro.
+    """A table for a scripted hand: a fifth more steps than so many, back and forth.
 
     Returns
     -------

@@ -23,7 +23,7 @@ from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, READING, SIMULATED
 SHORTEST_S = 0.1
 # Half of what spectra are high-passed at, so that the filter changes nothing that is modelled.
 HIGH_PASS_HZ = 5.0
-# Between readings further apart nobody knows what the hand did.
+# Between readings further apart the hand's motion is unknown.
 LONGEST_GAP_S = 0.05
 # Of the full scale: the highest step of 16 bits, and converters that stop short of it.
 CLIPPED_FROM = 0.999

@@ -236,7 +236,7 @@ class _Timeline:
 
 
 def _end_stream(stream: Any) -> None:
-    """Stop and close a stream; one whose server has died would hang for ever, and is left."""
+    """Stop and close a stream; one whose server has died would hang indefinitely, and is left."""
 
     def end() -> None:
         stream.abort(ignore_errors=True)

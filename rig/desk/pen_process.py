@@ -1,7 +1,8 @@
 """The process that follows an accelerometer at the pen, and keeps what is asked for.
 
 Its settings are the argument, as JSON; it answers each line by one, and ends with its input. It is
-a process of its own since PortAudio may end, or stop for ever, a process whose sound server dies.
+a process of its own since PortAudio may end, or stop indefinitely, a process whose sound server
+dies.
 """
 
 from __future__ import annotations

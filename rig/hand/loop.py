@@ -24,7 +24,7 @@ Tell = Callable[[dict[str, Any]], None]
 
 
 class HandLoop:
-    """Passes a device's samples on as readings, and goes on where the device is lost.
+    """Passes a device's samples on as readings, and continues where the device is lost.
 
     Parameters
     ----------

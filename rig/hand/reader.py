@@ -111,7 +111,7 @@ class HandReader:
 
         Of a serial sensor: lines, bad (damaged), missing, late (of the lines, those that were
         dropped because they were read more than 0.1 s after they were measured). Of a tablet or
-        mouse: frames, dropped (by the kernel). They begin anew where the device was opened again.
+        mouse: frames, dropped (by the kernel). They restart where the device was opened again.
         """
         with self._lock:
             return dict(self._counts)

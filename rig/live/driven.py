@@ -13,7 +13,7 @@ def settings_from_parent() -> dict[str, Any]:
     """What the parent said when it started this process; Ctrl-C and Ctrl-Z are the parent's."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform != "win32":
-        # A stopped process cannot fade; a card may repeat for ever what it got last.
+        # A stopped process cannot fade; a card may repeat indefinitely what it got last.
         signal.signal(signal.SIGTSTP, signal.SIG_IGN)
     settings: dict[str, Any] = json.loads(sys.argv[1])
     return settings
