@@ -1,4 +1,4 @@
-"""What a rig consists of, and what is missing before a study could run on it.
+"""The parts of a rig, and what is missing for a study.
 
 Nothing is played or moved to find that out.
 """
@@ -40,7 +40,7 @@ _WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault,
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One item that was checked.
 
     Parameters
     ----------

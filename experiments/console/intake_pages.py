@@ -55,7 +55,7 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
 
 
 def message(runner: PageRunner, page: str, *, values: dict[str, object]) -> None:
-    """A title, a text, and a button to go on."""
+    """A title, a text, and a button to continue."""
     of = runner.texts.of
     label = runner.texts.by_key.get(f"{page}.continue")
     proceed = runner.proceed(label, y=-0.24)

@@ -1,4 +1,4 @@
-"""What is on the screen at one time, and who of it hears the mouse and the keys."""
+"""What is on the screen at one time, and which widget receives the mouse and the keys."""
 
 from __future__ import annotations
 

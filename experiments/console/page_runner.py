@@ -1,4 +1,4 @@
-"""Shows one page after another, lets the participant stop on each, and minds every event."""
+"""Shows one page after another, lets the participant stop on each, and handles every event."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether a machine is quick enough for a session: its screen, its rig and its disk.
+"""Whether a machine is fast enough for a session: its screen, its rig and its disk.
 
 docs/method/protocols.md#self-test
 """

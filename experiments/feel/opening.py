@@ -1,4 +1,4 @@
-"""Opens what a visitor feels with: the rig of a rig file, or what any computer has."""
+"""Opens the rig for a visitor: that of a rig file, or the devices of any computer."""
 
 from __future__ import annotations
 

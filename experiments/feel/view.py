@@ -73,7 +73,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Yardstick:
-    """By what is judged whether a layer is felt, as in `modeling.simplify`."""
+    """The criterion for whether a layer is felt, as in `modeling.simplify`."""
 
     threshold: Threshold
     criterion: CriterionName = "energy"

@@ -1,4 +1,4 @@
-"""What a visitor has chosen, and what the rig is asked for when that changes."""
+"""A visitor's choice, and the requests to the rig when it changes."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Visit:
         self.rig.silence()
 
     def stop_or_play(self) -> None:
-        """Stop, or go on after a stop."""
+        """Stop, or continue after a stop."""
         if self.playing:
             self.stop()
         else:

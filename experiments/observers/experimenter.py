@@ -6,7 +6,7 @@ from experiments.sessions.surfaces import Standing
 
 
 class SimulatedExperimenter:
-    """Mounts every sample and mends every rig at once.
+    """Mounts every sample and repairs every rig at once.
 
     Attributes
     ----------

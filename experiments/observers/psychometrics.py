@@ -39,7 +39,7 @@ class Trait:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The least and the most that anybody has."""
+        """The lowest and the highest possible value."""
         return self.mean - FURTHEST_SD * self.sd, self.mean + FURTHEST_SD * self.sd
 
 

@@ -1,4 +1,4 @@
-"""What is to be done in a session: all of it, or what an earlier run left."""
+"""What remains to be done in a session: all of it, or what an earlier run left."""
 
 from __future__ import annotations
 

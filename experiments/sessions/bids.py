@@ -82,7 +82,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
 
 
 def export_all(data_folder: str | Path) -> Exported:
-    """Write what BIDS shows of every session that nobody is running, where it is not so already.
+    """Write the BIDS tables of every session that is not running, where they differ.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Who took part, in which sessions: the tables of a data set about people.
+"""The tables of a data set about people: who took part, in which sessions.
 
 docs/method/protocols.md#bids
 """
@@ -76,7 +76,7 @@ def people_files(
     roster : mapping of subject to mapping
         As `Roster.subjects` gives it.
     rows_kept : collection of str
-        Participants whose row stays as it is there, since what it follows from is damaged.
+        Participants whose row stays as it is there, since its source is damaged.
     kept : collection of str
         Participants whose sessions.tsv is left alone for that reason.
     """

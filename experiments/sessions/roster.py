@@ -173,7 +173,7 @@ class Roster:
             write_bytes(self.path, b"".join(lines))
 
     def subjects(self) -> dict[int, dict[str, Any]]:
-        """Everybody who was ever enrolled, by number, as far as it can be read.
+        """Everybody who was ever enrolled, by number, as far as the roster can be read.
 
         Returns
         -------
@@ -255,7 +255,7 @@ class Roster:
         )
 
     def _cut_half_line(self) -> None:
-        """Take away what a process left that was killed before it had enrolled anybody."""
+        """Remove what a process left that was killed before it had enrolled anybody."""
         there = self.path.read_bytes() if self.path.exists() else b""
         whole = there.rfind(b"\n") + 1
         if whole < len(there):

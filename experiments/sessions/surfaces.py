@@ -40,7 +40,8 @@ class SessionAborted(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Rating:
-    """The answer to a trial with two scales: similarities, 0 (nothing alike) … 100 (identical).
+    """The answer to a trial with two scales: similarities, 0 (completely different) … 100
+    (identical).
 
     Raises
     ------
@@ -260,7 +261,7 @@ class Surfaces:
 
 
 class RatedTrial(Protocol):
-    """A trial whose answer is how alike a real and a virtual surface are."""
+    """A trial whose answer is the similarity of a real and a virtual surface."""
 
     @property
     def trial(self) -> int: ...
@@ -359,7 +360,7 @@ class Respondent(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """How far a session is, as an experimenter sees it.
+    """The progress of a session, as an experimenter sees it.
 
     Parameters
     ----------
@@ -399,7 +400,7 @@ class Experimenter(Protocol):
         ...
 
     def tell(self, standing: Standing) -> None:
-        """Show how far the session is, and how the rig is."""
+        """Show the progress of the session and the state of the rig."""
         ...
 
     def page(self, name: str) -> None:
@@ -407,5 +408,5 @@ class Experimenter(Protocol):
         ...
 
     def answered(self) -> None:
-        """Show that an answer came; never which one."""
+        """Show that an answer was given, but not which one."""
         ...

@@ -1,4 +1,4 @@
-"""The rows of a session's traces, line by line: one that is damaged costs itself, and is named."""
+"""The rows of a session's traces, line by line; a damaged line is named and skipped."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Deleting what there is of a person, and noting who will not come again.
+"""Deleting all data of a person, and recording dropouts.
 
 docs/method/protocols.md#withdrawing
 """
@@ -18,7 +18,7 @@ from modeling.files.writing import write_bytes
 
 
 def withdraw(data_folder: str | Path, subject: int) -> Exported:
-    """Delete all files of a person; the number is never given again, the slot becomes free.
+    """Delete all files of a person; the number is never reused, the slot becomes free.
 
     Begun again after a failure, it continues where it stopped.
 
@@ -61,7 +61,7 @@ def withdraw(data_folder: str | Path, subject: int) -> Exported:
 
 
 def drop_out(data_folder: str | Path, subject: int) -> Exported:
-    """Note that a person will not come again: the data stay, the slot becomes free.
+    """Record that a person dropped out: the data stay, the slot becomes free.
 
     Parameters
     ----------

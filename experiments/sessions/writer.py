@@ -1,4 +1,4 @@
-"""The thread that writes a session's log, so that nobody who draws waits for a disk."""
+"""The thread that writes a session's log, so that drawing never waits for a disk."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from modeling.files.reading import reason_of
 
 
 class StoreError(OSError):
-    """The disk did not take a file or a line; the message is one sentence for the user."""
+    """The disk did not store a file or a line; the message is one sentence for the user."""
 
 
 SAFE = "what was answered before is safe: free disk space, then continue with --resume"

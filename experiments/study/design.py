@@ -1,4 +1,5 @@
-"""The order of the trials: who does what, when (docs/method/protocols.md#order, PAPER VII).
+"""The order of the trials: which conditions, in which order (docs/method/protocols.md#order, PAPER
+VII).
 
 What is balanced over participants follows from the *slot*, a place 1 … participants in the plan of
 a task, which the replacement of a dropout takes over; all shuffles follow from the subject.

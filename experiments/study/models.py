@@ -25,7 +25,7 @@ Allow = Callable[[str, str], None]
 
 
 def refuse(what: str, sentence: str) -> NoReturn:
-    """Continue with nothing."""
+    """Allow no override."""
     raise InputError(sentence)
 
 

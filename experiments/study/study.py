@@ -230,7 +230,7 @@ class Study:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of its values, by which files name the study that they rest on."""
+        """SHA-256 of its values, by which files name the study that they are based on."""
         return sha256_of_values(self.to_dict())
 
     @staticmethod

@@ -1,4 +1,4 @@
-"""The one way in which files are read: whole, and only what is a file with contents of its own."""
+"""The only way in which files are read: as a whole, and only regular files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Forcing files and their names to disk, so that a loss of power leaves them there."""
+"""Forcing files and their names to disk, so that they survive a loss of power."""
 
 from __future__ import annotations
 

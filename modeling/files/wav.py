@@ -1,4 +1,4 @@
-"""WAV files of one axis or several, and what their full scale stands for."""
+"""WAV files of one axis or several, and the meaning of their full scale."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class ParameterTable:
 
 
 def wide_enough(axis: Floats, values: Floats, *, along: int) -> tuple[Floats, Floats]:
-    """An axis of two nodes where there is only one: nothing is known of others, so it is repeated.
+    """An axis of two nodes from a single one, which is repeated, since others are unknown.
 
     Parameters
     ----------

@@ -257,7 +257,7 @@ def _decide_alone(
 
 
 def _keep_together(decided: list[tuple[bool, str]], fills: Integers) -> None:
-    """A layer that fills another's shape stays as long as that one, and holds it."""
+    """A layer that fills another's shape is kept as long as that one, and keeps it."""
     for layer, peak in enumerate(fills.tolist()):
         if peak < 0:
             continue

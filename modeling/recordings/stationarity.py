@@ -1,4 +1,4 @@
-"""Whether a record is of one speed and one level: drift within it, found, reported and corrected.
+"""Stationarity of a record in speed and level: drift is found, reported and corrected.
 
 A turntable that slows down moves all spatial frequencies together. The record is then played at a
 changing rate, so that they stay constant (order tracking), and belongs to its middle. A level that

@@ -86,7 +86,7 @@ class Alternative:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CompiledTexture:
-    """The least model of one texture.
+    """The compiled model of one texture: the cheapest one that keeps the bound.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class CompiledTexture:
 
 @dataclass(frozen=True, eq=False)
 class CompiledScene:
-    """The least models of all textures of a scene."""
+    """The compiled models of all textures of a scene."""
 
     scene: Scene
     textures: tuple[CompiledTexture, ...]

@@ -1,4 +1,4 @@
-"""The least model that keeps a scene's bound (docs/method/scenes.md).
+"""The cheapest model that keeps a scene's bound (docs/method/scenes.md).
 
 Cheapest is what takes the fewest counted operations per sample; of equals the fewest bytes; of
 those the fewest stored numbers. What is searched: which of the layers that are not felt are
@@ -26,7 +26,7 @@ def compile_scene(
     *,
     progress: Callable[[str], None] = lambda texture: None,
 ) -> CompiledScene:
-    """The least model of every texture of a scene.
+    """The cheapest model of every texture of a scene that keeps the bound.
 
     Parameters
     ----------

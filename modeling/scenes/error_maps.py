@@ -1,4 +1,4 @@
-"""What each thing that the compiler may do costs in likeness, place by place.
+"""The error of each of the compiler's simplifications, place by place.
 
 docs/method/scenes.md#errors
 

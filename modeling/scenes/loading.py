@@ -46,7 +46,7 @@ def scene_models(
     *,
     progress: Callable[[float, str], None] = lambda share, texture: None,
 ) -> dict[str, Layered]:
-    """The least models of a scene by the name of their texture.
+    """The compiled models of a scene by the name of their texture.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How far one response is from another in what a scene bounds: GFC30, bands, level.
+"""Distance of one response from another by a scene's measures: GFC30, bands, level.
 
 The GFC of two spectra is the cosine of the angle between them. Angles, the RMS of band errors in dB
 and the error of the level all obey the triangle inequality, so that errors of different origin add

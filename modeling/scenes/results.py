@@ -83,7 +83,7 @@ def _of_full(search: Search, candidate: Candidate) -> Errors:
 
 
 def _steps(search: Search, candidate: Candidate) -> tuple[Step, ...]:
-    """What each step brings, in the order of the compiler."""
+    """The effect of each step, in the order of the compiler."""
     felt = with_signs_chosen_again(search.full, list(candidate.layers))
     shorter = cut(felt, search.places)
     usual = search.usual_plan

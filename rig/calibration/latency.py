@@ -1,4 +1,4 @@
-"""From the hand to the vibration: onsets, lags, and what many trials say.
+"""Latency from hand to vibration: onsets, lags, and statistics over trials.
 
 docs/method/rig.md#latency
 """
@@ -201,7 +201,7 @@ def summary_of(
 
 
 def check_latency(summary: LatencySummary, *, accepted: str | None) -> None:
-    """Refuse a 95th percentile above 40 ms, unless somebody accepts it and says why.
+    """Refuse a 95th percentile above 40 ms, unless it is accepted with a reason.
 
     Raises
     ------
@@ -225,7 +225,7 @@ class Part:
 
 
 def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) -> list[Part]:
-    """What the log of blocks says of latency.
+    """Latency according to the log of blocks.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How strong a vibration reaches the held pen, beside what was asked for.
+"""The level of a vibration at the held pen, relative to the requested one.
 
 docs/method/rig.md#level
 """
@@ -126,7 +126,7 @@ def _check(
 
 @dataclass(frozen=True)
 class Level:
-    """Gain over several placements of the pen, each held anew.
+    """Gain over several placements of the pen, which is picked up again each time.
 
     Parameters
     ----------

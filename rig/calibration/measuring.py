@@ -1,4 +1,4 @@
-"""Plays on the vibrator and records the accelerometer; what comes out is in g, with its time."""
+"""Plays on the vibrator and records the accelerometer, in g, with times."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Accelerometer:
         self._source = source
 
     def forget(self) -> None:
-        """What was recorded until now is not wanted."""
+        """Discard what was recorded until now."""
         self._source.read()
 
     def take(self) -> Record:

@@ -1,4 +1,4 @@
-"""The measurements of a calibration: each plays, records, and says what it found.
+"""The measurements of a calibration: each plays, records, and reports its result.
 
 Each figure says how it was measured; on a simulated rig it says so, too.
 """
@@ -43,7 +43,7 @@ def check_softly(
     rms_g: float,
     band_hz: tuple[float, float],
 ) -> None:
-    """A tenth of the level first: what is not yet calibrated may be many times too loud.
+    """Play a tenth of the level first: an uncalibrated rig may be many times too loud.
 
     Raises
     ------

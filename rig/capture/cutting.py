@@ -244,7 +244,7 @@ class _Run:
 
 
 class _HighPass:
-    """Takes gravity and the swinging of the arm out of a stream, before it is cut."""
+    """Removes gravity and the swinging of the arm from a stream, before it is cut."""
 
     def __init__(self, rate_hz: float) -> None:
         from scipy.signal import butter, sosfilt_zi

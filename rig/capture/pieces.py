@@ -1,4 +1,4 @@
-"""Pieces of strokes on the disk, and the recordings that they fill: nothing kept is lost.
+"""Pieces of strokes on the disk, and the recordings made from them; no stored piece is lost.
 
 docs/method/strokes.md#files
 """
@@ -95,7 +95,7 @@ class _Kept:
 
 
 class PieceStore:
-    """A folder of recordings that fills as one strokes; opened again, it goes on.
+    """A folder of recordings that is filled by strokes; opened again, it continues.
 
     Each piece is a file of its own as soon as it is cut. Once the pieces of a condition suffice,
     they are joined into its recording, so that the folder is a recording set at any time.

@@ -185,7 +185,7 @@ class StrokeRecorder:
         return self._trace.outside_share
 
     def warnings(self) -> list[str]:
-        """One sentence for everything that makes the recording slow or worse than it could be."""
+        """One warning for everything that slows the recording down or impairs it."""
         sentences = list(self.store.damaged)
         if self.lost:
             sentences.append(
@@ -359,5 +359,5 @@ def mains_in(samples: Floats, rate_hz: float) -> float:
 
 
 def _rms(samples: Floats) -> float:
-    """About the mean, since gravity is no vibration."""
+    """About the mean, since gravity is not a vibration."""
     return float(np.std(samples))

@@ -1,4 +1,4 @@
-"""Opens whatever measures the hand, as the settings say."""
+"""Opens the device that measures the hand, according to the settings."""
 
 from __future__ import annotations
 

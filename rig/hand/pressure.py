@@ -1,4 +1,4 @@
-"""Newtons from a pen's pressure, by weights laid on (docs/method/hand.md#pressure)."""
+"""Newtons from a pen's pressure, by calibration weights (docs/method/hand.md#pressure)."""
 
 from __future__ import annotations
 

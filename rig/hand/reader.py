@@ -145,7 +145,7 @@ class HandReader:
         self._window.pointer.push(x, y, down=down, button=button)
 
     def unplug(self, unplugged: bool = True) -> None:
-        """Have the process act as if the device's plug were pulled, or put back; for tests."""
+        """Have the process act as if the device were unplugged, or plugged in again; for tests."""
         with self._lock:
             process = self._process
         if process is not None and process.stdin is not None:

@@ -1,4 +1,4 @@
-"""What a device that measures the hand gives, whichever it is."""
+"""The interface of devices that measure the hand."""
 
 from __future__ import annotations
 

@@ -148,7 +148,7 @@ def import_csv(
 
 
 def _meant(one: Imported) -> Recording:
-    """The recording; refused where something of it cannot be meant."""
+    """The recording; refused where something about it is implausible."""
     if one.doubts:
         raise InputError(one.doubts[0])
     return one.recording
@@ -258,7 +258,7 @@ def _even(
     *,
     given_hz: float | None,
 ) -> tuple[float, Floats, Sequence[str], Sequence[str]]:
-    """Rate and evenly spaced samples; what is to be said of that; what contradicts the rate.
+    """Rate and evenly spaced samples; warnings about them; contradictions to the rate.
 
     A rate that is given says that the samples are even, whatever their times.
     """

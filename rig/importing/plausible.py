@@ -1,4 +1,4 @@
-"""Recordings whose labels, unit or scale cannot be meant, and what else they may mean.
+"""Recordings with implausible labels, unit or scale, and what else these may mean.
 
 docs/method/recordings.md#implausible-imports
 """
@@ -15,7 +15,7 @@ from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 
 
 class Range(NamedTuple):
-    """What is taken without asking, both ends included."""
+    """A plausible range, both ends included."""
 
     lowest: float
     highest: float
@@ -57,7 +57,7 @@ GO_ON = "or give --yes if it is intended (in Python take import_wav_file or impo
 def doubts_about(
     recording: Recording, name: str, *, unit: str = "g", g_per_fullscale: float | None = None
 ) -> tuple[str, ...]:
-    """What of a recording cannot be meant, a sentence each, with what else it may mean.
+    """What is implausible about a recording, one sentence each, with what else it may mean.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from typing import Any
 
 
 def settings_from_parent() -> dict[str, Any]:
-    """What the parent said when it started this process; Ctrl-C and Ctrl-Z are the parent's."""
+    """What the parent said when it started this process; the parent handles Ctrl-C and Ctrl-Z."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform != "win32":
         # A stopped process cannot fade; a card may repeat indefinitely what it got last.

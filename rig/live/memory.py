@@ -79,7 +79,7 @@ def compiled() -> Any:
 
 
 def now_s() -> float:
-    """Seconds on the one clock of all processes of a rig (monotonic; its zero means nothing)."""
+    """Seconds on the one clock of all processes of a rig (monotonic, with an arbitrary zero)."""
     return float(compiled().lib.tq_now())
 
 
@@ -139,7 +139,7 @@ class Live:
         return live
 
     def close(self) -> None:
-        """Give the memory back; nothing of it may be used afterwards."""
+        """Release the memory, which must not be used afterwards."""
         if self._memory is None:
             return
         self.address = None

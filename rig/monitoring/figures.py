@@ -1,4 +1,4 @@
-"""What the shared memory says of a running rig, as figures that can be shown."""
+"""Figures of a running rig from its shared memory."""
 
 from __future__ import annotations
 

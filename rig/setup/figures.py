@@ -1,4 +1,4 @@
-"""What a rig file says of a quantity: its value with unit, and whether it was measured."""
+"""A quantity in a rig file: its value with unit, and whether it was measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Starts the simulated vibrator as a process of its own, and ends it."""
+"""Starts the simulated vibrator as a separate process, and ends it."""
 
 from __future__ import annotations
 

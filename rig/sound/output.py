@@ -1,4 +1,4 @@
-"""What a session plays through: textures under the hand, prepared signals, masking noise.
+"""The output of a session: textures under the hand, prepared signals, masking noise.
 
 docs/method/live.md#output
 """
@@ -43,7 +43,7 @@ class SoundLost(OSError):
 
 @dataclass(frozen=True, kw_only=True)
 class Presented:
-    """What began to play: its number in the log of blocks, and when its first sample left."""
+    """A presentation that began: its number in the log of blocks, the time of its first sample."""
 
     presentation: int
     time_s: float
