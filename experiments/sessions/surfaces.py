@@ -40,8 +40,7 @@ class SessionAborted(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Rating:
-    """The answer to a trial with two scales: similarities, 0 (completely different) … 100
-    (identical).
+    """The answer to a trial with two scales: similarity, 0 (different) … 100 (identical).
 
     Raises
     ------

@@ -1,7 +1,6 @@
-"""The order of the trials: which conditions, in which order (docs/method/protocols.md#order, PAPER
-VII).
+"""The order of the trials and conditions (docs/method/protocols.md#order, PAPER VII).
 
-What is balanced over participants follows from the *slot*, a place 1 … participants in the plan of
+Balancing over participants is based on the *slot*, a place 1 … participants in the plan of
 a task, which the replacement of a dropout takes over; all shuffles follow from the subject.
 """
 

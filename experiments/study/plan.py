@@ -28,8 +28,7 @@ LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
 
 
 def measures_of(task: str) -> tuple[str, ...]:
-    """The measures that claims about a task can use: its scales, and the proportion of correct
-    answers.
+    """Measures that claims about a task can use: its scales, the proportion of correct answers.
 
     Anything of a task that does not exist; `Plan.check` names it.
     """

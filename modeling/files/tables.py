@@ -17,7 +17,7 @@ _FORMULA = re.compile(r"'*[=+@]")
 
 
 def guarded(cell: str) -> str:
-    """A cell of text that spreadsheets do not read as a formula: with ' before a leading =, + or @."""
+    """A cell that spreadsheets do not read as a formula: with ' before a leading =, + or @."""
     return f"'{cell}" if _FORMULA.match(cell) else cell
 
 
