@@ -139,10 +139,10 @@ def _tell(margins: pd.DataFrame) -> None:
     """How far each default is from the nearest edge."""
     for row in margins.to_dict("records"):
         most = "at least " if row["at_least"] else ""
-        near = "" if row["enough"] else f" ({row['exception'] or 'no reason is known'})"
+        near = "" if row["enough"] else f" ({row['exception'] or 'reason unknown'})"
         unit = f" {row['unit']}" if row["unit"] else ""
         print(
             f"{row['family']}: {row['method']}, {row['measured']}: {row['verdict']} at "
             f"{row['default']:.5g}{unit} ({row['axis']}), nearest edge {most}{row['margin']:.3g} × "
-            f"as far{near}"
+            f"more severe{near}"
         )
