@@ -196,7 +196,7 @@ class SimulatedRig:
         Raises
         ------
         InputError
-            Where truths were given, but none for this texture.
+            If truths were given, but none for this texture.
         """
         if self._real and texture not in self._real:
             raise InputError(

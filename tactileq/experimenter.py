@@ -87,7 +87,7 @@ class Terminal:
         Raises
         ------
         SessionAborted
-            Where the experimenter stops the session, or the terminal is closed.
+            If the experimenter stops the session, or the terminal is closed.
         """
         if not (self._asked or self._stopping):
             return True

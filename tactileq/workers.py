@@ -36,7 +36,7 @@ def working(
     Raises
     ------
     ValueError
-        Where Dask is not installed, or nobody answers at its address.
+        If Dask is not installed, or nobody answers at its address.
     """
     if dask is None and (len(items) < 2 or jobs == 1):
         yield enumerate(map(work, items))

@@ -101,7 +101,7 @@ class PageRunner(Parts):
         Raises
         ------
         SessionAborted
-            Where the participant stops the session.
+            If the participant stops the session.
         """
         stop = [self.stop_button(self._ask_soon)] if stoppable else []
         stamp = [self.stamped(self._stamp)] if self._stamp else []

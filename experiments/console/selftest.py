@@ -65,7 +65,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
     Raises
     ------
     InputError
-        Where there is no screen.
+        If there is no screen.
     """
     window = open_window(size=(1280, 800), fullscreen=fullscreen, screen=screen)
     try:
@@ -86,7 +86,7 @@ def time_presentations(rig: TextureRig, models: Sequence[Presentable]) -> Timing
     Raises
     ------
     InputError
-        Where the rig cannot be opened, or fails while it presents.
+        If the rig cannot be opened, or fails while it presents.
     """
     rig.open()
     try:

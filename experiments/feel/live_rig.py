@@ -155,7 +155,7 @@ class LiveRig:
         Raises
         ------
         SoundLost, InputError
-            Where nothing can be played any more.
+            If nothing can be played any more.
         """
         own, self._faults = tuple(self._faults), []
         sound = () if self._sound is None else self._sound.faults()

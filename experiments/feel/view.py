@@ -191,7 +191,7 @@ PLACES: dict[Place, str] = {
 
 
 def short(name: str, longest: int) -> str:
-    """A name in at most so many characters."""
+    """A name in at most this many characters."""
     return name if len(name) <= longest else f"{name[: longest - 1]}…"
 
 

@@ -153,7 +153,7 @@ def _row(event: Event, onset: float, of_trial: list[Mapping[str, str]]) -> dict[
 def _presentation(event: Event, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
     """What the rig says of a presentation, where it was stored; taken from the trial's, each once.
 
-    A simulated rig, whose clock stands still between presses, starts several at one time.
+    A simulated rig, whose clock stops between presses, starts several at one time.
     """
     start_s = event.get("start_s")
     if not isinstance(start_s, int | float):

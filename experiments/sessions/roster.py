@@ -92,7 +92,7 @@ class Roster:
     ) -> Iterator[Person]:
         """The participant with this number, enrolled now if never before.
 
-        Who is new is not enrolled after all where the block raises; meanwhile nobody else can be.
+        Who is new is not enrolled after all where the block raises; meanwhile no one else can be.
 
         Parameters
         ----------

@@ -22,7 +22,7 @@ class SessionState:
     Parameters
     ----------
     status : {"running", "complete", "aborted", "crashed"}
-        Crashed where nobody runs it and its last start has no end on record.
+        Crashed if no process runs it and its last start has no recorded end.
     events : tuple of dict
         All of the log's.
     rows : tuple of dict

@@ -188,7 +188,7 @@ def next_level_db(answers: Sequence[Answer], frequency_hz: float, *, highest_db:
     Raises
     ------
     InputError
-        Where the rig can present none of `LEVELS_DB`.
+        If the rig can present none of `LEVELS_DB`.
     """
     allowed = LEVELS_DB[highest_db + _TOLERANCE_DB >= LEVELS_DB]
     if not allowed.size:

@@ -93,7 +93,7 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
     Raises
     ------
     InputError
-        Where nobody has answered, a table is damaged, or simulated and real people are mixed.
+        If nobody has answered, a table is damaged, or simulated and real people are mixed.
     """
     folder = Path(data_folder)
     files = answer_files(folder, subject=subject)
@@ -180,7 +180,7 @@ def _mean(of: Sequence[Estimate]) -> MeanThreshold:
 
 
 def _factor(count: int) -> float:
-    """Half the 95 % interval of a mean over so many people, in standard deviations."""
+    """Half the 95 % interval of a mean over this many people, in standard deviations."""
     from scipy.stats import norm, t  # late: takes longer to load than all of modeling
 
     if count == 1:

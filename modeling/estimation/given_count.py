@@ -84,7 +84,7 @@ def _likeliest(power: Power, starts: Floats, patterns: Floats) -> Climbed:
     theta = np.repeat(starts, len(patterns), axis=0)
     signs = np.tile(patterns, (len(starts), 1))
     limits = limits_of(count, rate_hz=power.rate_hz, step_hz=power.step_hz)
-    for _ in range(_ROUNDS):  # bins are finest near the layers, so they are drawn anew
+    for _ in range(_ROUNDS):  # bins are finest near the layers, so they are drawn again
         near = centres_and_widths(theta, count)
         observed = observe([power] * len(theta), *near, scale=power.scale)
         theta = climb(theta, signs, observed, limits=limits, steps=60, enough=1e-3).theta

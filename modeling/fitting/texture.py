@@ -53,9 +53,9 @@ def fit_texture(
     Raises
     ------
     GridError
-        Where the recordings lie on a line across the grid.
+        If the recordings lie on a line across the grid.
     InputError
-        Where they mix textures or units, or have contact without speed; for a number of layers out
+        If they mix textures or units, or have contact without speed; for a number of layers out
         of range or with another estimator.
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)

@@ -56,7 +56,7 @@ def models_in(folder: Path) -> tuple[list[Path], list[Path]]:
     Raises
     ------
     InputError
-        Where none may be a model.
+        If none may be a model.
     """
     models, others = models_among(sorted(folder.glob("*.json")))
     if not models:

@@ -92,7 +92,7 @@ def parameter_regressions(model: TextureModel) -> tuple[ParameterRegression, ...
     Raises
     ------
     InputError
-        Where no condition says anything about a parameter.
+        If no condition says anything about a parameter.
     """
     found = []
     for o in parameter_observations(model):

@@ -192,7 +192,7 @@ class CompiledScene:
         Raises
         ------
         InputError
-            Where two textures would have one file.
+            If two textures would have one file.
         """
         names = [f"{file_stem(compiled.texture)}.json" for compiled in self.textures]
         if FILE in names or len(set(names)) < len(names):

@@ -28,7 +28,7 @@ def full_models(
     Raises
     ------
     InputError
-        Where there is no such folder, or it holds no models or two of one texture.
+        If there is no such folder, or it holds no models or two of one texture.
     """
     named = scene.models if folder is None else Path(folder)
     if named is None or not os.path.isdir(named):

@@ -60,7 +60,7 @@ def aligned(
     Raises
     ------
     InputError
-        Where nothing of what was played is found.
+        If nothing of what was played is found.
     """
     check_rate(played_rate_hz)
     check_rate(rate_hz)

@@ -96,7 +96,7 @@ def stroke_lag_s(
     Raises
     ------
     InputError
-        Where the stretch is no longer than the longest lag.
+        If the stretch is no longer than the longest lag.
     """
     power, wanted = np.asarray(power_g2, np.float64), np.square(np.asarray(level, np.float64))
     longest = round(longest_s / LAG_BIN_S)
@@ -168,7 +168,7 @@ def summary_of(
     Raises
     ------
     InputError
-        Where too few trials were found.
+        If too few trials were found.
     """
     from scipy.stats import bootstrap  # late: takes longer to load than all of modeling
 

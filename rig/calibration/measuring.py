@@ -78,7 +78,7 @@ class Accelerometer:
         Raises
         ------
         InputError
-            Where the device gives nothing, is gone, or samples were lost.
+            If the device gives nothing, is gone, or samples were lost.
         """
         stretches = self.stretches()
         if len(stretches) > 1:
@@ -94,7 +94,7 @@ class Accelerometer:
         Raises
         ------
         InputError
-            Where the device gives nothing, or is gone.
+            If the device gives nothing, or is gone.
         """
         blocks = self._source.read()
         if not blocks or not self._source.running:
@@ -118,7 +118,7 @@ class Accelerometer:
         return Record(samples * scale_g, float(np.median(times - positions / rate_hz)), rate_hz)
 
     def record(self, duration_s: float) -> Record:
-        """Record for so long; what is left without a gap, where samples were lost."""
+        """Record for this long; what is left without a gap, where samples were lost."""
         self.forget()
         time.sleep(duration_s + AROUND_S)
         record = max(self.stretches(), key=lambda stretch: stretch.samples_g.size)

@@ -41,7 +41,7 @@ def accelerometer_input(rig: RigFile) -> AudioInput:
     Raises
     ------
     InputError
-        Where the rig has none.
+        If the rig has none.
     """
     section = rig.accelerometer
     if section is None:

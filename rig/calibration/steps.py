@@ -48,7 +48,7 @@ def check_softly(
     Raises
     ------
     InputError
-        Where the whole level would be beyond the peak that the limits allow.
+        If the whole level would be beyond the peak that the limits allow.
     """
     soft = _played(
         rig, sound, accelerometer, rms_g=SOFT_SHARE * rms_g, seconds=SOFT_S, band_hz=band_hz, seed=1
@@ -112,7 +112,7 @@ def mean_pressure(live: Live, *, seconds: float = PRESSURE_S) -> float:
     Raises
     ------
     InputError
-        Where nothing presses.
+        If nothing presses.
     """
     count, _ = live.readings_since(live.readings_written)
     time.sleep(seconds)

@@ -153,7 +153,7 @@ def stroke_latencies_s(seen: Watched, *, floor_g2: float) -> list[float | None]:
     Raises
     ------
     InputError
-        Where the hand did not stroke.
+        If the hand did not stroke.
     """
     latencies: list[float | None] = []
     for record in seen.records:
@@ -195,7 +195,7 @@ def loop_back_s(
     Raises
     ------
     InputError
-        Where no record holds it.
+        If no record holds it.
     """
     signal = noise_signal(0.3, rate_hz=rate_hz, rms_g=rms_g, band_hz=(20.0, 2500.0))
     delays: list[float] = []

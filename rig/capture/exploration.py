@@ -77,7 +77,7 @@ def explored(readings: Readings) -> Exploration:
     Raises
     ------
     InputError
-        Where the hand moved on the surface for less than 5 s.
+        If the hand moved on the surface for less than 5 s.
     """
     steps = np.diff(readings["time_s"], append=readings["time_s"][-1:])
     speed = np.abs(readings["speed_mm_s"])

@@ -78,7 +78,7 @@ class DeskRig:
     Raises
     ------
     InputError
-        Where the study requires another rig, or its latency is too long.
+        If the study requires another rig, or its latency is too long.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class DeskRig:
         Raises
         ------
         InputError
-            Where another process uses it, or a part is not there or does not do what the rig file
+            If another process uses it, or a part is not there or does not do what the rig file
             says.
         """
         with ExitStack() as stack:

@@ -22,7 +22,7 @@ from rig.capture.input import AudioInput, InputBlock, InputSettings
 from rig.live.driven import settings_from_parent, tell
 
 LOOK_S = 0.25  # from one look at the input to the next
-RECENT_S = 2.0  # what is not asked for is forgotten after so long
+RECENT_S = 2.0  # what is not asked for is forgotten after this time
 
 
 class PenLog:

@@ -16,7 +16,7 @@ def open_device(settings: HandSettings) -> Device:
     Raises
     ------
     InputError
-        Where it is not there, may not be read, or cannot be used.
+        If it is not there, may not be read, or cannot be used.
     """
     if settings.kind == "scripted":
         return ScriptedHand.open(settings)

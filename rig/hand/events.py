@@ -43,7 +43,7 @@ class Frame(NamedTuple):
         By the clock that the device was set to use.
     events : tuple of Event
     dropped : bool
-        The kernel had to throw events away: what the device is like has to be asked for anew.
+        The kernel had to throw events away: what the device is like has to be queried again.
     """
 
     time_s: float

@@ -37,7 +37,7 @@ class HandReader:
     live : Live
         Has to outlive this.
     settings : HandSettings
-        Kind "window" has no process: whoever owns the window calls `push`.
+        Kind "window" has no process: the owner of the window calls `push`.
     """
 
     def __init__(self, live: Live, settings: HandSettings) -> None:
@@ -64,7 +64,7 @@ class HandReader:
         Raises
         ------
         InputError
-            Where the device is not there, may not be read or cannot be used.
+            If the device is not there, may not be read or cannot be used.
         """
         if self._window is not None:
             self._window.open()

@@ -236,7 +236,7 @@ def usable(
     Raises
     ------
     InputError
-        Where no file can be read: what is wrong with the first.
+        If no file can be read: what is wrong with the first.
     """
     records: list[Imported] = []
     refusals: list[InputError] = []

@@ -68,7 +68,7 @@ def compiled() -> Any:
     Raises
     ------
     InputError
-        Where there is none: nothing in Python keeps the time of an audio callback.
+        If there is none: nothing in Python keeps the time of an audio callback.
     """
     if _live is None:
         raise InputError(

@@ -111,7 +111,7 @@ class RigFile:
         Raises
         ------
         InputError
-            Where the file cannot be read, or would not be a rig file any more; then nothing
+            If the file cannot be read, or would not be a rig file any more; then nothing
             has changed.
         """
         file = Path(path)

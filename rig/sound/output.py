@@ -147,9 +147,9 @@ class SoundOutput:
         Raises
         ------
         InputError
-            Where the device is not there, or does not do what is wanted of it.
+            If the device is not there, or does not do what is wanted of it.
         SoundLost
-            Where it cannot be started.
+            If it cannot be started.
         """
         if self._child is None:
             self._start()
@@ -204,7 +204,7 @@ class SoundOutput:
         InputError
             For a model of a higher rate; for an ARModel that `lattice_fields` refuses.
         SoundLost
-            Where nothing can be played.
+            If nothing can be played.
         """
         number = self._number()
         wanted: dict[str, Any] = {"do": "surface", "presentation": number}
@@ -238,7 +238,7 @@ class SoundOutput:
         InputError
             For a signal beyond the limits, or with values that are not finite.
         SoundLost
-            Where nothing can be played; with `wait` also where the process is lost meanwhile, or
+            If nothing can be played; with `wait` also where the process is lost meanwhile, or
             the signal halted.
         """
         samples = self.checked(samples_g, compensated=compensated)

@@ -110,7 +110,7 @@ def stimuli_of_surfaces(
     Raises
     ------
     InputError
-        Where no file has this label, several stand for one texture, or one cannot be used (see
+        If no file has this label, several stand for one texture, or one cannot be used (see
         `stimulus`).
     """
     rows = read_table(folder / MANIFEST, _OF_SURFACES)

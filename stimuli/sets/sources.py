@@ -187,7 +187,7 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
     Raises
     ------
     InputError
-        Where two sources would have one name.
+        If two sources would have one name.
     """
     models = {labelled: _copy_of_model(labelled) for labelled in sources.models}
     hands = [_copy_of_trajectory(entry) for entry in recipe.trajectories]

@@ -220,7 +220,7 @@ def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Response
     Raises
     ------
     InputError
-        Where a session is damaged, or tables are not what its log says, of those who are not left
+        If a session is damaged, or tables are not what its log says, of those who are not left
         out, or the answers cannot be used.
     """
     from analysis.answers.loading import load_responses

@@ -41,7 +41,7 @@ Yes = Annotated[
     bool,
     typer.Option("--yes", help="Import implausible values, too, with a warning."),
 ]
-# So many names of files are listed; the rest are counted.
+# This many names of files are listed; the rest are counted.
 MOST_NAMES = 5
 
 

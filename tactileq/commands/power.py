@@ -185,7 +185,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
     Raises
     ------
     ValueError
-        Where there is no claim, a claim is about a task that compares no models, or a number of
+        If there is no claim, a claim is about a task that compares no models, or a number of
         participants leaves the order of models unbalanced.
     """
     from modeling.files.answer_tables import ANSWER_TABLES

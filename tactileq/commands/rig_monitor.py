@@ -101,9 +101,9 @@ def _play_on(sound: SoundOutput, model: AnyModel | None, faults: Sequence[str]) 
     Raises
     ------
     InputError
-        Where the vibration was halted: the last of the faults.
+        If the vibration was halted: the last of the faults.
     SoundLost
-        Where nothing can be played.
+        If nothing can be played.
     """
     if sound.halted:
         raise InputError(faults[-1])

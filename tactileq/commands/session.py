@@ -229,7 +229,7 @@ def tell_timings(
     Raises
     ------
     InputError
-        Where one of them is too slow.
+        If one of them is too slow.
     """
     from rich.console import Console as Paper
     from rich.table import Table
