@@ -39,11 +39,11 @@ def fit_texture(
     Parameters
     ----------
     recordings : RecordingSet or iterable of Recording
-        One texture, one unit; any rates. One speed or one force will do: then nothing is known of
-        others.
+        One texture, one unit; any rates. One speed or one force suffices; then the model says
+        nothing about others.
     estimator : {"joint", "paper", "paper-consistent"}
     layers : int, optional
-        Number of layers, 1 … 12, with `joint` only, which chooses it otherwise.
+        Number of layers, 1 … 12, with `joint` only; by default `joint` chooses it.
 
     Returns
     -------

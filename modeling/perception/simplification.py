@@ -67,15 +67,15 @@ def simplify(
     margin_db: float = 0.0,
     hold_above: bool = True,
 ) -> Simplification:
-    """Drop every layer that is below threshold in every condition, stably and in sum.
+    """Drop every layer that is reliably below threshold in every condition, also in sum.
 
-    A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
-    grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
-    weighted by the threshold, margin included) stay below it too; else the loudest of them are
-    kept. Where no threshold is known the layer is kept; but above the table's end its last level is
-    held as a lower bound, below which a layer may go. A layer that only fills another's shape
-    (`modeling.models.own_peaks`) goes with that one or not at all. The noise and at least one layer
-    always stay (PAPER V, docs/method/perception.md#simplification).
+    A layer is dropped only if its level plus `margin_db` is below the threshold in each condition
+    of the grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
+    weighted by the threshold, margin included) stay below it too; otherwise the loudest of them are
+    kept. If no threshold is known, the layer is kept; but above the table's end its last level is
+    held as a lower bound, below which a layer may be dropped. A layer that only fills another's
+    shape (`modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at
+    least one layer are always kept (PAPER V, docs/method/perception.md#simplification).
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def simplify(
     margin_db : float
         ≥ 0; how far below the threshold a layer has to be.
     hold_above : bool
-        False: above the table's end nothing is known, so that every layer there stays.
+        False: above the table's end the threshold is unknown, so that every layer there is kept.
 
     Raises
     ------

@@ -50,15 +50,15 @@ def render_many(
 ) -> list[Floats]:
     """Vibrations of k models under k hands, each from its start.
 
-    The same bits as `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
-    one after the other, but side by side in the processor's vectors and on all cores that this
-    process may use (docs/method/rendering.md#many-streams). What shares a number of layers, rates
-    and an update interval runs together; an ARModel is rendered alone.
+    Bit-identical to `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
+    one after the other, but parallel in the processor's vectors and on all cores that this
+    process may use (docs/method/rendering.md#many-streams). Streams with the same number of layers,
+    rates and update interval run together; an ARModel is rendered by itself.
 
     Parameters
     ----------
     models : (k,) sequence of TextureModel, RegressedModel or ARModel
-        What to render; one model may come many times.
+        What to render; a model may occur several times.
     hands : (k,) sequence of pairs of (n_i,) array_like
         Tangential speed (mm/s, either direction) and normal force (N) at each sample, each pair of
         its own length. NaN and infinite values count as lift-off.

@@ -41,7 +41,7 @@ def compile_scene(
     ------
     InputError
         For a texture without a model; for a scene beyond the recorded grid; for a bound that the
-        actuator's limits or a budget do not allow, with the nearest that can be kept.
+        actuator's limits or a budget do not allow, with the closest that can be kept.
     """
     return compile_scenes([scene], models, progress=lambda scene, texture: progress(texture))[0]
 
