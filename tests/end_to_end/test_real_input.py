@@ -66,7 +66,7 @@ def test_ten_files_at_one_force_give_models_of_that_force(main, tmp_path: Path) 
     fitted = main("model", "set", "--out", "models")
     assert fitted.returncode == 0, fitted.stderr
     for name in ("cloth A", "cloth B"):
-        told = f"note: {name}: recorded at 1 N alone; nothing is known of other forces."
+        told = f"note: {name}: recorded at 1 N only; the model says nothing about other forces."
         assert told in fitted.stdout
     names = ("cloth-A", "cloth-B")
     tables = [
