@@ -45,7 +45,7 @@ from rig.sound.signals import tone_burst
 
 OLDEST_READING_S = 0.1
 FIRST_READING_S = 5.0
-LOOK_S = 0.1  # so often it looks after a burst that it waits for
+LOOK_S = 0.1  # interval of checks while waiting for a burst
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class DeskRig:
     """A rig of parts on a desk; implements `rig.interface.TextureRig`.
 
     What fails while it is open is reported by `take_faults`, and what was lost is started again by
-    what is presented next. `read` and `take_faults` look after what plays: see `TextureRig`.
+    what is presented next. `read` and `take_faults` are the heartbeat: see `TextureRig`.
 
     Parameters
     ----------

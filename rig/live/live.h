@@ -166,7 +166,7 @@ static inline int tq_live_fits(const tq_live *live)
     return __atomic_load_n(&live->format, __ATOMIC_ACQUIRE) == TQ_LIVE_FORMAT;
 }
 
-/* The session was there at this time, and looked after what plays. */
+/* The heartbeat: the session was there at this time. */
 static inline void tq_heartbeat(tq_live *live, double time_s)
 {
     tq_put_time(&live->heartbeat, time_s);
