@@ -1,9 +1,9 @@
 # make demo    the whole study in silico, ends with the path of its report
 # make test    style, types, import rules and every test
-# make quick ROOM=modeling/fitting   the tests of one room alone
-# make bench   time the modeling beside its rivals
+# make quick ROOM=modeling/fitting   only the tests of one room
+# make bench   time the modeling and its rivals
 # make plant   plant 40 bugs, one at a time, and see which ones the tests catch
-# make install what both begin with: .venv/ from requirements.lock
+# make install set up .venv/ from requirements.lock (demo and test begin with it)
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
 SHELL := /bin/sh
@@ -11,8 +11,8 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
 	$$p -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13))' 2>/dev/null && echo $$p && break; done)
 BIN := .venv/bin
 PYTEST_FLAGS ?=
-# Where Python may keep no bytecode, every process that the tests start compiles the
-# libraries anew; .venv/ and the project keep theirs, whatever the machine is set to.
+# If Python may not store bytecode, every process that the tests start compiles the
+# libraries again; .venv/ and the project store theirs, whatever the machine's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: install demo test quick bench plant lint lock clean
@@ -26,7 +26,7 @@ install: .venv/installed
 	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-compile -r requirements.lock
 	@touch $@
 
-# The project itself and its C parts; says so where there is no compiler.
+# The project itself and its C parts; reports a missing compiler.
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h analysis/benches/rivals.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"

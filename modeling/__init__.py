@@ -1,6 +1,6 @@
 """Texture models: from recordings to parameters, to fewer parameters, to vibration.
 
-Each name is loaded when it is first asked for, so that `import modeling.errors` loads no numerics.
+Each name is loaded on first use, so that `import modeling.errors` loads no numerics.
 """
 
 from typing import TYPE_CHECKING

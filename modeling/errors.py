@@ -1,4 +1,4 @@
-"""The errors that users see, and how values are quoted in them."""
+"""The errors that users see, and how values and counts are written in them."""
 
 from __future__ import annotations
 
@@ -34,6 +34,11 @@ _QUOTES = _Quotes()
 def shown(value: object) -> str:
     """A value as a message quotes it: at most 60 characters in one line, numbers plain."""
     return shortened(_QUOTES.repr(value))
+
+
+def counted(number: int, noun: str, plural: str | None = None) -> str:
+    """A number with its noun: "1 layer", "2 layers"; `plural` where it does not end in s."""
+    return f"{number} {noun if number == 1 else plural or f'{noun}s'}"
 
 
 def shortened(text: str, *, longest: int = LONGEST_QUOTE) -> str:

@@ -26,7 +26,7 @@ EXPECTED_DRAWS = 8
 
 @runtime_checkable
 class SpectralFilter(Protocol):
-    """What one condition's filter must tell: a `PEQ`, an `ARFilter`, or another kind."""
+    """The interface of one condition's filter: a `PEQ`, an `ARFilter`, or another kind."""
 
     @property
     def rate_hz(self) -> float: ...

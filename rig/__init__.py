@@ -1,4 +1,4 @@
-"""The rig: what presents surfaces to a hand, its simulated twin, and the import of recordings."""
+"""The rig, which presents surfaces to a hand, its simulated twin, and the import of recordings."""
 
 import modeling
 

@@ -1,4 +1,4 @@
-"""What an experiment sees of a rig, be it metal or simulated."""
+"""What an experiment sees of a rig, real or simulated."""
 
 from __future__ import annotations
 

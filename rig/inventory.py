@@ -1,4 +1,4 @@
-"""What a rig consists of, and what is missing before a study could run on it.
+"""The parts of a rig, and what is missing for a study.
 
 Nothing is played or moved to find that out.
 """
@@ -14,7 +14,7 @@ from math import log10
 from pathlib import Path
 from typing import Literal
 
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.files.provenance import version_of
 from modeling.rendering.compiled import is_compiled
 from rig.hand.devices import connected_devices
@@ -35,12 +35,12 @@ State = Literal["ok", "note", "fault"]
 PACKAGES = ("tactileq", "numpy", "scipy", "sounddevice", "pyserial", "psychopy")
 GROUPS = {"tablet": "input", "mouse": "input", "serial": "dialout"}  # who may read, on Debian
 OLD_DAYS = 90  # a study may ask for less
-_WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a fault by itself, told once
+_WITHOUT_PORTAUDIO = "not known without PortAudio"  # which is a separate fault, reported once
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
+    """One item that was checked.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def connected_input() -> list[Finding]:
 def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Finding]]:
     """The rig file, and what of it is there: sound, hand, accelerometer, calibration, latency."""
     if not file.exists():
-        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and correct what is yours."
+        told = f"expected a rig file, got none; copy {SHIPPED_RIG_FILE} and adapt it to your rig."
         return None, [Finding(str(file), told, "fault")]
     try:
         rig = RigFile.load(file)
@@ -114,7 +114,7 @@ def of_rig(file: Path, *, today: datetime.date) -> tuple[RigFile | None, list[Fi
     ]
     assumed = rig.assumed()
     if assumed:
-        told = f"{len(assumed)} of {len(rig.figures())} figures are assumed, see below"
+        told = f"{len(assumed)} of {counted(len(rig.figures()), 'figure')} are assumed, see below"
         found.append(Finding("figures", told, "note"))
     return rig, found
 
@@ -204,7 +204,7 @@ def _present(what: str, file: Path, told: str, *, group: str) -> Finding:
     if not file.exists():
         return Finding(what, f"expected {file}, got no such device; connect it.", "fault")
     if not os.access(file, os.R_OK):
-        told = f"expected to read {file}, got no permission; have the group {group}."
+        told = f"expected to read {file}, got no permission; join the group {group}."
         return Finding(what, told, "fault")
     return Finding(what, told)
 
@@ -226,7 +226,7 @@ def _accelerometer(rig: RigFile) -> Finding:
 def _calibration(rig: RigFile, today: datetime.date) -> Finding:
     done = rig.calibration
     if done is None or rig.vibrator.g_per_volt.assumed:
-        told = "never: levels are assumed (tactileq rig calibrate level)"
+        told = "never calibrated: levels are assumed (tactileq rig calibrate level)"
         return Finding("calibration", told, "note")
     now, then = (rig.rig.name, set(rig.rig.serials)), (done.rig, set(done.serials))
     if now != then:
@@ -244,7 +244,7 @@ def _latency(rig: RigFile, today: datetime.date) -> Finding:
         return Finding("latency", "never measured (tactileq rig latency)", "note")
     told = f"median {done.median_ms.value:.1f} ms, 95 % within {done.p95_ms.value:.1f} ms"
     if done.measured_on is None:
-        return Finding("latency", f"{told}, of no known day", "note")
+        return Finding("latency", f"{told}, date unknown", "note")
     aged = _aged("latency", done.measured_on, today)
     return Finding("latency", f"{told}, {aged.told}", aged.state)
 

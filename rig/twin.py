@@ -46,7 +46,7 @@ _PER_STEP = round(STEP_S * SIGNAL_RATE_HZ)
 class SimulatedRig:
     """In-process twin of the rig; implements `rig.interface.TextureRig`.
 
-    The hand strokes to and fro, 1 Hz, up to 250 mm/s, with 1 to 2 N.
+    The hand strokes back and forth, 1 Hz, up to 250 mm/s, with 1 to 2 N.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class SimulatedRig:
         return {}
 
     def open(self) -> None:
-        """Forget what was presented before; clock, presentations and the stroke begin anew."""
+        """Forget what was presented before; clock, presentations and the stroke restart."""
         self.silence()
         self._steps = self._presentations = 0
         self._ended, self._rows, self._faults = [], [], []
@@ -108,7 +108,7 @@ class SimulatedRig:
         self._faults.append(Fault(self.now_s(), told, invalidates=True))
 
     def take_faults(self) -> tuple[Fault, ...]:
-        """What `break_down` was told since the last call."""
+        """What `break_down` was given since the last call."""
         taken, self._faults = tuple(self._faults), []
         return taken
 
@@ -196,7 +196,7 @@ class SimulatedRig:
         Raises
         ------
         InputError
-            Where truths were given, but none for this texture.
+            If truths were given, but none for this texture.
         """
         if self._real and texture not in self._real:
             raise InputError(

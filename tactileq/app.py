@@ -41,8 +41,8 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    help="Record a surface, keep what a finger can feel, render it, and find out with people "
-    "whether anybody can tell the difference.",
+    help="Record a surface, model it, keep the layers that people can feel, render it, and test in "
+    "experiments whether anybody can tell the difference.",
 )
 
 
@@ -64,7 +64,7 @@ def options(
         ),
     ] = False,
 ) -> None:
-    """Options of the program itself, each of which acts by its callback."""
+    """Options of the program itself; each acts through its callback."""
 
 
 for name, file in COMMANDS.items():
@@ -87,7 +87,7 @@ def main() -> None:
         return
     except Interrupted as end:
         sentence, code = (
-            f"interrupted by {end.signal_name}; nothing is left half written.",
+            f"interrupted by {end.signal_name}; no file was left half written.",
             end.code,
         )
     except (ValueError, OSError, MemoryError) as error:  # InputError is a ValueError

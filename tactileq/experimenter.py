@@ -1,4 +1,4 @@
-"""The experimenter's terminal: which sample to mount, how far the session is, how the rig is.
+"""The experimenter's terminal: which sample to mount, progress of the session, state of the rig.
 
 It names trays, never a texture or a model (docs/method/protocols.md#mounting).
 """
@@ -17,7 +17,7 @@ from experiments.sessions.surfaces import SessionAborted, Standing
 
 STOP = "stop"
 PAGES = {
-    "consent": "reads the consent form's page",
+    "consent": "reads the consent page",
     "code": "reads the code",
     "known": "is asked for the code",
     "wait": "waits for you",
@@ -48,7 +48,7 @@ class Terminal:
         self._typed: SimpleQueue[str | None] = SimpleQueue()
         self._stopping = False
         self._asked = False
-        # A daemon, since nothing can end a wait for a line.
+        # A daemon thread, since nothing can interrupt waiting for a line.
         Thread(target=self._listen, args=(lines,), daemon=True).start()
 
     def ask_mount(self, tray: str) -> None:
@@ -56,16 +56,16 @@ class Terminal:
         self._ask(f"[bold]Tray {escape(tray)}[/]: put its sample in place")
 
     def call(self, told: str) -> None:
-        """Tell what failed, and ask to mend it; the trial will be repeated."""
-        self._ask(f"[bold]The rig failed in this trial.[/] {escape(told)} Mend it")
+        """Report what failed, and ask to repair it; the trial will be repeated."""
+        self._ask(f"[bold]The rig failed in this trial.[/] {escape(told)} Repair it")
 
     def go_on(self) -> None:
-        """Ask for nothing; a stop that was typed meanwhile counts."""
+        """Ask for nothing; a stop that was typed in the meantime counts."""
         self._asked = False
         self._forget_lines()
 
     def tell(self, standing: Standing) -> None:
-        """Show how far the session is, and how the rig is."""
+        """Show the progress of the session and the state of the rig."""
         training = standing.phase == "training"
         parts = ["training" if training else f"{standing.done} of {standing.of} trials done"]
         if standing.minutes_left is not None:
@@ -74,12 +74,12 @@ class Terminal:
         self._console.print("\n" + " · ".join(parts), markup=False)
 
     def page(self, name: str) -> None:
-        """Show which page the participant is on."""
+        """Show which page the participant is viewing."""
         self._console.print(f"  participant: {_on_page(name)}", markup=False)
 
     def answered(self) -> None:
-        """Show that an answer came."""
-        self._console.print("  an answer came")
+        """Show that an answer was given."""
+        self._console.print("  an answer was given")
 
     def ready(self) -> bool:
         """Whether what was asked last has been confirmed.
@@ -87,7 +87,7 @@ class Terminal:
         Raises
         ------
         SessionAborted
-            Where the experimenter stops the session, or the terminal is closed.
+            If the experimenter stops the session, or the terminal is closed.
         """
         if not (self._asked or self._stopping):
             return True
@@ -109,7 +109,7 @@ class Terminal:
             self._console.print(f"{what}, then press Enter (or type {STOP}).")
 
     def _forget_lines(self) -> None:
-        """An Enter from before must not confirm what is asked only now; a stop counts."""
+        """An earlier Enter must not confirm what is asked only now; an earlier stop counts."""
         while (line := self._next()) is not None:
             if line.lower() == STOP and not self._stopping:
                 self._stopping = True

@@ -24,8 +24,8 @@ class Interrupted(SystemExit):
 def ended_by_signals() -> Iterator[None]:
     """Raise `Interrupted` in this block when a signal asks the program to end.
 
-    What is ignored already (nohup) stays ignored. A second signal within two seconds is taken for
-    the same one, so that it does not break off the cleaning up.
+    Signals that are already ignored (nohup) stay ignored. A second signal within two seconds
+    counts as the same one, so that it does not interrupt the clean-up.
     """
     last = -SAME_S
 

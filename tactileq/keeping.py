@@ -1,4 +1,4 @@
-"""What a command may replace: its own results, and nobody else's."""
+"""What a command may replace: its own results and nothing else."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def check_own_files(
     for path in found:
         if path.exists() and any(path.samefile(one) for one in given):
             raise ValueError(
-                f"expected a place beside the input, got {path}, which is the input itself; "
+                f"expected a file other than the input, got {path}, which is the input itself; "
                 "choose another name or folder with --out."
             )
     if not found:

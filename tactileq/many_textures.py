@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from modeling.errors import counted
 from tactileq.keeping import check_own_files, write_own_files
 from tactileq.telling import (
     clipping_warnings,
@@ -54,7 +55,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class _Made:
-    """What a process hands back of one texture: its files are written by the process that asked.
+    """What a process returns for one texture; its files are written by the parent process.
 
     Parameters
     ----------
@@ -136,8 +137,8 @@ def _model_all(
                     advance(source.texture)
         except BrokenExecutor:
             raise ValueError(
-                "expected every process to end by itself, got one that the system stopped, "
-                "perhaps for want of memory; run again with a smaller --jobs."
+                "expected every process to finish, got one that the system stopped, perhaps "
+                "because memory ran out; run again with a smaller --jobs."
             ) from None
     return [outcomes[number] for number in range(len(sources))]
 
@@ -173,7 +174,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
 
     what = f"{source.texture} in {source.folder}"
     try:
-        # One thread each: sums must not depend on how many cores a process finds.
+        # One thread each: sums must not depend on the number of cores.
         with threadpool_limits(limits=1):
             inputs = sha256_of_paths([source.folder])
             records, unusable = load_usable(source.folder, texture=source.texture)
@@ -195,7 +196,7 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
             provenance = provenance_of("model", settings, inputs=inputs)
     except (ValueError, OSError, MemoryError) as error:
         return _Made(Outcome(what, error=sentence_of(error)))
-    notes = (*_rate_notes(records), *_told(found, _start(source, out), plot=how.plot))
+    notes = (*_rate_notes(records), *_findings(found, _start(source, out), plot=how.plot))
     warnings = (
         *left_out_warnings(source.texture, unusable),
         *clipping_warnings(records),
@@ -227,18 +228,20 @@ def _rate_notes(records: RecordingSet) -> list[str]:
         return []
     return [
         f"note: {records.texture}: the data's rate of {rate_hz:g} Hz becomes the model's; the "
-        f"band from {rate_hz / 2:g} to {MODEL_RATE_HZ / 2:g} Hz is lost."
+        f"band from {rate_hz / 2:g} to {MODEL_RATE_HZ / 2:g} Hz is missing."
     ]
 
 
-def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
+def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     """What was found and where it is, with the conditions that were interpolated."""
     from analysis.textures.between import sentence
     from modeling import missing_conditions
     from modeling.models.own_peaks import own_peaks
 
     name, model = found.texture, found.model
-    lines = [f"{name}: layers of each recording alone in {start}_alone.tsv"] if found.alone else []
+    lines = (
+        [f"{name}: layers of each recording by itself in {start}_alone.tsv"] if found.alone else []
+    )
     if model is None:
         return [*lines, f"no full model of {found.why_not}"]
     peaks = own_peaks(model)
@@ -246,11 +249,12 @@ def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
     filled = f", {filling} of them without a peak of {'its' if filling == 1 else 'their'} own"
     conditions, unknown = model.noise_gains.size, int(model.not_identifiable.any(axis=2).sum())
     lines.append(
-        f"{name}{simulated_note(model)}: {model.n_layers} layers{filled * bool(filling)}, "
-        f"{model.n_parameters} numbers per condition; some layer's frequency is given by other "
-        f"conditions in {int(model.inherited.any(axis=2).sum())}, its width or level not resolved "
-        f"in {int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
-        f"{conditions} conditions: {start}.json"
+        f"{name}{simulated_note(model)}: {counted(model.n_layers, 'layer')}"
+        f"{filled * bool(filling)}, {counted(model.n_parameters, 'number')} per condition; a "
+        f"layer's frequency is inherited from other conditions in "
+        f"{int(model.inherited.any(axis=2).sum())}, its width or level not resolved in "
+        f"{int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
+        f"{counted(conditions, 'condition')}: {start}.json"
     )
     lines.append(f"{name}: layers over the grid in {start}_layers.tsv")
     lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
@@ -260,14 +264,14 @@ def _told(found: Findings, start: Path, *, plot: bool) -> list[str]:
         if axis.size == 1:
             other = "speeds" if unit == "mm/s" else "forces"
             lines.append(
-                f"note: {name}: recorded at {axis[0]:g} {unit} alone; nothing is known of "
+                f"note: {name}: recorded at {axis[0]:g} {unit} only; the model says nothing about "
                 f"other {other}."
             )
     if plot:
-        lines.append(f"{name}: pictures in {start}_spectra.png and {start}_layers.png")
+        lines.append(f"{name}: figures in {start}_spectra.png and {start}_layers.png")
     if missing := missing_conditions(model):
         names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
-        lines.append(f"{name}: interpolated for want of a recording: {names}")
+        lines.append(f"{name}: interpolated, because there is no recording: {names}")
     return lines
 
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
-Out = Annotated[Path, typer.Option("--out", help="Where the results go.")]
-Seed = Annotated[int, typer.Option(min=0, max=2**31, help="Seed of everything that is random.")]
+Out = Annotated[Path, typer.Option("--out", help="Folder or file for the results.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**31, help="Seed of all random numbers.")]
 ModelFile = Annotated[Path, typer.Argument(metavar="MODEL", help="A model file (JSON).")]
 VibratorFile = Annotated[
     Path | None,
@@ -26,38 +26,46 @@ HoldAbove = Annotated[
     bool,
     typer.Option(
         "--hold-above/--known-only",
-        help="Above the threshold's table hold its last level as a lower bound, or know nothing.",
+        help="Above the threshold's table: hold its last level as a lower bound, or treat the "
+        "threshold as unknown.",
     ),
 ]
 StudyFile = Annotated[
-    Path | None, typer.Option("--study", help="Study file (TOML); the paper's design without it.")
+    Path | None, typer.Option("--study", help="Study file (TOML); by default the paper's design.")
 ]
 StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help="A study file (TOML).")]
 Models = Annotated[
     Path | None,
-    typer.Option("--models", help="Instead of the study's first models: a folder of full ones."),
+    typer.Option("--models", help="Folder of full models, instead of the study's first models."),
 ]
 Simplified = Annotated[
     Path | None,
     typer.Option(
-        "--simplified", help="Instead of the study's second models: a folder of simplified ones."
+        "--simplified", help="Folder of simplified models, instead of the study's second models."
     ),
 ]
 SceneModels = Annotated[
     Path | None,
     typer.Option(
         "--scene",
-        help="Instead of --simplified: a scene file (TOML), or a folder of tactileq scene.",
+        help="Instead of --simplified: a scene file (TOML), or a folder from tactileq scene.",
     ),
 ]
 Data = Annotated[Path, typer.Option("--data", help="Folder of the study's answers.")]
 RigPath = Annotated[Path, typer.Option("--rig", help="Rig file (TOML).")]
 OptionalRigPath = Annotated[Path | None, typer.Option("--rig", help="Rig file (TOML).")]
 HandKind = Annotated[
-    str | None, typer.Option("--hand", help="Without --rig: tablet, mouse, serial or scripted.")
+    str | None,
+    typer.Option("--hand", help="Kind of hand, without --rig: tablet, mouse, serial or scripted."),
 ]
-HandDevice = Annotated[str | None, typer.Option("--hand-device", help="Device of the hand.")]
-CountsPerMm = Annotated[float | None, typer.Option("--counts-per-mm", help="Of a mouse or tablet.")]
+HandDevice = Annotated[
+    str | None, typer.Option("--hand-device", help="Input device that measures the hand.")
+]
+CountsPerMm = Annotated[
+    float | None,
+    typer.Option("--counts-per-mm", help="Resolution of a mouse or tablet, in counts per mm."),
+]
 AssumedForce = Annotated[
-    float | None, typer.Option("--force", help="Force of a hand that measures none, N.")
+    float | None,
+    typer.Option("--force", help="Assumed force in N, where the device measures none."),
 ]

@@ -1,4 +1,4 @@
-"""What is told on the screen: progress, errors, notes and warnings."""
+"""What commands print: progress, errors, notes and warnings."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 
 def sentence_of(error: Exception) -> str:
-    """What a user is told of an error: one sentence, never a traceback."""
-    # A StoreError carries its own sentence, the system's errors only a number and a word.
+    """The sentence that a user sees for an error, never a traceback."""
+    # A StoreError has its own sentence, the system's errors only a number and a word.
     if isinstance(error, OSError) and error.errno is not None:
         place = "a file" if error.filename is None else shortened(str(error.filename), longest=200)
         return (
@@ -28,7 +28,7 @@ def sentence_of(error: Exception) -> str:
             "permissions and the space on the disk."
         )
     if isinstance(error, MemoryError):
-        return "expected a task that fits the memory, got a larger one; ask for less at once."
+        return "expected a task that fits into memory, got a larger one; process less at once."
     return str(error)
 
 
@@ -39,7 +39,7 @@ def tell_warning(message: Warning | str, *where: object, **more: object) -> None
 
 @contextmanager
 def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
-    """A progress bar over countable steps; in a log it is one line at the end."""
+    """A progress bar over countable steps; in a log one line at the end."""
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -63,7 +63,7 @@ def progress(title: str, total: int) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def share_of(title: str) -> Iterator[Callable[[float, str], None]]:
-    """A progress bar for work that tells its share done (0–1)."""
+    """A progress bar for work that reports its share done (0–1)."""
     from rich.progress import Progress, TextColumn
 
     _, *columns = Progress.get_default_columns()
@@ -88,20 +88,20 @@ def clipping_warnings(records: RecordingSet) -> list[str]:
 
 
 def simulated_note(model: AnyModel) -> str:
-    """What a printed line says of a model that nobody recorded."""
+    """The mark of a simulated model in a printed line."""
     return " (simulated)" if model.simulated else ""
 
 
 def tell_models(sets: ModelSets, textures: Sequence[str]) -> None:
-    """Name the textures of a study of which two sets hold one model, or models of other ones.
+    """Name textures whose models are identical in two sets, and models from outside the sets.
 
-    Not for who runs sessions and has to stay blind: `tell_foreign_models` alone is.
+    Not for an experimenter who has to stay blind; for them use `tell_foreign_models` only.
     """
     for first, second in combinations(sets.names, 2):
         if controls := sets.identical(textures, (first, second)):
             print(
-                f"note: {first} and {second} are identical for {', '.join(controls)}: a control, "
-                "nothing to compare."
+                f"note: {first} and {second} are identical for {', '.join(controls)}: a control; "
+                "there is nothing to compare."
             )
     tell_foreign_models(sets, textures)
 
@@ -111,12 +111,12 @@ def tell_foreign_models(sets: ModelSets, textures: Sequence[str]) -> None:
     for texture, name in sets.of_others(textures):
         print(
             f"warning: the {name} model of {texture} was made from a model that is in none of the "
-            "sets; make it again from the one that it is compared with."
+            "sets; simplify again the model that it is compared with."
         )
 
 
 def usable_recordings(folder: Path, texture: str) -> RecordingSet:
-    """The recordings of one texture; what cannot be used is told and left out."""
+    """The recordings of one texture; what cannot be used is left out with a warning."""
     from modeling.recordings.recording_set import load_usable
 
     records, unusable = load_usable(folder, texture=texture)

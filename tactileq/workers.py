@@ -30,13 +30,13 @@ def working(
     """The work on each item, `jobs` at a time, as they are done: number of the item, and result.
 
     Processes of their own where there are several items and jobs (as many jobs as cores without a
-    number). After an exception in the block no worker goes on. With the address of a Dask scheduler
-    its workers do the same work instead.
+    number). After an exception in the block no worker continues. With the address of a Dask
+    scheduler its workers do the same work instead.
 
     Raises
     ------
     ValueError
-        Where Dask is not installed, or nobody answers at its address.
+        If Dask is not installed, or nobody answers at its address.
     """
     if dask is None and (len(items) < 2 or jobs == 1):
         yield enumerate(map(work, items))
@@ -83,7 +83,7 @@ def _dask(address: str) -> Iterator[None]:
 def mapping(*, jobs: int | None) -> Iterator[Callable[..., Iterator[Any]]]:
     """As `map`, but with the work done by several processes, which begin at once.
 
-    What is asked of the results waits for them; after the block nothing goes on.
+    Iterating over the results waits for them; after the block no worker continues.
     """
     with ExitStack() as stack:
 
@@ -111,7 +111,7 @@ def _numbered(work: Callable[[Item], Result], number: int, item: Item) -> tuple[
 def _end_with(parent: int) -> None:
     """Let this worker end at once when its parent does.
 
-    An interrupt from the keyboard, which all processes of a terminal get, is the parent's matter.
+    The parent handles keyboard interrupts, which all processes of a terminal receive.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()

@@ -7,8 +7,8 @@
 #include <stdint.h>
 
 #define TQ_LINE 82
-#define TQ_FIRMWARE 40 /* characters of a version; what is longer is cut off */
-#define TQ_NO_FORCE INT32_MIN /* nothing measures it: the field stays empty */
+#define TQ_FIRMWARE 40 /* characters of a version; the rest is cut off */
+#define TQ_NO_FORCE INT32_MIN /* force is not measured: the field stays empty */
 #define TQ_CONTACT 1u
 #define TQ_BUTTON 2u
 

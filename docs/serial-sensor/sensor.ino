@@ -2,12 +2,12 @@
 // A sketch to start from: set the constants to your parts. docs/serial-sensor.md
 #include "line.h"
 
-const char FIRMWARE[] = "wheel and load cell 1.0"; // of this sketch: it stands in the data
-const float UM_PER_COUNT = 25.0;       // of the wheel, by a ruler
-const float MN_PER_STEP = 5.0;         // of the load cell, by a weight laid on
+const char FIRMWARE[] = "wheel and load cell 1.0"; // of this sketch; stored in the data
+const float UM_PER_COUNT = 25.0;       // of the wheel, measured with a ruler
+const float MN_PER_STEP = 5.0;         // of the load cell, measured with a weight
 const int REST_STEPS = 512;            // the load cell without weight
 const uint32_t PERIOD_US = 2000;       // 500 lines a second
-const uint32_t BAUD = 500000;          // a 16 MHz AVR has exactly this; baud under [hand] is the same
+const uint32_t BAUD = 500000;          // exact on a 16 MHz AVR; set baud under [hand] to the same
 
 volatile int32_t counts = 0;
 uint16_t number = 0;

@@ -45,7 +45,7 @@ class Console:
     screen : int
         Which screen, from 0.
     on_page : callable, optional
-        Told of each page that has come up; lets a test press the right pixels.
+        Called with each page that is shown; lets a test press the right pixels.
 
     Raises
     ------
@@ -87,7 +87,7 @@ class Console:
     # --- The respondent: each page may raise SessionAborted -----------------------------------
 
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
-        """Be told where events go, such as that somebody asked to stop, and who follows pages."""
+        """Receive the log for events, such as a request to stop, and the follower of pages."""
         self._runner.note, self._runner.follow = note, page
 
     def welcome(self, intake: Intake) -> dict[str, str | int]:
@@ -95,7 +95,7 @@ class Console:
         return intake_pages.welcome(self._runner, intake)
 
     def announce(self, page: str, **values: object) -> None:
-        """Show the page of this key until the participant goes on."""
+        """Show the page of this key until the participant continues."""
         intake_pages.message(self._runner, page, values=values)
 
     def wait(self, until: Callable[[], bool]) -> None:

@@ -86,7 +86,7 @@ def text(
 
 
 def fitted(window: Any, content: str, *, box: Point, height: float, **options: Any) -> Any:
-    """A text as large as fits a box of this width and height, `height` at the most."""
+    """A text as large as fits a box of this width and height, `height` at most."""
     smallest = SMALLEST_SHARE * height
     drawn = text(window, content, height=height, wrap=box[0], **options)
     while height > smallest and not _fits(window, drawn, box):

@@ -1,4 +1,4 @@
-"""What hands do: presses of the mouse and of keys, each as an event, none lost between frames."""
+"""Input events: presses of the mouse and of keys, each as an event, none lost between frames."""
 
 from __future__ import annotations
 

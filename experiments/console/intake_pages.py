@@ -29,9 +29,9 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
     Raises
     ------
     SessionAborted
-        Where consent is refused, the code is another person's, or the participant stops.
+        If consent is refused, the code is another person's, or the participant stops.
     InputError
-        Where a question has no text in the language of the console.
+        If a question has no text in the language of the console.
     """
     runner.texts.require(intake.questions)
     of = runner.texts.of
@@ -55,7 +55,7 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
 
 
 def message(runner: PageRunner, page: str, *, values: dict[str, object]) -> None:
-    """A title, a text, and a button to go on."""
+    """A title, a text, and a button to continue."""
     of = runner.texts.of
     label = runner.texts.by_key.get(f"{page}.continue")
     proceed = runner.proceed(label, y=-0.24)

@@ -62,7 +62,9 @@ class Texts:
         for key, content in texts.items():
             wanted, found = _places(complete[key]), _places(content)
             if found != wanted:
-                expected = f"the places {', '.join(sorted(wanted)) or 'none'} of English in {key}"
+                expected = (
+                    f"the placeholders {', '.join(sorted(wanted)) or 'none'} of English in {key}"
+                )
                 got = ", ".join(sorted(found)) or "none"
                 _refuse(language, expected, f"got {got}; correct it")
         return Texts(language, texts)

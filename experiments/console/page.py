@@ -1,4 +1,4 @@
-"""What is on the screen at one time, and who of it hears the mouse and the keys."""
+"""What is on the screen at one time, and which widget receives the mouse and the keys."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Page:
             self._focus.key(key)
 
     def let_go(self) -> None:
-        """Forget a press that has not ended; its end will not be told."""
+        """Forget a press that has not ended; its end will not be reported."""
         if self._held is not None:
             self._held.cancel()
         self._held = None

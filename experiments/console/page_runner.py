@@ -1,4 +1,4 @@
-"""Shows one page after another, lets the participant stop on each, and minds every event."""
+"""Shows one page after another, lets the participant stop on each, and handles every event."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class PageRunner(Parts):
     stamp : str
         What every page is stamped with, in the participant's language.
     on_page : callable, optional
-        Told of each page that has come up.
+        Called with each page that is shown.
     """
 
     def __init__(self, window: Any, texts: Texts, *, stamp: str, on_page: PageHook | None) -> None:
@@ -101,7 +101,7 @@ class PageRunner(Parts):
         Raises
         ------
         SessionAborted
-            Where the participant stops the session.
+            If the participant stops the session.
         """
         stop = [self.stop_button(self._ask_soon)] if stoppable else []
         stamp = [self.stamped(self._stamp)] if self._stamp else []

@@ -48,7 +48,7 @@ class Parts:
         self.progress: tuple[int, int] | None = None
 
     def title(self, content: str, *, y: float = 0.395) -> Any:
-        """What a page is about, on two lines at the most."""
+        """What a page is about, on two lines at most."""
         return fitted(
             self.window, content, box=(1.2, 0.13), height=TITLE_HEIGHT, at=(0.0, y), bold=True
         )

@@ -60,8 +60,8 @@ def check_screen(screen: int) -> None:
     if not 0 <= screen < count:
         there_are = "0, the only one" if count == 1 else f"0 to {count - 1}, of {count}"
         raise InputError(
-            f"expected the number of a screen ({there_are}), got {screen}; choose one that is "
-            "there, or connect another."
+            f"expected the number of a screen ({there_are}), got {screen}; choose an "
+            "existing one, or connect another."
         )
 
 

@@ -1,4 +1,4 @@
-"""Whether a machine is quick enough for a session: its screen, its rig and its disk.
+"""Whether a machine is fast enough for a session: its screen, its rig and its disk.
 
 docs/method/protocols.md#self-test
 """
@@ -65,7 +65,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
     Raises
     ------
     InputError
-        Where there is no screen.
+        If there is no screen.
     """
     window = open_window(size=(1280, 800), fullscreen=fullscreen, screen=screen)
     try:
@@ -74,7 +74,7 @@ def time_flips(*, screen: int, fullscreen: bool) -> Timing:
         window.close()
     return Timing(
         name="frames",
-        meaning="from one frame to the next",
+        meaning="interval between frames",
         milliseconds=(1e3 * np.diff(shown)).tolist(),
         limit_ms=25.0,
     )
@@ -86,7 +86,7 @@ def time_presentations(rig: TextureRig, models: Sequence[Presentable]) -> Timing
     Raises
     ------
     InputError
-        Where the rig cannot be opened, or fails while it presents.
+        If the rig cannot be opened, or fails while it presents.
     """
     rig.open()
     try:
@@ -119,7 +119,7 @@ def time_syncs(folder: Path) -> Timing:
 
         taken = [_duration_ms(keep) for _ in range(SYNCS)]
     return Timing(
-        name="answers", meaning="to keep an answer on the disk", milliseconds=taken, limit_ms=50.0
+        name="answers", meaning="to store an answer on the disk", milliseconds=taken, limit_ms=50.0
     )
 
 

@@ -183,7 +183,7 @@ def _remaining(surfaces: Surfaces) -> int:
 
 
 def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
-    """What there is to do: press a number, choose, feel the rest, or confirm the choice."""
+    """What to do next: press a number, choose, feel the rest, or confirm the choice."""
     if surfaces.chosen is not None:
         told = of("choice.so_far", number=surfaces.chosen + 1)
     else:
@@ -194,7 +194,7 @@ def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
 
 
 class _Line:
-    """A remark whose words change; it is made anew when they do."""
+    """A remark whose words change; its stimulus is created again when they do."""
 
     def __init__(self, runner: PageRunner, *, y: float) -> None:
         self._runner, self._y = runner, y

@@ -61,7 +61,7 @@ class Widget(Protocol):
         ...
 
     def cancel(self) -> None:
-        """Forget a press whose end will not be told."""
+        """Forget a press whose end will not be reported."""
         ...
 
     def key(self, key: Key) -> None:
@@ -196,7 +196,7 @@ class RatingScale:
     width : float
         Length of the line.
     told : callable
-        Told of each rating, 0 … 100.
+        Called with each rating, 0 … 100.
     """
 
     enabled = True

@@ -1,1 +1,1 @@
-"""What one shows a visitor: textures under the hand, and what of them is felt, live."""
+"""The demonstration for visitors: textures under the hand, and which layers are felt, live."""

@@ -63,7 +63,7 @@ class LiveRig:
         return self._notes
 
     def present_model(self, model: Layered) -> None:
-        """Render this model under the hand; a fault is told by `take_faults`."""
+        """Render this model under the hand; `take_faults` reports a fault."""
         self._counters = RenderCounters()
         self._model = model
         if self._sound is None:
@@ -80,7 +80,7 @@ class LiveRig:
             self._sound.silence()
 
     def mask(self, on: bool) -> None:
-        """Masking noise on or off; a fault is told by `take_faults`."""
+        """Masking noise on or off; `take_faults` reports a fault."""
         if self._sound is None:
             return
         try:
@@ -155,13 +155,13 @@ class LiveRig:
         Raises
         ------
         SoundLost, InputError
-            Where nothing can be played any more.
+            If nothing can be played any more.
         """
-        told, self._faults = tuple(self._faults), []
+        own, self._faults = tuple(self._faults), []
         sound = () if self._sound is None else self._sound.faults()
         if self.halted:
             self._model = None
         if self._sound is not None and self._sound.pid is None:
             self._counters = RenderCounters()
             self._sound.open() if self._model is None else self._sound.play(self._model)
-        return (*told, *sound, *self._hand.faults())
+        return (*own, *sound, *self._hand.faults())

@@ -1,4 +1,4 @@
-"""Opens what a visitor feels with: the rig of a rig file, or what any computer has."""
+"""Opens the rig for a visitor: that of a rig file, or the devices of any computer."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ NO_SOUND = "no sound device: nothing is played"
 
 @contextmanager
 def desk(path: Path) -> Iterator[LiveRig]:
-    """The rig of a rig file, which nobody else uses meanwhile.
+    """The rig of a rig file, which no other program uses at the same time.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def demonstration(vibrator: Vibrator | None = None) -> Iterator[LiveRig]:
 def _usual_sound(
     live: Live, vibrator: Vibrator | None, opened: ExitStack
 ) -> tuple[SoundOutput | None, str]:
-    """The open sound output, None where none can be opened, and what a visitor is told of it."""
+    """The open sound output, None if none can be opened, and the note about it for visitors."""
     try:
         device = find_device(None, "output")
     except InputError:

@@ -31,6 +31,7 @@ from experiments.feel.view import (
     level_words,
     short,
 )
+from modeling.errors import counted
 
 Box = tuple[float, float, float, float]
 
@@ -125,7 +126,7 @@ class SpectrumPanel:
             x=frequency_scale(highest_hz),
             y=density_scale(*density),
         )
-        heading = "What plays: spectrum at this speed and force (dB re 1 g²/Hz)"
+        heading = "Playing: spectrum at this speed and force (dB re 1 g²/Hz)"
         at = (left + 0.02, top - 0.026)
         self._fixed = [
             card(window, box=box),
@@ -149,9 +150,11 @@ class SpectrumPanel:
     def tell(self, texture: Texture) -> None:
         """Name what is drawn."""
         fewer = texture.simplified
-        self._legend[0].show(f"full model, {texture.full.n_layers} layers")
+        self._legend[0].show(f"full model, {counted(texture.full.n_layers, 'layer')}")
         self._legend[1].show(
-            "no simplified model" if fewer is None else f"simplified model, {fewer.n_layers} layers"
+            "no simplified model"
+            if fewer is None
+            else f"simplified model, {counted(fewer.n_layers, 'layer')}"
         )
 
     def draw(self, now: Now, *, plays: ModelNow | None) -> None:
@@ -242,7 +245,7 @@ class LayerPanel:
     def tell(self, plays: ModelNow) -> None:
         """Say how many layers are felt, and the level of each."""
         layers = plays.layers
-        self._heading.show(f"What is felt: {felt_words(layers)} (g peak; dB: above threshold)")
+        self._heading.show(f"Layers felt: {felt_words(layers)} (g peak; dB: above threshold)")
         for label, level in zip(self._labels, layers.sensation_db, strict=False):
             label.show(level_words(float(level)))
 

@@ -1,4 +1,4 @@
-"""What can be felt with: a rig as the window for visitors sees it."""
+"""A rig as the window for visitors sees it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NO_HAND = HandNow(speed_mm_s=0.0, force_n=0.0, there=False)
 
 @dataclass(frozen=True, kw_only=True)
 class OutputNow:
-    """What leaves for the hand.
+    """The output to the hand.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class FeltRig(Protocol):
         """The hand as it is now; never waits."""
 
     def output(self) -> OutputNow | None:
-        """What leaves now, None where nothing can; never waits."""
+        """The present output, None if there is none; never waits."""
 
     @property
     def halted(self) -> bool:

@@ -76,7 +76,7 @@ def load_textures(named: Sequence[Path], simplified: Path | None = None) -> tupl
     if simplified is not None and not set(full) & set(fewer):
         raise InputError(
             f"expected a simplified model of {' or '.join(full)} in {simplified}, got "
-            f"{', '.join(fewer)}; simplify the models that are to be felt."
+            f"{', '.join(fewer)}; simplify these models, too."
         )
     return tuple(Texture(full=model, simplified=fewer.get(name)) for name, model in full.items())
 

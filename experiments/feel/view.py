@@ -15,6 +15,7 @@ from experiments.feel.rigs import HandNow, OutputNow
 from experiments.feel.textures import Texture
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
+from modeling.errors import counted
 from modeling.models.loading import Layered
 from modeling.perception.simplification import layer_amplitudes_g
 from modeling.perception.thresholds import Threshold
@@ -72,7 +73,7 @@ class Now(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Yardstick:
-    """By what is judged whether a layer is felt, as in `modeling.simplify`."""
+    """The criterion for whether a layer is felt, as in `modeling.simplify`."""
 
     threshold: Threshold
     criterion: CriterionName = "energy"
@@ -190,14 +191,14 @@ PLACES: dict[Place, str] = {
 
 
 def short(name: str, longest: int) -> str:
-    """A name in at most so many characters."""
+    """A name in at most this many characters."""
     return name if len(name) <= longest else f"{name[: longest - 1]}…"
 
 
 def felt_words(layers: FeltLayers) -> str:
     """How many layers are felt, in words."""
     count, felt, unknown = layers.felt.size, int(layers.felt.sum()), int(layers.unknown.sum())
-    words = f"{felt} of {count} layers"
+    words = f"{felt} of {counted(count, 'layer')}"
     return f"{words}, {unknown} unknown" if unknown else words
 
 

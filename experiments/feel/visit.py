@@ -1,4 +1,4 @@
-"""What a visitor has chosen, and what the rig is asked for when that changes."""
+"""A visitor's choice, and the requests to the rig when it changes."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Visit:
         self.rig.silence()
 
     def stop_or_play(self) -> None:
-        """Stop, or go on after a stop."""
+        """Stop, or continue after a stop."""
         if self.playing:
             self.stop()
         else:
@@ -82,9 +82,9 @@ class Visit:
 
     def take_faults(self) -> tuple[str, ...]:
         """What went wrong at the rig since the last call; what it has halted does not play."""
-        told = self.rig.take_faults()
+        faults = self.rig.take_faults()
         self.playing = self.playing and not self.rig.halted
-        return told
+        return faults
 
     def press(self, key: str) -> None:
         """Act on a key by PsychoPy's name for it; other keys have no effect."""

@@ -37,7 +37,7 @@ POINTER_S = 0.005
 WORDS_S = 0.1  # words that change faster cannot be read, and cost the most to draw
 MOST_BUTTONS = 9
 LONGEST_LABEL, LONGEST_TITLE, LONGEST_FAULT = 14, 18, 240  # characters
-LEAD = "Stroke: the spectrum follows your hand. Filled layers are felt, hollow ones are not."
+LEAD = "Stroke: the spectrum follows your hand. Filled layers can be felt, hollow ones cannot."
 KEYS = (
     "1–9 or arrow keys: texture     F: full or simplified     Space: stop or play     "
     "M: masking noise     Esc: end"
@@ -81,7 +81,7 @@ class FeelWindow:
     screen : int
         Which screen, from 0; InputError where there is none.
     on_frame : callable, optional
-        Told of each frame; lets a test press the right pixels and look.
+        Called with each frame; lets a test press the right pixels and look.
     """
 
     def __init__(
@@ -141,7 +141,7 @@ class FeelWindow:
             self._follow_pointer(due)
 
     def _follow_pointer(self, until_s: float) -> None:
-        """Tell the rig where the pointer is, more often than a frame is drawn."""
+        """Pass the pointer's position to the rig, more often than a frame is drawn."""
         while True:
             self.window.winHandle.dispatch_events()
             self._visit.rig.point(*self._pointer.at, inside=self._pointer.inside)

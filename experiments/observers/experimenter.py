@@ -6,14 +6,14 @@ from experiments.sessions.surfaces import Standing
 
 
 class SimulatedExperimenter:
-    """Mounts every sample and mends every rig at once.
+    """Mounts every sample and repairs every rig at once.
 
     Attributes
     ----------
     asked : list of str
         The trays that were asked for, in order.
     calls : list of str
-        What was told to have failed.
+        What was reported to have failed.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class SimulatedExperimenter:
         self.asked.append(tray)
 
     def call(self, told: str) -> None:
-        """What failed is mended at once."""
+        """What failed is repaired at once."""
         self.calls.append(told)
 
     def go_on(self) -> None:
@@ -36,7 +36,7 @@ class SimulatedExperimenter:
         return True
 
     def tell(self, standing: Standing) -> None:
-        """Needs to be told nothing."""
+        """Needs no information."""
 
     def page(self, name: str) -> None:
         """Nor this."""

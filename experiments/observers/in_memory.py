@@ -52,7 +52,7 @@ class _UnfeltRig(SimulatedRig):
 
 
 class _Answers(MemoryStore):
-    """Keeps answers alone."""
+    """Keeps only answers."""
 
     def log(self, event: str, **fields: object) -> None:
         pass

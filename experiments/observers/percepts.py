@@ -202,7 +202,7 @@ class Perception:
         )
 
     def felt(self, threshold_shift_db: float = 0.0) -> Felt:
-        """All distances, as felt by somebody whose threshold is that much higher."""
+        """All distances, as felt by a person whose threshold is that much higher."""
         percepts = np.maximum(self._levels - threshold_shift_db, 0.0)
         real, virtual = percepts[0], percepts[1:]
         return Felt(

@@ -39,7 +39,7 @@ class Trait:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """The least and the most that anybody has."""
+        """The lowest and the highest possible value."""
         return self.mean - FURTHEST_SD * self.sd, self.mean + FURTHEST_SD * self.sd
 
 
@@ -152,7 +152,7 @@ class Psychometrics:
             if not isinstance(effects, Mapping):
                 raise InputError(
                     f"expected points by {', '.join(EFFECTS)} planted for {texture}, got "
-                    f"{shown(effects)}; name what they are planted in."
+                    f"{shown(effects)}; name what they apply to."
                 )
             planted[texture] = self._checked(texture, effects)
         object.__setattr__(self, "planted", planted)

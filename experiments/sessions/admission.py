@@ -19,8 +19,8 @@ from modeling import InputError
 _AGAIN = {
     "running": "another console runs it now; wait for its end",
     "complete": "it is complete; choose another subject or session",
-    "aborted": "it was aborted; go on with --resume",
-    "crashed": "it broke off; go on with --resume",
+    "aborted": "it was aborted; continue with --resume",
+    "crashed": "it was interrupted; continue with --resume",
 }
 
 
@@ -85,7 +85,7 @@ def _require_day_before(
         overrides.allow(
             "same date",
             f"expected session {manifest.session} on a later date than {before.stem}, which ended "
-            f"on {ended}, got {today}; let the participant come on another day",
+            f"on {ended}, got {today}; let the participant come back on another day",
         )
 
 

@@ -1,4 +1,4 @@
-"""What is to be done in a session: all of it, or what an earlier run left."""
+"""What remains to be done in a session: all of it, or what an earlier run left."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Agenda:
 
     @property
     def trained(self) -> int:
-        """Training trials answered already, in the training that goes on."""
+        """Training trials answered already, in the training that continues."""
         if self.training_again:
             return 0
         return sum(row["phase"] == "training" and not row["repeats"] for row in self.rows)

@@ -24,7 +24,7 @@ from experiments.sessions.held import (
 )
 from experiments.sessions.roster import Roster
 from modeling import InputError
-from modeling.errors import shortened
+from modeling.errors import counted, shortened
 from modeling.files.documents import read_json_object
 from modeling.files.reading import LONGEST_PATH
 from modeling.files.writing import write_files
@@ -82,7 +82,7 @@ def export_session(data_folder: str | Path, manifest_path: str | Path) -> None:
 
 
 def export_all(data_folder: str | Path) -> Exported:
-    """Write what BIDS shows of every session that nobody is running, where it is not so already.
+    """Write the BIDS tables of every session that is not running, where they differ.
 
     Parameters
     ----------
@@ -164,11 +164,11 @@ def require_tables(
         wrong += _differing(_people(root, held, damaged=damaged, kept=kept))
     if wrong:
         others = len(wrong) - 1
-        more = f" (and {others} more file{'s' * (others > 1)})" if others else ""
-        got = "differs" if wrong[0].exists() else "is not there"
+        more = f" (and {counted(others, 'more file')})" if others else ""
+        got = "differs" if wrong[0].exists() else "is missing"
         raise InputError(
-            f"expected tables that say what the logs of their sessions do, got {wrong[0]}, which "
-            f"{got}{more}; make them again with tactileq study status --data {root}, which tells "
+            f"expected tables that agree with the logs of their sessions, got {wrong[0]}, which "
+            f"{got}{more}; make them again with tactileq study status --data {root}, which says "
             "what it changes."
         )
 

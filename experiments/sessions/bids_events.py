@@ -16,29 +16,30 @@ from experiments.sessions.traces import PRESENTATION_COLUMNS
 SAME_START_S = 1e-3
 
 _MEANINGS = {
-    "opened": "The session was begun or taken up again",
+    "opened": "The session began or was resumed",
     "welcome": "The participant consented, confirmed the code and answered the questions",
     "phase": "A part of the session was announced",
     "mount_requested": "The experimenter was asked for the sample of a tray",
-    "mount_confirmed": "The experimenter said that it is mounted",
+    "mount_confirmed": "The experimenter confirmed that it is mounted",
     "presented": "A surface was presented",
-    "slider": "A slider was let go",
+    "slider": "A slider was released",
     "chosen": "A virtual surface was chosen; the last one before the answer counts",
     "answer": "The trial was answered; the answer is in the table of answers",
     "training_over": "Training ended",
-    "outside": "The participant was asked to stroke otherwise",
+    "outside": "The participant was asked to stroke differently",
     "break_began": "A break began",
     "break_ended": "The participant ended the break",
     "stop_asked": "The participant asked to stop, and was asked whether to",
-    "stop_withdrawn": "The participant goes on after all",
-    "fault": "The rig failed, or something in it did",
+    "stop_withdrawn": "The participant decided to continue",
+    "fault": "The rig or a part of it failed",
     "pen": "Acceleration at the pen was stored",
     "ended": "This start of the session ended",
 }
 _OWN: dict[str, dict[str, Any]] = {
-    "onset": {"Description": "Since the session was begun", "Units": "s"},
+    "onset": {"Description": "Since the session began", "Units": "s"},
     "duration": {
-        "Description": "From the first to the last sample of a presentation; n/a of what has none",
+        "Description": "From the first to the last sample of a presentation; n/a for events "
+        "without duration",
         "Units": "s",
     },
     "trial_type": {"Description": "What happened"},
@@ -52,7 +53,7 @@ _OWN: dict[str, dict[str, Any]] = {
     },
     "button": {"Description": "Button of the virtual surface, from 1"},
     "scale": {"Description": "Which slider"},
-    "value": {"Description": "Where it was let go, 0 to 100", "Units": "arbitrary"},
+    "value": {"Description": "Where it was released, 0 to 100", "Units": "arbitrary"},
     "status": {
         "Description": "How this start of the session ended",
         "Levels": {
@@ -62,12 +63,15 @@ _OWN: dict[str, dict[str, Any]] = {
         },
     },
     "by": {"Description": "Who or what ended it"},
-    "told": {"Description": "What was told: a fault, a reason, an advice"},
+    "told": {"Description": "What was reported: a fault, a reason, an advice"},
     "invalidates": {
         "Description": "Whether the participant cannot have felt what was planned",
         "Levels": {"true": "the trial is not valid", "false": "nothing follows"},
     },
-    "start_s": {"Description": "When the first sample left, on the rig's clock", "Units": "s"},
+    "start_s": {
+        "Description": "When the first sample was output, on the rig's clock",
+        "Units": "s",
+    },
 }
 _FROM_PRESENTATIONS = {
     name: described
@@ -92,8 +96,8 @@ def event_rows(
         The rows of the session's table of presentations, as text.
     """
     onsets = onsets_s(events)
-    # By start of the session too: a trial that broke off is presented again in a later one, whose
-    # rig has a clock of its own.
+    # By start of the session too: a trial that was interrupted is presented again in a later one,
+    # whose rig has a clock of its own.
     shown: dict[tuple[str, str], list[Mapping[str, str]]] = {}
     for row in presentations:
         shown.setdefault((row["run"], row["trial"]), []).append(row)
@@ -107,7 +111,7 @@ def event_rows(
 def onsets_s(events: Sequence[Event]) -> list[float]:
     """When each event happened, in seconds since the first one (its run's clock, then UTC's).
 
-    Within a run the monotonic clock counts; where a run begins is told by the date and time, but
+    Within a run the monotonic clock counts; the start of a run is given by the date and time, but
     is never before the end of the last one.
     """
     onsets: list[float] = []
@@ -124,7 +128,7 @@ def onsets_s(events: Sequence[Event]) -> list[float]:
 def trial_types(rows: Sequence[Mapping[str, object]]) -> dict[str, str]:
     """Every kind of event that there is, with its meaning."""
     found = sorted({str(row["trial_type"]) for row in rows})
-    return {name: _MEANINGS.get(name, "As the log of the session says") for name in found}
+    return {name: _MEANINGS.get(name, "As in the log of the session") for name in found}
 
 
 def _moment(event: Event) -> datetime:
@@ -149,7 +153,7 @@ def _row(event: Event, onset: float, of_trial: list[Mapping[str, str]]) -> dict[
 def _presentation(event: Event, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
     """What the rig says of a presentation, where it was stored; taken from the trial's, each once.
 
-    A simulated rig, whose clock stands still between presses, starts several at one time.
+    A simulated rig, whose clock stops between presses, starts several at one time.
     """
     start_s = event.get("start_s")
     if not isinstance(start_s, int | float):

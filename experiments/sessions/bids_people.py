@@ -1,4 +1,4 @@
-"""Who took part, in which sessions: the tables of a data set about people.
+"""The tables of a data set about people: who took part, in which sessions.
 
 docs/method/protocols.md#bids
 """
@@ -18,28 +18,31 @@ STATUS_LEVELS = {
     "complete": "all trials were answered",
     "aborted": "somebody ended it; it can be resumed",
     "crashed": "the program was killed or failed; it can be resumed",
-    "running": "it was going on when this table was written",
+    "running": "it was running when this table was written",
 }
 _SESSION_COLUMNS: dict[str, dict[str, Any]] = {
     "session_id": {"Description": "Session (day)"},
     "day": {
         "Description": "Whole days since the participant's first session; the dates themselves are "
-        "left out, since they may tell who it was",
+        "left out, since they may identify the person",
         "Units": "day",
     },
     **{
-        task: {"Description": f"How the session of the task {task} stands", "Levels": STATUS_LEVELS}
+        task: {
+            "Description": f"State of the session of the task {task} stands",
+            "Levels": STATUS_LEVELS,
+        }
         for task in ANSWER_TABLES
     },
 }
 _FIRST = {"participant_id": {"Description": "Participant"}}
 _LAST: dict[str, dict[str, Any]] = {
     "slot": {
-        "Description": "Place in the design: whose share of the balanced parts of the order it is"
+        "Description": "Place in the design, which determines the balanced parts of the order"
     },
     "status": {
-        "Description": "Whether the participant goes on",
-        "Levels": {"enrolled": "takes part", "dropped": "will not come again"},
+        "Description": "Whether the participant continues",
+        "Levels": {"enrolled": "takes part", "dropped": "will not come back"},
     },
     "consent_version": {"Description": "Version of the consent form that was agreed to"},
     "language": {"Description": "Language of the texts"},
@@ -73,7 +76,7 @@ def people_files(
     roster : mapping of subject to mapping
         As `Roster.subjects` gives it.
     rows_kept : collection of str
-        Participants whose row stays as it stands there, since what it follows from is damaged.
+        Participants whose row stays as it is there, since its source is damaged.
     kept : collection of str
         Participants whose sessions.tsv is left alone for that reason.
     """
@@ -163,9 +166,9 @@ def _session_rows(sessions: Sequence[Held]) -> list[dict[str, object]]:
 
 
 def readme(description: Mapping[str, Any]) -> bytes:
-    """What somebody reads first who is given the data set."""
+    """The README of the data set."""
     simulated = (
-        "\nTHESE DATA ARE SIMULATED: dataset_description.json says what of them.\n"
+        "\nTHESE DATA ARE SIMULATED: dataset_description.json says which parts.\n"
         if description.get("Simulated")
         else ""
     )
@@ -176,13 +179,15 @@ Answers of a study with tactileq, as a BIDS data set.
 participants.tsv           who took part
 sub-XX/sub-XX_sessions.tsv the person's sessions, and how each one ended
 sub-XX/ses-XX/beh/         of each session
-  *_beh.tsv                the answers, one row for each trial, in the order in which they came
+  *_beh.tsv                the answers, one row for each trial, in the order in which they were
+  given
   *_events.tsv             what happened: presentations and what limits did to them, breaks, faults
   *_physio.tsv.gz          the hand, 250 times a second; a file for each start of the session
-sourcedata/                what the program wrote meanwhile; all of the above is made from it
+sourcedata/                what the program wrote during sessions; all of the above is generated
+from it
 
-Every column is described in the JSON file beside its table. n/a stands for what there is not. Text
-with quotes is written as in CSV; control characters stand as the characters that picture them.
+Every column is described in the JSON file beside its table. n/a means that there is no value. Text
+with quotes is written as in CSV; control characters are replaced by their symbols.
 
 sourcedata holds pseudonyms, dates and times: leave it out of what you publish.
 """.encode()

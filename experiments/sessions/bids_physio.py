@@ -19,7 +19,7 @@ from modeling.arrays import Floats
 from rig.interface import SURFACES
 
 RATE_HZ = 250.0
-# Between readings further apart than this nobody knows what the hand did.
+# Between readings further apart than this the hand's motion is unknown.
 LONGEST_GAP_S = 0.02
 # No table is longer than its readings warrant, whatever one of their times says: an hour of pauses,
 # and fifty rows for each reading (readings come at 200 Hz and more while a hand is on a surface).
@@ -38,7 +38,7 @@ COLUMNS: dict[str, dict[str, Any]] = {
         "Units": "N",
     },
     "surface": {
-        "Description": "What was presented at the last reading",
+        "Description": "Surface presented at the last reading",
         "Levels": {
             str(SURFACES.index("none")): "nothing",
             str(SURFACES.index("real")): "the mounted real surface",

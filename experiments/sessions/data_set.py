@@ -1,4 +1,4 @@
-"""Which study, models and participants a data folder takes: those of its first session."""
+"""Which study, models and participants a data folder accepts: those of its first session."""
 
 from __future__ import annotations
 

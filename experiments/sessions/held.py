@@ -119,7 +119,7 @@ def _check_rows(events: Iterable[Event], files: SessionFiles) -> None:
 
 
 def _wrong_in(row: Mapping[str, Any], task: str) -> str:
-    """The first value of an answer that cannot be one; empty where there is none."""
+    """The first invalid value of an answer; empty where there is none."""
     for column in ANSWER_TABLES[task].columns:
         value = row.get(column.name)
         whole = column.name not in _WHOLE or value is None or is_whole(value)

@@ -1,4 +1,4 @@
-"""What is fixed before the first trial of a session, and what it rests on.
+"""What is fixed before the first trial of a session, and its basis.
 
 docs/method/protocols.md#storing
 """

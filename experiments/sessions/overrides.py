@@ -1,4 +1,4 @@
-"""Rules that a study may break for a stated reason, which is then on record."""
+"""Rules that a study may break for a stated reason, which is recorded."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from modeling.errors import shown
 
 
 class Overrides:
-    """What was allowed against a rule, and why.
+    """The rules that were overridden, and the reason.
 
     Parameters
     ----------
     reason : str, optional
         Printable text; without one nothing is allowed.
     tell : callable, optional
-        Told each rule that is broken, in one sentence.
+        Called with each rule that is broken, in one sentence.
 
     Raises
     ------
@@ -36,7 +36,7 @@ class Overrides:
         self.recorded: list[dict[str, str]] = []
 
     def allow(self, what: str, sentence: str) -> None:
-        """Go on against a rule, which is recorded once.
+        """Override a rule, which is recorded once.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What a session says of the program that ran it."""
+"""The program that ran a session, as its manifest describes it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is left to do in a session that was aborted, or broke off.
+"""What is left to do in a session that was aborted or interrupted.
 
 docs/method/protocols.md#resuming
 """

@@ -26,7 +26,7 @@ from modeling.files.writing import write_bytes
 
 # Easy to say and to hear apart in English and in Japanese: TAKI-46.
 _SYLLABLES = tuple(consonant + vowel for consonant in "KMNRST" for vowel in "AEIO")
-_ADVICE = "make room or choose another data folder"
+_ADVICE = "free disk space or choose another data folder"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,12 +92,12 @@ class Roster:
     ) -> Iterator[Person]:
         """The participant with this number, enrolled now if never before.
 
-        Who is new is not enrolled after all where the block raises; meanwhile nobody else can be.
+        Who is new is not enrolled after all where the block raises; meanwhile no one else can be.
 
         Parameters
         ----------
         subject : int, optional
-            ≥ 1; without it the lowest number that nobody has had.
+            ≥ 1; without it the lowest number that has not been used.
         participants : int
             How many slots the task's design has.
         simulated, pilot : bool
@@ -142,7 +142,7 @@ class Roster:
         Raises
         ------
         InputError
-            If nobody of that number takes part.
+            If nobody with that number takes part.
         StoreError
             If the disk does not take it.
         """
@@ -157,7 +157,7 @@ class Roster:
         Raises
         ------
         InputError
-            If nobody of that number was enrolled, or the data are deleted already, or the line
+            If nobody with that number was enrolled, or the data are deleted already, or the line
             that says so cannot be read.
         StoreError
             If the disk does not take it.
@@ -173,7 +173,7 @@ class Roster:
             write_bytes(self.path, b"".join(lines))
 
     def subjects(self) -> dict[int, dict[str, Any]]:
-        """Everybody who was ever enrolled, by number, as far as it can be read.
+        """Everybody who was ever enrolled, by number, as far as the roster can be read.
 
         Returns
         -------
@@ -242,7 +242,8 @@ class Roster:
         if listed.damaged:
             raise InputError(
                 "expected a roster that can be read before somebody new gets a number and a slot, "
-                f"got {listed.damaged}, which may be another one's; restore the file from a copy."
+                f"got {listed.damaged}, which may belong to another person; restore "
+                "the file from a copy."
             )
 
     def _not_there(self, subject: int, listed: Listed) -> InputError:
@@ -254,7 +255,7 @@ class Roster:
         )
 
     def _cut_half_line(self) -> None:
-        """Take away what a process left that was killed before it had enrolled anybody."""
+        """Remove what a process left that was killed before it had enrolled anybody."""
         there = self.path.read_bytes() if self.path.exists() else b""
         whole = there.rfind(b"\n") + 1
         if whole < len(there):

@@ -1,4 +1,4 @@
-"""One session with everything that belongs to it: enrolment, order, rig, store, data set."""
+"""One session with all its parts: enrolment, order, rig, store, data set."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from rig.interface import TextureRig
 
 @dataclass(frozen=True, kw_only=True)
 class Circumstances:
-    """What is said of a session beside its study, task and numbers.
+    """The circumstances of a session, in addition to its study, task and numbers.
 
     Parameters
     ----------
@@ -39,11 +39,11 @@ class Circumstances:
     language : str
         One of the study's; empty for its first.
     override : str, optional
-        Reason to go on where a rule is broken; stored.
+        Reason to continue where a rule is broken; stored.
     tell : callable, optional
-        Told each rule that is broken for that reason.
+        Called with each rule that is broken for that reason.
     resume : bool
-        Whether to go on with a session that was aborted or broke off.
+        Whether to continue with a session that was aborted or interrupted.
     sources : mapping of set of models to path
         Where the models came from.
 
@@ -169,7 +169,7 @@ def _stated(
     people: People,
     said: Circumstances,
 ) -> dict[str, Any]:
-    """What a manifest holds whoever takes part."""
+    """The part of a manifest that does not depend on the participant."""
     sha256 = models.sha256(study.textures)
     return {
         "task": task.name,

@@ -1,4 +1,4 @@
-"""How a session stands, as its log tells."""
+"""The state of a session, according to its log."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class SessionState:
     Parameters
     ----------
     status : {"running", "complete", "aborted", "crashed"}
-        Crashed where nobody runs it and its last start has no end on record.
+        Crashed if no process runs it and its last start has no recorded end.
     events : tuple of dict
         All of the log's.
     rows : tuple of dict

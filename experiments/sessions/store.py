@@ -48,7 +48,7 @@ from rig.interface import Acceleration, Fault, HandRows, PresentationRecord
 __all__ = ["MemoryStore", "SessionStore", "Store", "StoreError"]
 
 CLAIM_S = 0.2  # who only asks whether a session is running holds its lock for a moment
-_NOTHING = "nothing was presented: make room or choose another data folder"
+_NOTHING = "nothing was presented: free disk space or choose another data folder"
 
 
 class Store(Protocol):
@@ -294,7 +294,7 @@ class SessionStore:
         *,
         overrides: Overrides | None = None,
     ) -> SessionStore:
-        """Go on with a session that was aborted, or broke off.
+        """Continue with a session that was aborted or interrupted.
 
         Parameters
         ----------
@@ -368,7 +368,7 @@ class SessionStore:
 
     def _event(self, event: str, fields: Mapping[str, object]) -> dict[str, object]:
         if not fields.keys().isdisjoint(OWN_FIELDS):
-            raise TypeError(f"{event}: {', '.join(OWN_FIELDS)} are names of the log's own")
+            raise TypeError(f"{event}: {', '.join(OWN_FIELDS)} are reserved names of the log")
         t_s = round(time.monotonic() - self._began_s, 6)
         return {"utc": utc_text(), "t_s": t_s, "run": self.run, "event": event, **fields}
 
@@ -392,7 +392,7 @@ class SessionStore:
         for piece in pieces:
             number += 1
             while (path := self.files.named(f"trial-{trial:03d}_pen-{number}.wav")).exists():
-                number += 1  # of a run that broke off in this trial
+                number += 1  # of a run that was interrupted in this trial
             try:
                 write_bytes(path, pen_file(piece))
             except OSError as error:
@@ -462,7 +462,7 @@ def _check_open(state: SessionState, stored: SessionManifest, *, files: SessionF
     """Refuse to resume what is complete, or whose manifest is not the one that it began with."""
     if state.status == "complete":
         raise InputError(
-            f"expected a session to go on with, got {files.stem}, which is complete; choose "
+            f"expected a session to resume, got {files.stem}, which is complete; choose "
             "another subject or session."
         )
     check_named(state.events, files, sha256=stored.sha256)

@@ -40,7 +40,7 @@ class SessionAborted(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Rating:
-    """The answer to a trial with two scales: similarities, 0 (nothing alike) … 100 (identical).
+    """The answer to a trial with two scales: similarity, 0 (different) … 100 (identical).
 
     Raises
     ------
@@ -260,7 +260,7 @@ class Surfaces:
 
 
 class RatedTrial(Protocol):
-    """A trial whose answer is how alike a real and a virtual surface are."""
+    """A trial whose answer is the similarity of a real and a virtual surface."""
 
     @property
     def trial(self) -> int: ...
@@ -325,7 +325,7 @@ class Respondent(Protocol):
         ...
 
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
-        """Be told where events outside trials go, and who follows which page is shown."""
+        """Receive the log for events outside trials, and the follower of the pages shown."""
         ...
 
     def welcome(self, intake: Intake) -> Mapping[str, str | int]:
@@ -333,7 +333,7 @@ class Respondent(Protocol):
         ...
 
     def announce(self, page: str, **values: object) -> None:
-        """Show a text, by its key, until the participant goes on."""
+        """Show a text, by its key, until the participant continues."""
         ...
 
     def wait(self, until: Callable[[], bool]) -> None:
@@ -359,7 +359,7 @@ class Respondent(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Standing:
-    """How far a session is, as an experimenter sees it.
+    """The progress of a session, as an experimenter sees it.
 
     Parameters
     ----------
@@ -387,7 +387,7 @@ class Experimenter(Protocol):
         ...
 
     def call(self, told: str) -> None:
-        """Tell what failed, and ask to mend it."""
+        """Report what failed, and ask to repair it."""
         ...
 
     def go_on(self) -> None:
@@ -399,7 +399,7 @@ class Experimenter(Protocol):
         ...
 
     def tell(self, standing: Standing) -> None:
-        """Show how far the session is, and how the rig is."""
+        """Show the progress of the session and the state of the rig."""
         ...
 
     def page(self, name: str) -> None:
@@ -407,5 +407,5 @@ class Experimenter(Protocol):
         ...
 
     def answered(self) -> None:
-        """Show that an answer came; never which one."""
+        """Show that an answer was given, but not which one."""
         ...

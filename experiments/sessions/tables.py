@@ -20,7 +20,7 @@ MISSING = "n/a"
 
 
 class GrowingTable:
-    """A table whose rows the system writes to the disk when it gets round to it.
+    """A table whose rows the system writes to the disk in its own time.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The rows of a session's traces, line by line: one that is damaged costs itself, and is named."""
+"""The rows of a session's traces, line by line; a damaged line is named and skipped."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 
 from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
 from modeling import InputError
+from modeling.errors import counted
 from modeling.files.reading import read_bytes
 from modeling.files.tables import unguarded
 from rig.interface import SURFACES
@@ -92,5 +93,5 @@ def _cell(name: str) -> str:
 
 def _told(lines: Sequence[int], path: Path) -> str:
     more = len(lines) - 1
-    others = f" and {more} more line{'s' * (more > 1)}" if more else ""
+    others = f" and {counted(more, 'more line')}" if more else ""
     return f"line {lines[0]}{others} of {path.name}"

@@ -16,8 +16,8 @@ from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationR
 _CLOCK = "seconds since the rig was opened"
 _RUN = {
     "run": {
-        "Description": "In which start of the session, from 1; a trial that broke off in one is "
-        "presented again in a later one, which has its answer"
+        "Description": "In which start of the session, from 1; a trial that was interrupted in one "
+        "is presented again in a later one, which has its answer"
     },
 }
 HAND_COLUMNS: dict[str, dict[str, Any]] = {
@@ -51,13 +51,13 @@ _OUTSIDE = {
     "too_hard_share": "harder than its hardest condition (n/a where the force is assumed)",
 }
 _COUNTERS = {
-    "lift_offs": "Samples with a speed or force that is no number",
+    "lift_offs": "Samples with a speed or force that is not a number",
     "above_grid": "Samples while the hand was faster or harder than the highest condition",
     "below_grid": "Samples while the hand was slower or lighter than the lowest condition",
-    "clamped": "Parameters that were moved into the legal range",
-    "limited_peak": "Samples that the limit of the peak touched",
-    "limited_rms": "Samples that the limit of the RMS touched",
-    "limited_duration": "Samples that the limit of the duration muted",
+    "clamped": "Parameters that were clamped to the legal range",
+    "limited_peak": "Samples affected by the peak limit",
+    "limited_rms": "Samples affected by the RMS limit",
+    "limited_duration": "Samples muted by the duration limit",
 }
 PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
     **_RUN,
@@ -68,8 +68,8 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
     "model_sha256": {
         "Description": "Of the model, or of the file of a stimulus set; n/a of a real surface"
     },
-    "start_s": {"Description": f"When its first sample left, {_CLOCK}", "Units": "s"},
-    "end_s": {"Description": f"When its last sample left, {_CLOCK}", "Units": "s"},
+    "start_s": {"Description": f"When its first sample was output, {_CLOCK}", "Units": "s"},
+    "end_s": {"Description": f"When its last sample was output, {_CLOCK}", "Units": "s"},
     **{
         name: {"Description": f"Share of the time with a moving hand on the surface, {what}"}
         for name, what in _OUTSIDE.items()
@@ -79,9 +79,9 @@ PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
     "dose_g2_s": {"Description": "Its square over time, unweighted", "Units": "g²·s"},
     "rms_g": {"Description": "Its RMS", "Units": "g"},
     "peak_g": {"Description": "Its largest absolute value", "Units": "g"},
-    "misses": {"Description": "Blocks that the sound card had to do without"},
+    "misses": {"Description": "Blocks that the sound card missed"},
     "stale_blocks": {"Description": "Blocks for which the hand was not read in time"},
-    "faults": {"Description": "What went wrong until the next presentation, separated by |"},
+    "faults": {"Description": "Faults until the next presentation, separated by |"},
 }
 
 

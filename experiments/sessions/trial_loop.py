@@ -132,7 +132,7 @@ def _ending_of(error: BaseException) -> tuple[str, str, str]:
 
 
 class _Running:
-    """A session that goes on: what takes part in it, and how far it has come."""
+    """A session that continues: what takes part in it, and how far it has come."""
 
     def __init__(
         self,
@@ -357,7 +357,7 @@ class _Running:
         }
 
     def _trace(self, trial: Trial, faults: Sequence[Fault]) -> None:
-        """Store what the hand did and felt; tell the participant who mostly stroked outside."""
+        """Store what the hand did and felt; advise a participant who mostly stroked outside."""
         rows, shown = self._keep(trial.trial, faults)
         advice = advice_on(outside_grid(rows, shown))
         self._inside = advice is None

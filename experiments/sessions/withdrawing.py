@@ -1,4 +1,4 @@
-"""Deleting what there is of a person, and noting who will not come again.
+"""Deleting all data of a person, and recording dropouts.
 
 docs/method/protocols.md#withdrawing
 """
@@ -18,9 +18,9 @@ from modeling.files.writing import write_bytes
 
 
 def withdraw(data_folder: str | Path, subject: int) -> Exported:
-    """Delete all files of a person; the number is never given again, the slot becomes free.
+    """Delete all files of a person; the number is never reused, the slot becomes free.
 
-    Begun again after a failure, it goes on where it stopped.
+    Begun again after a failure, it continues where it stopped.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def withdraw(data_folder: str | Path, subject: int) -> Exported:
     Raises
     ------
     InputError
-        If nobody of that number was enrolled, a session of that person is running, there is
+        If nobody with that number was enrolled, a session of that person is running, there is
         nothing left to delete, or the roster's line of that person cannot be read; then nothing
         was deleted.
     OSError
@@ -61,7 +61,7 @@ def withdraw(data_folder: str | Path, subject: int) -> Exported:
 
 
 def drop_out(data_folder: str | Path, subject: int) -> Exported:
-    """Note that a person will not come again: the data stay, the slot becomes free.
+    """Record that a person dropped out: the data stay, the slot becomes free.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def drop_out(data_folder: str | Path, subject: int) -> Exported:
     Raises
     ------
     InputError
-        If nobody of that number takes part, or a session of that person is running.
+        If nobody with that number takes part, or a session of that person is running.
     """
     root = Path(data_folder)
     _require_still(root, subject)

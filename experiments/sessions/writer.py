@@ -1,4 +1,4 @@
-"""The thread that writes a session's log, so that nobody who draws waits for a disk."""
+"""The thread that writes a session's log, so that drawing never waits for a disk."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from modeling.files.reading import reason_of
 
 
 class StoreError(OSError):
-    """The disk did not take a file or a line; the message is one sentence for the user."""
+    """The disk did not store a file or a line; the message is one sentence for the user."""
 
 
-SAFE = "what was answered before is safe: make room, then go on with --resume"
+SAFE = "what was answered before is safe: free disk space, then continue with --resume"
 
 
 def store_error(error: OSError, path: Path, advice: str = SAFE) -> StoreError:
-    """What is told about a disk that took nothing; `advice` says what is safe, and what to do."""
+    """The error for a disk that stored nothing; `advice` says what is safe, and what to do."""
     return StoreError(f"expected to write to {path}, got {reason_of(error)}; {advice}.")
 
 
@@ -133,7 +133,7 @@ class LogWriter:
                 )
                 lines = [line_of(event) for event in numbered]
                 safe = self._append(lines)
-        except Exception as error:  # whatever it is: who waits must not wait for ever
+        except Exception as error:  # whatever it is: who waits must not wait indefinitely
             self._error = self._error or StoreError(
                 f"expected to write to {self._path}, got {error!r}; report this as an error."
             )

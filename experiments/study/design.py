@@ -1,6 +1,6 @@
-"""The order of the trials: who does what, when (docs/method/protocols.md#order, PAPER VII).
+"""The order of the trials and conditions (docs/method/protocols.md#order, PAPER VII).
 
-What is balanced over participants follows from the *slot*, a place 1 … participants in the plan of
+Balancing over participants is based on the *slot*, a place 1 … participants in the plan of
 a task, which the replacement of a dropout takes over; all shuffles follow from the subject.
 """
 
@@ -171,7 +171,7 @@ def models_of_session(study: Study, *, task: str, slot: int, session: int) -> tu
 
     By day, as many neighbouring slots as there are models do them in the rows of a cyclic Latin
     square of a random order, dealt at random: exactly as many begin with each model, and a number
-    does not tell which.
+    does not reveal which.
     """
     models = study.models_of(task)
     if study.plan_of(task).schedule == "interleaved":

@@ -20,12 +20,12 @@ from rig.interface import Presentable, Stimulus
 from rig.sound.signals import MANIFEST as STIMULI
 from rig.sound.signals import stimuli_of_surfaces
 
-# What may go on where a reason is given: a word for what, and the sentence that refuses it.
+# What may continue where a reason is given: a word for what, and the sentence that refuses it.
 Allow = Callable[[str, str], None]
 
 
 def refuse(what: str, sentence: str) -> NoReturn:
-    """Go on with nothing."""
+    """Allow no override."""
     raise InputError(sentence)
 
 
@@ -130,7 +130,7 @@ class ModelSets:
         ----------
         study : Study
         allow : callable
-            Told what could go on for a reason ("exchanged models") and the sentence against it.
+            Called with what may be overridden ("exchanged models") and the error against it.
 
         Raises
         ------
@@ -152,8 +152,7 @@ class ModelSets:
             allow(
                 "exchanged models",
                 "expected models to be made from those of a set that is named before theirs, got "
-                f"the {earlier} model of {texture}, made from the {later} one; exchange the two "
-                "sets.",
+                f"the {earlier} model of {texture}, made from the {later} one; swap the two sets.",
             )
 
     def _require_all(self, study: Study) -> None:
@@ -203,7 +202,7 @@ def load_model_sets(
     overriding : mapping of set to path, optional
         Other places than the study's; relative to where the program runs.
     progress : callable
-        Told the share that is done, and the texture that was done last, where a scene is compiled.
+        Called with the share that is done, and the last texture, when a scene is compiled.
 
     Raises
     ------

@@ -28,7 +28,7 @@ LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
 
 
 def measures_of(task: str) -> tuple[str, ...]:
-    """What claims about a task can be about: its scales, and the share of right answers.
+    """Measures that claims about a task can use: its scales, the proportion of correct answers.
 
     Anything of a task that does not exist; `Plan.check` names it.
     """
@@ -37,7 +37,7 @@ def measures_of(task: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One claim about two models, with what would count against it.
+    """One claim about two models, with the bounds that would contradict it.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class Claim:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """What is claimed and left out, fixed before the first answer.
+    """Claims and exclusions, fixed before the first answer.
 
     Parameters
     ----------

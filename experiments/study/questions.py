@@ -65,7 +65,7 @@ class Question:
         object.__setattr__(self, "levels_text", shown_as)
         if not (isinstance(self.name, str) and re.fullmatch("[a-z][a-z0-9_]*", self.name)):
             raise InputError(
-                "expected a name of small letters, digits and underscores for a question, got "
+                "expected a name of lower-case letters, digits and underscores for a question, got "
                 f"{shown(self.name)}; rename it."
             )
         if self.name in TAKEN:

@@ -41,7 +41,7 @@ SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Everything that fixes the order of all trials, and what is told about the circumstances.
+    """Everything that fixes the order of all trials, and what is stated about the circumstances.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ class Study:
     plan : Plan
         Claims and exclusions.
     longest_gap_min : float
-        A session that goes on after a longer gap begins with training again, minutes.
+        A session that continues after a longer gap begins with training again, minutes.
     masking : str
         How the sound of the device was masked.
     surface_visible : str
@@ -230,7 +230,7 @@ class Study:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of its values, by which files name the study that they rest on."""
+        """SHA-256 of its values, by which files name the study that they are based on."""
         return sha256_of_values(self.to_dict())
 
     @staticmethod

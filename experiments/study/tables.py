@@ -36,7 +36,7 @@ def require_keys(values: Mapping[str, Any], needed: Collection[str], *, where: s
 
 
 def require_bool(name: str, value: object) -> None:
-    """Refuse all but true and false."""
+    """Refuse everything but true and false."""
     if not isinstance(value, bool):
         raise InputError(f"expected true or false for {name}, got {shown(value)}; correct it.")
 

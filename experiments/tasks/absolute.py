@@ -20,7 +20,8 @@ from rig.interface import Presentable
 # --- Parameters -----------------------------------------------------------------------------
 
 DESCRIPTION = (
-    "A real and a virtual surface, said to correspond, are compared at will and their similarity "
+    "A real and a virtual surface, presented as a corresponding pair, are compared "
+    "freely and their similarity "
     "is rated on two visual analogue scales without a preset marker."
 )
 

@@ -135,10 +135,14 @@ def _buttons(sessions: Sequence[Sequence[Trial]]) -> Iterator[Found]:
         right = Counter(places)
         over.update(right)
         within += [right[button] for button in range(len(trials[0].layout))]  # type: ignore[attr-defined]
-    yield "trials of a session in which a button is right", within, len(sessions[0])
+    yield "trials of a session in which a button is correct", within, len(sessions[0])
     trials_in_all = sum(map(len, sessions))
     buttons = range(len(sessions[0][0].layout))  # type: ignore[attr-defined]
-    yield "trials of all in which a button is right", [over[b] for b in buttons], trials_in_all
+    yield (
+        "trials of all sessions in which a button is correct",
+        [over[b] for b in buttons],
+        trials_in_all,
+    )
 
 
 def _right(trial: Trial) -> int | None:

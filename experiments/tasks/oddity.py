@@ -2,7 +2,7 @@
 
 Three buttons present virtual surfaces of one texture: two render one model, the third the other.
 Which is the odd one out? Nobody has to name a texture or to find a number for a likeness, so this
-most sharply tells whether anybody feels the difference.
+shows most directly whether anybody feels the difference.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ def _positions(occasion: Occasion, order: Order) -> dict[tuple[str, str], list[i
     rng, place = occasion.block(BUTTONS, f"odd position, {occasion.phase}")
     positions, begun = {}, 0
     for pair in fisher_yates(pairs, rng):
-        # Each pair goes on where the one before stopped, so that all buttons come in turn.
+        # Each pair continues where the one before stopped, so that all buttons come in turn.
         turns = [(begun + n + place) % BUTTONS + 1 for n in range(counts[pair])]
         begun += counts[pair]
         positions[pair] = fisher_yates(turns, occasion.rng)

@@ -70,7 +70,7 @@ def _design(study: Study, task: str) -> Iterator[str]:
         yield f"- Each frequency comes {_times(plan.repeats)}."
     else:
         yield f"- Models compared: {_listed(plan.models)}, {_schedule(study, task)}."
-        times = "comes" if ANSWER_TABLES[task].both_models else "comes with each model"
+        times = "comes" if ANSWER_TABLES[task].both_models else "is presented with each model"
         yield f"- Each texture {times} {_times(plan.repeats)}."
     yield (
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
@@ -78,8 +78,9 @@ def _design(study: Study, task: str) -> Iterator[str]:
     )
     for real, virtual in plan.anchors.items():
         yield (
-            f"- Anchor: real {real} beside the {plan.models[0]} model of {virtual}, said to "
-            "correspond, once in each session; no part of the comparison of models."
+            f"- Anchor: real {real} beside the {plan.models[0]} model of {virtual}, "
+            "presented as a pair like any other, once in each session; not part of the "
+            "comparison of models."
         )
     if plan.break_after:
         yield f"- A break after every {plan.break_after} trials."
@@ -91,7 +92,7 @@ def _design(study: Study, task: str) -> Iterator[str]:
 def _schedule(study: Study, task: str) -> str:
     if study.plan_of(task).schedule == "interleaved":
         return "mixed in one session"
-    return f"each on a day of its own ({study.sessions(task)} sessions), counterbalanced exactly"
+    return f"each on a separate day ({study.sessions(task)} sessions), counterbalanced exactly"
 
 
 def _training(fewest: int, plan: TaskPlan) -> str:
@@ -116,7 +117,7 @@ def _models(study: Study, models: ModelSets) -> Iterator[str]:
 
 def _claims(study: Study) -> Iterator[str]:
     if not study.plan.claims:
-        yield "None: whatever is found is exploratory."
+        yield "None: all findings are exploratory."
     for number, claim in enumerate(study.plan.claims, start=1):
         yield f"{number}. **{claim.name}.** {_claimed(claim)} {proof_of_sensitivity(study, claim)}"
 
@@ -135,8 +136,8 @@ def proof_of_sensitivity(study: Study, claim: Claim) -> str:
 def _claimed(claim: Claim) -> str:
     first, second = claim.models
     measure = claim.measure.replace("_", " ")
-    unit = "points of the scale" if claim.measure in RATINGS else "(shares of right answers)"
-    what = f"share of right answers in the {claim.task} task"
+    unit = "points on the scale" if claim.measure in RATINGS else "(proportions of correct answers)"
+    what = f"proportion of correct answers in the {claim.task} task"
     if claim.measure in RATINGS:
         what = f"{measure} in the {claim.task} task"
     against = f"{second} minus {first}"
@@ -156,7 +157,7 @@ def _exclusions(study: Study) -> Iterator[str]:
         yield f"- {sentence}"
     share = study.plan.highest_share_at_ends
     yield (
-        f"- Nobody is left out for it, but a scale counts as exhausted where more than "
+        f"- Nobody is excluded for it, but a scale counts as exhausted where more than "
         f"{share:.0%} of its ratings are 0 or 100."
     )
 
@@ -164,7 +165,10 @@ def _exclusions(study: Study) -> Iterator[str]:
 def _participants(study: Study) -> Iterator[str]:
     for task, plan in study.tasks.items():
         yield f"- {task}: {plan.participants} participants."
-    yield "- Whoever drops out is replaced by somebody who takes over the same place in the design."
+    yield (
+        "- A participant who drops out is replaced by one who takes over the same place in "
+        "the design."
+    )
     yield "- Data are collected until these numbers have completed their sessions, then no more."
     yield "- Nothing is tested before."
 
@@ -173,16 +177,16 @@ def _randomisation(study: Study) -> Iterator[str]:
     yield (
         "Orders are Fisher–Yates shuffles within the balanced design, from the seed in the study "
         f"file (SHA-256 of the study: `{study.sha256}`), and are stored before the first trial of "
-        "each session. The seed is not told here, since orders could be foretold from it."
+        "each session. The seed is not stated here, since orders could be predicted from it."
     )
 
 
 def _circumstances(study: Study) -> Iterator[str]:
-    yield f"- Masking of sound: {study.masking}."
-    yield f"- What is seen of the surface: {study.surface_visible}."
+    yield f"- Acoustic masking: {study.masking}."
+    yield f"- Visibility of the surface: {study.surface_visible}."
     yield f"- Languages: {', '.join(study.languages)}."
     if study.questions:
-        yield f"- Asked of each participant: {', '.join(q.name for q in study.questions)}."
+        yield f"- Questions to each participant: {', '.join(q.name for q in study.questions)}."
     yield f"- Consent: {f'page of version {study.consent}' if study.consent else 'no page'}."
 
 

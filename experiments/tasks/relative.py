@@ -21,7 +21,7 @@ from rig.interface import Presentable
 
 DESCRIPTION = (
     "Forced choice: which of the virtual surfaces, one per button and in a new layout each time, "
-    "is the real surface that can be felt beside them?"
+    "corresponds to the real surface that can be felt beside them?"
 )
 
 

@@ -23,7 +23,7 @@ from rig.interface import TextureRig, ToneBurst
 
 DESCRIPTION = (
     "Two-interval forced choice: the pen is held still, one of two intervals holds a tone of some "
-    "frequency, and the participant says which one. The amplitude follows the answers (QUEST+)."
+    "frequency, and the participant says which one. The amplitude adapts to the answers (QUEST+)."
 )
 # An octave to two thirds of one apart: on lines between them the shipped thresholds are met within
 # 1 dB RMS.

@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 # --- Parameters -----------------------------------------------------------------------------
 
-# Levels are of the sinusoid's peak, in dB re 1 g. 2 dB are finer than what 60 trials can tell.
+# Levels are of the sinusoid's peak, in dB re 1 g. 2 dB is finer than 60 trials can resolve.
 LEVELS_DB: Floats = np.arange(-70.0, 21.0, 2.0)
-# Beyond the levels on both sides, so that a threshold beyond them can be told from one at them.
+# Beyond the levels on both sides, to distinguish a threshold beyond them from one at them.
 THRESHOLDS_DB: Floats = np.arange(-80.0, 31.0, 1.0)
 # Normal, broad: the shipped thresholds lie from -42 to -16 dB. One wrong answer to a strong tone
 # then does not cost a dozen trials.
@@ -188,7 +188,7 @@ def next_level_db(answers: Sequence[Answer], frequency_hz: float, *, highest_db:
     Raises
     ------
     InputError
-        Where the rig can present none of `LEVELS_DB`.
+        If the rig can present none of `LEVELS_DB`.
     """
     allowed = LEVELS_DB[highest_db + _TOLERANCE_DB >= LEVELS_DB]
     if not allowed.size:

@@ -15,6 +15,7 @@ import numpy as np
 from experiments.tasks.threshold import DURATION_S
 from experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
 from modeling import InputError
+from modeling.errors import counted
 from modeling.files.tables import read_table, table_text
 
 READ = ("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid")
@@ -92,7 +93,7 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
     Raises
     ------
     InputError
-        Where nobody has answered, a table is damaged, or simulated and real people are mixed.
+        If nobody has answered, a table is damaged, or simulated and real people are mixed.
     """
     folder = Path(data_folder)
     files = answer_files(folder, subject=subject)
@@ -179,7 +180,7 @@ def _mean(of: Sequence[Estimate]) -> MeanThreshold:
 
 
 def _factor(count: int) -> float:
-    """Half the 95 % interval of a mean over so many people, in standard deviations."""
+    """Half the 95 % interval of a mean over this many people, in standard deviations."""
     from scipy.stats import norm, t  # late: takes longer to load than all of modeling
 
     if count == 1:
@@ -192,14 +193,14 @@ def _factor(count: int) -> float:
 
 def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bool) -> str:
     """The table as a TSV with its source and caveat; `Threshold.load` reads it."""
-    who = f"{people} {'person' if people == 1 else 'people'}{' (simulated)' if simulated else ''}"
+    who = f"{counted(people, 'person', 'people')}{' (simulated)' if simulated else ''}"
     bounds = [f"{one.frequency_hz:g} Hz" for one in means if one.note]
-    caveat = "felt with a pen held still; a hand that strokes feels less"
+    caveat = "measured with a pen held still; a stroking hand is less sensitive"
     if bounds:
         caveat += f"; at {', '.join(bounds)} only a bound (see note)"
     notes = (
         f"# source: tactileq threshold, {who}: two-interval forced choice (QUEST+) of bursts of "
-        f"{DURATION_S:g} s, 75 % right with lapses left out\n# caveat: {caveat}\n"
+        f"{DURATION_S:g} s, 75 % correct, lapses excluded\n# caveat: {caveat}\n"
     )
     return notes + table_text(COLUMNS, [_cells(one) for one in means])
 

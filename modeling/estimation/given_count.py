@@ -13,7 +13,7 @@ from modeling.arrays import Floats
 from modeling.equalizer.bands import clamp_bands
 from modeling.equalizer.peq import PEQ
 from modeling.equalizer.signs import sign_patterns
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.estimation.coherent import Climbed, climb, limits_of, observe
 from modeling.estimation.likelihood import Power, centres_and_widths, signal_power, split
 from modeling.recordings.spectrum import Spectrum
@@ -42,7 +42,7 @@ def fit_layer_count(spectrum: Spectrum, count: int) -> PEQ:
     """
     power = signal_power(spectrum)
     if power is None or count < 1:
-        got = f"{count} layers" if power is not None else "silence"
+        got = counted(count, "layer") if power is not None else "silence"
         raise InputError(f"expected a spectrum with power and a layer or more, got {got}; fix it.")
     patterns = sign_patterns(np.arange(float(count)))
     fitted = _likeliest(power, starts_of(power, count), patterns)
@@ -84,7 +84,7 @@ def _likeliest(power: Power, starts: Floats, patterns: Floats) -> Climbed:
     theta = np.repeat(starts, len(patterns), axis=0)
     signs = np.tile(patterns, (len(starts), 1))
     limits = limits_of(count, rate_hz=power.rate_hz, step_hz=power.step_hz)
-    for _ in range(_ROUNDS):  # bins are finest near the layers, so they are drawn anew
+    for _ in range(_ROUNDS):  # bins are finest near the layers, so they are drawn again
         near = centres_and_widths(theta, count)
         observed = observe([power] * len(theta), *near, scale=power.scale)
         theta = climb(theta, signs, observed, limits=limits, steps=60, enough=1e-3).theta

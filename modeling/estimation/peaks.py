@@ -174,7 +174,7 @@ def _as_peaks(theta: Floats, m: int, power: Power) -> Peaks:
     bins = bins_near(power, *centres_and_widths(theta, m))
     parts = power_sum_of_peaks(theta, m, bins)
     whole = misfit_of(bins, parts.sum(axis=0))
-    # Summed anew: next to a pure tone, the whole less the tone would be rounded to nothing.
+    # Summed again: next to a pure tone, the whole less the tone would be rounded to nothing.
     rest = [np.delete(parts, i, axis=0).sum(axis=0) for i in range(1, m + 1)]
     evidence = np.array([misfit_of(bins, expected) - whole for expected in rest])
     noise, frequency, bandwidth, gain = split(theta, m)

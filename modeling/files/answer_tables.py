@@ -182,8 +182,8 @@ def _with_common_columns(
     return (
         AnswerColumn(
             name="trial",
-            description="Number in the session: of a planned trial its own, training included; of "
-            "any other one the next that was free",
+            description="Number in the session: for a planned trial its own, training included; "
+            "for any other trial the next free number",
             limits=(0, inf),
             required=True,
         ),
@@ -223,7 +223,7 @@ def _with_common_columns(
         ),
         AnswerColumn(
             name="pilot",
-            description="Whether the session was a pilot, whose answers are no data of the study",
+            description="Whether the session was a pilot, whose answers are not data of the study",
             levels={"true": "of a pilot", "false": "of the study"},
             required=True,
         ),
@@ -248,7 +248,7 @@ RESPONSE_TIME = AnswerColumn(
 
 CORRECT = AnswerColumn(
     name="correct",
-    description="Whether the answer is right",
+    description="Whether the answer is correct",
     levels=YES_NO,
     limits=(0, 1),
 )
@@ -264,7 +264,7 @@ ANSWER_TABLES = {
         AnswerColumn(
             name="virtual_texture",
             description="Texture that the virtual surface models: the real one's, or in an anchor "
-            "another one, which was said to be the same",
+            "another one, which was presented as the same",
             required=True,
         ),
         AnswerColumn(
@@ -306,7 +306,7 @@ ANSWER_TABLES = {
         PRESSES,
         RESPONSE_TIME,
         title="forced choice",
-        texture="Real surface, which is the right answer",
+        texture="Real surface, which is the correct answer",
         model="Model behind all virtual surfaces of the trial",
         alternatives="layout",
     ),

@@ -60,11 +60,11 @@ def read_json_object(path: Path, *, advice: str, what: str = "a JSON file") -> d
     except _Double as error:
         got = f"{shown(str(error))} twice"
     except ValueError:
-        got = "a whole number too large for any calculation, or text that is no Unicode"
+        got = "a whole number too large for any calculation, or text that is not Unicode"
     else:
         if isinstance(values, dict):
             return values
-        got = "a value that is no object"
+        got = "a value that is not an object"
     raise InputError(f"expected JSON in {path}, got {got}; {advice}.")
 
 

@@ -174,7 +174,8 @@ def _check_same(now: Contents, before: Contents, target: Path) -> None:
     if changed:
         raise InputError(
             f"expected {target} as it was before the run, got {changed[0]}, which was added, "
-            "changed or removed meanwhile, so all of it stays; move one of the two folders away."
+            "changed or removed in the meantime, so all of it stays; move one of the "
+            "two folders away."
         )
 
 
@@ -187,7 +188,7 @@ def _put_back(old: Path, target: Path) -> None:
 
 
 def _kept(folder: Path, target: Path) -> Path:
-    """Move a hidden folder to a visible place beside `target`, and tell which."""
+    """Move a hidden folder to a visible place beside `target`; return that place."""
     names = (f"{target.name}-{number}" for number in itertools.count(2))
     place = next(p for name in names if not os.path.lexists(p := target.with_name(name)))
     folder.rename(place)
@@ -249,5 +250,5 @@ def listed_file(folder: Path, name: str, *, index_name: str) -> Path:
             "lies outside; copy the file into the folder."
         )
     path = folder / name
-    check_file(path, "the file", advice=f"restore it, or take it out of {index_name}")
+    check_file(path, "the file", advice=f"restore it, or remove it from {index_name}")
     return path

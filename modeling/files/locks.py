@@ -66,7 +66,7 @@ class Lock:
         Raises
         ------
         HeldError
-            If another holder, a thread of this process included, kept it for so long.
+            If another holder, a thread of this process included, kept it for this long.
         InputError
             For a file in its place that cannot be locked, such as a link or another user's.
         """

@@ -43,7 +43,7 @@ def behind_links(path: str | Path) -> Path:
         return target.resolve() if target.name == ".." else target
     if not target.exists():
         raise InputError(
-            f"expected a place to write to, got the link {target}, which leads nowhere (to "
+            f"expected a place to write to, got the link {target}, which points to nothing (to "
             f"{target.readlink()}); make what it leads to, or remove it."
         )
     return target.resolve()

@@ -1,4 +1,4 @@
-"""The one way in which files are read: whole, and only what is a file with contents of its own."""
+"""The only way in which files are read: as a whole, and only regular files."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LONGEST_PATH = 200
 _REASONS = {
     errno.ENOENT: "nothing there",
     errno.ENOTDIR: "nothing there",
-    errno.ELOOP: "a link that leads back to itself",
+    errno.ELOOP: "a link that points back to itself",
     errno.EACCES: "no permission",
     errno.EPERM: "no permission",
     errno.ENAMETOOLONG: "a name that is too long",
@@ -20,7 +20,7 @@ _REASONS = {
     errno.EEXIST: "a file in the way",
     errno.EFBIG: "a file that is larger than it may be",
     errno.ENOSPC: "a full disk",
-    errno.EROFS: "a disk that takes nothing",
+    errno.EROFS: "a full disk or one that refuses writes",
     errno.EIO: "a disk that fails",
 }
 
@@ -28,7 +28,7 @@ _REASONS = {
 def check_file(path: Path, what: str, *, advice: str = "give its path") -> None:
     """Refuse anything but a regular file, or a link to one, before it is opened.
 
-    A pipe would wait for its other end for ever, and a device may never end.
+    A pipe would wait for its other end indefinitely, and a device may never end.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Forcing files and their names to disk, so that a loss of power leaves them there."""
+"""Forcing files and their names to disk, so that they survive a loss of power."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 
 def make_folder(folder: Path) -> None:
     """Make a folder and those that it is in, forced to disk."""
-    # A drive that is not there has no folder above it: making what lies on it tells so.
+    # A missing drive has no folder above it; creating files on it reports that.
     if folder.is_dir() or folder.parent == folder:
         return
     make_folder(folder.parent)

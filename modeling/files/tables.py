@@ -17,7 +17,7 @@ _FORMULA = re.compile(r"'*[=+@]")
 
 
 def guarded(cell: str) -> str:
-    """A cell of text that no spreadsheet takes for a formula: with ' before a leading =, + or @."""
+    """A cell that spreadsheets do not read as a formula: with ' before a leading =, + or @."""
     return f"'{cell}" if _FORMULA.match(cell) else cell
 
 
@@ -81,7 +81,7 @@ def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]
 
 
 def check_columns(names: Iterable[str], known: Sequence[str], table: str | Path) -> None:
-    """Refuse a column that is not known: a misspelt one would be passed over without a word.
+    """Refuse a column that is not known: a misspelt one would be ignored silently.
 
     Raises
     ------

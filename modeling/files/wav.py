@@ -1,4 +1,4 @@
-"""WAV files of one axis or several, and what their full scale stands for."""
+"""WAV files of one axis or several, and the meaning of their full scale."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.files.reading import check_file
 
-# The beginnings of sound files. In others libsndfile would look for MP3, and tell of it on stderr.
+# The first bytes of sound files. In others libsndfile would look for MP3 and report it on stderr.
 _FORMS = (b"RIFF", b"RIFX", b"RF64", b"riff", b"FORM", b"fLaC")
 
 
@@ -76,7 +76,7 @@ def read_wav_channels(path: Path) -> tuple[Floats, float]:
         ) from None
     except MemoryError:
         raise InputError(
-            f"expected a WAV file that fits the memory, got {path}; cut it into parts."
+            f"expected a WAV file that fits into memory, got {path}; cut it into parts."
         ) from None
     # Streaming recorders write 0 or about the largest size there is; a last pad byte may lack.
     if form == b"RIFF" and path.stat().st_size + 1 < announced and 8 < announced < 0x7FFF0000:

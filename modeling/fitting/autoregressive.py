@@ -46,9 +46,9 @@ def fit_ar(recordings: RecordingSet | Iterable[Recording], *, order: int) -> ARM
     Raises
     ------
     GridError
-        Where the recordings lie on a line across the grid.
+        If the recordings lie on a line across the grid.
     InputError
-        Where they mix textures or units, have contact without speed, or are shorter than the
+        If they mix textures or units, have contact without speed, or are shorter than the
         order asks for.
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)

@@ -98,7 +98,7 @@ def _spectrum_of(
     if hum_hz:
         samples = without_hum(samples, rate_hz, hum_hz)
         lines = ", ".join(f"{f:.0f}" for f in hum_hz)
-        notes.append(f"hum of the mains at {lines} Hz taken out")
+        notes.append(f"mains hum at {lines} Hz removed")
     # Without contact there is nothing that could drift.
     drift = drift_of(samples, rate_hz) if record.force_n > 0 else Drift(0.0, 0.0)
     if drift.frequency:

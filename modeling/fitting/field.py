@@ -102,7 +102,7 @@ class Field:
         return 0.5 * (trend + float(np.sum(rest * (self.laplacian(rest) @ self.precision))))
 
     def predicted(self, theta: Floats) -> Floats:
-        """What the neighbours of each condition and the trend make of its parameters, (C, p)."""
+        """Prediction of each condition's parameters from its neighbours and the trend, (C, p)."""
         rest = theta - self.places @ self.trend
         neighbours = np.maximum(self.neighbours(), 1.0)[:, None]
         predicted: Floats = theta - self.laplacian(rest) / neighbours
@@ -257,7 +257,7 @@ def _band(field: Field, blocks: Floats) -> Floats:
 
 
 class _BandPlaces(NamedTuple):
-    """Where blocks and couplings of neighbours stand in the band, its rows one after the other.
+    """Positions of blocks and couplings of neighbours in the band, row by row.
 
     `lower` (t,) are the places of a block's lower triangle in the block, `diagonal` (C, t) those in
     the band; `coupled` those of whole blocks that join neighbours in a row, and in a column.

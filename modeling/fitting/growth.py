@@ -1,4 +1,4 @@
-"""Where a texture needs a further layer: power above what is expected, along laws over the grid.
+"""Where a texture needs a further layer: excess power along laws over the grid.
 
 A layer's frequency changes with speed, often as a power of it (1 for a spatial wavelength, 0 for a
 resonance). What the spectra of all conditions have above the response so far is summed along such

@@ -103,7 +103,7 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
 
 
 def _chosen(grid: TextureGrid, solutions: Sequence[Solution]) -> Solution:
-    """The likeliest, whatever its freedom, that predicts hidden conditions, too."""
+    """The most likely solution that also predicts hidden conditions."""
     if len(solutions) == 1:
         return solutions[0]
     losses = np.array([prediction_losses(grid, s) for s in solutions])

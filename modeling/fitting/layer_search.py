@@ -145,7 +145,7 @@ class _Pool:
         return max(self._solutions.get(count, []), key=lambda s: s.evidence, default=None)
 
     def rank(self, solution: Solution) -> tuple[int, float]:
-        """The larger the better: as many layers as are asked for, then the evidence."""
+        """Ranking, larger is better: the requested number of layers first, then the evidence."""
         off = 0 if self.count is None else abs(solution.count - self.count)
         return -off, solution.evidence
 
@@ -175,7 +175,7 @@ class _Pool:
 def _grow(pool: _Pool) -> None:
     """Independent layers, one by one, along laws over the grid; each number of them with signs.
 
-    Where coherent layers cancel or add up, independent ones go on growing for ever; it ends
+    Where coherent layers cancel or add up, independent ones go on growing indefinitely; it ends
     when two more have not made the coherent solution any better.
     """
     grid = pool.grid
@@ -215,7 +215,7 @@ def _with_signs(grid: TextureGrid, theta: Floats) -> list[Solution]:
 
 
 def _reduce(pool: _Pool) -> None:
-    """From the most layers downwards: the one that is missed least goes."""
+    """Backward elimination: the layer whose removal costs least is removed."""
     for m in range(pool.largest(), 1, -1):
         solution = pool.of(m)
         if solution is None:
@@ -332,7 +332,7 @@ def _spread_layers(grid: TextureGrid, count: int) -> list[Solution]:
 
 
 def _distinct(fits: Climbed, count: int) -> list[Climbed]:
-    """The likeliest rows that do not say the same."""
+    """The most likely rows that differ from each other."""
     chosen: list[Climbed] = []
     for row in np.argsort(fits.objective, kind="stable"):
         fit = fits.row(int(row))
@@ -346,7 +346,7 @@ def _distinct(fits: Climbed, count: int) -> list[Climbed]:
 def _likeliest(
     grid: TextureGrid, starts: Sequence[tuple[Floats, Floats]], count: int
 ) -> list[tuple[Floats, Floats]]:
-    """The best of some starts of as many layers, by what they come to in a few conditions."""
+    """The best of some starts with this number of layers, by their fit in a few conditions."""
     some = grid.spread(DECIDING_CONDITIONS)
     theta = np.concatenate([theta[some] for theta, _ in starts])
     signs = np.concatenate([np.tile(signs, (some.size, 1)) for _, signs in starts])

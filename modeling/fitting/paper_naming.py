@@ -1,4 +1,4 @@
-"""One layer, one name, over the whole grid (docs/method/fitting.md#tracking; PAPER III)."""
+"""Consistent names of layers over the whole grid (docs/method/fitting.md#tracking; PAPER III)."""
 
 from __future__ import annotations
 

@@ -39,11 +39,11 @@ def fit_texture(
     Parameters
     ----------
     recordings : RecordingSet or iterable of Recording
-        One texture, one unit; any rates. One speed or one force will do: then nothing is known of
-        others.
+        One texture, one unit; any rates. One speed or one force suffices; then the model says
+        nothing about others.
     estimator : {"joint", "paper", "paper-consistent"}
     layers : int, optional
-        Number of layers, 1 … 12, with `joint` only, which chooses it otherwise.
+        Number of layers, 1 … 12, with `joint` only; by default `joint` chooses it.
 
     Returns
     -------
@@ -53,9 +53,9 @@ def fit_texture(
     Raises
     ------
     GridError
-        Where the recordings lie on a line across the grid.
+        If the recordings lie on a line across the grid.
     InputError
-        Where they mix textures or units, or have contact without speed; for a number of layers out
+        If they mix textures or units, or have contact without speed; for a number of layers out
         of range or with another estimator.
     """
     records = recordings if isinstance(recordings, RecordingSet) else RecordingSet(recordings)
@@ -140,7 +140,7 @@ def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> d
 
 
 def missing_conditions(model: TextureModel) -> list[Condition]:
-    """(speed, force) of the conditions that were interpolated for want of a recording."""
+    """(speed, force) of the conditions that were interpolated because there is no recording."""
     return [
         (float(model.speeds_mm_s[i]), float(model.forces_n[j]))
         for i, j in np.argwhere(model.interpolated)

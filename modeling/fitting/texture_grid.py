@@ -97,7 +97,7 @@ class TextureGrid:
         return np.where(np.isnan(levels), np.nanmean(levels), levels)
 
     def spread(self, count: int) -> Integers:
-        """So many recorded conditions in all parts of the grid."""
+        """This number of recorded conditions, spread over all parts of the grid."""
         rows = np.flatnonzero(self.recorded)
         stride = max(1, round(0.382 * rows.size))
         while np.gcd(stride, rows.size) > 1:

@@ -1,4 +1,4 @@
-"""What a model says of the scene that it was compiled for."""
+"""The scene that a model was compiled for, as stored in the model."""
 
 from __future__ import annotations
 

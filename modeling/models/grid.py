@@ -142,7 +142,7 @@ def fill_grid(rows: Mapping[Condition, ArrayLike], texture: str) -> tuple[Floats
     Raises
     ------
     GridError
-        Where the conditions do not span the grid.
+        If the conditions do not span the grid.
     """
     check_spanned(rows, texture)
     speeds, forces = grid_axes(rows)

@@ -18,7 +18,7 @@ Model = TypeVar("Model", bound=AnyModel)
 _KINDS: dict[str, type[AnyModel]] = {
     kind.FORMAT: kind for kind in (TextureModel, RegressedModel, ARModel)
 }
-# What stands beside models and tells of them.
+# Files beside models that describe them.
 _ABOUT_MODELS = ("tactileq.simplification", "tactileq.compiled-scene")
 
 
@@ -39,7 +39,7 @@ def models_among(paths: Iterable[Path]) -> tuple[list[Path], list[Path]]:
     """Which of these JSON files may be models, and which state that they are something else.
 
     A file that states nothing may be a damaged model. Provenance, simplifications and what
-    tells of a compiled scene are neither.
+    describes a compiled scene are neither.
     """
     models: list[Path] = []
     others: list[Path] = []
@@ -56,7 +56,7 @@ def models_in(folder: Path) -> tuple[list[Path], list[Path]]:
     Raises
     ------
     InputError
-        Where none may be a model.
+        If none may be a model.
     """
     models, others = models_among(sorted(folder.glob("*.json")))
     if not models:

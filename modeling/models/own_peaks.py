@@ -1,4 +1,4 @@
-"""Which layers are peaks of their own, and which only fill the shape of another's."""
+"""Which layers are peaks of their own, and which only fill the shape of another layer."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TINY = 1e-300
 
 
 class OwnPeaks(NamedTuple):
-    """What each of m layers is to the response.
+    """The role of each of m layers in the response.
 
     Parameters
     ----------

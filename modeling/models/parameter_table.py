@@ -1,4 +1,4 @@
-"""What a layered model tells the renderer: parameters over a grid, and how to read between.
+"""A layered model as the renderer sees it: parameters over a grid, and how to interpolate.
 
 Between its nodes a table is read linearly, whatever the model. A model that blends in logarithms
 gives a table with more nodes, as many as it takes to be close to its own laws: nothing that reads
@@ -108,7 +108,7 @@ class ParameterTable:
 
 
 def wide_enough(axis: Floats, values: Floats, *, along: int) -> tuple[Floats, Floats]:
-    """An axis of two nodes where there is only one: nothing is known of others, so it is repeated.
+    """An axis of two nodes from a single one, which is repeated, since others are unknown.
 
     Parameters
     ----------

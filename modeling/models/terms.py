@@ -1,4 +1,4 @@
-"""What parameters may be regressed on (eq. 3 and 4)."""
+"""The predictors of parameters (eq. 3 and 4)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DRIVING_TERMS = {"conditions": TERMS, "centroid": (CENTROID,)}
 
 
 def check_driver(driven_by: str) -> None:
-    """Refuse what cannot drive a model."""
+    """Refuse predictors that cannot drive a model."""
     names = tuple(DRIVING_TERMS)  # a file may hold a list, which no dictionary can look up
     if driven_by not in names:
         raise InputError(

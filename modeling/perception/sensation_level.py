@@ -15,7 +15,7 @@ from modeling.perception.thresholds import Threshold
 
 
 class SensationLevel(NamedTuple):
-    """Level in dB above threshold (dB SL), and the share of power that it says nothing about.
+    """Level in dB above threshold (dB SL), and the share of power without a known threshold.
 
     `share_without_threshold` (0 … 1) is the power at frequencies where no threshold is known.
     """

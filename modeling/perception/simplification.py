@@ -11,7 +11,7 @@ from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response, band_rms
 from modeling.equalizer.peq import PEQ
 from modeling.equalizer.signs import neighbouring_patterns
-from modeling.errors import InputError, shown
+from modeling.errors import InputError, counted, shown
 from modeling.models.own_peaks import own_peaks
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold
@@ -67,15 +67,15 @@ def simplify(
     margin_db: float = 0.0,
     hold_above: bool = True,
 ) -> Simplification:
-    """Drop every layer that is below threshold in every condition, stably and in sum.
+    """Drop every layer that is reliably below threshold in every condition, also in sum.
 
-    A layer goes only if its level plus `margin_db` is below the threshold in each condition of the
-    grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
-    weighted by the threshold, margin included) stay below it too; else the loudest of them are
-    kept. Where no threshold is known the layer is kept; but above the table's end its last level is
-    held as a lower bound, below which a layer may go. A layer that only fills another's shape
-    (`modeling.models.own_peaks`) goes with that one or not at all. The noise and at least one layer
-    always stay (PAPER V, docs/method/perception.md#simplification).
+    A layer is dropped only if its level plus `margin_db` is below the threshold in each condition
+    of the grid, if P(flip) of this verdict is below 5 %, and if all dropped layers together (powers
+    weighted by the threshold, margin included) stay below it too; otherwise the loudest of them are
+    kept. If no threshold is known, the layer is kept; but above the table's end its last level is
+    held as a lower bound, below which a layer may be dropped. A layer that only fills another's
+    shape (`modeling.models.own_peaks`) is dropped with that one or not at all. The noise and at
+    least one layer are always kept (PAPER V, docs/method/perception.md#simplification).
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def simplify(
     margin_db : float
         ≥ 0; how far below the threshold a layer has to be.
     hold_above : bool
-        False: above the table's end nothing is known, so that every layer there stays.
+        False: above the table's end the threshold is unknown, so that every layer there is kept.
 
     Raises
     ------
@@ -244,20 +244,20 @@ def _decide_alone(
     if (level >= 0).any():
         above = int((level >= 0).sum())
         what = f"not {margin_db:g} dB below threshold" if margin_db else "above threshold"
-        return True, f"{what} in {above} of {level.size} conditions"
+        return True, f"{what} in {above} of {counted(level.size, 'condition')}"
     if np.isnan(level).any():
         outside = int(np.isnan(level).sum())
         known = "{:g} to {:g} Hz".format(*threshold.valid_range_hz)
-        where = f"{outside} of {level.size} conditions"
+        where = f"{outside} of {counted(level.size, 'condition')}"
         return True, f"no threshold known in {where} ({threshold.name} covers {known})"
     if flip >= HIGHEST_FLIP_PROBABILITY:
-        return True, "below threshold, but the records are too short to be sure"
+        return True, "below threshold, but the records are too short to be certain"
     by = f"{margin_db:g} dB " if margin_db else ""
     return False, f"{by}below threshold in every condition"
 
 
 def _keep_together(decided: list[tuple[bool, str]], fills: Integers) -> None:
-    """A layer that fills another's shape stays as long as that one, and holds it."""
+    """A layer that fills another's shape is kept as long as that one, and keeps it."""
     for layer, peak in enumerate(fills.tolist()):
         if peak < 0:
             continue

@@ -75,7 +75,7 @@ class Threshold:
 
     @property
     def valid_range_hz(self) -> tuple[float, float]:
-        """Lowest and highest frequency of the table; outside nothing is known."""
+        """Lowest and highest frequency of the table; outside, the threshold is unknown."""
         return float(self.frequency_hz[0]), float(self.frequency_hz[-1])
 
     def at(self, frequency_hz: ArrayLike) -> Floats:
@@ -110,7 +110,7 @@ class Threshold:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of its values, by which files name the threshold that they rest on."""
+        """SHA-256 of its values, by which files name the threshold that they are based on."""
         return sha256_of_values(self.to_dict())
 
     @staticmethod
@@ -152,12 +152,12 @@ class Threshold:
 
     @staticmethod
     def named(name: str | Path) -> Threshold:
-        """One that comes along, by name, or a user's own, by the path of its TSV."""
+        """An included threshold, by name, or a user's own, by the path of its TSV."""
         return Threshold.load(name) if Path(name).suffix else Threshold.shipped(str(name))
 
     @staticmethod
     def shipped(name: str) -> Threshold:
-        """One of `SHIPPED`, which come along (docs/method/perception.md#shipped-thresholds)."""
+        """One of `SHIPPED`, which are included (docs/method/perception.md#shipped-thresholds)."""
         if name not in SHIPPED:
             raise InputError(
                 f"expected a threshold among {', '.join(SHIPPED)} or a TSV file, got "

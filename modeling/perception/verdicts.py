@@ -1,4 +1,4 @@
-"""What simplification decided: a verdict on every layer, and all that it rests on."""
+"""What simplification decided: a verdict on every layer, and the basis of the decision."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ENDING = "_simplification.json"
 
 @dataclass(frozen=True)
 class LayerVerdict:
-    """What became of one layer, and why.
+    """The verdict on one layer, and its reason.
 
     Parameters
     ----------

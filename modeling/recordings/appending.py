@@ -124,7 +124,7 @@ class Staged:
 def staged(
     folder: str | Path, recordings: RecordingSet, sources: Sequence[WavSource | None]
 ) -> Iterator[Staged]:
-    """Write recordings for a folder, forced to disk, without keeping others from it meanwhile.
+    """Write recordings for a folder, forced to disk, without locking the folder meanwhile.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def _check_new(target: Path) -> None:
 
 @contextmanager
 def _told(target: Path) -> Iterator[None]:
-    """What the disk refuses, as one sentence."""
+    """The disk's refusal, as one sentence."""
     try:
         yield
     except OSError as error:
@@ -184,7 +184,7 @@ def _told(target: Path) -> Iterator[None]:
 
 
 def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
-    """Refuse a second recording of a condition; told by the index, no samples are read."""
+    """Refuse a second recording of a condition, by the index; no samples are read."""
     taken = {
         (
             row["texture"],
@@ -204,7 +204,7 @@ def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet)
 
 
 def _remove_unfinished(folder: Path) -> None:
-    """Remove what an addition that did not come to its end has left behind, and its note."""
+    """Remove the files of an addition that did not finish, and its note."""
     note, index = folder / UNFINISHED_NAME, folder / INDEX_NAME
     # Without the index nobody knows which files are recordings.
     if not (note.is_file() and index.is_file()):

@@ -39,10 +39,10 @@ class Recording:
     texture : str
         Name of the surface.
     unit : {"g", "arbitrary"}
-        `arbitrary` where the g per full scale is unknown; such records are never compared with
+        `arbitrary` if the g per full scale is unknown; such records are never compared with
         a detection threshold.
     simulated : bool
-        True where no real surface was touched.
+        True if no real surface was touched.
     repeat : int
         1 for the first record of a condition, 2 for the second, …
     clipped_share : float

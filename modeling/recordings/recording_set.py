@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.errors import InputError, shortened, shown
+from modeling.errors import InputError, counted, shortened, shown
 from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.reading import read_text
@@ -78,7 +78,7 @@ class RecordingSet:
         return iter(self.recordings)
 
     def __repr__(self) -> str:
-        return f"<RecordingSet of {len(self)} recordings of {', '.join(self.textures)}>"
+        return f"<RecordingSet of {counted(len(self), 'recording')} of {', '.join(self.textures)}>"
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RecordingSet):

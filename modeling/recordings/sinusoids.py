@@ -54,7 +54,7 @@ _NONE = Sinusoids(*(np.zeros(0),) * 3)
 
 
 def find_sinusoids(samples: Floats, rate_hz: float, *, lowest_hz: float) -> Sinusoids:
-    """Sinusoids that are there beyond doubt, by rising frequency.
+    """Sinusoids that are certain, by rising frequency.
 
     Parameters
     ----------

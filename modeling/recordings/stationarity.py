@@ -1,7 +1,7 @@
-"""Whether a record is of one speed and one level: drift within it, found, reported and corrected.
+"""Stationarity of a record in speed and level: drift is found, reported and corrected.
 
 A turntable that slows down moves all spatial frequencies together. The record is then played at a
-changing rate, so that they stand still (order tracking), and belongs to its middle. A level that
+changing rate, so that they stay constant (order tracking), and belongs to its middle. A level that
 changes cannot be corrected; it is reported.
 """
 
@@ -18,8 +18,9 @@ FINE, PARTS = 0.005, 4  # cells of 2 % of the frequency, moved by quarters of on
 LOWEST_HZ = 20.0
 LARGEST_DRIFT = 0.3
 DRIFT_STEPS = 15
-# Of log likelihood, that frequencies stand still when followed. Of 1,200 steady records of planted
-# and drawn textures none gained 16; of 100 whose frequencies drift by 20 % nine in ten gain 20.
+# Of log likelihood, that frequencies stay constant when followed. Of 1,200 steady records of
+# planted and drawn textures none gained 16; of 100 whose frequencies drift by 20 % nine in ten
+# gain 20.
 LEAST_GAIN = 20.0
 LEAST_DRIFT = 0.04
 SMOOTHED_CELLS = 5
@@ -33,7 +34,7 @@ TINY = 1e-300
 class Drift(NamedTuple):
     """What changes from the beginning of a record to its end.
 
-    `frequency`: of all frequencies together, relative to the middle; 0 where they stand still.
+    `frequency`: of all frequencies together, relative to the middle; 0 where they stay constant.
     `level_db`: from the quietest quarter to the loudest; 0 where sampling error explains it.
     """
 
@@ -111,8 +112,8 @@ def _information_share(log_power: Floats) -> Floats:
 
     slope = np.gradient(uniform_filter1d(log_power, SMOOTHED_CELLS, mode="nearest"))
     square = uniform_filter1d(slope, SMOOTHED_CELLS, mode="nearest") ** 2
-    telling: Floats = square / (square + CLEAR_SLOPE**2)
-    return telling
+    weights: Floats = square / (square + CLEAR_SLOPE**2)
+    return weights
 
 
 def _level_change_db(power: Floats) -> float:

@@ -55,7 +55,7 @@ class Trajectory:
         if not 0 < self.duration_s <= LONGEST_S:
             raise InputError(
                 f"expected a trajectory of at most {LONGEST_S:g} s, got {self.duration_s:g} s in "
-                f"{shown(self.name)}; cut it, and see whether the times are in seconds."
+                f"{shown(self.name)}; cut it, and check that the times are in seconds."
             )
 
     def _what_is_wrong(self) -> str:

@@ -41,7 +41,7 @@ def centroid_observations(model: TextureModel) -> tuple[Floats, Floats, Floats]:
     Raises
     ------
     InputError
-        Where none has.
+        If none has.
     """
     centroid = spectral_centroid_hz(model)
     chosen = with_centroid(model)
@@ -88,7 +88,7 @@ def centroid_correlations(model: TextureModel) -> tuple[Correlation, ...]:
     Raises
     ------
     InputError
-        Where no layer has a gain.
+        If no layer has a gain.
     """
     centroid, _, _ = centroid_observations(model)
     gains = model.gains[with_centroid(model)]

@@ -1,4 +1,4 @@
-"""From the grid of a model to the regressions that drive it instead."""
+"""Regressions that replace the grid of a model."""
 
 from __future__ import annotations
 

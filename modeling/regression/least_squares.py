@@ -1,4 +1,4 @@
-"""Ordinary least squares with p-values, and its reduction to what is significant (eq. 3)."""
+"""Ordinary least squares with p-values, and its reduction to significant terms (eq. 3)."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ NOISE_GAIN, FREQUENCY, AMPLITUDE, BANDWIDTH = PARAMETERS
 
 
 class Observations(NamedTuple):
-    """One parameter of one layer in the n conditions that say something about it.
+    """One parameter of one layer in the n conditions that determine it.
 
     `layer` counts from 1; 0 is the noise gain, which belongs to no layer. `inherited` is the number
     of recorded conditions left out, because the layer's frequency there was given by other
@@ -48,7 +48,7 @@ class Observations(NamedTuple):
 
 
 def parameter_observations(model: TextureModel) -> tuple[Observations, ...]:
-    """What the regressions of a model rest on: n, then f, a and b of each layer.
+    """The data for the regressions of a model: n, then f, a and b of each layer.
 
     Interpolated conditions are left out, and of a layer those where its level is not identifiable.
     So are, for the frequency alone, those that inherited it: a copy is no observation (amplitude
@@ -92,7 +92,7 @@ def parameter_regressions(model: TextureModel) -> tuple[ParameterRegression, ...
     Raises
     ------
     InputError
-        Where no condition says anything about a parameter.
+        If no condition says anything about a parameter.
     """
     found = []
     for o in parameter_observations(model):

@@ -27,10 +27,11 @@ def is_compiled() -> bool:
     """Whether the compiled kernel renders; where there is none, a warning says so once."""
     if Call is None:
         warnings.warn(
-            "expected the compiled rendering kernel, got none; rendering goes on in Python with "
-            "the same numbers, some hundred times slower: install a C compiler, then tactileq.",
+            "expected the compiled rendering kernel, got none; rendering continues in Python with "
+            "the same numbers, more than a hundred times slower: install a C compiler, "
+            "then tactileq.",
             RuntimeWarning,
-            stacklevel=1,  # from one place, so that Python tells it once
+            stacklevel=1,  # from one place, so that Python shows it once
         )
     return Call is not None and not os.environ.get(SWITCH)
 

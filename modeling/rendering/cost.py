@@ -1,4 +1,4 @@
-"""What rendering costs wherever it runs, in counted operations and bytes.
+"""The cost of rendering on any machine, in counted operations and bytes.
 
 Counts of `kernel.h`, one layer at a time (TQ_LANES 1); a C++ program that counts every operation of
 the kernel itself confirms them (tests/modeling/rendering/counted_operations.cpp).

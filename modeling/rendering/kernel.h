@@ -51,8 +51,8 @@ typedef TQ_REAL tq_real;
                                       : (tq_real)TQ_SQRT_DOUBLE((double)(x)))
 #endif
 
-/* Where the compiler knows how: inlined whatever it thinks of it, since constant widths are what makes
-   the loops fast; and two layers in one operation where the processor has one for it. */
+/* Where the compiler can: always inlined, since constant widths make the loops fast; and two layers in
+   one operation where the processor has an instruction for it. */
 #ifdef __GNUC__
 #define TQ_INLINE static inline __attribute__((always_inline))
 #define TQ_RESTRICT __restrict
@@ -317,8 +317,8 @@ TQ_INLINE void tq_blend_all(const tq_hand *hand, int first, int width, tq_real *
         to[i] = tq_blend(hand, first + i);
 }
 
-/* Speeds, forces and their changes below a billionth of the grid's lowest count as 0: what dies away
-   exponentially would stay among the subnormal numbers for ever, which some processors compute at a
+/* Speeds, forces and their changes below a billionth of the grid's lowest count as 0: values that decay
+   exponentially would become subnormal numbers and stay so; some processors compute these at a
    fraction of their speed. */
 TQ_INLINE tq_real tq_settled(tq_real x, tq_real lowest)
 {
@@ -512,7 +512,7 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const 
     s->since_update += count;
 }
 
-/* What a FIR filter of `taps` weights makes of `taps` - 1 + `count` samples: several sums at a time in
+/* The output of a FIR filter of `taps` weights for `taps` - 1 + `count` samples: several sums at a time in
    registers, each in the order of the taps. */
 TQ_INLINE void tq_convolve(const tq_real *TQ_RESTRICT weights, int taps,
                            const tq_real *TQ_RESTRICT wide, tq_real *TQ_RESTRICT out, int count)
@@ -539,8 +539,8 @@ TQ_INLINE void tq_convolve(const tq_real *TQ_RESTRICT weights, int taps,
 }
 
 /* The next noise for the bands. For the noise branch it is low-passed with zero phase, which is
-   possible because the noise to come is known; at the model's own rate there is nothing to take away,
-   and `lowpassed` stays as it is. */
+   possible because future noise is known; at the model's own rate there is nothing to remove,
+   and `lowpassed` is unchanged. */
 static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *lowpassed, int count)
 {
     tq_real *wide = tq_wide(t, s), *fresh = wide + t->taps - 1;
@@ -553,8 +553,8 @@ static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *lowpa
     return wide + half;
 }
 
-/* Eq. 7: out - share * band-pass(out). What is not finite would stay in the state for ever and counts
-   as silence; what has died away is not left to ring among the smallest numbers. */
+/* Eq. 7: out - share * band-pass(out). Non-finite values would stay in the state and count as silence;
+   decayed values are set to 0 instead of becoming subnormal. */
 static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int count)
 {
     tq_band b = s->notch;
@@ -578,7 +578,7 @@ static void tq_compensate(const tq_texture *t, tq_state *s, tq_real *out, int co
 
 /* One sample within the limits. After `longest` samples of vibration without `pause` samples of
    silence the output is muted until such a pause. Then the peak; then the running mean square
-   of what leaves, which never exceeds its limit. */
+   of the output, which never exceeds its limit. */
 TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 {
     if (t->longest) {
@@ -604,7 +604,7 @@ TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
         }
         s->mean_square = kept + t->mean_share * (y * y);
         if (s->mean_square < (tq_real)1e-20 * t->mean_square)
-            s->mean_square = 0; /* not left to die away among the smallest numbers */
+            s->mean_square = 0; /* instead of becoming subnormal */
     }
     return y;
 }
@@ -651,7 +651,7 @@ TQ_INLINE uint64_t tq_lift_offs(const tq_real *speed, const tq_real *force, size
     return step ? lift_offs : lift_offs * (uint64_t)count;
 }
 
-/* What comes behind the sum of all branches. */
+/* The stages after the sum of all branches. */
 TQ_INLINE void tq_restrain(const tq_texture *t, tq_state *s, tq_real *out, int count)
 {
     int n;
@@ -701,7 +701,7 @@ static inline void tq_render(const tq_texture *t, tq_state *s, const tq_real *sp
     tq_render_by(t, s, speed, force, 1, out, count);
 }
 
-/* The next `count` samples for a hand whose speed and force are held, as where one is read a block. */
+/* The next `count` samples for a hand whose speed and force are held, as with one reading per block. */
 static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real speed, tq_real force,
                                   tq_real *out, size_t count)
 {

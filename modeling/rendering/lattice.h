@@ -2,11 +2,11 @@
    docs/method/rendering.md#ar-models-at-a-cards-rate
 
    A lattice is a tq_texture without layers, whose only values are the gains over the grid: so the hand, the
-   ramp of the gain, compensation, limits and counters are those of kernel.h. What the filter needs beside
-   it is in a tq_lattice. It runs at the model's own rate, since an all-pole filter has no equal at another
+   ramp of the gain, compensation, limits and counters are those of kernel.h. The rest of the filter is in a
+   tq_lattice. It runs at the model's own rate, since an all-pole filter has no equivalent at another
    one; a low-pass in `up` phases then makes up / down samples of each.
 
-   Every stage turns (its input, its state) by an angle, so all states keep unit variance however the
+   Every stage rotates (its input, its state) by an angle, so all states keep unit variance however the
    parameters move, and a jump of them cannot make the filter grow (Gray and Markel 1975).
 
    C99 or C++17, as kernel.h, whose lines on compiling and whose macros hold here, too. No allocation, no
@@ -20,7 +20,7 @@
 
 #include "kernel.h"
 
-/* What is filtered, and how it gets to the card's rate: constant while it plays. The texture beside it has no
+/* The filter, and its conversion to the card's rate: constant while playing. The texture beside it has no
    layers and one tap; its update_samples, slews and changes of the hand are for the model's rate, its
    rate_hz, compensation and limits for the card's. */
 typedef struct {

@@ -1,4 +1,4 @@
-"""All-pole models at a sound card's rate: what `lattice.h` holds of them.
+"""All-pole models at a sound card's rate: their representation in `lattice.h`.
 
 docs/method/rendering.md#ar-models-at-a-cards-rate
 """

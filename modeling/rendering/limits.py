@@ -1,4 +1,4 @@
-"""What a signal may be at most: peak, RMS and duration (docs/method/rendering.md#limits)."""
+"""Limits of a signal: peak, RMS and duration (docs/method/rendering.md#limits)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from modeling.errors import InputError
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Limits of what a renderer puts out; every sample that one of them touches is counted.
+    """Limits of a renderer's output; every sample that a limit affects is counted.
 
     First the duration, then the peak, then the RMS: what leaves obeys all three.
 
@@ -65,7 +65,8 @@ class Limits:
         return self.rms * self.rms
 
     def largest_rms(self, seconds: float) -> float:
-        """Largest RMS over so many seconds on end, in the model's unit: that after a long silence.
+        """Largest RMS over this many seconds in the model's unit, which occurs after a long
+        silence.
 
         Parameters
         ----------

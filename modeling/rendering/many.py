@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.hand import Hand
 from modeling.models.ar_model import ARModel
 from modeling.models.parameter_table import ParameterTable
@@ -50,15 +50,15 @@ def render_many(
 ) -> list[Floats]:
     """Vibrations of k models under k hands, each from its start.
 
-    The same bits as `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
-    one after the other, but side by side in the processor's vectors and on all cores that this
-    process may use (docs/method/rendering.md#many-streams). What shares a number of layers, rates
-    and an update interval runs together; an ARModel is rendered alone.
+    Bit-identical to `Renderer(models[i], seed=seeds[i], stream=streams[i], …).render(*hands[i])`
+    one after the other, but parallel in the processor's vectors and on all cores that this
+    process may use (docs/method/rendering.md#many-streams). Streams with the same number of layers,
+    rates and update interval run together; an ARModel is rendered by itself.
 
     Parameters
     ----------
     models : (k,) sequence of TextureModel, RegressedModel or ARModel
-        What to render; one model may come many times.
+        What to render; a model may occur several times.
     hands : (k,) sequence of pairs of (n_i,) array_like
         Tangential speed (mm/s, either direction) and normal force (N) at each sample, each pair of
         its own length. NaN and infinite values count as lift-off.
@@ -82,8 +82,9 @@ def render_many(
     if not len(models) == len(hands) == len(seeds) == len(streams):
         raise InputError(
             "expected as many hands, seeds and streams as models, got "
-            f"{len(models)} models, {len(hands)} hands, {len(seeds)} seeds and {len(streams)} "
-            "streams; give one of each for every signal."
+            f"{counted(len(models), 'model')}, {counted(len(hands), 'hand')}, "
+            f"{counted(len(seeds), 'seed')} and "
+            f"{counted(len(streams), 'stream')}; give one of each for every signal."
         )
     options = {
         "rate_hz": rate_hz,

@@ -1,4 +1,4 @@
-"""What is rendered and how: all that the compiled and the Python renderer must agree on."""
+"""What is rendered and how: everything on which the compiled and the Python renderer must agree."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ class RenderPlan:
 
     @property
     def hand_changes(self) -> tuple[float, float]:
-        """The furthest that a hand's speed (mm/s) and force (N) get in one update."""
+        """Largest change of a hand's speed (mm/s) and force (N) in one update."""
         update_s = self.update_samples / self.rate_hz
         return FASTEST_SPEED_CHANGE_MM_S2 * update_s, FASTEST_FORCE_CHANGE_N_S * update_s
 

@@ -5,30 +5,30 @@
    those of kernel.h; its lines on compiling and its macros hold here, too.
 
    A voice is a texture, or the lattice of an all-pole model, with its own state and memory. One control
-   thread (any thread, but one at a time) prepares voices and says which one it wants, NULL for silence.
+   thread (any thread, but one at a time) prepares voices and selects the one to play, NULL for silence.
    One callback thread renders. None of these calls ever waits.
 
-   A change is noticed by the next block. The voice that plays fades out linearly; then the wanted one
-   starts, fading in as long. So the new voice's first sample is at most one block and one fade late.
-   Whatever is wanted meanwhile counts as soon as it is noticed: the voice that fades out rises again
-   when it is wanted again, a voice that fades in falls again when it is not. After a stop the output is
-   exactly 0 and costs a memset. A voice that is wanted again without being prepared again goes on where
-   it stopped.
+   A change takes effect in the next block. The playing voice fades out linearly; then the selected one
+   starts, with a fade-in of the same length. So its first sample is at most one block and one fade late.
+   A selection during a fade takes effect at once: a voice that is fading out rises again if it is
+   selected again, a voice that is fading in falls again if it is not. After a stop the output is
+   exactly 0 and costs a memset. A voice that is selected again without being prepared again continues
+   where it stopped.
 
-   A hand is held for a block. Output depends on the blocks by nothing else: with equal hands, and
-   changes between blocks at equal samples, it has equal bits. A voice between its fades is what
-   tq_render or tq_lattice_render_held makes, rounded to single precision.
+   A hand is held for a block. Apart from that, output does not depend on the blocks: with equal hands,
+   and changes between blocks at equal samples, it has equal bits. A voice between its fades is the
+   output of tq_render or tq_lattice_render_held, rounded to single precision.
 
-   Every sample is rendered by one voice at most. So the dearest block costs what rendering needs for
-   it and, where a voice begins, up to 64 squarings more. Stack: 4 TQ_CHUNK reals.
+   Every sample is rendered by one voice at most. So the most expensive block costs its rendering and,
+   where a voice begins, up to 64 squarings more. Stack: 4 TQ_CHUNK reals.
 
    All voices of a player must have the same rate, peak, mean_square, mean_share, longest, pause and
-   silence. Then these limits hold for what leaves, swaps included: each voice takes over what the
-   limits remember of the one before and of the silence between, and a fade only makes samples smaller.
+   silence. Then these limits hold for the output, swaps included: each voice takes over the state of
+   the limits from the one before and the silence between, and a fade only makes samples smaller.
    (Rounding to single precision adds up to 6e-8 of a sample.)
 
-   Example for PortAudio. Whoever starts the stream calls begin before it, and change as often as it
-   likes; `hand` is the program's own and must not wait, either.
+   Example for PortAudio. The program that starts the stream calls begin before it, and change as often
+   as needed; `hand` is a function of the program and must not wait, either.
 
        #include "player.h"
 

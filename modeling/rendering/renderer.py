@@ -43,13 +43,13 @@ class Renderer:
     """Vibration of a texture model under a moving hand (eq. 1–2, docs/method/rendering.md).
 
     The state carries on from call to call: rendering in blocks of any size gives the same bits.
-    Layered models run through the compiled kernel (`kernel.h`), or, where there is none, through
-    Python with the same bits; an ARModel always runs in Python.
+    Layered models run in the compiled kernel (`kernel.h`) or, without it, in Python with
+    bit-identical results; an ARModel always runs in Python.
 
-    At each update the hand is extrapolated by its slope over the last 4 ms (but a change beyond any
-    hand's, 20 m/s² or 200 N/s, is a step): frequencies and bandwidths are those for the middle of
-    the time to the next update, and gains ramp linearly to those for its end. The largest
-    of the model's gains takes 5 ms at least from silence or to it, so that nothing clicks.
+    At each update the hand is extrapolated by its slope over the last 4 ms (but a change that no
+    hand can make, beyond 20 m/s² or 200 N/s, is a step): frequencies and bandwidths are those for
+    the middle of the time to the next update, and gains ramp linearly to those for its end. The
+    largest of the model's gains takes at least 5 ms from silence or to it, so that nothing clicks.
 
     Parameters
     ----------
@@ -61,19 +61,19 @@ class Renderer:
         that come close to that frequency do not, as the filter warps less: at 48 kHz third octaves
         of the planted textures differ by −0.7 to +3.2 dB, their level below 2.5 kHz by up to
         0.15 dB, and that of the whole band, with skirts above 2.5 kHz, by up to 0.24 dB.
-        For the very spectrum render at the model's rate and resample, as stimulus sets do. An
+        For the exact spectrum render at the model's rate and resample, as stimulus sets do. An
         ARModel is rendered at its own rate only.
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
         Samples from one reading of speed and force to the next, 1 … 1 000 000; by default one
         millisecond (5 at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was
-        compiled for a scene the interval that keeps the scene's bound. Where a device reads less
-        often, its period.
+        compiled for a scene the interval that keeps the scene's bound. For a device that reads less
+        often, use its period.
     limits : Limits, optional
         Peak, RMS and duration that the output does not exceed; none by default.
     compensation : Compensation, optional
-        Undoes the resonance of the vibrator that will play the output (eq. 7), before the limits;
+        Compensates the resonance of the vibrator that plays the output (eq. 7), before the limits;
         made for this rate.
     single : bool
         Everything in single precision, as on a micro-controller (docs/method/rendering.md#kernel):

@@ -6,16 +6,16 @@
    out as if the hand had lifted off: every gain is at 0 after 5 ms or one parameter update, whichever is
    longer. Then the next texture starts, in silence for one parameter update, and its gains rise from 0
    to those of the hand, the largest of them in 5 ms again. So it is heard after 6 ms with updates every
-   millisecond. In between nobody plays: a state renders one texture at a time, and the dearest sample
-   costs what tq_start and tq_render need for it.
+   millisecond. In between there is silence: a state renders one texture at a time, and the most
+   expensive sample costs one tq_start and one tq_render.
 
-   All textures of a scene must have the same rate, compensation and limits. What the limits remember and
-   what rings in the compensation goes on over a switch, and so do the counters (hand->state.counters):
-   a limit of the actuator holds for what leaves, whatever played.
+   All textures of a scene must have the same rate, compensation and limits. The states of the limits and
+   of the compensation continue over a switch, and so do the counters (hand->state.counters): the
+   actuator's limits hold for the output, whichever texture plays.
 
    Noise: before the first switch stream (number of the hand) * 2^32, after switch n stream n more, all
-   of the scene's seed. Output depends on the blocks by nothing else than when switches are asked for:
-   with these at equal samples it has equal bits.
+   of the scene's seed. Output depends on the blocks only through the times of switches: with switches
+   at equal samples it has equal bits.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -28,7 +28,7 @@
 
 #define TQ_LARGER(a, b) ((a) > (b) ? (a) : (b))
 
-/* What can be touched: constant while it plays. */
+/* The textures that can be touched: constant while playing. */
 typedef struct {
     const tq_texture *textures;
     int count;
@@ -122,9 +122,9 @@ static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_
 
 /* --- The calls --------------------------------------------------------------------------------- */
 
-/* A hand upon a texture of the scene, of which it takes the first where there is none of this index.
-   `memory` holds as many reals as the neediest texture's TQ_MEMORY and must live as long as the hand.
-   Hands of different numbers have different noise. */
+/* A hand on a texture of the scene; an index out of range selects the first texture.
+   `memory` holds as many reals as the largest TQ_MEMORY of all textures and must live as long as the
+   hand. Hands of different numbers have different noise. */
 static inline void tq_scene_start(tq_scene_hand *h, const tq_scene *scene, tq_real *memory,
                                   uint32_t number, int texture)
 {
@@ -135,8 +135,8 @@ static inline void tq_scene_start(tq_scene_hand *h, const tq_scene *scene, tq_re
     tq_start(tq_scene_texture(h), &h->state, memory, tq_scene_key(h));
 }
 
-/* What the hand shall touch from now on: asked for between two blocks, and at any time again. That which
-   plays rises again if it was fading out. An index of no texture changes nothing. */
+/* The texture that the hand touches from now on: called between two blocks, at any time. A texture that
+   is fading out rises again if selected. An index out of range changes nothing. */
 static inline void tq_scene_switch(tq_scene_hand *h, int texture)
 {
     if (texture >= 0 && texture < h->scene->count)

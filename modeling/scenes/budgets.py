@@ -59,7 +59,7 @@ def _fewest_operations(
 
 
 def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
-    """What a scene needs at least, and the nearest bound with which it fits."""
+    """The minimum that a scene needs, and the closest bound with which it fits."""
     cheapest = [search.candidates(scene.bound) for search in searches]
     operations = max(each[0].key[0] for each in cheapest)
     smallest = [min(each, key=lambda candidate: candidate.key[1]) for each in cheapest]
@@ -72,7 +72,7 @@ def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
     nearest = _nearest_bound(searches, scene)
     advice = "raise the budget, or take fewer textures"
     if nearest is not None:
-        advice = f"the nearest bound that fits is {_told(nearest)}"
+        advice = f"the closest bound that fits is {_told(nearest)}"
     return (
         f"expected the scene {scene.name} within {' and '.join(asked)}, got one that takes "
         f"{operations:.1f} operations per sample and {_bytes(smallest)} bytes at least to keep its "
@@ -81,7 +81,7 @@ def beyond_budget(searches: Sequence[Search], scene: Scene) -> str:
 
 
 def _told(bound: Bound) -> str:
-    """A bound in few digits, rounded so that it asks for no more."""
+    """A bound in few digits, rounded so that it is not stricter."""
     wider = {
         "gfc30": np.floor(1e4 * bound.gfc30) / 1e4,
         "bands_db": np.ceil(1e2 * bound.bands_db) / 1e2,
@@ -91,7 +91,7 @@ def _told(bound: Bound) -> str:
 
 
 def _nearest_bound(searches: Sequence[Search], scene: Scene) -> Bound | None:
-    """The least widening of the bound, to a few %, with which the budget suffices."""
+    """The smallest relaxation of the bound, to a few %, with which the budget suffices."""
     low, high = 1.0, WIDEST
     if within_budget(searches, scene, scene.bound.widened(high)) is None:
         return None

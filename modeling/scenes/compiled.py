@@ -86,7 +86,7 @@ class Alternative:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class CompiledTexture:
-    """The least model of one texture.
+    """The compiled model of one texture: the cheapest one that keeps the bound.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ class CompiledTexture:
 
 @dataclass(frozen=True, eq=False)
 class CompiledScene:
-    """The least models of all textures of a scene."""
+    """The compiled models of all textures of a scene."""
 
     scene: Scene
     textures: tuple[CompiledTexture, ...]
@@ -192,7 +192,7 @@ class CompiledScene:
         Raises
         ------
         InputError
-            Where two textures would have one file.
+            If two textures would have one file.
         """
         names = [f"{file_stem(compiled.texture)}.json" for compiled in self.textures]
         if FILE in names or len(set(names)) < len(names):

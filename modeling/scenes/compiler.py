@@ -1,4 +1,4 @@
-"""The least model that keeps a scene's bound (docs/method/scenes.md).
+"""The cheapest model that keeps a scene's bound (docs/method/scenes.md).
 
 Cheapest is what takes the fewest counted operations per sample; of equals the fewest bytes; of
 those the fewest stored numbers. What is searched: which of the layers that are not felt are
@@ -26,7 +26,7 @@ def compile_scene(
     *,
     progress: Callable[[str], None] = lambda texture: None,
 ) -> CompiledScene:
-    """The least model of every texture of a scene.
+    """The cheapest model of every texture of a scene that keeps the bound.
 
     Parameters
     ----------
@@ -35,13 +35,13 @@ def compile_scene(
         Full models by the name of their texture, in g; those that the scene does not name are not
         used.
     progress : callable
-        Told the name of each texture as it is done.
+        Called with the name of each texture when it is done.
 
     Raises
     ------
     InputError
         For a texture without a model; for a scene beyond the recorded grid; for a bound that the
-        actuator's limits or a budget do not allow, with the nearest that can be kept.
+        actuator's limits or a budget do not allow, with the closest that can be kept.
     """
     return compile_scenes([scene], models, progress=lambda scene, texture: progress(texture))[0]
 
@@ -54,7 +54,7 @@ def compile_scenes(
 ) -> list[CompiledScene]:
     """`compile_scene` of several scenes, which share what is known of the models' errors.
 
-    Parameters and errors as there; `progress` is told the scene, too.
+    Parameters and errors as there; `progress` is also called with the scene.
     """
     known = Known()
     return [_compiled(scene, models, known, progress=partial(progress, scene)) for scene in scenes]

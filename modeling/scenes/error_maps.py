@@ -1,10 +1,10 @@
-"""What each thing that the compiler may do costs in likeness, place by place.
+"""The error of each of the compiler's simplifications, place by place.
 
 docs/method/scenes.md#errors
 
 Errors do not depend on the scene, but only on the model and the actuator's band: a scene chooses
 the places that count and how large an error may be there. That is why a narrower scene never needs
-a dearer model.
+a more expensive model.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from modeling.scenes.measures import Errors, Features, Yardstick, errors_between
 from modeling.scenes.places import Places, nodes_of
 
 Segment = tuple[int, int]
-# Least displacement of a hand by a late update that is told from none.
+# Smallest displacement of a hand by a late update that is distinguished from none.
 LEAST_SPEED_MM_S, LEAST_FORCE_N = 0.25, 0.0025
 AT_ONCE = 64  # responses, so that they stay small beside the processor's cache
 ROUNDING_S = 0.5  # of each of the records by which precisions are compared

@@ -1,4 +1,4 @@
-"""Which layers nobody can feel in a scene (docs/method/scenes.md#what-is-felt)."""
+"""Which layers cannot be felt in a scene (docs/method/scenes.md#what-is-felt)."""
 
 from __future__ import annotations
 

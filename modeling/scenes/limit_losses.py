@@ -1,4 +1,4 @@
-"""What an actuator's limits take of a level (docs/method/scenes.md#sharing-and-budgets)."""
+"""How much an actuator's limits reduce a level (docs/method/scenes.md#sharing-and-budgets)."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def full_models(
     Raises
     ------
     InputError
-        Where there is no such folder, or it holds no models or two of one texture.
+        If there is no such folder, or it holds no models or two of one texture.
     """
     named = scene.models if folder is None else Path(folder)
     if named is None or not os.path.isdir(named):
@@ -46,7 +46,7 @@ def scene_models(
     *,
     progress: Callable[[float, str], None] = lambda share, texture: None,
 ) -> dict[str, Layered]:
-    """The least models of a scene by the name of their texture.
+    """The compiled models of a scene by the name of their texture.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def scene_models(
         The full models of today; without them a scene file is compiled from the models that it
         names, and a folder is taken as it is.
     progress : callable
-        Told the share that is done and the texture that was done last.
+        Called with the share that is done and the texture that was done last.
 
     Raises
     ------

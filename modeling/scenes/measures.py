@@ -1,4 +1,4 @@
-"""How far one response is from another in what a scene bounds: GFC30, bands, level.
+"""Distance of one response from another by a scene's measures: GFC30, bands, level.
 
 The GFC of two spectra is the cosine of the angle between them. Angles, the RMS of band errors in dB
 and the error of the level all obey the triangle inequality, so that errors of different origin add
@@ -218,7 +218,7 @@ class Yardstick:
 
 def errors_between(ours: Features, truth: Features) -> Errors:
     """Errors of n responses against n others."""
-    # The chord of two unit vectors tells small angles, whose cosine is 1 to rounding.
+    # The chord of two unit vectors resolves small angles, whose cosine rounds to 1.
     chord = np.sqrt(np.sum((ours.direction - truth.direction) ** 2, axis=1))
     bands = ours.bands_db - truth.bands_db
     rms = np.sqrt(np.mean(bands**2, axis=1)) if bands.shape[1] else np.zeros(len(bands))

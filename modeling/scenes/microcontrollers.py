@@ -1,4 +1,4 @@
-"""Micro-controllers by name: their clock, their memory, and what an operation costs them."""
+"""Micro-controllers by name: their clock, their memory, and the cost of an operation."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class MicroController:
     source: str
 
     def operations_per_sample(self, rate_hz: float) -> float:
-        """How many operations it has time for from one sample to the next, with nothing else to do.
+        """Number of operations that fit between two samples, with nothing else running.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Where in a model's grid the bound of a scene counts, and how fast the hand changes there.
+"""Where in a model's grid the bound of a scene applies, and how fast the hand changes there.
 
 Errors are looked at where the renderer reads parameters: at the nodes of the model's table, between
 which all parameters, and so all errors of them, are bilinear. A scene is rounded outwards to these

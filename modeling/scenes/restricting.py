@@ -41,7 +41,7 @@ def thinned(model: TextureModel, places: Places, rows: Nodes, columns: Nodes) ->
 
 
 def _on_axes(model: TextureModel, speeds_mm_s: Floats, forces_n: Floats) -> TextureModel:
-    """What a model tells at other speeds and forces within its own, blended linearly between."""
+    """A model's parameters at other speeds and forces within its own, blended linearly between."""
     shape = speeds_mm_s.size, forces_n.size
     speed, force = (x.ravel() for x in np.meshgrid(speeds_mm_s, forces_n, indexing="ij"))
     at = model.parameters(speed, force)

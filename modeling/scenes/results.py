@@ -1,4 +1,4 @@
-"""What is told of a compiled texture: measures, steps, and what was refused."""
+"""What is reported of a compiled texture: measures, steps, and what was refused."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _DRIVEN: dict[Way, str] = {
 
 
 def compiled_texture(search: Search, candidate: Candidate) -> CompiledTexture:
-    """A candidate with all that is told of it."""
+    """A candidate with all that is reported of it."""
     every = range(search.full.n_layers)
     return CompiledTexture(
         full=search.full,
@@ -54,7 +54,7 @@ def _measures(search: Search, candidate: Candidate) -> tuple[Measured, ...]:
     bound = search.scene.bound
 
     def measured(name: Any, kind: int) -> Measured:
-        def told(error: float) -> float:
+        def reported(error: float) -> float:
             return float(np.cos(min(error, np.pi / 2))) if name == "gfc30" else error
 
         place = int(np.argmax(np.where(counts, together[kind], -1.0)))
@@ -64,9 +64,9 @@ def _measures(search: Search, candidate: Candidate) -> tuple[Measured, ...]:
             measure=name,
             bound=float(getattr(bound, name)),
             mean=mean if name == "gfc30" else float(np.sqrt(mean)),
-            worst=told(float(together[kind][place])),
+            worst=reported(float(together[kind][place])),
             place=search.places.name(place),
-            of_full=told(float(np.max(of_full[kind]))),
+            of_full=reported(float(np.max(of_full[kind]))),
         )
 
     return tuple(measured(name, kind) for kind, name in enumerate(bound.to_dict()))
@@ -83,7 +83,7 @@ def _of_full(search: Search, candidate: Candidate) -> Errors:
 
 
 def _steps(search: Search, candidate: Candidate) -> tuple[Step, ...]:
-    """What each step brings, in the order of the compiler."""
+    """The effect of each step, in the order of the compiler."""
     felt = with_signs_chosen_again(search.full, list(candidate.layers))
     shorter = cut(felt, search.places)
     usual = search.usual_plan

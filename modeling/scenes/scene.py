@@ -1,4 +1,4 @@
-"""A scene: what hands will do, what plays it, how good it has to be and what it may cost.
+"""A scene: how hands will move, the actuator, the error bound and the budget.
 
 A scene is a TOML file; its paths are relative to it, and unknown keys are refused::
 
@@ -12,9 +12,9 @@ A scene is a TOML file; its paths are relative to it, and unknown keys are refus
     margin_db = 0.0                # how far below it a layer must be to be dropped (0)
 
     [hand]                         # one of three: a range,
-    speed_mm_s = [50, 150]         #   speeds; each place of a range may be where the hand stays
+    speed_mm_s = [50, 150]         #   speeds; the hand may stay anywhere in the range
     force_n = [0.5, 1.0]           #   forces; "recorded": all at which a texture was recorded
-    stroke_hz = 2.0                #   how often a second the hand goes to and fro (2)
+    stroke_hz = 2.0                #   strokes back and forth per second (2)
     file = "hand.csv"              # a recorded hand: time_s, speed_mm_s, force_n,
     [[hand.place]]                 # or a distribution: places with their shares of the time
     speed_mm_s = 100
@@ -27,7 +27,7 @@ A scene is a TOML file; its paths are relative to it, and unknown keys are refus
     peak_g = 5.0                   # limits of the output (none)
     rms_g = 2.0
 
-    [bound]                        # against what is felt of the full model, at every place
+    [bound]                        # relative to what is felt of the full model, at every place
     gfc30 = 0.95                   # share of the attainable goodness of fit (0.95)
     bands_db = 1.0                 # RMS error of the levels in nine bands, 10 … 480 Hz (1)
     level_db = 1.0                 # error of the level (1)
@@ -37,7 +37,7 @@ A scene is a TOML file; its paths are relative to it, and unknown keys are refus
     device = "stm32l432"           #   or a micro-controller, which also limits the bytes
     bytes = 16384                  # of tables and state of all textures
 
-What stands in brackets applies where the key is left out; `version`, `name` and a hand are needed.
+Values in brackets are the defaults; `version`, `name` and a hand are required.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ class HandRange:
     speed_mm_s, force_n : (float, float) or "recorded"
         Lowest and highest, 0 < lowest ≤ highest; or all at which a texture was recorded.
     stroke_hz : float
-        How often a second it goes to and fro, up to the highest speed, and presses up and down
+        How often a second it goes back and forth, up to the highest speed, and presses up and down
         through all forces: what a parameter update comes too late for. 0 … 20.
     """
 

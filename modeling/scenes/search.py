@@ -317,7 +317,7 @@ class Search:
         Raises
         ------
         InputError
-            Where it is more than the bound on the level allows.
+            If it is more than the bound on the level allows.
         """
         places, loss_db = self.places, np.zeros(self.places.counts.shape)
         loss_db[places.counts] = self._loss_db()

@@ -46,7 +46,7 @@ def windows_kept(
     scene : Scene
         The one that it was compiled for.
     count : int
-        Windows, ≥ 1; each goes on where the last one ended.
+        Windows, ≥ 1; each continues where the last one ended.
     seed : int
         Of the stroke and the noise.
     """

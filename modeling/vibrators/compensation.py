@@ -117,7 +117,7 @@ def compensation_for(vibrator: Vibrator, *, rate_hz: float | None = None) -> Com
     Raises
     ------
     InputError
-        Where the notch would be too wide for this rate, or the resonance too high.
+        If the notch would be too wide for this rate, or the resonance too high.
     """
     fs = vibrator.rate_hz if rate_hz is None else rate_hz
     check_rate(fs)
@@ -164,7 +164,7 @@ def flat_band(
     Raises
     ------
     InputError
-        Where the response comes nowhere near the level.
+        If the response comes nowhere near the level.
     """
     frequency = np.asarray(frequency_hz, dtype=np.float64)
     with np.errstate(divide="ignore"):  # a response of 0 is far from any level

@@ -1,4 +1,4 @@
-"""What was played, put under what was recorded of it: delay, and two clocks that drift.
+"""Alignment of a played signal with its recording: delay, and drift between two clocks.
 
 docs/method/rig.md#alignment
 """
@@ -60,7 +60,7 @@ def aligned(
     Raises
     ------
     InputError
-        Where nothing of what was played is found.
+        If nothing of what was played is found.
     """
     check_rate(played_rate_hz)
     check_rate(rate_hz)
@@ -139,7 +139,7 @@ def _peak(strength: Floats) -> float:
 
 
 def _line(middles: Floats, delays: Floats) -> tuple[float, float]:
-    """Delay at the beginning, and its growth per sample; single strays do not matter."""
+    """Delay at the beginning, and its growth per sample; robust to single outliers."""
     from scipy.stats import theilslopes  # late: as scipy.signal
 
     step, offset, *_ = theilslopes(delays, middles)

@@ -1,4 +1,4 @@
-"""What the accelerometer gives while nothing touches and nothing plays.
+"""The accelerometer's noise floor, without contact and without playback.
 
 docs/method/rig.md#floor
 """

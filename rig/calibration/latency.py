@@ -1,4 +1,4 @@
-"""From the hand to the vibration: onsets, lags, and what many trials say.
+"""Latency from hand to vibration: onsets, lags, and statistics over trials.
 
 docs/method/rig.md#latency
 """
@@ -96,7 +96,7 @@ def stroke_lag_s(
     Raises
     ------
     InputError
-        Where the stretch is no longer than the longest lag.
+        If the stretch is no longer than the longest lag.
     """
     power, wanted = np.asarray(power_g2, np.float64), np.square(np.asarray(level, np.float64))
     longest = round(longest_s / LAG_BIN_S)
@@ -168,7 +168,7 @@ def summary_of(
     Raises
     ------
     InputError
-        Where too few trials were found.
+        If too few trials were found.
     """
     from scipy.stats import bootstrap  # late: takes longer to load than all of modeling
 
@@ -201,7 +201,7 @@ def summary_of(
 
 
 def check_latency(summary: LatencySummary, *, accepted: str | None) -> None:
-    """Refuse a 95th percentile above 40 ms, unless somebody accepts it and says why.
+    """Refuse a 95th percentile above 40 ms, unless it is accepted with a reason.
 
     Raises
     ------
@@ -210,7 +210,7 @@ def check_latency(summary: LatencySummary, *, accepted: str | None) -> None:
     if summary.p95_ms > MOST_MS and not accepted:
         raise InputError(
             f"expected a latency of at most {MOST_MS:g} ms in 95 % of trials, got "
-            f"{summary.p95_ms:.1f} ms, at which textures are felt to change; take smaller blocks, "
+            f"{summary.p95_ms:.1f} ms, at which textures feel different; use smaller blocks, "
             "or accept it with --accept and a reason, which is kept in the rig file."
         )
 
@@ -225,7 +225,7 @@ class Part:
 
 
 def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) -> list[Part]:
-    """What the log of blocks says of latency.
+    """Latency according to the log of blocks.
 
     Parameters
     ----------

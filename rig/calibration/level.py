@@ -1,4 +1,4 @@
-"""How strong a vibration reaches the held pen, beside what was asked for.
+"""The level of a vibration at the held pen, relative to the requested one.
 
 docs/method/rig.md#level
 """
@@ -126,7 +126,7 @@ def _check(
 
 @dataclass(frozen=True)
 class Level:
-    """Gain over several placements of the pen, each held anew.
+    """Gain over several placements of the pen, which is picked up again each time.
 
     Parameters
     ----------
@@ -158,8 +158,8 @@ def level_of(gains: Sequence[float]) -> Level:
 
     if len(gains) < LEAST_PLACEMENTS:
         raise InputError(
-            f"expected at least {LEAST_PLACEMENTS} placements of the pen, got {len(gains)}; hold "
-            "it anew each time."
+            f"expected at least {LEAST_PLACEMENTS} placements of the pen, got "
+            f"{len(gains)}; pick it up again each time."
         )
     logs = np.log(gains)
     spread = float(logs.std(ddof=1))

@@ -1,4 +1,4 @@
-"""Plays on the vibrator and records the accelerometer; what comes out is in g, with its time."""
+"""Plays on the vibrator and records the accelerometer, in g, with times."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class Accelerometer:
         self._source = source
 
     def forget(self) -> None:
-        """What was recorded until now is not wanted."""
+        """Discard what was recorded until now."""
         self._source.read()
 
     def take(self) -> Record:
@@ -78,7 +78,7 @@ class Accelerometer:
         Raises
         ------
         InputError
-            Where the device gives nothing, is gone, or samples were lost.
+            If the device gives nothing, is gone, or samples were lost.
         """
         stretches = self.stretches()
         if len(stretches) > 1:
@@ -94,7 +94,7 @@ class Accelerometer:
         Raises
         ------
         InputError
-            Where the device gives nothing, or is gone.
+            If the device gives nothing, or is gone.
         """
         blocks = self._source.read()
         if not blocks or not self._source.running:
@@ -118,7 +118,7 @@ class Accelerometer:
         return Record(samples * scale_g, float(np.median(times - positions / rate_hz)), rate_hz)
 
     def record(self, duration_s: float) -> Record:
-        """Record for so long; what is left without a gap, where samples were lost."""
+        """Record for this long; what is left without a gap, where samples were lost."""
         self.forget()
         time.sleep(duration_s + AROUND_S)
         record = max(self.stretches(), key=lambda stretch: stretch.samples_g.size)
@@ -142,8 +142,8 @@ class Accelerometer:
 def gaps(late_s: Floats) -> list[int]:
     """Before which blocks samples were lost.
 
-    A system that is busy tells the time of single blocks too late, but some soon after are told
-    in time. Where samples are missing, all that follow are late. Of the last ten nothing is known.
+    A busy system reports the time of single blocks too late, but of some soon after in time. If
+    samples are missing, all following blocks are late. The last ten blocks cannot be judged.
 
     Parameters
     ----------

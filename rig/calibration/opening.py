@@ -21,7 +21,7 @@ PRESSURE_ITSELF = ((0.0, 0.0), (1.0, 1.0))
 
 @contextmanager
 def opened_sound(rig: RigFile, live: Live) -> Iterator[SoundOutput]:
-    """The open sound of a rig that nobody else uses meanwhile.
+    """The open sound of a rig that no other program uses at the same time.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def accelerometer_input(rig: RigFile) -> AudioInput:
     Raises
     ------
     InputError
-        Where the rig has none.
+        If the rig has none.
     """
     section = rig.accelerometer
     if section is None:

@@ -1,4 +1,4 @@
-"""The measurements of a calibration: each plays, records, and says what it found.
+"""The measurements of a calibration: each plays, records, and reports its result.
 
 Each figure says how it was measured; on a simulated rig it says so, too.
 """
@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from modeling.errors import InputError
+from modeling.errors import InputError, counted
 from modeling.files.writing import write_text
 from modeling.vibrators.identification import identify_vibrator
 from modeling.vibrators.vibrator import Vibrator
@@ -43,12 +43,12 @@ def check_softly(
     rms_g: float,
     band_hz: tuple[float, float],
 ) -> None:
-    """A tenth of the level first: what is not yet calibrated may be many times too loud.
+    """Play a tenth of the level first: an uncalibrated rig may be many times too loud.
 
     Raises
     ------
     InputError
-        Where the whole level would be beyond the peak that the limits allow.
+        If the whole level would be beyond the peak that the limits allow.
     """
     soft = _played(
         rig, sound, accelerometer, rms_g=SOFT_SHARE * rms_g, seconds=SOFT_S, band_hz=band_hz, seed=1
@@ -112,7 +112,7 @@ def mean_pressure(live: Live, *, seconds: float = PRESSURE_S) -> float:
     Raises
     ------
     InputError
-        Where nothing presses.
+        If nothing presses.
     """
     count, _ = live.readings_since(live.readings_written)
     time.sleep(seconds)
@@ -168,7 +168,7 @@ def pressure_figures(
 ) -> dict[str, object]:
     """The pen's force over pressure."""
     source = (
-        f"weights laid on, {today.isoformat()}: {len(curve.points)} weights, residual "
+        f"weights laid on, {today.isoformat()}: {counted(len(curve.points), 'weight')}, residual "
         f"{curve.residual_n:.3f} N{_note(rig)}"
     )
     return {"hand.pressure_curve": Curve(curve.points, "N", False, source)}
@@ -178,7 +178,7 @@ def latency_figures(
     rig: RigFile, summary: LatencySummary, *, how: str, accepted: str | None, today: datetime.date
 ) -> dict[str, object]:
     """What was measured from hand to vibration; `accepted` says why more than 40 ms may be."""
-    source = f"{how}, {today.isoformat()}: {summary.trials} trials{_note(rig)}"
+    source = f"{how}, {today.isoformat()}: {counted(summary.trials, 'trial')}{_note(rig)}"
     if accepted:
         source += f"; accepted: {accepted}"
     return {

@@ -59,7 +59,7 @@ def probe_texture(rms_g: float) -> TextureModel:
 
 
 def write_steps(path: Path, trials: int, *, seed: int) -> float:
-    """A table for a scripted hand: a fifth more steps than so many, to and fro.
+    """A table for a scripted hand: a fifth more steps than so many, back and forth.
 
     Returns
     -------
@@ -92,7 +92,7 @@ class Watched:
 def watched(
     live: Live, accelerometer: Accelerometer, seconds: float, *, tick: Callable[[float], None]
 ) -> Watched:
-    """Log everything for some time and look after what plays; `tick` is told the share over."""
+    """Log everything for some time and keep the rig playing; `tick` gets the share elapsed."""
     accelerometer.forget()
     reading, block = live.readings_written, live.blocks_written
     readings, blocks = [], []
@@ -153,7 +153,7 @@ def stroke_latencies_s(seen: Watched, *, floor_g2: float) -> list[float | None]:
     Raises
     ------
     InputError
-        Where the hand did not stroke.
+        If the hand did not stroke.
     """
     latencies: list[float | None] = []
     for record in seen.records:
@@ -172,8 +172,8 @@ def stroke_latencies_s(seen: Watched, *, floor_g2: float) -> list[float | None]:
                 latencies.append(lag)
     if not latencies:
         raise InputError(
-            "expected a hand that strokes to and fro, got none; press, and stroke about 10 cm "
-            "wide, once a second."
+            "expected a hand that strokes back and forth, got none; press, and stroke "
+            "about 10 cm, once a second."
         )
     return latencies
 
@@ -195,7 +195,7 @@ def loop_back_s(
     Raises
     ------
     InputError
-        Where no record holds it.
+        If no record holds it.
     """
     signal = noise_signal(0.3, rate_hz=rate_hz, rms_g=rms_g, band_hz=(20.0, 2500.0))
     delays: list[float] = []

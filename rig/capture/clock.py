@@ -20,7 +20,7 @@ class SampleClock:
     """Time of every sample by linear regression of the blocks' times on their positions.
 
     Each block says when it was measured, by a clock that is read with some jitter; over the last
-    30 s the line through all of them tells it better, and at which rate the card really runs.
+    30 s the line through all of them is more accurate, and gives the card's true rate.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class SampleClock:
         self._sums: Floats = np.zeros(6)
 
     def add(self, position: int, time_s: float) -> None:
-        """Tell that the sample at a position (from the stream's start) was measured at a time."""
+        """Record that the sample at a position (from the stream's start) was measured at a time."""
         if not self._blocks:
             self._first = (position, time_s)
         seconds = (position - self._first[0]) / self._rate_hz

@@ -1,4 +1,4 @@
-"""How far strokes have filled a grid, what is missing, and what to stroke next."""
+"""Coverage of a grid by strokes, what is missing, and what to stroke next."""
 
 from __future__ import annotations
 

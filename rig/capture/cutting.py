@@ -23,7 +23,7 @@ from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, READING, SIMULATED
 SHORTEST_S = 0.1
 # Half of what spectra are high-passed at, so that the filter changes nothing that is modelled.
 HIGH_PASS_HZ = 5.0
-# Between readings further apart nobody knows what the hand did.
+# Between readings further apart the hand's motion is unknown.
 LONGEST_GAP_S = 0.05
 # Of the full scale: the highest step of 16 bits, and converters that stop short of it.
 CLIPPED_FROM = 0.999
@@ -244,7 +244,7 @@ class _Run:
 
 
 class _HighPass:
-    """Takes gravity and the swinging of the arm out of a stream, before it is cut."""
+    """Removes gravity and the swinging of the arm from a stream, before it is cut."""
 
     def __init__(self, rate_hz: float) -> None:
         from scipy.signal import butter, sosfilt_zi
@@ -336,19 +336,19 @@ def _hand_at(time_s: Floats, readings: Readings, *, speed_delay_s: float) -> _Ha
 
 def _between(time_s: Floats, readings: Readings, name: str) -> tuple[Floats, Integers]:
     """A quantity at (n,) times, NaN where it is not known, and the flags that hold there."""
-    told = on_surface(readings)
+    valid = on_surface(readings)
     after = np.searchsorted(readings["time_s"], time_s, side="left").clip(1, readings.size - 1)
     before = after - 1
     first, last = readings["time_s"][before], readings["time_s"][after]
     inside = (first <= time_s) & (time_s <= last) & (last - first <= LONGEST_GAP_S)
-    inside &= told[before] & told[after]
+    inside &= valid[before] & valid[after]
     values = np.where(inside, np.interp(time_s, readings["time_s"], readings[name]), np.nan)
     return values, readings["flags"][before] | readings["flags"][after]
 
 
 def on_surface(readings: Any) -> Bools:
-    """Which of (n,) readings tell of a hand on a surface."""
+    """Which of (n,) readings are of a hand on a surface."""
     flags = readings["flags"]
-    told = np.isfinite(readings["speed_mm_s"]) & np.isfinite(readings["force_n"])
-    surface: Bools = told & (flags & CONTACT > 0) & (flags & GONE == 0)
+    valid = np.isfinite(readings["speed_mm_s"]) & np.isfinite(readings["force_n"])
+    surface: Bools = valid & (flags & CONTACT > 0) & (flags & GONE == 0)
     return surface

@@ -20,7 +20,7 @@ from rig.live.memory import FORCE_ASSUMED, SIMULATED
 
 PERCENTILES = (5, 25, 50, 75, 95)
 LEAST_S = 5.0
-# Steps of the grid are rounded to these, so that they can be read and told.
+# Steps of the grid are rounded to these, so that they are easy to read and to communicate.
 _SPEED_STEP_MM_S = 5.0
 _FORCE_STEP_N = 0.05
 
@@ -77,7 +77,7 @@ def explored(readings: Readings) -> Exploration:
     Raises
     ------
     InputError
-        Where the hand moved on the surface for less than 5 s.
+        If the hand moved on the surface for less than 5 s.
     """
     steps = np.diff(readings["time_s"], append=readings["time_s"][-1:])
     speed = np.abs(readings["speed_mm_s"])
@@ -86,7 +86,7 @@ def explored(readings: Readings) -> Exploration:
     if seconds < LEAST_S:
         raise InputError(
             f"expected a hand that strokes the surface for {LEAST_S:g} s at least, got "
-            f"{seconds:.1f} s; stroke it as you would to find out what it is, and for longer."
+            f"{seconds:.1f} s; stroke it as if to find out what it is, and for longer."
         )
     # Devices report more often while the hand moves, so each reading counts by its time.
     even = np.searchsorted(np.cumsum(steps[moving]), np.arange(0.0, seconds, 0.005), side="right")

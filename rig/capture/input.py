@@ -27,7 +27,7 @@ BLOCK_S = 0.02
 MOST_CHANNELS = 64
 # If even the most punctual of the last blocks is so much later than before, samples are missing.
 LOST_FROM_S = 0.01
-# Without a call for so long, the stream has ended.
+# Without a call for this long, the stream has ended.
 SILENT_S = 2.0
 END_S = 2.0
 # So long a callback waits for other Python threads. With Python's 5 ms blocks of a few ms were lost
@@ -216,7 +216,7 @@ class _Timeline:
     def block(self, call: _Call) -> InputBlock:
         position, size = self._position, call.samples.size
         began_s = position / self._rate_hz
-        # The stream's own clock may stand still with the card, so only its latency is used.
+        # The stream's own clock may stop with the card, so only its latency is used.
         measured_s = call.now_s - (call.current_s - call.measured_s)
         lost = position > 0 and (call.overflow or self._jumps(call.measured_s))
         before = min(self._behind_s, default=None)
@@ -231,12 +231,12 @@ class _Timeline:
         return InputBlock(position, call.samples, began_s + behind_s, lost=lost or slipped)
 
     def _jumps(self, measured_s: float) -> bool:
-        """Whether the stream's clock tells of a whole block that did not come."""
+        """Whether the stream's clock shows that a whole block is missing."""
         return self._expected_s is not None and measured_s > self._expected_s + 0.95 * BLOCK_S
 
 
 def _end_stream(stream: Any) -> None:
-    """Stop and close a stream; one whose server has died would hang for ever, and is left."""
+    """Stop and close a stream; one whose server has died would hang indefinitely, and is left."""
 
     def end() -> None:
         stream.abort(ignore_errors=True)

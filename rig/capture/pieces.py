@@ -1,4 +1,4 @@
-"""Pieces of strokes on the disk, and the recordings that they fill: nothing kept is lost.
+"""Pieces of strokes on the disk, and the recordings made from them; no stored piece is lost.
 
 docs/method/strokes.md#files
 """
@@ -95,7 +95,7 @@ class _Kept:
 
 
 class PieceStore:
-    """A folder of recordings that fills as one strokes; opened again, it goes on.
+    """A folder of recordings that is filled by strokes; opened again, it continues.
 
     Each piece is a file of its own as soon as it is cut. Once the pieces of a condition suffice,
     they are joined into its recording, so that the folder is a recording set at any time.
@@ -197,8 +197,8 @@ class PieceStore:
             write_files({note: self._note(about)})
 
     def _note(self, about: Mapping[str, Any] | None = None) -> bytes:
-        told = {**self._provenance, "pieces": dict(self.counts), **(about or {})}
-        return provenance_text(told).encode()
+        stated = {**self._provenance, "pieces": dict(self.counts), **(about or {})}
+        return provenance_text(stated).encode()
 
     def _begin_index(self) -> None:
         """Make the folder a recording set, as yet of none, so that recordings can be added."""
@@ -207,8 +207,8 @@ class PieceStore:
         if lost := sorted(path.name for path in self.folder.glob("[0-9]*.wav")):
             self.damaged.append(
                 f"expected {INDEX_NAME} beside {lost[0]} in {self.folder}, got none, so no "
-                "recording there counts; restore it from a copy, or what there are pieces of is "
-                "recorded again under new names."
+                "recording there counts; restore it from a copy, or what there are "
+                "pieces of is recorded again under new names."
             )
         with locked(self.folder / INDEX_NAME) as index:
             write_table(index, INDEX_COLUMNS, [])

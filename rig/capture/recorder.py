@@ -35,7 +35,7 @@ RESTING_MM_S = 5.0
 LEAST_REST_S = 0.5
 LOWEST_HZ, HIGHEST_HUM_HZ = 10.0, 1000.0
 MOSTLY_OUTSIDE = 0.5
-# Told once a hand has moved for so long.
+# Reported once a hand has moved for this long.
 JUDGED_FROM_S = 10.0
 
 
@@ -71,7 +71,7 @@ class HandLately:
 
 
 class StrokeRecorder:
-    """Takes what has come of both streams, cuts it, keeps the pieces, and tells how it stands.
+    """Takes new data of both streams, cuts them, keeps the pieces, and reports the progress.
 
     Parameters
     ----------
@@ -185,25 +185,25 @@ class StrokeRecorder:
         return self._trace.outside_share
 
     def warnings(self) -> list[str]:
-        """One sentence for everything that makes the recording slow or worse than it could be."""
-        told = list(self.store.damaged)
+        """One warning for everything that slows the recording down or impairs it."""
+        sentences = list(self.store.damaged)
         if self.lost:
-            told.append(
+            sentences.append(
                 f"samples of the input were lost at {self.lost} places, and pieces end there; "
                 "close other programs, or choose a lower rate."
             )
         if clipped := self.store.counts["clipped"]:
-            told.append(
+            sentences.append(
                 f"{clipped} pieces were clipped and are not used; turn the gain of the input down, "
                 "and its g per full scale up with it."
             )
         if silent := self.store.counts["silent"]:
-            told.append(
+            sentences.append(
                 f"the input was entirely silent in {silent} pieces, which are not used; check its "
                 "channel, and cable and power of the accelerometer."
             )
         if hum_hz := self._meter.hum_hz:
-            told.append(
+            sentences.append(
                 f"the input at rest is mostly hum of {hum_hz:g} Hz and its multiples, which cannot "
                 "be removed from strokes; use a battery, another socket or a balanced cable."
             )
@@ -212,12 +212,12 @@ class StrokeRecorder:
             (slow, fast), (light, hard) = (
                 one.ravel()[[0, -1]] for one in self._cutter.grid.bounds()
             )
-            told.append(
+            sentences.append(
                 f"the hand was outside of the grid ({slow:.3g} to {fast:.3g} mm/s, {light:.2g} to "
                 f"{hard:.2g} N) for {outside:.0%} of the time that it moved; stroke within it, or "
                 "find your own range with tactileq rig range."
             )
-        return told
+        return sentences
 
     def _take(self, block: InputBlock, readings: Readings) -> None:
         if block.lost:
@@ -359,5 +359,5 @@ def mains_in(samples: Floats, rate_hz: float) -> float:
 
 
 def _rms(samples: Floats) -> float:
-    """About the mean, since gravity is no vibration."""
+    """About the mean, since gravity is not a vibration."""
     return float(np.std(samples))

@@ -1,1 +1,1 @@
-"""The desk rig: a card that plays, a hand that is read, and what a session asks of them."""
+"""The desk rig: a sound card that plays, a hand that is read, and a session's interface to them."""

@@ -1,4 +1,4 @@
-"""What has to hold of a rig before people use it."""
+"""Requirements on a rig before people use it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ HIGHEST_LATENCY_MS = 40.0  # textures are felt to change there (Okamoto and othe
 
 @dataclass(frozen=True, kw_only=True)
 class Requirements:
-    """What a study wants of a rig.
+    """What a study requires of a rig.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ from rig.sound.signals import tone_burst
 
 OLDEST_READING_S = 0.1
 FIRST_READING_S = 5.0
-LOOK_S = 0.1  # so often it looks after a burst that it waits for
+LOOK_S = 0.1  # interval of checks while waiting for a burst
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Parts:
 class DeskRig:
     """A rig of parts on a desk; implements `rig.interface.TextureRig`.
 
-    What fails while it is open is told by `take_faults`, and what was lost is started again by what
-    is presented next. `read` and `take_faults` look after what plays: see `TextureRig`.
+    What fails while it is open is reported by `take_faults`, and what was lost is started again by
+    what is presented next. `read` and `take_faults` are the heartbeat: see `TextureRig`.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class DeskRig:
     Raises
     ------
     InputError
-        Where the study requires another rig, or its latency is too long.
+        If the study requires another rig, or its latency is too long.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class DeskRig:
         Raises
         ------
         InputError
-            Where another process uses it, or a part is not there or does not do what the rig file
+            If another process uses it, or a part is not there or does not do what the rig file
             says.
         """
         with ExitStack() as stack:
@@ -341,7 +341,7 @@ class DeskRig:
                 f"{played.stale} blocks, in which nothing was felt; check what reads the hand."
             )
 
-    # --- What it tells ----------------------------------------------------------------------
+    # --- What it reports --------------------------------------------------------------------
 
     def read(self) -> RigReading:
         """The hand as it is now; at rest in the air where nothing is read."""

@@ -1,4 +1,4 @@
-"""What the shared memory of a rig told, kept until somebody takes it: the hand, the blocks played.
+"""Rows read from a rig's shared memory, kept until somebody takes them: hand, blocks played.
 
 docs/method/live.md#shared-memory
 """

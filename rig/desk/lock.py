@@ -23,7 +23,7 @@ def rig_locked(name: str) -> Iterator[None]:
     Raises
     ------
     InputError
-        Where another process holds it, which is named by its number, or where something else is
+        If another process holds it, which is named by its number, or where something else is
         in the place of the lock.
     """
     lock = Lock(_folder() / f"{sha256_of(name)[:16]}.lock")

@@ -72,8 +72,8 @@ class Pen:
 
     def take(self, opened_s: float) -> tuple[Acceleration, ...]:
         """What was kept since the last call, on the clock of a rig that was opened then."""
-        told = self._ask({"do": "take"})
-        if not told.get("runs", False):
+        reply = self._ask({"do": "take"})
+        if not reply.get("runs", False):
             self.lost = self.lost or "its sound server or its device is gone"
         return tuple(
             Acceleration(
@@ -81,11 +81,11 @@ class Pen:
                 rate_hz=self._rate_hz,
                 samples_g=np.load(piece["file"]).astype(np.float64),
             )
-            for piece in told.get("pieces", ())
+            for piece in reply.get("pieces", ())
         )
 
     def _ask(self, wanted: dict[str, Any]) -> dict[str, Any]:
-        """The process' answer; none once it is lost, which `lost` then tells."""
+        """The process' answer; none once it is lost, which `lost` then reports."""
         if self._child is None or self.lost:
             return {}
         try:

@@ -1,7 +1,8 @@
 """The process that follows an accelerometer at the pen, and keeps what is asked for.
 
 Its settings are the argument, as JSON; it answers each line by one, and ends with its input. It is
-a process of its own since PortAudio may end, or stop for ever, a process whose sound server dies.
+a process of its own since PortAudio may end, or stop indefinitely, a process whose sound server
+dies.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from rig.capture.input import AudioInput, InputBlock, InputSettings
 from rig.live.driven import settings_from_parent, tell
 
 LOOK_S = 0.25  # from one look at the input to the next
-RECENT_S = 2.0  # what is not asked for is forgotten after so long
+RECENT_S = 2.0  # what is not asked for is forgotten after this time
 
 
 class PenLog:
@@ -123,13 +124,13 @@ def _answer(
 
 def _saved(pieces: list[list[InputBlock]], source: AudioInput, folder: Path) -> list[Any]:
     """Each piece as a file of numbers in g, and when it begins."""
-    told = []
+    written = []
     for number, piece in enumerate(pieces):
         samples = np.concatenate([block.samples for block in piece])
         path = folder / f"{number}.npy"
         np.save(path, (samples * source.settings.g_per_fullscale).astype(np.float32))
-        told.append({"file": str(path), "start_s": piece[0].time_s})
-    return told
+        written.append({"file": str(path), "start_s": piece[0].time_s})
+    return written
 
 
 if __name__ == "__main__":

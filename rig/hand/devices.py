@@ -1,4 +1,4 @@
-"""Opens whatever measures the hand, as the settings say."""
+"""Opens the device that measures the hand, according to the settings."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def open_device(settings: HandSettings) -> Device:
     Raises
     ------
     InputError
-        Where it is not there, may not be read, or cannot be used.
+        If it is not there, may not be read, or cannot be used.
     """
     if settings.kind == "scripted":
         return ScriptedHand.open(settings)

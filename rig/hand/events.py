@@ -40,10 +40,10 @@ class Frame(NamedTuple):
     Parameters
     ----------
     time_s : float
-        By the clock that the device was told to use.
+        By the clock that the device was set to use.
     events : tuple of Event
     dropped : bool
-        The kernel had to throw events away: what the device is like has to be asked for anew.
+        The kernel had to throw events away: what the device is like has to be queried again.
     """
 
     time_s: float

@@ -40,7 +40,7 @@ class Follower:
     ----------
     settings : HandSettings
     rest_s : float
-        A device that has been silent for so long rests (`Device.rest_s`).
+        A device that has been silent for this long rests (`Device.rest_s`).
     """
 
     def __init__(self, settings: HandSettings, *, rest_s: float) -> None:
@@ -55,7 +55,7 @@ class Follower:
         Raises
         ------
         DeviceLost
-            Where force is neither measured nor assumed.
+            If force is neither measured nor assumed.
         """
         self._sample = sample
         speed = sample.speed_mm_s

@@ -1,4 +1,4 @@
-"""From a device to readings in shared memory: at least 500 a second, whatever the device does."""
+"""From a device to readings in shared memory: at least 500 per second with any device."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Tell = Callable[[dict[str, Any]], None]
 
 
 class HandLoop:
-    """Passes a device's samples on as readings, and goes on where the device is lost.
+    """Passes a device's samples on as readings, and continues where the device is lost.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class HandLoop:
         self._told = ""  # the last fault, until a sample passes
         self._counts: dict[str, int] = {}
         self._counts_s = 0.0
-        self._late = 0  # of the counts, those that were told
+        self._late = 0  # of the counts, those that were reported
         self._firmware = ""
         self.unplugged = False  # on request: as if the plug were pulled
 
@@ -92,7 +92,7 @@ class HandLoop:
             self._write(self._follower.at(now) if self._device else self._follower.gone(now))
 
     def close(self) -> None:
-        """Leave behind that nobody touches anything, and give the device back."""
+        """Write a last reading without contact, and release the device."""
         self._write(self._follower.gone(now_s()))
         if self._device is not None:
             self._device.close()
@@ -119,7 +119,7 @@ class HandLoop:
         self._report(counts)
 
     def _tell_late(self, device: Device, late: int) -> None:
-        """Once samples are fresh again, say how many were not."""
+        """Once samples are in time again, report how many were late."""
         if late > self._late:
             told = (
                 f"expected the readings of the {device.name} within {LOST_S:g} s, got "

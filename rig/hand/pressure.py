@@ -1,4 +1,4 @@
-"""Newtons from a pen's pressure, by weights laid on (docs/method/hand.md#pressure)."""
+"""Newtons from a pen's pressure, by calibration weights (docs/method/hand.md#pressure)."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ def _means(weights_n: Sequence[float], raw: Sequence[float]) -> list[tuple[float
         readings.setdefault(float(weight), []).append(float(pressure))
     if len(readings) < FEWEST_WEIGHTS:
         raise InputError(
-            f"expected {FEWEST_WEIGHTS} or more different weights, got {len(readings)}; lay more "
-            "on the pen."
+            f"expected {FEWEST_WEIGHTS} or more different weights, got "
+            f"{len(readings)}; place more on the pen."
         )
     means = [(weight, fmean(readings[weight])) for weight in sorted(readings)]
     for (light, before), (heavy, after) in pairwise(means):
@@ -96,7 +96,7 @@ def _means(weights_n: Sequence[float], raw: Sequence[float]) -> list[tuple[float
             raise InputError(
                 f"expected more pressure under {heavy:g} N than under {light:g} N, got {after:g} "
                 f"after {before:g}; the pen saturates there or the weight leaned, so leave that "
-                "weight out or lay it on again."
+                "weight out or place it again."
             )
     return means
 

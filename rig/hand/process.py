@@ -1,6 +1,6 @@
 """The hand's process: reads the device, filters, writes readings.
 
-Started by `rig.hand.reader` with its settings as JSON; what it has to tell goes to standard output,
+Started by `rig.hand.reader` with its settings as JSON; its reports go to standard output,
 one JSON object a line. The end of standard input means that its parent is gone: it ends
 (docs/method/hand.md#process).
 """

@@ -37,7 +37,7 @@ class HandReader:
     live : Live
         Has to outlive this.
     settings : HandSettings
-        Kind "window" has no process: whoever owns the window calls `push`.
+        Kind "window" has no process: the owner of the window calls `push`.
     """
 
     def __init__(self, live: Live, settings: HandSettings) -> None:
@@ -64,7 +64,7 @@ class HandReader:
         Raises
         ------
         InputError
-            Where the device is not there, may not be read or cannot be used.
+            If the device is not there, may not be read or cannot be used.
         """
         if self._window is not None:
             self._window.open()
@@ -79,11 +79,11 @@ class HandReader:
         ]
         for thread in self._threads:
             thread.start()
-        told = self._wait_for_first()
-        if "ready" not in told:
+        message = self._wait_for_first()
+        if "ready" not in message:
             self.close()
-            raise InputError(told["error"])
-        self.device_name = told["ready"]
+            raise InputError(message["error"])
+        self.device_name = message["ready"]
         self._ready_s = now_s()
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class HandReader:
 
         Of a serial sensor: lines, bad (damaged), missing, late (of the lines, those that were
         dropped because they were read more than 0.1 s after they were measured). Of a tablet or
-        mouse: frames, dropped (by the kernel). They begin anew where the device was opened again.
+        mouse: frames, dropped (by the kernel). They restart where the device was opened again.
         """
         with self._lock:
             return dict(self._counts)
@@ -145,7 +145,7 @@ class HandReader:
         self._window.pointer.push(x, y, down=down, button=button)
 
     def unplug(self, unplugged: bool = True) -> None:
-        """Have the process act as if the device's plug were pulled, or put back; for tests."""
+        """Have the process act as if the device were unplugged, or plugged in again; for tests."""
         with self._lock:
             process = self._process
         if process is not None and process.stdin is not None:
@@ -212,20 +212,20 @@ class HandReader:
             _end(process)
         return process
 
-    def _hear(self, told: dict[str, Any]) -> None:
-        if "fault" in told:
-            self._add_fault(told["fault"])
-        if "counts" in told:
+    def _hear(self, message: dict[str, Any]) -> None:
+        if "fault" in message:
+            self._add_fault(message["fault"])
+        if "counts" in message:
             with self._lock:
-                self._counts = told["counts"]
-        if "firmware" in told:
+                self._counts = message["counts"]
+        if "firmware" in message:
             with self._lock:
-                self._firmware = told["firmware"]
+                self._firmware = message["firmware"]
             self._has_firmware.set()
         self._alive_s = min(self._alive_s, now_s())
-        if "ready" in told or "error" in told:
-            self._was_ready = self._was_ready or "ready" in told
-            self._first.put(told)
+        if "ready" in message or "error" in message:
+            self._was_ready = self._was_ready or "ready" in message
+            self._first.put(message)
 
     def _watch(self) -> None:
         """Kill a process that writes no readings; `_keep` replaces it."""

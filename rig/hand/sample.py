@@ -1,4 +1,4 @@
-"""What a device that measures the hand gives, whichever it is."""
+"""The interface of devices that measure the hand."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import nan
 from typing import NamedTuple, Protocol
 
-LOST_S = 0.1  # a sensor that sends always is lost after so long, and what is older is of no use
+LOST_S = 0.1  # a sensor that sends always is lost after this time, and what is older is of no use
 
 
 class Sample(NamedTuple):
@@ -68,14 +68,14 @@ class Device(Protocol):
     """An open device that measures the hand."""
 
     name: str
-    rest_s: float  # silent for so long, it rests (tracking.REST_S where it reports only changes)
+    rest_s: float  # silent for this long, it rests (tracking.REST_S where it reports only changes)
 
     @property
     def firmware(self) -> str:
         """The version that the device stated; empty where it states none, or has not yet."""
 
     def wait(self, seconds: float) -> None:
-        """Return when there may be something to read, at the latest after so long."""
+        """Return when there may be something to read, at the latest after this time."""
 
     def read(self) -> list[Sample]:
         """All samples since the last call, without waiting; DeviceLost where it is gone."""

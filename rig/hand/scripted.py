@@ -31,7 +31,7 @@ class Script(Protocol):
 
 
 class Strokes:
-    """To and fro along x, as a sine of speed, which begins at rest."""
+    """Back and forth along x, as a sine of speed, which begins at rest."""
 
     def __init__(self, speed_mm_s: float, force_n: float, *, per_s: float) -> None:
         self._angular = 2 * pi * per_s

@@ -133,7 +133,7 @@ class LineReader:
 
     def _count_missing(self, number: int) -> None:
         step = 1 if self._last is None else (number - self._last) % NUMBERS
-        # A step of half the circle or more is a step back: the sensor has started anew.
+        # A step of half the circle or more is a step back: the sensor has restarted.
         if 1 < step < NUMBERS // 2:
             self.missing += step - 1
         self._last = number
@@ -156,7 +156,7 @@ class SensorClock:
     def time_s(self, time_us: int, arrived_s: float) -> float:
         """When a line was written, on the clock on which it arrived."""
         step_us = 0 if self._last_us is None else (time_us - self._last_us) % CLOCK_US
-        if self._last_us is None or step_us >= CLOCK_US // 2:  # started anew
+        if self._last_us is None or step_us >= CLOCK_US // 2:  # restarted
             self._elapsed_us, self._offset_s = 0, arrived_s
         else:
             self._elapsed_us += step_us

@@ -15,7 +15,7 @@ from rig.hand.serial_line import LineReader, SensorClock, SensorLine
 from rig.hand.settings import HandSettings
 from rig.live.memory import now_s
 
-FIRST_LINE_S = 3.0  # many boards start anew when their port is opened
+FIRST_LINE_S = 3.0  # many boards restart when their port is opened
 _POLL_S = 0.001
 
 

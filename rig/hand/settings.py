@@ -50,10 +50,10 @@ class HandSettings:
     baud : int
         Of a serial port.
     grab : bool
-        Whether nobody else gets the device's movements, so that the pointer stands still.
+        Whether no other program gets the device's movements, so that the pointer does not move.
     script : str
-        Of a scripted hand: "strokes" (to and fro as a sine, up to `speed_mm_s`), "hold" (constant)
-        or the path of a table (time_s, x_mm, y_mm, force_n), which is played once.
+        Of a scripted hand: "strokes" (back and forth as a sine, up to `speed_mm_s`), "hold"
+        (constant) or the path of a table (time_s, x_mm, y_mm, force_n), which is played once.
     speed_mm_s, force_n, strokes_per_s : float
         Of the scripts "strokes" and "hold".
 

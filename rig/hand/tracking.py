@@ -25,7 +25,7 @@ class TrackingFilter:
     delay_s : float
         Above 0. At constant acceleration the speed is that of `delay_s` before the last position.
     rest_s : float
-        A device that reports only changes rests where it has been silent for so long.
+        A device that reports only changes rests where it has been silent for this long.
     """
 
     def __init__(self, delay_s: float, *, rest_s: float = REST_S) -> None:

@@ -1,6 +1,6 @@
 """A hand that moves a window's pointer, where no device can be read (docs/method/hand.md#window).
 
-Whoever owns the window pushes positions; a thread of the same process filters them and writes the
+The owner of the window pushes positions; a thread of the same process filters them and writes the
 readings. While that process is busy nothing is written, and what is rendered falls silent.
 """
 
@@ -41,7 +41,7 @@ class Pointer:
         self._news.set()
 
     def wait(self, seconds: float) -> None:
-        """Until something is pushed, at the latest after so long."""
+        """Until something is pushed, at the latest after this time."""
         if self._news.wait(seconds):
             self._news.clear()
 

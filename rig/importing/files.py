@@ -14,7 +14,7 @@ import numpy as np
 from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.checks import check_number
-from modeling.errors import shortened, shown
+from modeling.errors import counted, shortened, shown
 from modeling.files.reading import read_bytes
 from modeling.files.tables import csv_cells, is_number
 from modeling.files.wav import full_scale, read_wav
@@ -130,7 +130,7 @@ def import_csv(
         Unit of the axes, where the header names none (`x (g)`, `x_g`). With neither the unit is
         `arbitrary`.
     rate_hz : float, optional
-        Where there is no time column, or one that tells no rate; must not contradict one that does.
+        If there is no time column, or one that gives no rate; must not contradict one that does.
     mv_per_g : float, optional
         Sensitivity of the accelerometer, 0.01 … 100,000 mV/g; needed for samples in volts.
     named : mapping of "time", "x", "y" or "z" to str, optional
@@ -148,7 +148,7 @@ def import_csv(
 
 
 def _meant(one: Imported) -> Recording:
-    """The recording; refused where something of it cannot be meant."""
+    """The recording; refused where something about it is implausible."""
     if one.doubts:
         raise InputError(one.doubts[0])
     return one.recording
@@ -236,7 +236,7 @@ def usable(
     Raises
     ------
     InputError
-        Where no file can be read: what is wrong with the first.
+        If no file can be read: what is wrong with the first.
     """
     records: list[Imported] = []
     refusals: list[InputError] = []
@@ -258,7 +258,7 @@ def _even(
     *,
     given_hz: float | None,
 ) -> tuple[float, Floats, Sequence[str], Sequence[str]]:
-    """Rate and evenly spaced samples; what is to be said of that; what contradicts the rate.
+    """Rate and evenly spaced samples; warnings about them; contradictions to the rate.
 
     A rate that is given says that the samples are even, whatever their times.
     """
@@ -275,21 +275,21 @@ def _even(
         uneven = time.unevenness(rate_hz)
         if uneven is None:
             return rate_hz, axes, (), ()
-        told = (
+        note = (
             f"{path.name}: {uneven}; they were resampled at even times by a spline through their "
             "own ones; if only the times are uneven, give --rate."
         )
-        return rate_hz, time.resampled(axes, rate_hz), (told,), ()
+        return rate_hz, time.resampled(axes, rate_hz), (note,), ()
     contradiction = time.contradiction(given_hz)
     uneven = None if contradiction else time.unevenness(given_hz)
     if uneven is None:
         return given_hz, axes, (), (contradiction,) if contradiction else ()
-    told = (
+    note = (
         f"{path.name}: {uneven}, but are taken as evenly spaced, as --rate says; if they are not, "
         f"that turns {uneven.share:.0%} of the power of a vibration at {uneven.highest_hz:.4g} Hz "
         "into noise, and less at lower frequencies."
     )
-    return given_hz, axes, (told,), ()
+    return given_hz, axes, (note,), ()
 
 
 def _g_per(unit: str, mv_per_g: float | None, file: str) -> float:
@@ -377,7 +377,8 @@ def _read_lines(path: Path) -> tuple[list[str], bool]:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if len(lines) < 2:
         raise InputError(
-            f"expected a header and rows of numbers in {path.name}, got {len(lines)} lines; "
+            f"expected a header and rows of numbers in {path.name}, got "
+            f"{counted(len(lines), 'line')}; "
             "export or record it again."
         )
     return lines, text.endswith(("\n", "\r"))
@@ -456,12 +457,12 @@ def _read_columns(
     columns = {}
     for place, name in enumerate(_roles(path, header, named)):
         if name is not None:
-            told, column = name, values[:, place]
+            note, column = name, values[:, place]
             kind, unit = _name_and_unit(name)
             if kind in _TIME_NAMES:
                 column, since_1970 = since_first(column, [row[place] for row in rows[1:]])
-                told = f"{name} ({since_1970})" if since_1970 and not unit else name
-            columns[told] = column
+                note = f"{name} ({since_1970})" if since_1970 and not unit else name
+            columns[note] = column
     return columns, warnings
 
 
@@ -512,7 +513,7 @@ def _times_in(columns: Mapping[str, Floats]) -> list[str]:
 
 
 def _time_column(path: Path, columns: Mapping[str, Floats]) -> TimeColumn | None:
-    """The first column of times that tells a rate, or else the first one, if there is any."""
+    """The first column of times that gives a rate, or else the first one, if there is any."""
     every = [
         TimeColumn(path.name, name, _name_and_unit(name)[1], columns[name])
         for name in _times_in(columns)

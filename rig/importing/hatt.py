@@ -26,7 +26,7 @@ from modeling.checks import (
     LOWEST_RATE_HZ,
     check_duration,
 )
-from modeling.errors import shortened, shown
+from modeling.errors import counted, shortened, shown
 from modeling.files.reading import read_bytes
 from modeling.models.line_spectral import check_line_spectral, prediction_coefficients
 from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
@@ -38,7 +38,7 @@ UNITS = {"AccelUnits": "m/s^2", "SpeedUnits": "mm/s", "ForceUnits": "N"}
 # A pole 2 Hz wide has forgotten where it began to 1e-5 by then.
 _RUN_IN_S = 2.0
 _INSIDE = -1e-9
-# Toolkit models are short to fit and tell of their surfaces as of any length of record.
+# Toolkit models describe their surfaces whatever the length of the record.
 DURATION_S = 10.0
 
 
@@ -193,7 +193,7 @@ class HattTexture:
     def conditions_inside(
         self, conditions: Sequence[tuple[float, float]]
     ) -> list[tuple[float, float]]:
-        """Those of some (speed, force) conditions that the file tells of, and not as silence."""
+        """Those of some (speed, force) conditions that the file covers, and not with silence."""
         return [
             (speed, force)
             for speed, force in conditions
@@ -351,7 +351,7 @@ def _models_of(file: _Reader, root: ElementTree.Element, conditions: Floats) -> 
         speed, force = missing[0]
         file.refuse(
             f"a model for each of {len(listed)} listed speeds and forces",
-            f"{len(models)} models and none at {speed:g} mm/s and {force:g} N",
+            f"{counted(len(models), 'model')} and none at {speed:g} mm/s and {force:g} N",
             "download it again",
         )
     for field, sizes in (

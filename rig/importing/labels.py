@@ -18,7 +18,7 @@ LABEL_COLUMNS = (
 
 @dataclass(frozen=True)
 class Label:
-    """What a file does not say of itself: surface, speed (mm/s), force (N), which repetition.
+    """What a file itself does not state: surface, speed (mm/s), force (N), which repetition.
 
     Of WAV files also the acceleration (g) of a full-scale sample, and the channel, from 1.
     """

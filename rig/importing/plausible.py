@@ -1,6 +1,6 @@
-"""Recordings whose labels, unit or scale cannot be meant, and what else they may mean.
+"""Recordings with implausible labels, unit or scale, and what else these may mean.
 
-docs/method/recordings.md#imports-that-cannot-be-meant
+docs/method/recordings.md#implausible-imports
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from modeling.perception.thresholds import STANDARD_GRAVITY_M_S2
 
 
 class Range(NamedTuple):
-    """What is taken without asking, both ends included."""
+    """A plausible range, both ends included."""
 
     lowest: float
     highest: float
@@ -51,13 +51,13 @@ _SCALES_IN_G = {
     "per count of 16 bits": 2.0**15,
     "per count of 24 bits": 2.0**23,
 }
-GO_ON = "or give --yes where it is meant (in Python take import_wav_file or import_csv_file)"
+GO_ON = "or give --yes if it is intended (in Python take import_wav_file or import_csv_file)"
 
 
 def doubts_about(
     recording: Recording, name: str, *, unit: str = "g", g_per_fullscale: float | None = None
 ) -> tuple[str, ...]:
-    """What of a recording cannot be meant, a sentence each, with what else it may mean.
+    """What is implausible about a recording, one sentence each, with what else it may mean.
 
     Parameters
     ----------
@@ -73,14 +73,14 @@ def doubts_about(
     found.append("" if g_per_fullscale is None else _of_scale(g_per_fullscale))
     if recording.unit == "g" and not found[-1]:
         found.append(_of_level(recording, unit, g_per_fullscale) or _of_gravity(recording, unit))
-    return tuple(f"{name}: {told}" for told in found if told)
+    return tuple(f"{name}: {doubt}" for doubt in found if doubt)
 
 
 def _of_condition(speed_mm_s: float, force_n: float) -> str:
     if _is_condition(speed_mm_s, force_n):
         return ""
     others = {
-        "with the columns exchanged": (force_n, speed_mm_s),
+        "with the columns swapped": (force_n, speed_mm_s),
         "with the speed in m/s": (1000 * speed_mm_s, force_n),
         "with the force in mN": (speed_mm_s, force_n / 1000),
         "with m/s and mN": (1000 * speed_mm_s, force_n / 1000),
@@ -144,7 +144,7 @@ def _of_gravity(recording: Recording, unit: str) -> str:
     if unit != "g" or not is_constant or not GRAVITIES_M_S2.holds(constant_g):
         return ""
     return (
-        f"expected a constant part of at most {HIGHEST_GRAVITY_G:g} g, as gravity has, got "
+        f"expected a constant part of at most {HIGHEST_GRAVITY_G:g} g, as gravity gives, got "
         f"{constant_g:.3g} g with its numbers in g, or {constant_g * G_PER_UNIT['m/s2']:.3g} g "
         f"with them in m/s²; correct the unit in the header or --unit, {GO_ON}."
     )

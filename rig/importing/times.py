@@ -1,4 +1,4 @@
-"""The sampling rate that a time column tells, and how evenly its samples are spaced."""
+"""The sampling rate that a time column gives, and how evenly its samples are spaced."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TOLERATED_NOISE_SHARE = 0.01
 LOCAL_S = 0.1
 # Of 3, 5 and 7 the one with the least spectral error (docs/method/recordings.md#uneven-samples).
 SPLINE_DEGREE = 7
-# Times that count from 1970 tell their unit: from 2001 to 2096.
+# Times that count from 1970 reveal their unit: from 2001 to 2096.
 _EPOCH = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 _EPOCH_S = (1e9, 4e9)
 
@@ -111,7 +111,7 @@ class TimeColumn:
         """A sentence where neither the mean nor the typical step agrees with a rate that was given.
 
         A column of times that no vibration has in its unit may be in any; one that counts samples,
-        or whose times fall, tells no rate.
+        or whose times decrease, gives no rate.
         """
         steps = np.diff(self.values)
         rises = np.isfinite(self.values).all() and (steps >= 0).all() and steps.any()
@@ -120,15 +120,15 @@ class TimeColumn:
             return None
         # Coarse time stamps keep the mean step, lost samples the typical one.
         mean, typical = float(steps.mean()), float(np.median(steps[steps > 0]))
-        told = self._rates_hz(mean)
-        ratios = [rate_hz / hz * part for hz in told.values() for part in (1, typical / mean)]
-        if not told or any(abs(ratio - 1) <= RATE_TOLERANCE for ratio in ratios):
+        by_unit = self._rates_hz(mean)
+        ratios = [rate_hz / hz * part for hz in by_unit.values() for part in (1, typical / mean)]
+        if not by_unit or any(abs(ratio - 1) <= RATE_TOLERANCE for ratio in ratios):
             return None
-        by_column = " or ".join(f"{hz:.4g} Hz (in {unit})" for unit, hz in told.items())
+        by_column = " or ".join(f"{hz:.4g} Hz (in {unit})" for unit, hz in by_unit.items())
         return (
             f"{self.file}: expected a --rate that agrees with the time column, got {rate_hz:g} Hz "
             f"and by its column {shown(self.name)} {by_column}; leave --rate out, or give --yes "
-            "where the column is wrong."
+            "if the column is wrong."
         )
 
     def _rates_hz(self, step: float) -> dict[str, float]:

@@ -73,9 +73,9 @@ class Child:
     Raises
     ------
     InputError
-        Where it refuses its settings: its own sentence.
+        If it refuses its settings: its own sentence.
     ChildLost
-        Where it ends or does not answer.
+        If it ends or does not answer.
     """
 
     def __init__(self, module: str, settings: Mapping[str, Any]) -> None:
@@ -106,9 +106,9 @@ class Child:
         Raises
         ------
         InputError
-            Where it refuses: its own sentence.
+            If it refuses: its own sentence.
         ChildLost
-            Where it has ended, or does not answer in time.
+            If it has ended, or does not answer in time.
         """
         assert self._process.stdin is not None
         try:

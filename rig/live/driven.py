@@ -10,16 +10,16 @@ from typing import Any
 
 
 def settings_from_parent() -> dict[str, Any]:
-    """What the parent said when it started this process; Ctrl-C and Ctrl-Z are the parent's."""
+    """What the parent said when it started this process; the parent handles Ctrl-C and Ctrl-Z."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform != "win32":
-        # A stopped process cannot fade; a card may repeat for ever what it got last.
+        # A stopped process cannot fade; a card may repeat indefinitely what it got last.
         signal.signal(signal.SIGTSTP, signal.SIG_IGN)
     settings: dict[str, Any] = json.loads(sys.argv[1])
     return settings
 
 
 def tell(line: Mapping[str, Any]) -> None:
-    """Tell the parent."""
+    """Send a line to the parent."""
     sys.stdout.write(json.dumps(line) + "\n")
     sys.stdout.flush()

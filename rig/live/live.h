@@ -1,11 +1,11 @@
 /* What the processes of a rig share: readings of the hand, what was played, the session's heartbeat.
    docs/method/live.md#shared-memory
 
-   One process writes readings, the audio callback of another one writes blocks; anybody reads. Nobody
-   waits for anybody. Both are rings: whoever writes fills the next slot, then counts it. Who reads
-   copies a slot and looks at the count again: a slot that was overwritten meanwhile is noticed.
+   One process writes readings, the audio callback of another one writes blocks; any process reads. No
+   process waits for another. Both are rings: the writer fills the next slot, then increments the count.
+   A reader copies a slot and checks the count again, to detect a slot that was overwritten meanwhile.
 
-   C11, or C99 with GCC or Clang; 64-bit words are read and written whole.
+   C11, or C99 with GCC or Clang; 64-bit words are read and written atomically.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -119,7 +119,7 @@ static inline void tq_take(const uint64_t *slot, void *row, size_t words)
 static inline void tq_append(uint64_t *ring, uint64_t *count, const void *row, size_t words)
 {
     uint64_t n = __atomic_load_n(count, __ATOMIC_RELAXED);
-    __atomic_thread_fence(__ATOMIC_RELEASE); /* who sees this row's words sees the count before it */
+    __atomic_thread_fence(__ATOMIC_RELEASE); /* a reader of this row's words sees the count before it */
     tq_put(ring + (n & (TQ_RING - 1)) * words, row, words);
     __atomic_store_n(count, n + 1, __ATOMIC_RELEASE);
 }
@@ -166,7 +166,7 @@ static inline int tq_live_fits(const tq_live *live)
     return __atomic_load_n(&live->format, __ATOMIC_ACQUIRE) == TQ_LIVE_FORMAT;
 }
 
-/* The session was there at this time, and looked after what plays. */
+/* The heartbeat: the session was there at this time. */
 static inline void tq_heartbeat(tq_live *live, double time_s)
 {
     tq_put_time(&live->heartbeat, time_s);

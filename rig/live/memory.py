@@ -28,7 +28,7 @@ except ImportError:  # no compiler at installation
 CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
 STALE, UNDERFLOW, NO_HEARTBEAT = 1, 2, 4
 
-HEARTBEAT_S = 1.0  # the session looks after what plays as often at least
+HEARTBEAT_S = 1.0  # the session writes a heartbeat at least this often
 
 READING = np.dtype(
     [
@@ -68,7 +68,7 @@ def compiled() -> Any:
     Raises
     ------
     InputError
-        Where there is none: nothing in Python keeps the time of an audio callback.
+        If there is none: nothing in Python keeps the time of an audio callback.
     """
     if _live is None:
         raise InputError(
@@ -79,7 +79,7 @@ def compiled() -> Any:
 
 
 def now_s() -> float:
-    """Seconds on the one clock of all processes of a rig (monotonic; its zero means nothing)."""
+    """Seconds on the one clock of all processes of a rig (monotonic, with an arbitrary zero)."""
     return float(compiled().lib.tq_now())
 
 
@@ -139,7 +139,7 @@ class Live:
         return live
 
     def close(self) -> None:
-        """Give the memory back; nothing of it may be used afterwards."""
+        """Release the memory, which must not be used afterwards."""
         if self._memory is None:
             return
         self.address = None
@@ -184,7 +184,7 @@ class Live:
         self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
 
     def heartbeat(self) -> None:
-        """Say that the session looks after what plays: without it what plays falls silent.
+        """Write the session's heartbeat, without which playback falls silent.
 
         Only the loop that polls the participant or the keys may call this, never a thread of its
         own: where the loop hangs nobody looks.

@@ -5,12 +5,12 @@
    is logged there. In the callback there is no Python, no allocation, no lock and no system call (the
    clock is a page that the kernel maps).
 
-   One control thread prepares sources and says which one it wants, as of player.h, on which this rests.
-   A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and voices
-   when no signal does: all changes pass through silence.
+   One control thread prepares sources and selects the one to play, as in player.h, on which this is
+   based. A source is a voice (a model) or a signal. Signals begin when no voice plays any more, and
+   voices when no signal does: all changes pass through silence.
 
-   What plays is halted where the session's heartbeat in shared memory stays away: it fades, masking noise
-   with it, and nothing more is heard of it. What is asked for later plays.
+   A presentation is halted if the session's heartbeat in shared memory is missing: it fades, masking
+   noise with it, and stays silent. Later requests are played.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -160,7 +160,7 @@ TQ_INLINE void tq_sound_mind(tq_sound *s, double now_s)
     s->halted = s->halted_s == asked_s;
 }
 
-/* Tells the player what is wanted, which is silence while a signal plays. */
+/* Sets what the player has to play, which is silence while a signal plays. */
 TQ_INLINE void tq_sound_tell(tq_sound *s)
 {
     tq_surface *u = s->halted || TQ_GET(&s->signal_playing) ? NULL : TQ_GET(&s->surface_wanted);

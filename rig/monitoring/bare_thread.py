@@ -1,6 +1,6 @@
 """A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread SETTINGS`.
 
-What it misses, the machine misses: its figures stand beside those of the audio callback. To each
+Its misses are due to the machine; they are shown beside those of the audio callback. To each
 line on standard input it answers how often it woke up and how often too late.
 """
 

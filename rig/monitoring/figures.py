@@ -1,4 +1,4 @@
-"""What the shared memory says of a running rig, as figures that can be shown."""
+"""Figures of a running rig from its shared memory."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ class Monitor:
         return {
             "speed_mm_s": speed,
             "force_n": force,
-            "hand": ", ".join(told for flag, told in marks.items() if flags & flag),
+            "hand": ", ".join(words for flag, words in marks.items() if flags & flag),
             "in_grid": None if self._grid is None else _within(abs(speed), force, self._grid),
         }
 

@@ -26,7 +26,7 @@ def with_value(text: str, section: str, key: str, *, value: object) -> str:
     Raises
     ------
     InputError
-        Where the key's value spreads over several lines.
+        If the key's value spreads over several lines.
     """
     lines = text.splitlines()
     line = f"{key} = {as_toml(value)}"

@@ -1,4 +1,4 @@
-"""What a rig file says of a quantity: its value with unit, and whether it was measured."""
+"""A quantity in a rig file: its value with unit, and whether it was measured."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from modeling import InputError
 from modeling.checks import check_keys, is_number
-from modeling.errors import shown
+from modeling.errors import counted, shown
 from modeling.files.documents import as_text
 
 _FIGURE = ("value", "unit", "assumed", "source")
@@ -64,7 +64,9 @@ class Curve:
 
     def __str__(self) -> str:
         ends = f"{self.points[0][1]:g} to {self.points[-1][1]:g} {self.unit}"
-        return f"{ends}, {len(self.points)} points" + (" (assumed)" if self.assumed else "")
+        return f"{ends}, {counted(len(self.points), 'point')}" + (
+            " (assumed)" if self.assumed else ""
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, those of a rig file."""

@@ -99,7 +99,8 @@ class RigFile:
 
     @staticmethod
     def updated(path: str | Path, values: Mapping[str, object]) -> RigFile:
-        """Change a rig file and read it again; comments stay, and it is never there by half.
+        """Change a rig file and read it again; comments are kept, and the file is never left half
+        written.
 
         Parameters
         ----------
@@ -110,7 +111,7 @@ class RigFile:
         Raises
         ------
         InputError
-            Where the file cannot be read, or would not be a rig file any more; then nothing
+            If the file cannot be read, or would not be a rig file any more; then nothing
             has changed.
         """
         file = Path(path)

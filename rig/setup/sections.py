@@ -1,4 +1,4 @@
-"""The sections of a rig file: what each key is, its unit, its range and what stands without it."""
+"""The sections of a rig file: the meaning of each key, its unit, its range and its default."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Starts the simulated vibrator as a process of its own, and ends it."""
+"""Starts the simulated vibrator as a separate process, and ends it."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class SimulatedCard:
             self._child = Child("rig.simulated.process", settings)
         except ChildLost as lost:
             raise InputError(
-                f"expected the simulated vibrator to start, got: {lost}; look whether a JACK "
-                "server runs."
+                f"expected the simulated vibrator to start, got: {lost}; check that a "
+                "JACK server is running."
             ) from None
 
     def close(self) -> None:

@@ -35,7 +35,7 @@ def main() -> None:
 
 
 def _stream(vibrator: SimulatedVibrator, *, name: str) -> Any:
-    """A stream that shakes the vibrator by the first channel and gives its accelerometer there.
+    """A stream that drives the vibrator from the first channel and returns its accelerometer.
 
     The other channel comes back as it is played.
     """

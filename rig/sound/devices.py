@@ -55,7 +55,7 @@ def portaudio() -> Any:
     Raises
     ------
     NoPortAudio
-        Where it is missing.
+        If it is missing.
     """
     try:
         import sounddevice

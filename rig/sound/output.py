@@ -1,4 +1,4 @@
-"""What a session plays through: textures under the hand, prepared signals, masking noise.
+"""The output of a session: textures under the hand, prepared signals, masking noise.
 
 docs/method/live.md#output
 """
@@ -31,7 +31,7 @@ LOUDEST_MASKING = 0.5
 _MASKING_STREAM = 2**63
 _POLL_S = 0.001
 _HALTED = (
-    f"expected the program to look after what plays at least every {HEARTBEAT_S:g} s, got a longer "
+    f"expected the program to poll the rig at least every {HEARTBEAT_S:g} s, got a longer "
     "time without; the vibration was stopped, and nothing is felt until something is presented "
     "again."
 )
@@ -43,7 +43,7 @@ class SoundLost(OSError):
 
 @dataclass(frozen=True, kw_only=True)
 class Presented:
-    """What began to play: its number in the log of blocks, and when its first sample left."""
+    """A presentation that began: its number in the log of blocks, the time of its first sample."""
 
     presentation: int
     time_s: float
@@ -61,7 +61,7 @@ class SoundOutput:
     """A sound card with a vibrator, played by a process of its own.
 
     The process may be killed and its sound server may die: what is asked for next starts another
-    one, and `faults` tells of it.
+    one, and `faults` reports it.
 
     While something plays `faults` has to be called, best ten times a second: where nobody calls it
     for a second what plays is halted, and stays so (docs/method/live.md#heartbeat).
@@ -147,9 +147,9 @@ class SoundOutput:
         Raises
         ------
         InputError
-            Where the device is not there, or does not do what is wanted of it.
+            If the device is not there, or does not do what is wanted of it.
         SoundLost
-            Where it cannot be started.
+            If it cannot be started.
         """
         if self._child is None:
             self._start()
@@ -184,7 +184,7 @@ class SoundOutput:
 
     @property
     def misses(self) -> int:
-        """Blocks so far that came too late, as the driver told."""
+        """Blocks so far that came too late, according to the driver."""
         self._look()
         return self._misses
 
@@ -204,7 +204,7 @@ class SoundOutput:
         InputError
             For a model of a higher rate; for an ARModel that `lattice_fields` refuses.
         SoundLost
-            Where nothing can be played.
+            If nothing can be played.
         """
         number = self._number()
         wanted: dict[str, Any] = {"do": "surface", "presentation": number}
@@ -238,7 +238,7 @@ class SoundOutput:
         InputError
             For a signal beyond the limits, or with values that are not finite.
         SoundLost
-            Where nothing can be played; with `wait` also where the process is lost meanwhile, or
+            If nothing can be played; with `wait` also where the process is lost meanwhile, or
             the signal halted.
         """
         samples = self.checked(samples_g, compensated=compensated)
@@ -342,7 +342,7 @@ class SoundOutput:
         if self._child is not None and not self._child.runs:
             self._lose("it has ended")
         elif self._child is not None and now_s() - self._last_block_s > STALLED_S:
-            self._lose(f"no block for {STALLED_S:g} s, so its server is gone or stands still")
+            self._lose(f"no block for {STALLED_S:g} s, so its server is gone or suspended")
         told, self._faults = tuple(self._faults), []
         return told
 
@@ -358,7 +358,7 @@ class SoundOutput:
         return rows
 
     def _follow_halts(self, halted: NDArray[np.bool_]) -> None:
-        """Tell once of each halt; (n,), whether it holds in each block."""
+        """Report each halt once; (n,), whether it holds in each block."""
         before = np.concatenate(([self._halted], halted[:-1]))
         self._faults += [_HALTED] * int(np.count_nonzero(halted & ~before))
         self._halted = bool(halted[-1])

@@ -110,7 +110,7 @@ def stimuli_of_surfaces(
     Raises
     ------
     InputError
-        Where no file has this label, several stand for one texture, or one cannot be used (see
+        If no file has this label, several stand for one texture, or one cannot be used (see
         `stimulus`).
     """
     rows = read_table(folder / MANIFEST, _OF_SURFACES)
@@ -162,7 +162,7 @@ def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:
     if found != row["sha256"]:
         raise InputError(
             f"expected {path} with the SHA-256 {row['sha256'][:8]}… of its manifest, got "
-            f"{found[:8]}…; make the set anew."
+            f"{found[:8]}…; make the set again."
         )
     if row["unit"] != "g":
         raise InputError(

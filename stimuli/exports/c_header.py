@@ -9,6 +9,7 @@ from typing import Any
 
 from modeling import Compensation, Limits
 from modeling.checks import check_name
+from modeling.errors import counted
 from modeling.files.writing import write_text
 from modeling.models.loading import AnyModel
 from modeling.rendering.noise import stream_key
@@ -175,8 +176,9 @@ def _comment(model: Layered, plan: RenderPlan, *, name: str, file_name: str, see
    Texture {quoted(model.texture)}, {made}, for rendering in C99: output in {model.unit} at \
 {plan.rate_hz:g} Hz, seed {seed}.
 
-   {model.n_layers} layers ({quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} \
-to {speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N\
+   {counted(model.n_layers, "layer")} ({quoted(model.estimator)}) over \
+{counted(speeds.size, "speed")}, {speeds[0]:g} to {speeds[-1]:g} mm/s, and \
+{counted(forces.size, "force")}, {forces[0]:g} to {forces[-1]:g} N\
 {_origin(model)}.
    Model: SHA-256 {model.sha256}
 

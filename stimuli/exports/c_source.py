@@ -35,9 +35,9 @@ def licence(data: str) -> str:
 /* SPDX-License-Identifier: GPL-3.0-or-later
    {COPYRIGHT}
 
-   Whoever passes on a program that includes this header passes on the renderer in it, and so has
-   to offer the whole program, with its source, under the GNU General Public License, version 3 or
-   later. {data}
+   Anyone who distributes a program that includes this header distributes the renderer in it, and
+   so has to offer the whole program, with its source, under the GNU General Public License,
+   version 3 or later. {data}
 """
 
 
@@ -45,8 +45,8 @@ def check_rate(rate_hz: float) -> None:
     """Refuse an output rate beyond that of any converter."""
     if rate_hz > HIGHEST_RATE_HZ:
         raise InputError(
-            f"expected an output rate of at most {HIGHEST_RATE_HZ} Hz, got {rate_hz:g}; no "
-            "converter is faster, so lower it."
+            f"expected an output rate of at most {HIGHEST_RATE_HZ} Hz, got "
+            f"{rate_hz:g}; no converter is faster, so reduce it."
         )
 
 
@@ -108,8 +108,8 @@ def restraints(plan: RenderPlan, unit: str) -> str:
         vibrator = f"Compensated for a vibrator with a resonance at {notch.frequency_hz:g} Hz."
     found = {"peak": (limits.peak, unit), "RMS": (limits.rms, unit)}
     found["duration"] = (limits.duration_s, "s")
-    told = [f"{what} {value:g} {of}" for what, (value, of) in found.items() if np.isfinite(value)]
-    return f"{vibrator} Limits: {', '.join(told) or 'none'}. Both are fields of tq_texture."
+    stated = [f"{what} {value:g} {of}" for what, (value, of) in found.items() if np.isfinite(value)]
+    return f"{vibrator} Limits: {', '.join(stated) or 'none'}. Both are fields of tq_texture."
 
 
 def quoted(text: str) -> str:

@@ -102,8 +102,8 @@ def _conditions(
     if not (0 <= speed_mm_s <= speeds[-1] and 0 <= force_n <= forces[-1]):
         raise InputError(
             f"expected a condition within 0…{speeds[-1]:g} mm/s and 0…{forces[-1]:g} N, as far as "
-            f"{model.texture} was recorded, got {speed_mm_s:g} mm/s and {force_n:g} N; above the "
-            "grid the renderer keeps to its edge, so ask for that."
+            f"{model.texture} was recorded, got {speed_mm_s:g} mm/s and {force_n:g} N; "
+            "above the grid the renderer uses the grid's edge, so ask for that."
         )
     return [(float(speed_mm_s), float(force_n))]
 

@@ -11,6 +11,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from modeling import InputError
+from modeling.errors import counted
 from modeling.rendering.noise import seed_mix
 from modeling.rendering.plan import RenderPlan
 from stimuli.exports.c_source import (
@@ -74,7 +75,7 @@ def scene_header(
     seed : int
         Of the noise, 0 … 2⁶⁴ − 1.
     note : str
-        Told in the comment.
+        Stated in the comment.
 
     Raises
     ------
@@ -117,7 +118,7 @@ def _check(rendered: Rendered) -> None:
     check_rate(plan.rate_hz)
     for model, other in rendered:
         differ = [
-            told for name, told in _SHARED.items() if getattr(plan, name) != getattr(other, name)
+            what for name, what in _SHARED.items() if getattr(plan, name) != getattr(other, name)
         ]
         differ += ["unit"] * (first.unit != model.unit)
         if differ:
@@ -204,12 +205,12 @@ def _largest(textures: Sequence[Mapping[str, Any]]) -> str:
 
 def _about(name: str, rendered: Rendered, *, seed: int, note: str) -> str:
     model, plan = rendered[0]
-    count = "1 texture" if len(rendered) == 1 else f"{len(rendered)} textures"
-    told = f"\n{_commented(note)}\n" if note else ""
+    count = counted(len(rendered), "texture")
+    remark = f"\n{_commented(note)}\n" if note else ""
     return f"""
    Scene {quoted(name)}, {count}, for rendering in C99: output in {model.unit} at \
 {plan.rate_hz:g} Hz, seed {seed}.
-{told}
+{remark}
 """
 
 
@@ -223,12 +224,12 @@ def _listed(indices: Sequence[str], rendered: Rendered) -> str:
 def _described(index: str, model: Layered, plan: RenderPlan) -> str:
     speeds, forces = model.table.speeds_mm_s, model.table.forces_n
     made = "simulated" if model.simulated else "from recordings"
-    layers = "1 layer" if model.n_layers == 1 else f"{model.n_layers} layers"
+    layers = counted(model.n_layers, "layer")
     period = "sample" if plan.update_samples == 1 else f"{plan.update_samples} samples"
     return f"""\
    {index}: {quoted(model.texture)}, {made}
-       {layers} ({quoted(model.estimator)}) over {speeds.size} speeds, {speeds[0]:g} to \
-{speeds[-1]:g} mm/s, and {forces.size} forces, {forces[0]:g} to {forces[-1]:g} N;
+       {layers} ({quoted(model.estimator)}) over {counted(speeds.size, "speed")}, {speeds[0]:g} to \
+{speeds[-1]:g} mm/s, and {counted(forces.size, "force")}, {forces[0]:g} to {forces[-1]:g} N;
        parameters updated every {period}.
        Model: SHA-256 {model.sha256}
 """

@@ -24,7 +24,7 @@ COLUMNS = {
     "texture": "texture of the model",
     "model": "label of the model in the recipe",
     "layers": "number of layers; n/a for an autoregressive model",
-    "model_rate_hz": "rate of the model; above half of it the file holds nothing",
+    "model_rate_hz": "rate of the model; above half of it the file has no content",
     "trajectory": "name of the trajectory in the recipe",
     "speed_mm_s": "speed where it is constant, else n/a",
     "force_n": "force where it is constant, else n/a",
@@ -36,7 +36,7 @@ COLUMNS = {
     "format": "float32 (samples in the unit) or pcm24 (samples in shares of full_scale_g)",
     "bits": "bits per sample",
     "full_scale_g": "value of a full-scale sample of a pcm24 file in the unit, else n/a",
-    "gain_db": "gain applied to what the model gives",
+    "gain_db": "gain applied to the model's output",
     "rms": "RMS over the file without its fades (the first and last 10 ms); of a compensated file, "
     "of the vibration meant at the hand, before the compensation",
     "level_db": "the same in dB re 1 g (re 1 where the unit is arbitrary)",

@@ -12,7 +12,7 @@ A recipe is a TOML file; its paths are relative to it, and unknown keys are refu
     noise = "independent"           # "frozen": the models of a texture share their noise
     duration_s = 1.0                # of trajectories of constant speed (1)
     settling_s = 0.5                # rendered before the start and left out (0.5)
-    vibrator = "vibrator.json"      # each file is the drive for this one (none)
+    vibrator = "vibrator.json"      # each file is the drive signal for it (none)
 
     [level]
     mode = "as modelled"            # "rms", "loudness"
@@ -38,8 +38,8 @@ A recipe is a TOML file; its paths are relative to it, and unknown keys are refu
     file = "hand.csv"               # time_s, speed_mm_s, force_n
     name = "hand"                   # (name of the file)
 
-What stands in brackets applies where the key is left out; `name` under [set], `version`, one
-[[model]] and one [[trajectory]] are needed.
+Values in brackets are the defaults; `name` under [set], `version`, one [[model]] and one
+[[trajectory]] are required.
 """
 
 from __future__ import annotations

@@ -152,8 +152,8 @@ def _check_lasts(trajectory: Trajectory, recipe: Recipe) -> None:
     if round(trajectory.duration_s * slowest) < 1:
         raise InputError(
             f"expected a trajectory of at least one sample at {slowest} Hz, got "
-            f"{trajectory.duration_s:g} s in {shown(trajectory.name)}; see whether its times are "
-            "in seconds."
+            f"{trajectory.duration_s:g} s in {shown(trajectory.name)}; check that its "
+            "times are in seconds."
         )
 
 
@@ -187,7 +187,7 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
     Raises
     ------
     InputError
-        Where two sources would have one name.
+        If two sources would have one name.
     """
     models = {labelled: _copy_of_model(labelled) for labelled in sources.models}
     hands = [_copy_of_trajectory(entry) for entry in recipe.trajectories]

@@ -185,7 +185,7 @@ def check_place(target: Path) -> Contents:
 def _write_new(path: Path, data: bytes) -> None:
     if path.exists():
         raise InputError(
-            f"expected each stimulus to have a name of its own, got {path.name} twice; rename a "
+            f"expected each stimulus to have a unique name, got {path.name} twice; rename a "
             "texture, label or trajectory."
         )
     path.write_bytes(data)
@@ -262,7 +262,7 @@ def _level_db(take: _Take) -> float:
     level = level_db(float(np.sqrt(np.mean(take.steady() ** 2))))
     if level == -np.inf:
         raise InputError(
-            f"expected vibration to bring to a level, got silence in {take.name}; leave this "
+            f"expected vibration to adjust in level, got silence in {take.name}; leave this "
             "stimulus out or render the set as modelled."
         )
     return level

@@ -29,7 +29,7 @@ def analyze(
     data: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Folder of the study's answers; of several set-ups NAME=FOLDER each. With "
+            help="Folder of the study's answers; for several set-ups, NAME=FOLDER each. With "
             "--table: further tables."
         ),
     ] = None,
@@ -39,7 +39,7 @@ def analyze(
     ] = None,
     columns: Annotated[
         str | None,
-        typer.Option("--map", help="What columns mean: correct=TYPE_ANS,factor=TYPE,…"),
+        typer.Option("--map", help="Meaning of the columns: correct=TYPE_ANS,factor=TYPE,…"),
     ] = None,
     out: Out = Path("analysis-results"),
     recordings: Annotated[
@@ -48,44 +48,50 @@ def analyze(
     models: Annotated[Path | None, typer.Option(help="Folder of full models.")] = None,
     simplified: Annotated[Path | None, typer.Option(help="Folder of simplified models.")] = None,
     plan: Annotated[
-        Path | None, typer.Option(help="Study file whose claims are tested though it came later.")
+        Path | None,
+        typer.Option(
+            help="Study file written after the data, whose claims are tested as exploratory."
+        ),
     ] = None,
     exclude: Annotated[
-        list[str] | None, typer.Option(help="Participant and why: sub-05='fell asleep'.")
+        list[str] | None,
+        typer.Option(help="Participant to exclude, and why: sub-05='fell asleep'."),
     ] = None,
     complete: Annotated[
-        bool, typer.Option("--complete", help="Compare complete pairs, where some are not.")
+        bool,
+        typer.Option("--complete", help="Compare complete pairs only, where some are incomplete."),
     ] = False,
     validate: Annotated[
         int | None,
         typer.Option(
             min=1,
             metavar="N",
-            help="Append what the procedures do on planted truth, by N simulations of each.",
+            help="Append the results of the procedures on planted truth, with N simulations each.",
         ),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(min=1, help="Processes of --validate; one per core without it."),
+        typer.Option(min=1, help="Processes for --validate; by default one per core."),
     ] = None,
     dask: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler, whose workers --validate.")
+        str | None, typer.Option(help="Address of a Dask scheduler whose workers run --validate.")
     ] = None,
     seed: Seed = 0,
 ) -> None:
     """Test the answers and write report.html with its tables and figures.
 
-    DATA is only read: where a table differs from the log of its session, or is not complete, it is
-    named; tactileq study status makes it again. A session that is damaged is named, too, and has
-    to be restored, or its participant left out.
+    DATA is only read. A table that is incomplete or differs from the log of its session is named;
+    tactileq study status writes it again. A damaged session is named, too; it has to be restored,
+    or its participant excluded.
 
-    Claims are those of the study that was run; those of --plan are exploratory. With --recordings,
-    --models and --simplified the report also tells how good and how small the models are; why
-    layers went stands in the folder that tactileq simplify wrote.
+    The claims are those of the study that was run; those of --plan are exploratory. With
+    --recordings, --models and --simplified the report also states the accuracy and size of the
+    models; the reasons why layers were dropped are read from the folder that tactileq simplify
+    wrote.
 
-    With --table answers come from tables of any experiment. The map names columns: participant
-    (else the file's name), factor (any number), count, and one of correct (0 or 1), share (0 to
-    1), value, or presented with answered. Without these each file is a confusion matrix called
+    With --table, answers come from tables of any experiment. The map names columns: participant
+    (by default the file's name), factor (any number), count, and one of correct (0 or 1), share (0
+    to 1), value, or presented with answered. Without these, each file is a confusion matrix called
     PARTICIPANT_LEVEL, with a level for each factor.
 
     Example: tactileq analyze --table P*.csv --map correct=RIGHT,factor=SIZE
@@ -140,7 +146,7 @@ def analyze(
     appendix = []
     if validate is not None:
         appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
-    with replace_folder(out, seen) as fresh, share_of("Reporting") as tell:
+    with replace_folder(out, seen) as fresh, share_of("Reporting") as advance:
         settings = settings_of(responses, results)
         settings |= {"validate": validate} if validate is not None else {}
         provenance = provenance_of("analyze", settings, seed=seed, inputs=inputs)
@@ -152,7 +158,7 @@ def analyze(
             benches=appendix,
             provenance=provenance,
             seed=seed,
-            progress=tell,
+            progress=advance,
         )
         seal_folder(fresh, provenance)
     for warning in responses.warnings:
@@ -179,7 +185,7 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     inputs = sha256_of_paths(files)
     imported = load_imported(files, parse_map(columns))
     sections = table_sections(imported, rng=np.random.default_rng(seed))
-    with replace_folder(out, seen) as fresh, share_of("Reporting") as tell:
+    with replace_folder(out, seen) as fresh, share_of("Reporting") as advance:
         provenance = provenance_of("analyze", {"map": columns}, seed=seed, inputs=inputs)
         write_report(
             fresh / "report.html",
@@ -188,7 +194,7 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
             provenance=provenance,
             title="What the tables show",
             seed=seed,
-            progress=tell,
+            progress=advance,
         )
         seal_folder(fresh, provenance)
     print((out / "report.html").resolve())
@@ -214,7 +220,7 @@ def read_answers(places: Mapping[str, Path], exclude: Sequence[str]) -> Response
     Raises
     ------
     InputError
-        Where a session is damaged, or tables are not what its log says, of those who are not left
+        If a session is damaged, or tables are not what its log says, of those who are not left
         out, or the answers cannot be used.
     """
     from analysis.answers.loading import load_responses
@@ -298,7 +304,7 @@ def validated(
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:
-    """What a report rests on: study, models, and how layers were dropped."""
+    """What a report is based on: study, models, and how layers were dropped."""
     reasons = {
         result.texture: {
             "full_sha256": result.simplification.full_sha256,
@@ -360,7 +366,7 @@ def _require_models(
             )
     if texture not in why:
         raise ValueError(
-            f"expected the file that tells why layers of {texture} were dropped beside its "
+            f"expected the file with the reasons why layers of {texture} were dropped beside its "
             "simplified model, got none; simplify it again with tactileq simplify."
         )
     simplification = why[texture]

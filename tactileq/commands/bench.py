@@ -1,4 +1,4 @@
-"""tactileq bench: what runs beside what would run instead."""
+"""tactileq bench: our methods compared with alternatives."""
 
 from __future__ import annotations
 
@@ -24,17 +24,19 @@ if TYPE_CHECKING:
 bench = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Time what runs beside what would run instead.",
+    help="Benchmarks: our methods compared with alternatives.",
 )
 
 
 @bench.command("render")
 def bench_render(
     out: Out = Path("bench-render"),
-    quick: Annotated[bool, typer.Option("--quick", help="Measure briefly and roughly.")] = False,
-    plot: Annotated[bool, typer.Option("--plot", help="Draw the times.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Measure quickly, with less precision.")
+    ] = False,
+    plot: Annotated[bool, typer.Option("--plot", help="Plot the times.")] = False,
 ) -> None:
-    """Time rendering per sample beside other filters in C and in scipy, noise included.
+    """Time rendering per sample, compared with other filters in C and in scipy, noise included.
 
     Writes times.tsv, layers.tsv, operations.tsv and aims.tsv, with --plot also rendering.png. The
     machine should have nothing else to do.
@@ -49,7 +51,9 @@ def bench_chart(
     out: Out = Path("bench-chart"),
     recordings: Annotated[
         list[Path] | None,
-        typer.Option(help="Folder of recordings, some held out; instead of simulated surfaces."),
+        typer.Option(
+            help="Folder of recordings, some of them held out; instead of simulated surfaces."
+        ),
     ] = None,
     toolkit: Annotated[
         list[Path] | None,
@@ -57,10 +61,10 @@ def bench_chart(
     ] = None,
     models: Annotated[
         list[Path] | None,
-        typer.Option(help="Folder of models of these recordings, to be judged beside the others."),
+        typer.Option(help="Folder of models of these recordings, to be compared with the others."),
     ] = None,
     method: Annotated[
-        list[str] | None, typer.Option(help="A method, such as AR(20); most without it.")
+        list[str] | None, typer.Option(help="A method, such as AR(20); by default most of them.")
     ] = None,
     full: Annotated[
         bool,
@@ -70,18 +74,21 @@ def bench_chart(
         ),
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
+        int | None, typer.Option(min=1, help="Textures at a time; by default one per core.")
     ] = None,
     dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler whose workers do it.")
+        str | None,
+        typer.Option(
+            metavar="ADDRESS", help="Address of a Dask scheduler whose workers do the work."
+        ),
     ] = None,
 ) -> None:
     """Chart speed against accuracy: every way to model and render a texture, ours and others'.
 
-    Costs are counted operations, numbers, bytes, and times; accuracy is that at the conditions,
-    between them and while a hand strokes. Writes chart.html, chart_KIND.png, and the tables
-    rows.tsv, summary.tsv, fronts.tsv and comparisons.tsv. --method, --recordings, --toolkit and
-    --models may be given several times.
+    Costs are counted operations, numbers, bytes, and times; accuracy is measured at the conditions,
+    between them and during strokes. Writes chart.html, chart_KIND.png, and the tables rows.tsv,
+    summary.tsv, fronts.tsv and comparisons.tsv. --method, --recordings, --toolkit and --models are
+    repeatable.
 
     Example: tactileq bench chart --recordings recordings/cork --out chart
     """
@@ -138,7 +145,7 @@ def charted(
     jobs: int | None = None,
     dask: str | None = None,
 ) -> Chart:
-    """Judge all textures, some at a time, then time rendering alone."""
+    """Judge all textures, several at a time, then time rendering with nothing else running."""
     from analysis.benches.chart.chart import chart_of
     from analysis.benches.chart.judging import Judged, judge
 
@@ -164,7 +171,7 @@ def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str,
 
 
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
-    """Time the renderer beside its rivals, print and write what was measured."""
+    """Time the renderer and its rivals; print and write the results."""
     from analysis.benches.rendering import QUICK, Effort, bench_rendering
     from analysis.columns import tsv_text
     from analysis.figures.rendering import figure_rendering
@@ -192,7 +199,7 @@ def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
         }
         seal_folder(fresh, provenance_of("bench render", settings))
     _tell_bench(timed)
-    print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} aims met: {out / 'aims.tsv'}")
+    print(f"{int(timed.aims['met'].sum())} of {len(timed.aims)} targets met: {out / 'aims.tsv'}")
 
 
 def _tell_bench(bench: RenderingBench) -> None:
@@ -210,9 +217,9 @@ def _tell_bench(bench: RenderingBench) -> None:
     line = bench.line
     print(
         f"kernel: {line.ns_at_none:.2f} ns + {line.ns_per_layer:.2f} ns per layer (R² = "
-        f"{line.r_squared:.4f}); {bench.memory_bytes} bytes a stream of 3 layers\n"
-        f"AR(20) does not compare: its coefficients are made anew at every update\n"
-        f"at 48 kHz, 3 layers, updates each millisecond: {bench.sound_card_ns:.0f} ns\n"
+        f"{line.r_squared:.4f}); {bench.memory_bytes} bytes per stream of 3 layers\n"
+        f"AR(20) is not directly comparable: its coefficients are recomputed at every update\n"
+        f"at 48 kHz, 3 layers, an update every millisecond: {bench.sound_card_ns:.0f} ns\n"
         f"rendering in Python, 3 layers: {bench.python_ns:.0f} ns\n"
     )
     aims = bench.aims.assign(met=bench.aims["met"].map({True: "met", False: "not met"}))

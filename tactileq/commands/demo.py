@@ -53,7 +53,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
     with replace_folder(out, seen) as fresh, mapping(jobs=JOBS) as mapped:
         record = partial(demo_texture, folder=fresh, threshold=threshold, seed=seed)
         with progress("Recording, modeling, simplifying", len(TEXTURES)) as advance:
-            made = list(_told(mapped(record, TEXTURES), advance, _texture))
+            made = list(_reported(mapped(record, TEXTURES), advance, _texture))
         # Other processes check the models while this one presents them.
         checked, benches = mapped(with_checks, made), Benches.begun(mapped, made)
         render_set(demo_recipe(fresh, seed=seed), fresh / "stimuli")
@@ -75,7 +75,7 @@ def demo(out: Out = Path("demo"), seed: Seed = 1) -> None:
             psychometrics=population,
         )
         with progress("Predicting conditions that were left out", len(made)) as advance:
-            results, rivals = zip(*_told(checked, advance, lambda c: c[0].texture), strict=True)
+            results, rivals = zip(*_reported(checked, advance, lambda c: c[0].texture), strict=True)
         settings = {
             "estimators": [m.estimator for m in (results[0].model, *results[0].other_estimates)],
             "threshold": threshold.name,
@@ -202,15 +202,15 @@ class Benches(NamedTuple):
         from stimuli.planted.textures import PlantedSurface
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}
-        with progress("Least models of scenes", 2) as advance:
-            compiled, drawn = _told(
+        with progress("Compiling scenes", 2) as advance:
+            compiled, drawn = _reported(
                 self.scenes, advance, lambda found: found[0].compiled.scene.name
             )
         scenes = scene_section([*((one, surfaces) for one in compiled), drawn])
         with progress("Speed against accuracy", FEW.drawn) as advance:
-            judged = list(_told(self.judged, advance, lambda one: one.source.name))
+            judged = list(_reported(self.judged, advance, lambda one: one.source.name))
         with progress("Where methods fail", len(columns_of(CASES, full=False))) as advance:
-            examined = list(_told(self.examined, advance, lambda one: one.case.family))
+            examined = list(_reported(self.examined, advance, lambda one: one.case.family))
         # Rendering is timed now that no other process works.
         chart = chart_section(chart_of(judged, turns=CHART_TURNS))
         return [scenes, chart, stability_section(examined)]
@@ -232,7 +232,7 @@ def write_demo_report(
     from analysis.report.report import write_report
 
     responses = load_responses(folder / "data")
-    with share_of("Analyzing") as tell:
+    with share_of("Analyzing") as advance:
         write_report(
             folder / "report.html",
             responses=responses,
@@ -242,7 +242,7 @@ def write_demo_report(
             provenance=provenance,
             planted=planted,
             seed=seed,
-            progress=tell,
+            progress=advance,
             mapped=mapped,
         )
 
@@ -252,10 +252,10 @@ def _done(task: Any) -> Any:
     return task()
 
 
-def _told(
+def _reported(
     results: Iterable[Result], advance: Callable[[str], None], name: Callable[[Result], str]
 ) -> Iterator[Result]:
-    """The results, each told by its name as it comes."""
+    """The results, each reported by its name as it comes."""
     for result in results:
         advance(name(result))
         yield result

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.commands.stimuli import recipe_from, tell_beyond_grid
 from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import ModelFile, Seed, VibratorFile
@@ -16,39 +17,40 @@ from tactileq.telling import simulated_note
 exports = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Give a model to other programs.",
+    help="Export a model to other programs.",
 )
 
 
 @exports.command("c")
 def export_c(
     model_file: ModelFile,
-    out: Annotated[Path | None, typer.Option("--out", help="Header. [TEXTURE.h]")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="Header file. [TEXTURE.h]")] = None,
     rate_hz: Annotated[
-        float | None, typer.Option("--rate", help="Output rate in Hz; the model's without it.")
+        float | None, typer.Option("--rate", help="Output rate in Hz; by default the model's.")
     ] = None,
     name: Annotated[
         str | None,
         typer.Option(
-            "--name", help="Instead of the texture's: two headers of one texture need two."
+            "--name", help="Name in C, instead of the texture's; must be unique within a program."
         ),
     ] = None,
-    single: Annotated[bool, typer.Option("--single", help="Single precision.")] = False,
+    single: Annotated[bool, typer.Option("--single", help="Render in single precision.")] = False,
     seed: Seed = 0,
     vibrator: VibratorFile = None,
-    peak: Annotated[float | None, typer.Option("--peak", help="Largest sample, g.")] = None,
-    rms: Annotated[float | None, typer.Option("--rms", help="Largest running RMS, g.")] = None,
+    peak: Annotated[float | None, typer.Option("--peak", help="Limit of the peak, g.")] = None,
+    rms: Annotated[float | None, typer.Option("--rms", help="Limit of the running RMS, g.")] = None,
     duration_s: Annotated[
-        float | None, typer.Option("--duration", help="Longest vibration without a pause, s.")
+        float | None,
+        typer.Option("--duration", help="Limit of the vibration's duration without a pause, s."),
     ] = None,
 ) -> None:
-    """Write a model and the renderer as one C99 header that needs nothing else.
+    """Write a model and the renderer as one self-contained C99 header.
 
-    A comment on top of it shows a whole program. In double precision it renders what this program
+    A comment at its top shows a complete program. In double precision it renders what this program
     renders, bit for bit. Without --peak, --rms and --duration it has no limits.
 
-    The header holds the renderer's source, which is licensed under GPL-3.0-or-later: a program that
-    includes it can be passed on under that licence only. The model's numbers in it are your data.
+    The header contains the renderer's source, which is licensed under GPL-3.0-or-later: a program
+    that includes it can be distributed under that licence only. The model's numbers are your data.
 
     Example: tactileq export c models/canvas.json --rate 48000 --peak 5 --out canvas.h
     """
@@ -67,9 +69,9 @@ def export_c(
 @exports.command("wav")
 def export_wav(
     model_file: ModelFile,
-    speed: Annotated[float, typer.Option("--speed", help="mm/s.")],
-    force: Annotated[float, typer.Option("--force", help="N.")],
-    duration_s: Annotated[float, typer.Option("--duration", help="Seconds.")] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", help="Speed, mm/s.")],
+    force: Annotated[float, typer.Option("--force", help="Force, N.")],
+    duration_s: Annotated[float, typer.Option("--duration", help="Duration, s.")] = 1.0,
     rate_hz: Annotated[float, typer.Option("--rate", help="Sampling rate in Hz.")] = 48000.0,
     seed: Seed = 0,
     vibrator: VibratorFile = None,
@@ -94,14 +96,16 @@ def export_wav(
 @exports.command("json")
 def export_json(
     model_file: ModelFile,
-    speed: Annotated[float | None, typer.Option("--speed", help="With --force: mm/s.")] = None,
-    force: Annotated[float | None, typer.Option("--force", help="With --speed: N.")] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="File. [TEXTURE_peq.json]")] = None,
+    speed: Annotated[
+        float | None, typer.Option("--speed", help="With --force: speed, mm/s.")
+    ] = None,
+    force: Annotated[float | None, typer.Option("--force", help="With --speed: force, N.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="JSON file. [TEXTURE_peq.json]")] = None,
 ) -> None:
-    """Write a model's equalizer as JSON: one condition, or all of the grid.
+    """Write a model's equalizer as JSON: one condition, or all conditions of the grid.
 
     Each condition has its noise gain and its layers with frequency, bandwidth, gain and the
-    coefficients of a biquad; the file says what the numbers mean.
+    coefficients of a biquad; the file explains its numbers.
 
     Example: tactileq export json models/canvas.json --speed 150 --force 1 --out canvas_peq.json
     """
@@ -167,7 +171,7 @@ def export_wav_file(
     seed: int,
     vibrator: Path | None,
 ) -> None:
-    """Write a model's vibration at one speed and force, with provenance, and tell its level."""
+    """Write a model's vibration at one speed and force, with provenance; print its level."""
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.files.writing import file_stem
@@ -195,7 +199,7 @@ def export_wav_file(
     provenance = provenance_of("export wav", settings, seed=seed, inputs=inputs)
     write_own_files({target: data}, note, provenance, texture=model.texture)
     tell_beyond_grid(sources)
-    drive = "" if vibrator is None else ", as drive for the vibrator"
+    drive = "" if vibrator is None else ", as drive signal for the vibrator"
     simulated = " (simulated)" if stimulus.simulated == "true" else ""
     print(
         f"{model.texture}{simulated}, {stimulus.duration_s:g} s at {stimulus.rate_hz} "
@@ -225,5 +229,5 @@ def export_peq_json(
     provenance = provenance_of("export json", settings, inputs=inputs)
     contents = {target: dump_json(document).encode()}
     write_own_files(contents, note, provenance, texture=model.texture)
-    conditions = "1 condition" if count == 1 else f"{count} conditions"
+    conditions = counted(count, "condition")
     print(f"{conditions} of {model.texture}{simulated_note(model)}: {target}")

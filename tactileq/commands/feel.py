@@ -21,7 +21,9 @@ def feel(
     ],
     rig: Annotated[
         Path | None,
-        typer.Option("--rig", help="Rig file (TOML); without it, mouse pointer and usual sound."),
+        typer.Option(
+            "--rig", help="Rig file (TOML); by default mouse pointer and default sound device."
+        ),
     ] = None,
     simplified: Annotated[
         Path | None, typer.Option("--simplified", help="Folder of simplified models.")
@@ -31,16 +33,18 @@ def feel(
     hold_above: HoldAbove = True,
     vibrator: VibratorFile = None,
     fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
-    screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
+    screen: Annotated[int, typer.Option(help="Number of the screen, from 0.")] = 0,
 ) -> None:
-    """Feel models under your hand, and see what plays and which layers are felt.
+    """Feel models under your hand, and see what is played and which layers can be felt.
 
     A window shows the spectrum at the hand's speed and force, each layer against the detection
-    threshold, the hand on the model's grid, level and limits. Keys: 1–9 and arrows switch textures,
-    F full and simplified, Space stops and plays, M masking noise, Escape ends.
+    threshold, the hand's position on the model's grid, level and limits. Keys: 1–9 and arrows
+    switch textures, F switches between full and simplified, Space stops and starts playing,
+    M switches masking noise, Escape ends.
 
-    Without a rig file the mouse pointer is the hand, its force is assumed, and the system's usual
-    sound device plays, not calibrated; where there is none, nothing is played. The window says so.
+    Without a rig file the mouse pointer is the hand, its force is assumed, and the system's default
+    sound device plays without calibration; if there is none, nothing is played. The window shows
+    which of these apply.
 
     Example: tactileq feel models --simplified simplified --rig rig.toml
 

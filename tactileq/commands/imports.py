@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import Out, Seed
 from tactileq.telling import clipping_warnings, progress
 
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
 imports = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="Take in recordings that other equipment made.",
+    help="Import recordings made with other equipment.",
 )
 SurfaceName = Annotated[
-    str | None, typer.Option("--texture", help="Name of the surface; the name of --out without it.")
+    str | None, typer.Option("--texture", help="Name of the surface; by default the name of --out.")
 ]
 SpeedOfAll = Annotated[float | None, typer.Option("--speed", help="Speed of all files, mm/s.")]
 ForceOfAll = Annotated[float | None, typer.Option("--force", help="Force of all files, N.")]
@@ -33,14 +34,14 @@ LabelTable = Annotated[
     Path | None,
     typer.Option(
         "--labels",
-        help="TSV: file, speed_mm_s, force_n (texture, repeat; of WAV g_per_fullscale, channel).",
+        help="TSV: file, speed_mm_s, force_n (texture, repeat; for WAV g_per_fullscale, channel).",
     ),
 ]
 Yes = Annotated[
     bool,
-    typer.Option("--yes", help="Take in, with a warning, what cannot be meant by its numbers."),
+    typer.Option("--yes", help="Import implausible values, too, with a warning."),
 ]
-# So many names of files are told; the rest are counted.
+# This many names of files are listed; the rest are counted.
 MOST_NAMES = 5
 
 
@@ -56,11 +57,12 @@ def import_wav(
         float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
     ] = None,
     channel: Annotated[
-        int | None, typer.Option(min=1, help="Which channel, from 1, of files with several.")
+        int | None,
+        typer.Option(min=1, help="Number of the channel, from 1, of files with several."),
     ] = None,
     yes: Yes = False,
 ) -> None:
-    """Add WAV recordings to a recording set; it keeps copies of the files.
+    """Add WAV recordings to a recording set, which keeps copies of the files.
 
     Example: tactileq import wav *.wav --labels labels.tsv --texture oak --g-per-fullscale 16
     """
@@ -86,30 +88,32 @@ def import_csv(
     force: ForceOfAll = None,
     labels: LabelTable = None,
     axis: Annotated[
-        Literal["x", "y", "z", "dft321"] | None, typer.Option(help="Axis, or all as one.")
+        Literal["x", "y", "z", "dft321"] | None,
+        typer.Option(help="Axis, or all axes reduced to one."),
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="g, mg, m/s2, V, mV or arbitrary.")] = None,
+    unit: Annotated[str | None, typer.Option(help="Unit: g, mg, m/s2, V, mV or arbitrary.")] = None,
     rate_hz: Annotated[
         float | None,
-        typer.Option("--rate", help="Sampling rate in Hz; the time column's without it."),
+        typer.Option("--rate", help="Sampling rate in Hz; by default from the time column."),
     ] = None,
     mv_per_g: Annotated[
         float | None,
         typer.Option("--mv-per-g", help="Sensitivity of the accelerometer, for logs in volts."),
     ] = None,
     time_column: Annotated[
-        str | None, typer.Option("--time-column", help="Which column holds the time.")
+        str | None, typer.Option("--time-column", help="Name of the time column.")
     ] = None,
     columns: Annotated[
         str | None,
-        typer.Option("--map", help="Which column is which: time=Zeit,z=Beschl_Z."),
+        typer.Option("--map", help="Meaning of the columns: time=Zeit,z=Beschl_Z."),
     ] = None,
     yes: Yes = False,
 ) -> None:
     """Add CSV recordings (time and one or three axes) to a recording set.
 
-    Samples at uneven times, such as a phone's, are resampled at even ones, unless --rate says that
-    they are even. Times since 1970 may be in s, ms, us or ns; of other ones the header says it.
+    Unevenly spaced samples, such as a phone's, are resampled at even intervals, unless --rate
+    states that they are even. Times since 1970 may be in s, ms, us or ns; for other times the
+    header names the unit.
 
     Example: tactileq import csv run1.csv --speed 100 --force 1 --texture oak --axis dft321 --unit g
 
@@ -152,10 +156,10 @@ def import_hatt(
         list[Path], typer.Argument(help="Models_....xml of the toolkit, or folders of them.")
     ],
     out: Out = Path("recordings"),
-    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated.")] = None,
-    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated.")] = None,
+    speed: Annotated[list[float] | None, typer.Option(help="Speed, mm/s; repeatable.")] = None,
+    force: Annotated[list[float] | None, typer.Option(help="Force, N; repeatable.")] = None,
     rate_hz: Annotated[
-        float | None, typer.Option("--rate", help="Sampling rate in Hz; the file's without it.")
+        float | None, typer.Option("--rate", help="Sampling rate in Hz; by default the file's.")
     ] = None,
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 10.0,
     seed: Seed = 0,
@@ -163,8 +167,8 @@ def import_hatt(
 ) -> None:
     """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
 
-    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. Conditions beyond a file's
-    models are left out, so that they count as holes. The toolkit is not included.
+    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. Conditions outside the range
+    of a file's models are left out, so that they count as missing. The toolkit is not included.
 
     Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
     """
@@ -257,8 +261,8 @@ def add_to_set(
     """Add imported recordings to those that `out` already holds.
 
     `inputs`: the hashes of the files that were read. `left_out`: a sentence for each file that
-    could not be used. What cannot be meant is refused, or, where the answer is yes, told and
-    written into the provenance.
+    could not be used. Implausible values are refused or, if `yes`, warned about and written into
+    the provenance.
     """
     from modeling import RecordingSet
     from modeling.files.places import locked
@@ -271,7 +275,7 @@ def add_to_set(
     records = RecordingSet(one.recording for one in new)
     names = [Path(path).name for path in inputs]
     for sentence in (
-        *alike([f"warning: taken in all the same: {doubt}" for doubt in doubts], names),
+        *alike([f"warning: imported anyway: {doubt}" for doubt in doubts], names),
         *alike(clipping_warnings(records), names),
         *alike([f"warning: {sentence}" for one in new for sentence in one.warnings], names),
         *alike([f"warning: left out: {sentence}" for sentence in left_out], names),
@@ -280,7 +284,7 @@ def add_to_set(
     provenance = out / PROVENANCE_NAME
     taken = {"doubts": doubts} if doubts else {}
     origin = provenance_of(command, {**settings, **taken}, inputs=inputs)
-    # Only what is quick is done while another import cannot add to what this one adds to.
+    # Only quick work is done under the lock, while another import into the same set has to wait.
     with staged(out, records, [one.source for one in new]) as ready, locked(out):
         origin["settings"]["added to"] = imports_before(provenance)
         count = ready.add({PROVENANCE_NAME: provenance_text(origin).encode()})
@@ -291,14 +295,14 @@ def add_to_set(
         )
     rates = sorted({f"{record.rate_hz:g}" for record in records})
     if left_out:
-        print(f"note: {len(left_out)} of {len(new) + len(left_out)} files left out")
-    print(f"{len(new)} recordings added at {', '.join(rates)} Hz, {count} in {out}")
+        print(f"note: {len(left_out)} of {counted(len(new) + len(left_out), 'file')} left out")
+    print(f"{counted(len(new), 'recording')} added at {', '.join(rates)} Hz, {count} in {out}")
 
 
 def alike(sentences: Sequence[str], names: Sequence[str]) -> list[str]:
-    """The first of each kind of sentences, and of which files there are more.
+    """The first sentence of each kind, with the names of the files that the others are about.
 
-    Of one kind are those that differ in numbers and in these names of files alone.
+    Sentences of one kind differ only in numbers and in these names of files.
     """
     if not sentences:
         return []
@@ -327,9 +331,9 @@ def several(sentences: Sequence[str]) -> str:
 
 
 def imports_before(provenance: Path) -> list[dict[str, Any]]:
-    """What a set's provenance tells of its imports so far, in their order, side by side.
+    """The imports so far that a set's provenance lists, in order, as a flat list.
 
-    Each in the one after it would be indented deeper with every import.
+    Nested, each would be indented deeper with every import.
     """
     from modeling.files.documents import read_json_object
 
@@ -343,14 +347,14 @@ def imports_before(provenance: Path) -> list[dict[str, Any]]:
         history.insert(0, entry)
         if isinstance(earlier, list):
             return [*earlier, *history]
-        entry = earlier  # sets of before hold the last import within the one after it
+        entry = earlier  # older sets nest each import within the next one
     return history
 
 
 def tell_beyond_hull(
     textures: Sequence[HattTexture], conditions: Sequence[tuple[float, float]]
 ) -> None:
-    """Say how many conditions of each texture have no recording, in one line."""
+    """Report in one line how many conditions of each texture have no recording."""
     outside = {
         texture.material: len(conditions) - len(texture.conditions_inside(conditions))
         for texture in textures
@@ -358,6 +362,6 @@ def tell_beyond_hull(
     lacking = [f"{name} ({count})" for name, count in outside.items() if count]
     if lacking:
         print(
-            f"note: of {len(conditions)} conditions those beyond a texture's models, or silent "
-            f"there, are left out: {_first_of(lacking)}"
+            f"note: of {counted(len(conditions), 'condition')}, those outside the range of a "
+            f"texture's models, or silent there, are left out: {_first_of(lacking)}"
         )

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from modeling.errors import counted
 from tactileq.many_textures import HowToModel, Outcome, model_textures
 from tactileq.options import Out
 
@@ -16,29 +17,32 @@ from tactileq.options import Out
 def model(
     folders: Annotated[
         list[Path],
-        typer.Argument(metavar="FOLDER…", help="Folders of recordings, or a folder of them."),
+        typer.Argument(
+            metavar="FOLDER…", help="Folders of recordings, or a folder of such folders."
+        ),
     ],
     out: Out = Path("models"),
     estimator: Annotated[
         Literal["joint", "paper", "paper-consistent"], typer.Option(help="How layers are found.")
     ] = "joint",
     layers: Annotated[
-        int | None, typer.Option(min=1, help="Number of layers; chosen without it (joint).")
+        int | None,
+        typer.Option(min=1, help="Number of layers; by default chosen from the data (joint)."),
     ] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="Leave conditions out and predict them.")
+        bool, typer.Option("--check", help="Cross-validate: leave conditions out and predict them.")
     ] = False,
     alone: Annotated[
-        bool, typer.Option("--alone", help="Find the layers of each recording by itself, too.")
+        bool, typer.Option("--alone", help="Also find the layers of each recording separately.")
     ] = False,
     keep_hum: Annotated[
         bool, typer.Option("--keep-hum", help="Leave mains hum in the recordings.")
     ] = False,
     plot: Annotated[
-        bool, typer.Option("--plot", help="Draw some spectra, and the layers over the grid.")
+        bool, typer.Option("--plot", help="Plot some spectra, and the layers over the grid.")
     ] = False,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Textures at a time; one per core without it.")
+        int | None, typer.Option(min=1, help="Textures at a time; by default one per core.")
     ] = None,
 ) -> None:
     """Fit a model of each texture over its grid of speeds and forces.
@@ -57,7 +61,7 @@ def model(
 
 
 def _require_all(outcomes: Sequence[Outcome]) -> None:
-    """Tell of each texture in order; at the end name those that could not be modelled."""
+    """Report each texture in order; at the end name those that could not be modelled."""
     failed = [outcome for outcome in outcomes if outcome.error]
     if len(outcomes) == len(failed) == 1:
         raise ValueError(failed[0].error)
@@ -65,9 +69,9 @@ def _require_all(outcomes: Sequence[Outcome]) -> None:
         _tell(outcome)
     if failed:
         raise ValueError(
-            f"expected {len(outcomes)} textures that can be modelled, got {len(failed)} that "
-            f"cannot ({'; '.join(outcome.what for outcome in failed)}); correct them and model "
-            "them again."
+            f"expected {counted(len(outcomes), 'texture')} that can be modelled, got {len(failed)} "
+            f"that cannot ({'; '.join(outcome.what for outcome in failed)}); correct them and "
+            "model them again."
         )
 
 

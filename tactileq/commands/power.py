@@ -51,33 +51,36 @@ def power(
         str,
         typer.Option(
             "--subjects",
-            help="Participants: from,to,step (8,48,8), or a list in brackets ([8,20]).",
+            help="Numbers of participants: from,to,step (8,48,8), or a list in brackets ([8,20]).",
         ),
     ] = "8,48,8",
-    simulations: Annotated[int, typer.Option(min=10, max=100_000, help="Simulated studies.")] = 200,
+    simulations: Annotated[
+        int, typer.Option(min=10, max=100_000, help="Number of simulations.")
+    ] = 200,
     effect: Annotated[
         list[str] | None,
         typer.Option(
             metavar="[TEXTURE:]WHAT=POINTS",
-            help="Plant a difference between the models instead of what percepts do, in all "
-            "textures or in one; WHAT is magnitude_similarity, frequency_similarity or choice; "
-            "repeatable.",
+            help="Plant a difference between the models instead of the one that the simulated "
+            "percepts give, in all textures or in one; WHAT is magnitude_similarity, "
+            "frequency_similarity or choice; repeatable.",
         ),
     ] = None,
     threshold: ThresholdName = "codec",
     seed: Seed = 0,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes at once; one per core without it.")
+        int | None, typer.Option(min=1, help="Processes at once; by default one per core.")
     ] = None,
     dask: Annotated[
-        str | None, typer.Option(help="Address of a Dask scheduler, whose workers simulate.")
+        str | None,
+        typer.Option(help="Address of a Dask scheduler whose workers run the simulations."),
     ] = None,
     out: Out = Path("power"),
 ) -> None:
     """Simulate a study with n participants many times: the chance of each verdict on its claims.
 
-    What stands for the real surfaces are the planted textures of the same names. Writes power.tsv,
-    power.png and power.svg. A first answer comes within 20 s, with how long the rest takes.
+    The planted textures of the same names take the place of the real surfaces. Writes power.tsv,
+    power.png and power.svg. A first estimate is printed within 20 s, with the time remaining.
 
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
@@ -100,10 +103,10 @@ def power(
 
     def tell_first(table: pd.DataFrame, left_s: float) -> None:
         done = int(table["simulations"].iloc[0])
-        print(f"first answer, from {done} of {simulations} simulated studies:")
+        print(f"first estimate, from {done} of {simulations} simulated studies:")
         for line in _sentences(table, plan, out):
             print(f"  {line}")
-        print(f"about {max(1, round(left_s / 60))} min more")
+        print(f"about {max(1, round(left_s / 60))} min left")
 
     with progress("Simulated studies", simulations) as advance:
         table = chances(
@@ -182,7 +185,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
     Raises
     ------
     ValueError
-        Where there is no claim, a claim is about a task that compares no models, or a number of
+        If there is no claim, a claim is about a task that compares no models, or a number of
         participants leaves the order of models unbalanced.
     """
     from modeling.files.answer_tables import ANSWER_TABLES
@@ -190,7 +193,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
     if not plan.plan.claims:
         raise ValueError(
             "expected claims under [[plan.claims]] in the study, whose verdicts are simulated, got "
-            "none; write down what is claimed (tactileq study init shows how)."
+            "none; add the study's claims (tactileq study init shows how)."
         )
     for claim in plan.plan.claims:
         if not ANSWER_TABLES[claim.task].measures:
@@ -260,8 +263,8 @@ def people_of(
 
     if unknown := [name for name in study.textures if name not in TEXTURES]:
         raise ValueError(
-            f"expected a study of the planted textures {', '.join(TEXTURES)}, which stand for the "
-            f"real surfaces here, got {', '.join(unknown)}; plan with textures of these names."
+            f"expected a study of the planted textures {', '.join(TEXTURES)}, which take the place "
+            f"of the real surfaces, got {', '.join(unknown)}; plan with textures of these names."
         )
     sets.require(study)
     psychometrics = Psychometrics(planted=planted)
@@ -305,8 +308,8 @@ def chances(
     advance : callable, optional
         Called after each simulation.
     first : callable, optional
-        Told what the simulations that are done by `FIRST_ANSWER_S` say, and about how long the
-        others take in s; not where all are done by then.
+        Called once, after `FIRST_ANSWER_S`, with the table so far and the estimated time left (s);
+        not called if all simulations are done by then.
 
     Returns
     -------

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Seed
 from tactileq.telling import progress
 
@@ -16,23 +17,25 @@ SILICO_RATE_HZ = 22704.0
 def record(
     folder: Annotated[Path, typer.Argument(help="Folder for the recordings.")],
     texture: Annotated[
-        str, typer.Option(help="Name of the surface; in silico a planted one, such as canvas.")
+        str, typer.Option(help="Name of the surface; in silico a planted texture, such as canvas.")
     ],
     rate_hz: Annotated[
         float | None,
-        typer.Option("--rate", help="Sampling rate in Hz; the card's, or 22704 in silico."),
+        typer.Option(
+            "--rate", help="Sampling rate in Hz; by default the sound card's, in silico 22704."
+        ),
     ] = None,
     duration_s: Annotated[float, typer.Option("--duration", help="Seconds per record.")] = 1.0,
     seed: Seed = 0,
     audio: Annotated[
-        bool, typer.Option("--audio", help="Record an accelerometer at a sound card, by hand.")
+        bool, typer.Option("--audio", help="Record by hand, with an accelerometer at a sound card.")
     ] = False,
     rig: OptionalRigPath = None,
     grid: Annotated[
         Path | None,
-        typer.Option("--grid", help="Grid (TOML) from tactileq rig range; 7 x 7 without it."),
+        typer.Option("--grid", help="Grid (TOML) from tactileq rig range; by default 7 x 7."),
     ] = None,
-    repeat: Annotated[int, typer.Option(min=1, help="Which repeat of each condition.")] = 1,
+    repeat: Annotated[int, typer.Option(min=1, help="Number of the repeat of each condition.")] = 1,
     device: Annotated[
         str | None, typer.Option(help="Input device: its name or a part of it.")
     ] = None,
@@ -41,7 +44,7 @@ def record(
         float | None, typer.Option(help="Acceleration of a full-scale sample, g.")
     ] = None,
     simulated: Annotated[
-        bool, typer.Option("--simulated", help="The input is a simulation: mark the recordings.")
+        bool, typer.Option("--simulated", help="Mark the recordings as simulated.")
     ] = False,
     hand: HandKind = None,
     hand_device: HandDevice = None,
@@ -51,7 +54,7 @@ def record(
     """Record a surface by hand (--audio), or a planted texture in silico, 7 speeds x 7 forces.
 
     With --audio you stroke the surface freely; strokes are cut into the conditions of the grid, and
-    a map shows what is missing. Ctrl-C ends it; run it again to go on.
+    a map shows which are missing. Ctrl-C ends it; run the command again to continue.
 
     Example: tactileq record recordings/oak --audio --texture oak --rig rig.toml --grid grid.toml
 
@@ -73,7 +76,7 @@ def record(
     if rig or grid or repeat > 1 or (by_hand, heard) != (HandOptions(), InputOptions()):
         raise ValueError(
             "expected --audio with options of the hand, the input, the grid or the repeat, got "
-            "them without it; add --audio, or leave them out to record in silico."
+            "those options without it; add --audio, or leave them out to record in silico."
         )
     record_in_silico(folder, texture, rate_hz=rate_hz, duration_s=duration_s, seed=seed)
 
@@ -98,4 +101,4 @@ def record_in_silico(
             records.save(fresh)
             write_provenance(fresh / "provenance.json", "record", settings, seed=seed)
         advance("")
-    print(f"{len(records)} simulated recordings of {texture} in {folder}")
+    print(f"{counted(len(records), 'simulated recording')} of {texture} in {folder}")

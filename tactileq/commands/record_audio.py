@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from modeling.errors import counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_map import recording_map
 
@@ -32,7 +33,7 @@ WITHOUT_FORCE = ("mouse", "window")
 
 @dataclass(frozen=True)
 class HandOptions:
-    """What the command line says of the hand, where no rig file does."""
+    """What the command line says about the hand, where there is no rig file."""
 
     kind: str | None = None
     device: str | None = None
@@ -42,7 +43,7 @@ class HandOptions:
 
 @dataclass(frozen=True)
 class InputOptions:
-    """What the command line says of the input; it wins over a rig file."""
+    """What the command line says about the input; it overrides a rig file."""
 
     device: str | None = None
     channel: int | None = None
@@ -53,7 +54,7 @@ class InputOptions:
 
 @dataclass(frozen=True)
 class HandRecording:
-    """What is to be recorded, and by what."""
+    """What is to be recorded, and with what."""
 
     texture: str
     duration_s: float
@@ -80,8 +81,8 @@ def _hand_of_rig(rig: RigFile, options: HandOptions) -> HandSettings:
 
     if options != HandOptions():
         raise ValueError(
-            "expected the hand in the rig file or on the command line, got both; leave --hand "
-            "and what belongs to it out, or --rig."
+            "expected the hand in the rig file or on the command line, got both; leave out --hand "
+            "and its options, or --rig."
         )
     return hand_settings(rig)
 
@@ -91,8 +92,8 @@ def _hand_of_options(options: HandOptions) -> HandSettings:
 
     if options.kind is None:
         raise ValueError(
-            "expected what measures the hand, got neither --rig nor --hand; give a rig file, or "
-            "--hand tablet, mouse, serial or scripted."
+            "expected a device that measures the hand, got neither --rig nor --hand; give a rig "
+            "file, or --hand tablet, mouse, serial or scripted."
         )
     return HandSettings(
         kind=options.kind,
@@ -137,7 +138,7 @@ def rig_from(path: Path | None) -> RigFile | None:
 
 
 def record_by_hand(folder: Path, options: HandRecording) -> None:
-    """Fill a grid by strokes until it is full, or until the program is asked to end."""
+    """Record strokes until the grid is full, or until the program is asked to end."""
     from rig.capture.grid import StrokeGrid
     from rig.capture.input import AudioInput
     from rig.capture.pieces import PieceStore, Plan
@@ -204,12 +205,12 @@ def provenance_of_run(
 
 
 def tell_assumed(rig: RigFile) -> None:
-    """Say that levels rest on a scale that nobody measured."""
+    """Note that levels depend on a scale that was assumed, not measured."""
     scale = None if rig.accelerometer is None else rig.accelerometer.g_per_fullscale
     if scale is not None and scale.assumed:
         print(
-            f"note: {scale.value:g} g per full scale of the input is assumed ({scale.source}), and "
-            "all levels with it."
+            f"note: the input's scale of {scale.value:g} g per full scale is assumed "
+            f"({scale.source}), and so are all levels."
         )
 
 
@@ -236,7 +237,7 @@ def opened_hand(hand: HandSettings) -> Iterator[tuple[Live, HandReader]]:
 
 
 def run(recorder: StrokeRecorder, faults: Callable[[], tuple[str, ...]]) -> None:
-    """Record until the grid is full, with a map; then, or when asked to end, tell what there is."""
+    """Record until the grid is full, with a map; then, or when asked to end, report the result."""
     from rich.console import Console
 
     console = Console()
@@ -263,13 +264,14 @@ def shown_map(recorder: StrokeRecorder, console: Console) -> Iterator[Callable[[
         with Screen(recording_map(recorder), console=console, refresh_per_second=10) as screen:
             yield lambda: screen.update(recording_map(recorder))
         return
-    told = recorder.store.conditions_recorded
+    logged = recorder.store.conditions_recorded
 
     def show() -> None:
-        nonlocal told
-        if recorder.store.conditions_recorded > told:
-            told = recorder.store.conditions_recorded
-            print(f"{told} of {recorder.coverage.full.size} conditions recorded", flush=True)
+        nonlocal logged
+        if recorder.store.conditions_recorded > logged:
+            logged = recorder.store.conditions_recorded
+            of = counted(recorder.coverage.full.size, "condition")
+            print(f"{logged} of {of} recorded", flush=True)
 
     yield show
 
@@ -281,11 +283,13 @@ def tell(recorder: StrokeRecorder, *, before: int) -> None:
     store, coverage = recorder.store, recorder.coverage
     new = store.conditions_recorded - before
     print(
-        f"{store.conditions_recorded} of {coverage.full.size} conditions of {store.plan.texture} "
-        f"recorded in {store.folder}, {new} of them now"
+        f"{store.conditions_recorded} of {counted(coverage.full.size, 'condition')} of "
+        f"{store.plan.texture} recorded in {store.folder}, {new} of them in this run"
         + (" (simulated)" if store.simulated else "")
     )
     missing = [f"{speed:g} mm/s at {force:g} N" for speed, force in coverage.missing]
     if missing:
         more = f" and {len(missing) - MOST_MISSING} more" if len(missing) > MOST_MISSING else ""
-        print(f"missing: {'; '.join(missing[:MOST_MISSING])}{more}; run it again to go on")
+        print(
+            f"missing: {'; '.join(missing[:MOST_MISSING])}{more}; run the command again to continue"
+        )

@@ -1,4 +1,4 @@
-"""The map that tactileq record --audio shows: what is filled, what to stroke next, the input."""
+"""The map of tactileq record --audio: recorded conditions, what to stroke next, the input."""
 
 from __future__ import annotations
 
@@ -14,22 +14,24 @@ if TYPE_CHECKING:
     from rig.capture.coverage import Coverage
     from rig.capture.recorder import HandLately, Level, StrokeRecorder
 
-# Okabe–Ito blue and orange; each cell also says in characters what its colour says.
+# Okabe–Ito blue and orange; characters in each cell repeat what its colour means.
 FULL, PART, NEXT = "#56B4E9", "#E69F00", "bold reverse"
 METER_DB, METER_WIDTH = 60.0, 30
 
 
 def recording_map(recorder: StrokeRecorder) -> Group:
-    """How a recording stands: grid, hand, input, and what goes wrong."""
+    """The state of a recording: grid, hand, input, and warnings."""
     from rich.console import Group
     from rich.text import Text
 
     coverage = recorder.coverage
     target, words = recorder.target(coverage)
     lines = [hand_line(recorder.hand, target, words), level_line(recorder.level)]
-    warnings = [Text(f"warning: {told}", style=PART) for told in recorder.warnings()]
+    warnings = [Text(f"warning: {warning}", style=PART) for warning in recorder.warnings()]
     done, of = int(coverage.full.sum()), coverage.full.size
-    head = Text(f"{done} of {of} conditions; seconds of {coverage.wanted_s:g} s in each:")
+    head = Text(
+        f"{done} of {of} conditions recorded; seconds so far, of {coverage.wanted_s:g} s each:"
+    )
     legend = Text("ok full, > next, * you are here", style="dim")
     table = grid_table(coverage, target, here=recorder.condition)
     return Group(head, table, legend, *lines, *warnings)
@@ -74,7 +76,7 @@ def hand_line(hand: HandLately, target: Condition | None, words: list[str]) -> T
     if target is None:
         return Text("all conditions are recorded", style=FULL)
     now = f"{hand.speed_mm_s:.0f} mm/s, {hand.force_n:.2f} N" if hand.touching else "off surface"
-    say = ", ".join(words).upper() or ("good: go on" if hand.touching else "touch and stroke")
+    say = ", ".join(words).upper() or ("good: continue" if hand.touching else "touch and stroke")
     return Text.assemble(
         f"hand: {now}; next: {target[0]:g} mm/s at {target[1]:g} N: ", (say, "bold")
     )
@@ -84,7 +86,7 @@ def level_line(level: Level) -> Text:
     """The input: a bar of its level, peak, floor, and whether it clips."""
     from rich.text import Text
 
-    floor = "not seen yet" if isnan(level.floor_g) else f"{level.floor_g:.2g} g"
+    floor = "not measured yet" if isnan(level.floor_g) else f"{level.floor_g:.2g} g"
     text = (
         f"input: [{_meter(level)}] {level.rms_g:.2g} g RMS, peak {level.peak_g:.2g} g, "
         f"at rest {floor}"

@@ -1,4 +1,4 @@
-"""tactileq rig: what one does with a rig before and beside an experiment."""
+"""tactileq rig: checks, measurements and playback on a rig, outside of experiments."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tactileq.commands.rig_twin import rig_twin
 rig = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="A rig for real hands: what is there, how it does, its calibration and latency.",
+    help="A rig for real hands: its parts, state, calibration and latency.",
 )
 rig.command("check")(rig_check)
 rig.command("monitor")(rig_monitor)

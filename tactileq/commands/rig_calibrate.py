@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import RigPath, Seed
 
 if TYPE_CHECKING:
@@ -24,26 +25,30 @@ def rig_calibrate(
     what: Annotated[
         What,
         typer.Argument(
-            help="floor: the accelerometer at rest; vibrator: its resonance; level: g per volt at "
-            "the held pen; pressure: newtons of a pen tablet, by weights."
+            help="floor: the accelerometer's noise at rest; vibrator: its resonance; level: g per "
+            "volt at the held pen; pressure: force curve of a pen tablet, by weights."
         ),
     ],
     rig: RigPath = Path("rig.toml"),
     level_g: Annotated[
         float | None,
-        typer.Option("--level", help="RMS of the test noise, in g; half the limits without it."),
+        typer.Option("--level", help="RMS of the test noise, in g; by default half the limits."),
     ] = None,
-    low_hz: Annotated[float, typer.Option("--low", help="Lower edge of the band, Hz.")] = 100.0,
-    high_hz: Annotated[float, typer.Option("--high", help="Upper edge, Hz.")] = 500.0,
+    low_hz: Annotated[
+        float, typer.Option("--low", help="Lower edge of the frequency band, Hz.")
+    ] = 100.0,
+    high_hz: Annotated[
+        float, typer.Option("--high", help="Upper edge of the frequency band, Hz.")
+    ] = 500.0,
     placements: Annotated[
-        int, typer.Option(min=3, help="How often the pen is held anew, for the level.")
+        int, typer.Option(min=3, help="How often the pen is picked up again, for the level.")
     ] = 5,
     seed: Seed = 0,
 ) -> None:
     """Measure a figure of the rig, and write it into the rig file.
 
-    In this order: floor, vibrator, level; pressure at any time. It asks for what you have to do,
-    refuses what cannot be right, and leaves the file as it is where you stop it.
+    Calibrate in this order: floor, vibrator, level; pressure at any time. The command asks you for
+    each step, refuses implausible results, and leaves the file unchanged if you stop it.
 
     Example: tactileq rig calibrate level --rig rig.toml
     """
@@ -66,7 +71,7 @@ def _floor(rig: RigFile) -> None:
     from rig.calibration.steps import floor_figures
 
     with accelerometer_input(rig) as source:
-        _ask("Lay the pen down and touch nothing")
+        _ask("Put the pen down and touch nothing")
         record = Accelerometer(source).record(2 * SHORTEST_S)
     floor = no_contact_floor(record.samples_g, rate_hz=record.rate_hz)
     print(f"at rest {1e3 * floor.rms_g:.2f} mg RMS from 10 to 1000 Hz, peak {floor.peak_g:.4f} g")
@@ -75,8 +80,8 @@ def _floor(rig: RigFile) -> None:
     if floor.mains_hz is not None:
         lines = ", ".join(f"{hz:.0f}" for hz in floor.hum.frequency_hz)
         print(
-            f"warning: hum of the mains ({lines} Hz), {1e3 * floor.hum_rms_g:.2f} mg RMS; ground "
-            "the amplifier and keep the sensor's cable off power cables."
+            f"warning: mains hum ({lines} Hz), {1e3 * floor.hum_rms_g:.2f} mg RMS; ground the "
+            "amplifier and keep the sensor's cable away from power cables."
         )
     _write(rig, floor_figures(rig, floor, today=date.today()))
 
@@ -102,7 +107,7 @@ def _vibrator(rig: RigFile, level_g: float | None, *, seed: int) -> None:
     )
     name = f"vibrator_{datetime.now():%Y%m%d_%H%M%S}.json"
     _write(rig, save_vibrator(rig, found, name))
-    print("note: now calibrate the level, which this changes.")
+    print("note: now calibrate the level, which this result changes.")
 
 
 def _level(
@@ -121,7 +126,7 @@ def _level(
     gains = []
     with _bench(rig) as (sound, accelerometer):
         for number in range(1, placements + 1):
-            _ask(f"Placement {number} of {placements}: hold the pen anew, off any surface")
+            _ask(f"Placement {number} of {placements}: pick up the pen again, off any surface")
             if number == 1:
                 check_softly(rig, sound, accelerometer, rms_g=rms_g, band_hz=band_hz)
             found = measure_gain(
@@ -157,19 +162,19 @@ def _pressure(rig: RigFile) -> None:
             print(f"  {weights_n[-1]:.3f} N: {shares[-1]:.4f} of the pen's range")
     curve = fit_pressure(weights_n, shares)
     print(
-        f"{len(curve.points)} weights, residual {curve.residual_n:.3f} N, between weights within "
-        f"{curve.left_out_n:.3f} N"
+        f"{counted(len(curve.points), 'weight')}, residual {curve.residual_n:.3f} N, between "
+        f"weights within {curve.left_out_n:.3f} N"
     )
     _write(rig, pressure_figures(rig, curve, today=date.today()))
 
 
 def _grams(*, enough: bool) -> float:
-    """The weight that now stands on the pen; 0 for no more."""
+    """The weight now on the pen; 0 to end."""
     end = ", 0 to end" if enough else ""
     grams: float = typer.prompt(f"Weight on the pen in g, the pen's own included{end}", type=float)
     if grams < 0 or (grams == 0 and not enough):
         raise ValueError(
-            f"expected a weight above 0 g, got {grams:g}; lay at least three different weights on."
+            f"expected a weight above 0 g, got {grams:g}; use at least three different weights."
         )
     return grams
 

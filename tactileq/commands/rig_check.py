@@ -23,7 +23,7 @@ _STYLES = {"ok": "", "note": "yellow", "fault": "bold red"}
 def rig_check(rig: RigPath = Path("rig.toml")) -> None:
     """Show what is connected, each figure of the rig file, and what is missing for a study.
 
-    Nothing is played. The exit code is 1 where no study could run, and the last lines say why.
+    Nothing is played. If no study can run, the exit code is 1 and the last lines say why.
 
     Example: tactileq rig check --rig rig.toml
     """
@@ -70,7 +70,7 @@ def _show(console: Console, title: str, findings: Sequence[Finding]) -> None:
         style = _STYLES[finding.state]
         table.add_row(
             Text(finding.name),
-            # Faults are told below, where they stand in full.
+            # Faults are listed below, in full.
             Text("" if finding.state == "fault" else finding.told, style=style),
             Text(_MARKS[finding.state], style=style),
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import RigPath, Seed
 from tactileq.telling import share_of
 
@@ -20,29 +21,29 @@ if TYPE_CHECKING:
 
 def rig_latency(
     rig: RigPath = Path("rig.toml"),
-    trials: Annotated[int, typer.Option(min=50, max=1000, help="How many.")] = 60,
+    trials: Annotated[int, typer.Option(min=50, max=1000, help="Number of trials.")] = 60,
     hand: Annotated[
         bool,
         typer.Option(
-            "--hand", help="Your own strokes, instead of a scripted hand that starts suddenly."
+            "--hand", help="Use your own strokes instead of a scripted hand that starts suddenly."
         ),
     ] = False,
     level_g: Annotated[
         float | None,
-        typer.Option("--level", help="RMS of the vibration, in g; half the limits without it."),
+        typer.Option("--level", help="RMS of the vibration, in g; by default half the limits."),
     ] = None,
     accept: Annotated[
         str | None,
-        typer.Option("--accept", help="Why more than 40 ms may be; kept in the rig file."),
+        typer.Option("--accept", help="Reason to accept more than 40 ms; stored in the rig file."),
     ] = None,
     seed: Seed = 0,
 ) -> None:
     """Measure the latency from hand to vibration, and write it into the rig file.
 
-    A scripted hand steps from rest to a stroke; its readings pass the same process, filter, shared
-    memory and audio callback as any hand's, and the accelerometer (or a cable from output to input)
-    shows when the vibration begins. With --hand you stroke, and the vibration's level is compared
-    with your speed. More than 40 ms in 95 % of trials is refused without --accept.
+    A scripted hand steps from rest to a stroke; its readings pass through the same process, filter,
+    shared memory and audio callback as any hand's, and the accelerometer (or a cable from output to
+    input) shows when the vibration begins. With --hand you stroke, and the vibration's level is
+    compared with your speed. A 95th percentile above 40 ms is refused without --accept.
 
     Example: tactileq rig latency --rig rig.toml
     """
@@ -103,10 +104,10 @@ def _measured(
         loop_s = loop_back_s(sound, accelerometer, rate_hz=rig.sound.rate_hz, rms_g=rms_g)
         floor = accelerometer.record(0.5)
         if hand:
-            print(f"Stroke to and fro, about 10 cm wide and once a second, for {seconds:.0f} s.")
-        with HandReader(live, settings), share_of("Trials") as tell:
+            print(f"Stroke back and forth, about 10 cm and once a second, for {seconds:.0f} s.")
+        with HandReader(live, settings), share_of("Trials") as advance:
             sound.play(probe_texture(rms_g))
-            seen = watched(live, accelerometer, seconds, tick=lambda share: tell(share, ""))
+            seen = watched(live, accelerometer, seconds, tick=lambda share: advance(share, ""))
             sound.silence()
         if faults := sound.faults():
             raise ValueError(faults[0])
@@ -135,15 +136,18 @@ def _show(summary: LatencySummary, parts: list[Part], *, loop_s: float, filter_s
         table.add_row(part.name, f"{part.median_ms:.1f}", f"{part.p95_ms:.1f}")
     table.add_row("output to record (loop-back)", f"{1e3 * loop_s:.1f}", "")
     table.add_row(
-        "hand to vibration, all of it", f"{summary.median_ms:.1f}", f"{summary.p95_ms:.1f}"
+        "hand to vibration, in total", f"{summary.median_ms:.1f}", f"{summary.p95_ms:.1f}"
     )
     Console().print(table)
     low, high = summary.median_within_ms
     low95, high95 = summary.p95_within_ms
     missed = f", {summary.missed} without a vibration" if summary.missed else ""
     print(
-        f"{summary.trials} trials{missed}; median within {low:.1f} to {high:.1f} ms, 95th "
-        f"percentile within {low95:.1f} to {high95:.1f} ms (95 %). The loop-back is included."
+        f"{counted(summary.trials, 'trial')}{missed}; 95 % confidence intervals: median "
+        f"{low:.1f} to {high:.1f} ms, 95th percentile {low95:.1f} to {high95:.1f} ms. The "
+        "loop-back is included."
     )
     if summary.p95_ms > AIM_MS:
-        print(f"note: {AIM_MS:g} ms is the aim; smaller blocks and a faster device come nearer.")
+        print(
+            f"note: the target is {AIM_MS:g} ms; smaller blocks or a faster device reduce latency."
+        )

@@ -28,18 +28,19 @@ _EVERY_S = 0.1
 def rig_monitor(
     model: Annotated[
         Path | None,
-        typer.Argument(metavar="[MODEL]", help="What plays under the hand; silence without it."),
+        typer.Argument(metavar="[MODEL]", help="Model to play under the hand; by default silence."),
     ] = None,
     rig: RigPath = Path("rig.toml"),
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.1, help="End by itself after so long.")
+        float | None, typer.Option("--seconds", min=0.1, help="Stop after this time, s.")
     ] = None,
 ) -> None:
-    """Show a rig live: hand, level, limits, missed blocks, latency, time that the callback takes.
+    """Show a rig live: hand, level, limits, missed blocks, latency, duration of the callback.
 
-    Beside it the misses of a thread that only wakes up once per block: what it misses is the
-    machine's, not the rig's. Ctrl-C ends it with one line. Where the sound process is lost another
-    one plays on; where that cannot be, one sentence says so, and the exit code is 1.
+    For comparison it counts the misses of a bare thread that only wakes up once per block; these
+    are due to the machine, not the rig. Ctrl-C ends it with a one-line summary. If the sound
+    process is lost, another one continues; if that is impossible, an error says so and the exit
+    code is 1.
 
     Example: tactileq rig monitor models/canvas.json --rig rig.toml
     """
@@ -100,9 +101,9 @@ def _play_on(sound: SoundOutput, model: AnyModel | None, faults: Sequence[str]) 
     Raises
     ------
     InputError
-        Where the vibration was halted: the last of the faults.
+        If the vibration was halted: the last of the faults.
     SoundLost
-        Where nothing can be played.
+        If nothing can be played.
     """
     if sound.halted:
         raise InputError(faults[-1])

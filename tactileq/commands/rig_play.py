@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import RigPath
 
 if TYPE_CHECKING:
@@ -17,17 +18,21 @@ if TYPE_CHECKING:
 def rig_play(
     rig: RigPath,
     stimuli: Annotated[
-        Path | None, typer.Option("--set", help="Folder of tactileq stimuli.")
+        Path | None, typer.Option("--set", help="Folder from tactileq stimuli.")
     ] = None,
     which: Annotated[
-        str | None, typer.Option("--file", help="Name or SHA-256 of one of its files.")
+        str | None, typer.Option("--file", help="Name or SHA-256 of a file in the set.")
     ] = None,
-    tone_hz: Annotated[float | None, typer.Option("--tone", help="A sinusoid instead, Hz.")] = None,
+    tone_hz: Annotated[
+        float | None, typer.Option("--tone", help="Frequency of a sinusoid to play instead, Hz.")
+    ] = None,
     amplitude_g: Annotated[
-        float, typer.Option("--amplitude", help="Of the sinusoid at the pen, g.")
+        float, typer.Option("--amplitude", help="Amplitude of the sinusoid at the pen, g.")
     ] = 0.1,
-    duration_s: Annotated[float, typer.Option("--duration", help="Of the sinusoid, s.")] = 1.0,
-    times: Annotated[int, typer.Option(min=1, max=1000, help="How often.")] = 1,
+    duration_s: Annotated[
+        float, typer.Option("--duration", help="Duration of the sinusoid, s.")
+    ] = 1.0,
+    times: Annotated[int, typer.Option(min=1, max=1000, help="Number of repetitions.")] = 1,
 ) -> None:
     """Play a calibrated tone burst, or a file of a stimulus set, at a resting hand.
 
@@ -44,7 +49,9 @@ def rig_play(
     play(loaded, signal, times=times)
     simulated = "simulated " if signal.simulated else ""
     seconds = signal.samples_g.size / signal.rate_hz
-    print(f"{simulated}signal of {seconds:.3g} s played {times} times on {loaded.rig.name}")
+    print(
+        f"{simulated}signal of {seconds:.3g} s played {counted(times, 'time')} on {loaded.rig.name}"
+    )
 
 
 def chosen_signal(
@@ -81,7 +88,7 @@ def chosen_signal(
 
 
 def play(rig: RigFile, signal: PreparedSignal, *, times: int) -> None:
-    """Play a signal so often, one after the other."""
+    """Play a signal `times` times in succession."""
     from rig.desk.lock import rig_locked
     from rig.desk.parts import sound_output
     from rig.live.memory import Live

@@ -1,4 +1,4 @@
-"""tactileq rig range: which speeds and forces a hand uses freely, and the grid to record."""
+"""tactileq rig range: the speeds and forces that a hand uses freely, and the grid to record."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.commands.record_audio import HandOptions, hand_from, opened_hand, rig_from, since_now
 from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Out
@@ -29,17 +30,17 @@ COMMAND = "rig range"
 def rig_range(
     out: Out = Path("grid.toml"),
     rig: OptionalRigPath = None,
-    seconds: Annotated[float, typer.Option(min=6, max=LONGEST_S, help="For how long.")] = 30.0,
-    speeds: Annotated[int, typer.Option(min=1, max=50, help="Speeds of the grid.")] = 7,
-    forces: Annotated[int, typer.Option(min=1, max=50, help="Forces of the grid.")] = 7,
+    seconds: Annotated[float, typer.Option(min=6, max=LONGEST_S, help="Duration, s.")] = 30.0,
+    speeds: Annotated[int, typer.Option(min=1, max=50, help="Number of speeds of the grid.")] = 7,
+    forces: Annotated[int, typer.Option(min=1, max=50, help="Number of forces of the grid.")] = 7,
     hand: HandKind = None,
     hand_device: HandDevice = None,
     counts_per_mm: CountsPerMm = None,
     force: AssumedForce = None,
 ) -> None:
-    """Explore a surface freely; the grid to record goes up to the 95th percentile.
+    """Explore a surface freely, to find the grid to record: up to the 95th percentile.
 
-    A mouse measures no force: then the grid has the one that is assumed.
+    A mouse measures no force; the grid then has the assumed force only.
 
     Example: tactileq rig range --rig rig.toml --seconds 30 --out grid.toml
     """
@@ -59,19 +60,20 @@ def rig_range(
         inputs=inputs,
     )
     write_own_files({out: grid_text(grid, found).encode()}, note, origin)
-    for told in notes_on(found, grid):
-        print(told)
-    print(f"grid of {grid.shape[0]} speeds x {grid.shape[1]} forces in {out}")
+    for note_on in notes_on(found, grid):
+        print(note_on)
+    speeds_of, forces_of = counted(grid.shape[0], "speed"), counted(grid.shape[1], "force")
+    print(f"grid of {speeds_of} x {forces_of} in {out}")
 
 
 def watched(settings: HandSettings, seconds: float) -> Readings:
-    """The readings of a hand for so long."""
+    """The readings of a hand over this time."""
     import numpy as np
 
     with opened_hand(settings) as (live, reader):
         readings, rows = since_now(live), []
         began_s = time.monotonic()
-        with share_of("Stroke the surface as you would to find out what it is") as advance:
+        with share_of("Stroke the surface as if to find out what it is") as advance:
             while (passed_s := time.monotonic() - began_s) < seconds:
                 time.sleep(STEP_S)
                 rows.append(readings())
@@ -93,7 +95,7 @@ def picture(found: Exploration, grid: StrokeGrid) -> str:
 
 
 def bars(title: str, values: Floats, steps: Floats, *, of: dict[str, float]) -> str:
-    """A histogram lying on its side; `<` marks a step of the grid."""
+    """A horizontal histogram; `<` marks a step of the grid."""
     import numpy as np
 
     top = max(float(np.percentile(values, 99)), float(steps[-1]) * 1.05)
@@ -108,7 +110,7 @@ def bars(title: str, values: Floats, steps: Floats, *, of: dict[str, float]) -> 
 
 
 def notes_on(found: Exploration, grid: StrokeGrid) -> list[str]:
-    """What the grid does not tell by itself."""
+    """What the grid itself does not show."""
     notes = []
     if found.force_assumed:
         notes.append(

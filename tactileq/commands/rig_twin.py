@@ -19,14 +19,14 @@ def rig_twin(
     rig: RigPath = Path("rig.toml"),
     vibrator: Annotated[
         Path | None,
-        typer.Option("--simulated", help="File (TOML) of what the simulated vibrator is."),
+        typer.Option("--simulated", help="File (TOML) that describes the simulated vibrator."),
     ] = None,
 ) -> None:
     """Run a simulated vibrator and accelerometer, and write the rig file that uses them.
 
-    It needs a running JACK server, which may have no sound card. Until Ctrl-C every command with
+    It needs a running JACK server, which may have no sound card. Until Ctrl-C, every command with
     this rig file, in another terminal, plays on it and records from it; a scripted hand strokes.
-    All that comes of it is marked simulated.
+    All data from it are marked as simulated.
 
     Example: tactileq rig twin --rig twin.toml
     """
@@ -49,7 +49,7 @@ def rig_twin(
                 raise
             return
     raise ValueError(
-        "expected the simulated vibrator to run, got its end; look whether the JACK server runs."
+        "expected the simulated vibrator to run, got its end; check that the JACK server runs."
     )
 
 

@@ -1,4 +1,4 @@
-"""tactileq scene: the least models that a scene needs."""
+"""tactileq scene: the cheapest models that keep a scene's bound."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.keeping import check_own_results
 from tactileq.options import Out, Seed
 from tactileq.telling import progress, simulated_note
@@ -27,22 +28,24 @@ def scene(
     scene_file: Annotated[Path, typer.Argument(metavar="SCENE.toml", help="A scene file.")],
     models: Annotated[
         Path | None,
-        typer.Option("--models", help="Folder of full models; else the scene's, else models."),
+        typer.Option(
+            "--models", help="Folder of full models; by default the scene's, or else models/."
+        ),
     ] = None,
     out: Out = Path("scene"),
     seed: Seed = 0,
 ) -> None:
-    """Compile a scene: the least model of each texture that keeps the scene's bound.
+    """Compile a scene: the cheapest model of each texture that keeps the scene's bound.
 
     A scene (TOML) names textures, the speeds and forces of the hand, the actuator's band and
-    limits, a threshold, a bound on the error and a budget; start from those in
-    modeling/scenes/shipped. It needs version = 1; a name under [scene]; speed_mm_s and force_n
+    limits, a threshold, a bound on the error and a budget; start from the examples in
+    modeling/scenes/shipped. Required: version = 1; a name under [scene]; speed_mm_s and force_n
     under [hand].
 
-    Writes TEXTURE.json (the least model), scene.json, before_after.tsv (layers, numbers, bytes,
-    operations, each measure with its worst place), steps.tsv (what each step brings), tradeoff.png
-    and SCENE.h (all textures and the renderer in C99, licensed as those of tactileq export c). The
-    times per sample that are shown are those of this machine, now.
+    Writes TEXTURE.json (the cheapest model), scene.json, before_after.tsv (layers, numbers, bytes,
+    operations, each error with the place where it is largest), steps.tsv (what each step saves),
+    tradeoff.png and SCENE.h (all textures and the renderer in C99, licensed like the headers of
+    tactileq export c). The times per sample shown are measured on this machine.
 
     Example: tactileq scene scene.toml --models models --out scene
     """
@@ -72,7 +75,7 @@ def scene(
         if is_compiled():
             tell_in_motion(texture, compiled, seed=seed)
     if not is_compiled():
-        print("note: without the compiled kernel no strokes are rendered to time and judge.")
+        print("note: without the compiled kernel no strokes are rendered for timing and checking.")
     print(
         f"{asked.name}: {compiled.bytes_before} → {compiled.bytes_after} bytes, at most "
         f"{compiled.operations_before:.1f} → {compiled.operations_after:.1f} operations per "
@@ -81,7 +84,7 @@ def scene(
 
 
 def write_scene(compiled: CompiledScene, folder: Path, *, seed: int) -> None:
-    """Write the models of a compiled scene, its tables, its picture and its header in C."""
+    """Write the models of a compiled scene, its tables, its figure and its C header."""
     from analysis.figures.scenes import figure_tradeoff
     from analysis.report.findings import picture_bytes, table_bytes
     from analysis.textures.scenes import before_after_table, steps_table
@@ -92,7 +95,7 @@ def write_scene(compiled: CompiledScene, folder: Path, *, seed: int) -> None:
     (folder / "steps.tsv").write_bytes(table_bytes(steps_table(compiled)))
     (folder / "tradeoff.png").write_bytes(picture_bytes(figure_tradeoff(compiled)))
     if len({texture.plan.rate_hz for texture in compiled.textures}) > 1:
-        print("note: no header in C: models of different rates need a rate_hz under [actuator].")
+        print("note: no C header: models of different rates need a rate_hz under [actuator].")
         return
     name = f"{file_stem(compiled.scene.name)}.h"
     (folder / name).write_text(header_of(compiled, name, seed=seed), encoding="utf-8")
@@ -105,34 +108,35 @@ def header_of(compiled: CompiledScene, name: str, *, seed: int) -> str:
     scene = compiled.scene
     bound = ", ".join(f"{measure} {value:g}" for measure, value in scene.bound.to_dict().items())
     note = (
-        f"Compiled for the scene of SHA-256 {scene.sha256}; bound: {bound}. Beyond the scene the "
+        f"Compiled for the scene with SHA-256 {scene.sha256}; bound: {bound}. Beyond the scene the "
         "nearest edge is rendered, and samples are counted (above_grid, below_grid)."
     )
     return scene_header(name, scene.name, compiled.rendered, seed=seed, note=note)
 
 
 def tell_texture(texture: CompiledTexture) -> None:
-    """Print what became of a texture, what it costs, and what it takes of the bound."""
+    """Print what a texture was reduced to, what it costs, and how close it is to the bound."""
     from analysis.textures.scenes import driven_by
     from modeling.scenes.cost import stored_numbers
 
     full, model, plan = texture.full, texture.model, texture.plan
     before, after = texture.before, texture.after
     print(
-        f"{texture.texture}{simulated_note(full)}: {full.n_layers} → {model.n_layers} layers, "
-        f"{stored_numbers(full)} → {stored_numbers(model)} numbers, "
+        f"{texture.texture}{simulated_note(full)}: {full.n_layers} → "
+        f"{counted(model.n_layers, 'layer')}, "
+        f"{stored_numbers(full)} → {counted(stored_numbers(model), 'number')}, "
         f"{before.bytes} → {after.bytes} "
         f"bytes, {before.operations:.1f} → {after.operations:.1f} operations per sample"
     )
     update_ms = 1e3 * plan.update_samples / plan.rate_hz
     print(
         f"  {driven_by(texture)}, an update every {update_ms:g} ms, "
-        f"{'single' if plan.single else 'double'} precision; worst {worst_told(texture.measures)}"
+        f"{'single' if plan.single else 'double'} precision; worst {worst_of(texture.measures)}"
     )
 
 
-def worst_told(measures: Sequence[Measured]) -> str:
-    """The measure that takes most of its bound, and where."""
+def worst_of(measures: Sequence[Measured]) -> str:
+    """The measure that is closest to its bound, and where."""
     worst = max(measures, key=_share)
     return f"{worst.measure} {worst.worst:.4g} (bound {worst.bound:g}) at {worst.place}"
 
@@ -159,13 +163,14 @@ def tell_in_motion(texture: CompiledTexture, compiled: CompiledScene, *, seed: i
     before, after = (ns_per_sample(renderer, hand) for renderer in (full, least))
     windows = windows_kept(texture, compiled.scene, count=WINDOWS, seed=seed)
     print(
-        f"  here {before:.1f} → {after:.1f} ns per sample; along a random stroke the bound is kept "
+        f"  on this machine {before:.1f} → {after:.1f} ns per sample; along a random "
+        "stroke the bound is kept "
         f"in {windows.kept} of {windows.of} windows of 1 s"
     )
 
 
 def ns_per_sample(renderer: Renderer, hand: Hand) -> float:
-    """How long this machine takes to render a sample of a stroke, of several turns the quickest."""
+    """How long this machine takes to render a sample of a stroke, the fastest of several runs."""
     import numpy as np
 
     vibration = np.empty(hand.speed_mm_s.size, dtype=renderer.plan.precision)

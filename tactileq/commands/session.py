@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 from tactileq.options import Data, Models, SceneModels, Simplified, StudyFile
 from tactileq.telling import share_of, tell_foreign_models
@@ -22,40 +23,44 @@ else:
 
 
 def session(
-    task: Annotated[TaskName, typer.Option(help="Which evaluation.")],
+    task: Annotated[TaskName, typer.Option(help="Task of the session.")],
     subject: Annotated[int, typer.Option(min=1, help="Number of the participant.")] = 1,
     models: Models = None,
     simplified: Simplified = None,
     scene: SceneModels = None,
     data: Data = Path("data"),
-    number: Annotated[int, typer.Option("--session", min=1, help="Which day.")] = 1,
+    number: Annotated[
+        int, typer.Option("--session", min=1, help="Number of the session (day).")
+    ] = 1,
     study: StudyFile = None,
     rig: Annotated[
-        Path | None, typer.Option(help="Rig file (TOML); the simulated rig without it.")
+        Path | None, typer.Option(help="Rig file (TOML); by default the simulated rig.")
     ] = None,
     resume: Annotated[
-        bool, typer.Option(help="Go on with a session that was aborted or broke off.")
+        bool, typer.Option(help="Continue a session that was aborted or interrupted.")
     ] = False,
-    pilot: Annotated[bool, typer.Option(help="Mark all answers as those of a pilot.")] = False,
+    pilot: Annotated[bool, typer.Option(help="Mark all answers as pilot data.")] = False,
     language: Annotated[
-        str, typer.Option(help="Of the participant's screen; the study's first without it.")
+        str,
+        typer.Option(help="Language of the participant's screen; by default the study's first."),
     ] = "",
     override: Annotated[
         str | None,
         typer.Option(
-            help="Reason to go on where a rule is broken, such as a rig of a latency above 40 ms "
-            "or a second day on the same date; it is stored."
+            help="Reason to continue although a rule is broken, such as a rig with a latency "
+            "above 40 ms or a second session on the same date; it is stored."
         ),
     ] = None,
     selftest: Annotated[
-        bool, typer.Option(help="Only time screen, rig and disk against what a session needs.")
+        bool,
+        typer.Option(help="Only check that screen, rig and disk are fast enough for a session."),
     ] = False,
     fullscreen: Annotated[bool, typer.Option(help="Fill the screen.")] = False,
-    screen: Annotated[int, typer.Option(help="Which screen, from 0.")] = 0,
+    screen: Annotated[int, typer.Option(help="Number of the screen, from 0.")] = 0,
 ) -> None:
     """Run one participant's session at the console; the experimenter sits at this terminal.
 
-    The terminal asks for samples by their tray. A session that was aborted or broke off goes on
+    The terminal asks for samples by their tray. A session that was aborted or interrupted continues
     with --resume. A trial in which the rig fails is stored, marked and repeated once at the end of
     its phase.
 
@@ -91,7 +96,7 @@ def session(
         return
     stamp = ", ".join(["pilot"] * pilot + ["simulated rig"] * device.simulated)
     if device.simulated:
-        print("note: the rig is simulated; its data are marked so.")
+        print("note: the rig is simulated; its data are marked as simulated.")
     with open_console(
         plan, language=language, stamp=stamp, fullscreen=fullscreen, screen=screen
     ) as console:
@@ -108,12 +113,12 @@ def session(
         )
     export_session(data, manifest)
     if result.invalid:
-        print(f"note: the rig failed in {result.invalid} trials; the log says how.")
+        print(f"note: the rig failed in {counted(result.invalid, 'trial')}; the log says how.")
     if result.completed:
         print(f"completed: {manifest.parent}")
     else:
         left = f"{result.answered} of {result.planned} trials answered"
-        print(f"ended early ({result.reason}), {left}; go on with --resume: {manifest.parent}")
+        print(f"ended early ({result.reason}), {left}; continue with --resume: {manifest.parent}")
 
 
 def _language_of(data: Path, *, task: str, subject: int, session: int) -> str:
@@ -142,7 +147,7 @@ def rig_of(plan: Study, sets: ModelSets, *, rig: Path | None, override: str | No
     Raises
     ------
     InputError
-        For a rig file that is none, and for a rig that does not do for this study.
+        For an invalid rig file, and for a rig that does not meet the study's requirements.
     """
     from rig.desk.checks import Requirements, check_models
     from rig.desk.desk_rig import DeskRig
@@ -172,8 +177,7 @@ def models_of_study(
 ) -> tuple[ModelSets, dict[str, str]]:
     """The sets of models of a study, and where each came from.
 
-    `models` stands in the place of the study's first set, `simplified` or `scene` in that of its
-    second one.
+    `models` replaces the study's first set, `simplified` or `scene` its second one.
     """
     from experiments.study.models import load_model_sets
     from modeling.scenes.compiled import FILE as SCENE
@@ -195,8 +199,8 @@ def models_of_study(
     sources = {name: str(place) for name, place in places.items()}
     if not any(place.suffix == ".toml" for place in places.values()):
         return load_model_sets(plan, folder, overriding=overriding)[0], sources
-    with share_of("Compiling the scene") as tell:
-        sets, _ = load_model_sets(plan, folder, overriding=overriding, progress=tell)
+    with share_of("Compiling the scene") as advance:
+        sets, _ = load_model_sets(plan, folder, overriding=overriding, progress=advance)
     return sets, sources
 
 
@@ -225,7 +229,7 @@ def tell_timings(
     Raises
     ------
     InputError
-        Where one of them is too slow.
+        If one of them is too slow.
     """
     from rich.console import Console as Paper
     from rich.table import Table
@@ -242,11 +246,11 @@ def tell_timings(
     table = Table("", "", "median", "99th percentile", "limit", "")
     for timing in timings:
         numbers = (timing.median_ms, timing.p99_ms, timing.limit_ms)
-        told = [f"{number:.1f} ms" for number in numbers]
-        table.add_row(timing.name, timing.meaning, *told, "ok" if timing.within else "too slow")
+        cells = [f"{number:.1f} ms" for number in numbers]
+        table.add_row(timing.name, timing.meaning, *cells, "ok" if timing.within else "too slow")
     Paper().print(table)
     if device.simulated:
-        print("note: the rig is simulated; its presentations say nothing of a real one.")
+        print("note: the rig is simulated; its times say nothing about a real rig.")
     if slow := [timing.name for timing in timings if not timing.within]:
         raise InputError(
             f"expected {', '.join(slow)} within the limit, got longer; close other programs, "

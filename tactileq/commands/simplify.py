@@ -1,4 +1,4 @@
-"""tactileq simplify: models without the layers that nobody can feel."""
+"""tactileq simplify: models without the layers below the detection threshold."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.keeping import check_own_files, write_own_files
 from tactileq.many_textures import recording_folders
 from tactileq.options import Criterion, HoldAbove, Margin, ModelFile, ThresholdName
@@ -23,19 +24,25 @@ ENDINGS = (".json", "_simplification.json", "_layers.tsv", "_threshold.png")
 
 def simplify(
     model_file: ModelFile,
-    out: Annotated[Path, typer.Option("--out", help="Folder.")] = Path("simplified"),
+    out: Annotated[Path, typer.Option("--out", help="Folder for the results.")] = Path(
+        "simplified"
+    ),
     threshold: ThresholdName = "codec",
     criterion: Criterion = "energy",
     margin_db: Margin = 0.0,
     hold_above: HoldAbove = True,
     plot: Annotated[
-        bool, typer.Option("--plot", help="Draw spectra, layers and threshold of one condition.")
+        bool, typer.Option("--plot", help="Plot spectra, layers and threshold of one condition.")
     ] = False,
     recordings: Annotated[
-        Path | None, typer.Option(help="With --plot: recordings to draw the model beside.")
+        Path | None, typer.Option(help="With --plot: recordings to plot beside the model.")
     ] = None,
-    speed: Annotated[float | None, typer.Option(help="With --plot: mm/s, else fastest.")] = None,
-    force: Annotated[float | None, typer.Option(help="With --plot: N, else strongest.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="With --plot: speed in mm/s; by default the fastest.")
+    ] = None,
+    force: Annotated[
+        float | None, typer.Option(help="With --plot: force in N; by default the strongest.")
+    ] = None,
 ) -> None:
     """Drop the layers that nobody can feel, with a reason for each.
 
@@ -97,14 +104,17 @@ def simplify(
     tell_verdicts(result)
     if result.identical:
         print(
-            f"note: {full.texture}: the simplified model is identical to the full one: nothing to "
-            "compare, and in a session a control."
+            f"note: {full.texture}: the simplified model is identical to the full one; there is "
+            "nothing to compare, and in a session this texture is a control."
         )
-    print(f"{full.n_layers} layers to {result.model.n_layers}{simulated_note(full)}: {start}.json")
+    print(
+        f"{counted(full.n_layers, 'layer')} reduced to {result.model.n_layers}"
+        f"{simulated_note(full)}: {start}.json"
+    )
 
 
 def tell_verdicts(result: Simplification) -> None:
-    """Print what became of each layer and why, and what the threshold is."""
+    """Print the verdict on each layer with its reason, and the threshold."""
     for verdict in result.layers:
         line = f"layer {verdict.layer}: {verdict.verdict}, {verdict.reason}"
         if not isnan(verdict.distance_db):  # where a threshold is known

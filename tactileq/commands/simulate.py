@@ -36,7 +36,7 @@ def simulate(
 ) -> None:
     """Run the whole study with simulated participants of known truth.
 
-    What stands for the real surfaces are the planted textures of the same names.
+    The planted textures of the same names take the place of the real surfaces.
 
     Example: tactileq simulate --models models --simplified simplified --data data
     """
@@ -49,8 +49,8 @@ def simulate(
     plan = Study.load(study)
     if unknown := [name for name in plan.textures if name not in TEXTURES]:
         raise ValueError(
-            f"expected a study of the planted textures {', '.join(TEXTURES)}, which stand for the "
-            f"real surfaces here, got {', '.join(unknown)}; run people with tactileq session."
+            f"expected a study of the planted textures {', '.join(TEXTURES)}, which take the place "
+            f"of the real surfaces, got {', '.join(unknown)}; test people with tactileq session."
         )
     real = {name: planted_texture(name) for name in plan.textures}
     sets, sources = models_of_study(plan, study, models=models, simplified=simplified, scene=scene)

@@ -1,4 +1,4 @@
-"""tactileq stability: where methods hold and from where on they fail."""
+"""tactileq stability: where methods hold and where they start to fail."""
 
 from __future__ import annotations
 
@@ -25,20 +25,23 @@ if TYPE_CHECKING:
 def stability(
     out: Out = Path("stability"),
     reduced: Annotated[
-        bool, typer.Option("--reduced", help="A column of each case, edges to 1/8 of their axis.")
+        bool,
+        typer.Option(
+            "--reduced", help="One column of each case, edges to within 1/8 of their axis."
+        ),
     ] = False,
     only: Annotated[
         list[str] | None,
-        typer.Option(metavar="FAMILY", help="These cases alone, such as filters; repeatable."),
+        typer.Option(metavar="FAMILY", help="Only these cases, such as filters; repeatable."),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(min=1, help="Processes at once; one per core without it.")
+        int | None, typer.Option(min=1, help="Processes at once; by default one per core.")
     ] = None,
 ) -> None:
-    """Measure where methods hold, degrade and fail, and how far our defaults are from there.
+    """Measure where methods hold, degrade and fail, and how far the defaults are from failure.
 
     Everything is simulated. Writes cells.tsv, edges.tsv, margins.tsv, atlas.png, atlas.svg and
-    atlas.html, which holds all of them.
+    atlas.html, which contains all of them.
 
     Example: tactileq stability --only filters
     """
@@ -87,7 +90,7 @@ def examined(
     jobs : int, optional
         Processes; as many as cores without it.
     advance : callable, optional
-        Told which column is done.
+        Called with the name of each column that is done.
     """
     found: dict[int, Examined] = {}
     columns = columns_of(cases, full=full)
@@ -136,10 +139,10 @@ def _tell(margins: pd.DataFrame) -> None:
     """How far each default is from the nearest edge."""
     for row in margins.to_dict("records"):
         most = "at least " if row["at_least"] else ""
-        near = "" if row["enough"] else f" ({row['exception'] or 'no reason is known'})"
+        near = "" if row["enough"] else f" ({row['exception'] or 'reason unknown'})"
         unit = f" {row['unit']}" if row["unit"] else ""
         print(
             f"{row['family']}: {row['method']}, {row['measured']}: {row['verdict']} at "
             f"{row['default']:.5g}{unit} ({row['axis']}), nearest edge {most}{row['margin']:.3g} × "
-            f"as far{near}"
+            f"more severe{near}"
         )

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.options import Out, VibratorFile
 from tactileq.telling import progress
 
@@ -23,8 +24,10 @@ def stimuli(
         typer.Argument(metavar="SET.toml|MODEL…", help="A recipe, or model files (JSON)."),
     ],
     out: Out = Path("stimuli-set"),
-    speed: Annotated[list[float] | None, typer.Option(help="mm/s; may be repeated. [150]")] = None,
-    force: Annotated[list[float] | None, typer.Option(help="N; may be repeated. [1.5]")] = None,
+    speed: Annotated[
+        list[float] | None, typer.Option(help="Speed, mm/s; repeatable. [150]")
+    ] = None,
+    force: Annotated[list[float] | None, typer.Option(help="Force, N; repeatable. [1.5]")] = None,
     rate_hz: Annotated[
         float | None, typer.Option("--rate", help="Sampling rate in Hz. [48000]")
     ] = None,
@@ -39,17 +42,17 @@ def stimuli(
     """Render a set of stimuli to WAV files, with a manifest and a picture of all spectra.
 
     A recipe (TOML) names models, trajectories (constant speed, or a hand's as CSV), seeds, rates,
-    24-bit or float samples, the level (as modelled, one RMS, or matched in loudness) and the
-    vibrator that plays it, for which it then holds the drive. The set holds its own recipe.toml
-    with copies of the models, from which it can be made again bit for bit.
+    24-bit or float samples, the level (as modelled, a common RMS, or matched in loudness) and the
+    vibrator that plays it, in which case the files contain the drive signal. The set contains its
+    own recipe.toml with copies of the models, from which it can be reproduced bit for bit.
 
-    Start from docs/stimuli.toml. A recipe needs version = 1; a name under [set]; for each model, or
-    folder of them, a path under [[model]], or a scene there (a scene file, or a folder of tactileq
-    scene); for each stroke under [[trajectory]] speed_mm_s and force_n, or a file (CSV: time_s,
+    Start from docs/stimuli.toml. A recipe needs version = 1; a name under [set]; under [[model]], a
+    path for each model or folder of models, or a scene (a scene file, or a folder from tactileq
+    scene); under [[trajectory]], for each stroke speed_mm_s and force_n, or a file (CSV: time_s,
     speed_mm_s, force_n).
 
-    The options are for model files without a recipe; there the manifest's column model holds the
-    folder that each model came from, and samples are g.
+    The options are for model files without a recipe. The manifest's column model then names the
+    folder that each model came from, and samples are in g.
 
     Example: tactileq stimuli set.toml --out stimuli-set
 
@@ -88,8 +91,8 @@ def recipe_from(
     if recipes:
         if len(named) > 1 or any((speeds, forces)) or options != {None}:
             raise ValueError(
-                "expected one recipe and --out, or model files with options, got both; write all "
-                f"that {recipes[0]} lacks into it."
+                "expected one recipe and --out, or model files with options, got both; write the "
+                f"options into {recipes[0]}."
             )
         return Recipe.load(recipes[0])
     models, others = models_among(named)
@@ -110,11 +113,11 @@ def recipe_from(
 def tell_passed_over(others: Sequence[Path]) -> None:
     """Name the JSON files among models that hold something else."""
     for path in others:
-        print(f"note: {path} says that it is no model and is passed over.")
+        print(f"note: {path} states that it is not a model and is skipped.")
 
 
 def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) -> None:
-    """Write a stimulus set with its contact sheet and provenance, and say what it asks beyond."""
+    """Write a stimulus set with its contact sheet and provenance; report what exceeds the grid."""
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import write_provenance
     from stimuli.sets.sources import files_behind
@@ -128,7 +131,7 @@ def render_stimuli(recipe: Recipe, out: Path, *, inputs: Sequence[Path] = ()) ->
     sources, count = render_set(recipe, out, finish=tell_origin)
     tell_passed_over(sources.passed_over)
     tell_beyond_grid(sources)
-    print(f"{count} files: {out / 'manifest.tsv'}")
+    print(f"{counted(count, 'file')}: {out / 'manifest.tsv'}")
 
 
 def render_set(
@@ -164,7 +167,7 @@ def render_set(
 
 
 def tell_beyond_grid(sources: Sources) -> None:
-    """Say where a stimulus asks for more than was recorded."""
+    """Report where a stimulus goes beyond the recorded grid."""
     for labelled in sources.models:
         model = labelled.model
         fastest, strongest = float(model.speeds_mm_s[-1]), float(model.forces_n[-1])
@@ -175,5 +178,5 @@ def tell_beyond_grid(sources: Sources) -> None:
                 print(
                     f"note: {model.texture} ({labelled.label}) was {done} up to {fastest:g} mm/s "
                     f"and {strongest:g} N; {trajectory.name} reaches {speed:g} mm/s and {force:g} "
-                    "N, and what lies beyond is rendered as the nearest edge."
+                    "N, and everything beyond is rendered as the nearest edge of the grid."
                 )

@@ -1,4 +1,4 @@
-"""tactileq study: the study file, from its first line to the page to preregister."""
+"""tactileq study: the study file, its design, the page to preregister, its people."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tactileq.commands.study_withdraw import study_dropout, study_withdraw
 study = typer.Typer(
     no_args_is_help=True,
     rich_markup_mode=None,
-    help="A study with people: its file, its design, the page to preregister.",
+    help="A study with people: its file, design, preregistration and progress.",
 )
 study.command("init")(study_init)
 study.command("check")(study_check)

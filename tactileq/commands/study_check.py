@@ -1,10 +1,11 @@
-"""tactileq study check: is this study as it was meant?"""
+"""tactileq study check: whether this study is as intended."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modeling.errors import counted
 from tactileq.options import StudyArgument
 from tactileq.telling import share_of, tell_models
 
@@ -14,14 +15,15 @@ if TYPE_CHECKING:
 
 
 def study_check(path: StudyArgument) -> None:
-    """Load a study and all its models, and say what is wrong or right with them.
+    """Load a study and all its models, and report errors, design and balance.
 
     Example: tactileq study check study.toml
     """
     plan, sets, _ = loaded(path)
-    print(f"study: {plan.name}, {len(plan.textures)} textures, SHA-256 {plan.sha256[:12]}…")
-    told = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
-    print(f"models: one of each texture in {told}")
+    textures = counted(len(plan.textures), "texture")
+    print(f"study: {plan.name}, {textures}, SHA-256 {plan.sha256[:12]}…")
+    places = ", ".join(f"{name} ({place})" for name, place in plan.models.items())
+    print(f"models: one of each texture in {places}")
     tell_models(sets, plan.textures)
     _tell_sessions(plan)
     _tell_balance(plan)
@@ -43,8 +45,8 @@ def loaded(path: Path) -> tuple[Study, ModelSets, list[Path]]:
     plan = Study.load(path)
     require_texts(plan)
     if any(place.endswith(".toml") for place in plan.models.values()):
-        with share_of("Compiling the scene") as tell:
-            sets, files = load_model_sets(plan, path.parent, progress=tell)
+        with share_of("Compiling the scene") as advance:
+            sets, files = load_model_sets(plan, path.parent, progress=advance)
     else:
         sets, files = load_model_sets(plan, path.parent)
     sets.require(plan)
@@ -55,7 +57,7 @@ def _tell_claims(plan: Study) -> None:
     from experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
-    print(f"claims: {len(claims)}" if claims else "claims: none; whatever is found is exploratory")
+    print(f"claims: {len(claims)}" if claims else "claims: none; all findings are exploratory")
     for claim in claims:
         print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 
@@ -67,15 +69,15 @@ def _tell_sessions(plan: Study) -> None:
         training, main = trials_of_session(plan, task)
         sessions = plan.sessions(task)
         print(
-            f"{task}: {planned.participants} participants, {sessions} "
-            f"session{'s' if sessions > 1 else ''} each, {training} + {main} trials in a session; "
-            f"about {minutes_of_session(plan, task)} min a session (an estimate)"
+            f"{task}: {counted(planned.participants, 'participant')}, "
+            f"{counted(sessions, 'session')} each, {training} training + {main} main trials per "
+            f"session; about {minutes_of_session(plan, task)} min per session (an estimate)"
         )
 
 
 def _tell_balance(plan: Study) -> None:
     from experiments.tasks.balance import balance_of
 
-    print("balance of the orders (least to most of its counts, of how many):")
+    print("balance of the orders (lowest to highest count, of how many trials):")
     for row in (row for task in plan.tasks for row in balance_of(plan, task)):
         print(f"  {row.task:9} {row.what:56} {row.least} to {row.most} of {row.of}")

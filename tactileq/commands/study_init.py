@@ -20,18 +20,18 @@ HIGHEST_SEED = 2**53  # what every reader of numbers holds exactly
 def study_init(
     path: Annotated[Path, typer.Argument(metavar="PATH", help="The study file (TOML) to write.")],
     models: Annotated[
-        Path | None, typer.Option("--models", help="Folder of full models: a study of these.")
+        Path | None, typer.Option("--models", help="Folder of full models to study.")
     ] = None,
     simplified: Annotated[
         Path | None,
         typer.Option(
-            "--simplified", help="Folder of simplified ones; that beside --models without it."
+            "--simplified", help="Folder of simplified models; by default the one beside --models."
         ),
     ] = None,
 ) -> None:
     """Write a commented study file, the paper's design with a freshly drawn seed.
 
-    With --models its textures are those of the folder, and the file passes tactileq study check.
+    With --models, its textures are those in the folder, and the file passes tactileq study check.
 
     Example: tactileq study init study.toml
 
@@ -42,7 +42,7 @@ def study_init(
 
     if os.path.lexists(path):
         raise ValueError(
-            f"expected a new file at {path}, got one that is there already; choose another name."
+            f"expected a new file at {path}, got an existing one; choose another name."
         )
     if path.suffix != ".toml":
         raise ValueError(f"expected a name that ends in .toml, got {path}; rename it.")
@@ -76,7 +76,7 @@ def study_init(
 
 
 def _textures_in(folders: Sequence[Path]) -> list[str]:
-    """The textures of the first folder, which the other one has to have, too."""
+    """The textures of the first folder, which must also be in the other one."""
     from modeling.models.loading import load_any_models
 
     full, simplified = (sorted(load_any_models(folder)) for folder in folders)

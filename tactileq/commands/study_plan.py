@@ -14,11 +14,13 @@ from tactileq.options import StudyArgument
 
 def study_plan(
     path: StudyArgument,
-    out: Annotated[Path, typer.Option("--out", help="The page (Markdown).")] = Path("plan.md"),
+    out: Annotated[Path, typer.Option("--out", help="File for the page (Markdown).")] = Path(
+        "plan.md"
+    ),
 ) -> None:
     """Write the page to preregister: question, design, models, claims, exclusions.
 
-    Its SHA-256 stands in the description of every session.
+    Its SHA-256 is stored in the description of every session.
 
     Example: tactileq study plan study.toml --out plan.md
     """

@@ -1,4 +1,4 @@
-"""tactileq study status: who was here, what was answered, what comes next."""
+"""tactileq study status: who took part, what was answered, what is due next."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from modeling.errors import counted
 from tactileq.options import Data, StudyFile
 
 if TYPE_CHECKING:
@@ -18,8 +19,8 @@ if TYPE_CHECKING:
 def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     """Show each participant's sessions and the next one due; no names of conditions.
 
-    Tables that a killed session left incomplete, or that differ from its log, are made again from
-    it; what was written and what is damaged is told.
+    Tables that a killed session left incomplete, or that differ from its log, are written again
+    from the log. What was written and what is damaged is reported.
 
     Example: tactileq study status --data data
     """
@@ -35,18 +36,18 @@ def study_status(data: Data = Path("data"), study: StudyFile = None) -> None:
     for task in progress.tasks:
         print(f"{task.task}: {task.complete} of {task.planned} planned sessions complete")
     tell_made(made)
-    for told in progress.damaged:
-        print(f"damaged: {told}")
+    for damage in progress.damaged:
+        print(f"damaged: {damage}")
 
 
 def tell_made(made: Exported) -> None:
     """Name each file that held something else, folders with new ones, and what is damaged."""
     for path in made.changed:
-        print(f"changed, as the log says: {path}")
+        print(f"corrected from the log: {path}")
     for folder, count in sorted(Counter(path.parent for path in made.new).items()):
-        print(f"written from the log: {count} new file{'s' * (count > 1)} in {folder}")
-    for told in made.damaged:
-        print(f"damaged: {told}")
+        print(f"written from the log: {counted(count, 'new file')} in {folder}")
+    for damage in made.damaged:
+        print(f"damaged: {damage}")
 
 
 def table_of(progress: StudyProgress) -> Table:

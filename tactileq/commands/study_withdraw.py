@@ -1,4 +1,4 @@
-"""tactileq study withdraw and dropout: people who take their data back, or do not come again."""
+"""tactileq study withdraw and dropout: people who withdraw their data, or drop out."""
 
 from __future__ import annotations
 
@@ -7,39 +7,40 @@ from typing import Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.commands.study_status import tell_made
 from tactileq.options import Data
 
 Subject = Annotated[int, typer.Argument(metavar="SUBJECT", min=1, help="Number of the person.")]
 OfStudy = Annotated[
     Path | None,
-    typer.Option("--study", help="Study file (TOML): refuses the data of another study."),
+    typer.Option("--study", help="Study file (TOML); the data of another study are refused."),
 ]
-Yes = Annotated[bool, typer.Option("--yes", help="Do not ask.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Do not ask for confirmation.")]
 
 
 def study_withdraw(
     subject: Subject, data: Data = Path("data"), study: OfStudy = None, yes: Yes = False
 ) -> None:
-    """Delete all data of a person; the number stays taken, the slot goes to a replacement.
+    """Delete all data of a person; the number is not reused, the slot goes to a replacement.
 
     Example: tactileq study withdraw 7 --data data
     """
     from experiments.sessions.withdrawing import files_of, withdraw
 
     _require(data, study)
-    there = len(files_of(data, subject))
-    _confirm(f"Delete {there} files of subject {subject} in {data}, for good?", yes=yes)
+    files = counted(len(files_of(data, subject)), "file")
+    _confirm(f"Permanently delete {files} of subject {subject} in {data}?", yes=yes)
     made = withdraw(data, subject)
-    print(f"withdrawn: subject {subject}; {there} files deleted, the slot is free")
-    print("Copies elsewhere, such as backups and reports, are yours to delete.")
+    print(f"withdrawn: subject {subject}; {files} deleted, the slot is free")
+    print("Copies elsewhere, such as in backups and reports, you have to delete yourself.")
     tell_made(made)
 
 
 def study_dropout(
     subject: Subject, data: Data = Path("data"), study: OfStudy = None, yes: Yes = False
 ) -> None:
-    """Note that a person will not come again: the data stay, the slot goes to a replacement.
+    """Record that a person dropped out: the data stay, the slot goes to a replacement.
 
     Example: tactileq study dropout 7 --data data
     """
@@ -63,4 +64,4 @@ def _require(data: Path, study: Path | None) -> None:
 
 def _confirm(question: str, *, yes: bool) -> None:
     if not (yes or typer.confirm(question)):
-        raise ValueError("expected y to go on, got no; nothing was changed.")
+        raise ValueError("expected y to continue, got no; nothing was changed.")

@@ -7,23 +7,26 @@ from typing import Annotated
 
 import typer
 
+from modeling.errors import counted
 from tactileq.keeping import note_of_file, write_own_files
 from tactileq.options import Data
 
 
 def threshold(
     data: Data,
-    out: Annotated[Path, typer.Option("--out", help="The table (TSV).")] = Path("threshold.tsv"),
+    out: Annotated[Path, typer.Option("--out", help="File for the table (TSV).")] = Path(
+        "threshold.tsv"
+    ),
     subject: Annotated[
-        int | None, typer.Option(min=1, help="One participant; the mean of all without it.")
+        int | None, typer.Option(min=1, help="One participant; by default the mean of all.")
     ] = None,
 ) -> None:
-    """Find detection thresholds in the answers to tactileq session --task threshold.
+    """Estimate detection thresholds from the answers to tactileq session --task threshold.
 
-    The table has the amplitude (peak, g) at which 75 % of the answers are right, lapses left out,
-    with a 95 % interval: of one participant, or of the mean (in dB) over all. Where a threshold
-    lies above the highest amplitude that the rig may present, it says so, and that amplitude
-    stands there.
+    The table gives the amplitude (peak, g) at which 75 % of the answers are correct, lapses
+    excluded, with a 95 % interval: for one participant, or for the mean (in dB) over all. Where a
+    threshold is above the highest amplitude that the rig may present, the table gives that
+    amplitude and says so.
 
     Example: tactileq threshold --data data --subject 1 --out mine.tsv, then tactileq simplify
     models/canvas.json --threshold mine.tsv
@@ -57,10 +60,10 @@ def threshold(
     write_own_files({out: text.encode()}, note, provenance)
     for one in means:
         within = "" if one.interval_db is None else "{:+.1f} to {:+.1f}, ".format(*one.interval_db)
-        told = f" ({one.note})" if one.note else ""
+        note_on = f" ({one.note})" if one.note else ""
         print(
-            f"{one.frequency_hz:g} Hz: {one.level_db:+.1f} dB re 1 g ({within}{one.trials} "
-            f"trials){told}"
+            f"{one.frequency_hz:g} Hz: {one.level_db:+.1f} dB re 1 g "
+            f"({within}{counted(one.trials, 'trial')}){note_on}"
         )
     simulated = " (simulated)" if answered.simulated else ""
-    print(f"threshold of {people} {'person' if people == 1 else 'people'}{simulated}: {out}")
+    print(f"threshold of {counted(people, 'person', 'people')}{simulated}: {out}")

@@ -14,22 +14,26 @@ if TYPE_CHECKING:
 
 
 def vibrator(
-    test: Annotated[Path, typer.Argument(metavar="TEST", help="WAV: drive, acceleration.")],
-    out: Annotated[Path, typer.Option("--out", help="File of what is found.")] = Path(
+    test: Annotated[
+        Path,
+        typer.Argument(metavar="TEST", help="WAV file with two channels: drive, acceleration."),
+    ],
+    out: Annotated[Path, typer.Option("--out", help="File for the result (JSON).")] = Path(
         "vibrator.json"
     ),
     plot: Annotated[
-        Path | None, typer.Option("--plot", help="PNG: response before and after, coherence.")
+        Path | None,
+        typer.Option("--plot", help="PNG file: response before and after compensation, coherence."),
     ] = None,
     simulated: Annotated[
-        bool, typer.Option("--simulated", help="The test was simulated: say so wherever it goes.")
+        bool, typer.Option("--simulated", help="Mark the result as simulated.")
     ] = False,
 ) -> None:
     """Identify a vibrator from a white-noise test, to compensate its resonance.
 
-    TEST has two channels recorded at once, the drive and the acceleration, for 8.25 s at least. A
-    poor coherence of the two is refused. What is found goes into a recipe (vibrator under [set]) or
-    to --vibrator of tactileq stimuli, export wav and export c.
+    TEST has two channels recorded simultaneously, the drive and the acceleration, for at least
+    8.25 s. A test in which their coherence is poor is refused. Use the result in a recipe (vibrator
+    under [set]) or as --vibrator of tactileq stimuli, export wav and export c.
 
     Example: tactileq vibrator white-noise.wav --out vibrator.json --plot vibrator.png
     """
@@ -84,7 +88,7 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
 
 
 def _found(shown: CompensatedVibrator) -> str:
-    """One line on a vibrator's resonance, the test's coherence and what compensation gains."""
+    """One line on a vibrator's resonance, the test's coherence and the effect of compensation."""
     vibrator, before, after = shown.vibrator, shown.flat_before_hz, shown.flat_after_hz
     note = "simulated " if vibrator.simulated else ""
     return (

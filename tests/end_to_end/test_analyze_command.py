@@ -167,7 +167,7 @@ def test_tables_that_differ_from_their_log_are_named_and_only_status_changes_the
     assert "tactileq study status --data data" in refused.stderr
     assert contents(data) == before
     status = main("study", "status", "--data", "data")
-    assert f"changed, as the log says: data/{name}\n" in status.stdout
+    assert f"corrected from the log: data/{name}\n" in status.stdout
     assert "written from the log: 1 new file in data/sub-03/ses-01/beh\n" in status.stdout
     assert contents(data).keys() - before.keys() == {physio}
     assert read_answers({"": data}, ()).absolute.equals(good.absolute)

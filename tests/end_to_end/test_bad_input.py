@@ -74,7 +74,7 @@ def test_a_damaged_recording_is_named_and_left_out(main, tmp_path: Path, name: s
     (warning,) = [line for line in done.stderr.splitlines() if "left out" in line]
     assert warning.startswith("warning: oak: left out: ")
     assert sentence in warning
-    assert "oak: interpolated for want of a recording: " in done.stdout
+    assert "oak: interpolated, because there is no recording: " in done.stdout
     model = json.loads((tmp_path / "models/oak.json").read_text())
     assert np.sum(model["interpolated"]) == 1
     provenance = json.loads((tmp_path / "models/oak_provenance.json").read_text())
@@ -87,7 +87,7 @@ def test_a_silent_recording_is_named_and_left_out(main, tmp_path: Path, silence:
     done = main("model", "set", "--out", "models")
     assert done.returncode == 0, done.stderr
     assert "left out" in done.stderr
-    assert "oak: interpolated for want of a recording: 50 mm/s at 2 N" in done.stdout
+    assert "oak: interpolated, because there is no recording: 50 mm/s at 2 N" in done.stdout
 
 
 def test_recordings_that_are_all_damaged_are_refused(main, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def test_bench_render_prints_and_writes_its_tables(main, tmp_path: Path) -> None
     aims = pd.read_csv(out / "aims.tsv", sep="\t")
     assert list(aims.columns) == ["what", "where", "aim", "measured", "met"]
     told = done.stdout
-    assert f"{aims['met'].sum()} of {len(aims)} aims met" in told
+    assert f"{aims['met'].sum()} of {len(aims)} targets met" in told
     assert told.count("not met") == (~aims["met"]).sum()
     assert "sosfilt" in told
     assert "direct form" in told

@@ -33,7 +33,7 @@ def test_a_signal_ends_a_command_with_one_sentence(
     monkeypatch.setattr(app, "app", interrupted)
     done = main("demo")
     assert done.returncode == code
-    assert done.stderr == f"interrupted by {number.name}; nothing is left half written.\n"
+    assert done.stderr == f"interrupted by {number.name}; no file was left half written.\n"
     assert cleaned == [number]
     assert signal.getsignal(number) is handler
 

@@ -27,7 +27,7 @@ def test_a_set_keeps_wav_files_and_tells_of_its_imports_side_by_side(main, tmp_p
         added = main("import", "wav", "a.wav", *options, *labels)
         assert added.returncode == 0, added.stderr
         sizes.append((tmp_path / "set/provenance.json").stat().st_size)
-    assert added.stdout.splitlines()[-1] == "1 recordings added at 10000 Hz, 5 in set"
+    assert added.stdout.splitlines()[-1] == "1 recording added at 10000 Hz, 5 in set"
     records = RecordingSet.load(tmp_path / "set").recordings
     assert len(records) == 5
     assert all(np.array_equal(record.samples, 4 * NOISE[:, 1].astype(float)) for record in records)
@@ -124,7 +124,7 @@ def test_what_cannot_be_meant_is_refused_and_taken_where_it_is(main, tmp_path: P
     refused = main(*words, "--g-per-fullscale", 4)
     assert refused.returncode == 1
     assert "got 1.5 mm/s and 160 N, or 160 mm/s and 1.5 N with the columns" in refused.stderr
-    assert "--yes where it is meant" in refused.stderr
+    assert "--yes if it is intended" in refused.stderr
     assert refused.stderr.endswith(" (1 more like it).\n")
     assert not (tmp_path / "set").exists()
     taken = main(*words, "--g-per-fullscale", 4, "--yes")

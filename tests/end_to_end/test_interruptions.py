@@ -209,7 +209,7 @@ def test_interrupted_commands_lose_nothing_and_leave_nothing(place: Path, name: 
         code, told = interrupt(words, place, number=number, after_s=share * takes_s)
         assert code in (0, -number, 128 + number), told
         if number == signal.SIGTERM:
-            sentence = "interrupted by SIGTERM; nothing is left half written."
+            sentence = "interrupted by SIGTERM; no file was left half written."
             # Else it came before the program could take it, or after all was done.
             assert code <= 0 or sentence in told.splitlines(), told
             assert not hidden(place)

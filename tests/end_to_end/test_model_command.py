@@ -264,7 +264,7 @@ def test_hum_is_taken_out_with_a_warning_and_kept_on_request(main, tmp_path: Pat
     assert done.returncode == 0, done.stderr
     [warning] = done.stderr.splitlines()
     assert warning.startswith("warning: ")
-    assert "and 3 more: hum of the mains at 60 Hz taken out." in warning
+    assert "and 3 more: mains hum at 60 Hz removed." in warning
     kept = main("model", "set", "--keep-hum", "--out", "kept")
     assert "pure tone of 0.35" in kept.stderr
     without, with_it = (

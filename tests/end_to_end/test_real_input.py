@@ -66,7 +66,7 @@ def test_ten_files_at_one_force_give_models_of_that_force(main, tmp_path: Path) 
     fitted = main("model", "set", "--out", "models")
     assert fitted.returncode == 0, fitted.stderr
     for name in ("cloth A", "cloth B"):
-        told = f"note: {name}: recorded at 1 N alone; nothing is known of other forces."
+        told = f"note: {name}: recorded at 1 N only; the model says nothing about other forces."
         assert told in fitted.stdout
     names = ("cloth-A", "cloth-B")
     tables = [
@@ -151,10 +151,10 @@ def test_three_axis_csv_at_1_khz_says_which_band_is_lost(main, tmp_path: Path) -
             labels = ["--speed", speed, "--force", force, "--texture", "felt", "--out", "set"]
             added = main("import", "csv", name, *labels, "--axis", "dft321")
             assert added.returncode == 0, added.stderr
-    assert "1 recordings added at 1000 Hz, 4 in set" in added.stdout
+    assert "1 recording added at 1000 Hz, 4 in set" in added.stdout
     fitted = main("model", "set")
     assert fitted.returncode == 0, fitted.stderr
-    assert "the band from 500 to 2500 Hz is lost" in fitted.stdout
+    assert "the band from 500 to 2500 Hz is missing" in fitted.stdout
     model = TextureModel.load(tmp_path / "models/felt.json")
     assert model.rate_hz == 1000.0
     assert model.n_layers >= 1

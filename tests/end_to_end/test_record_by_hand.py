@@ -92,8 +92,8 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
         player.kill()
         player.communicate(timeout=30)
     assert second.returncode == 130
-    assert "1 of 2 conditions of oak recorded in oak, 1 of them now (simulated)\n" in told
-    assert "missing: 300 mm/s at 1.5 N; run it again to go on" in told
+    assert "1 of 2 conditions of oak recorded in oak, 1 of them in this run (simulated)\n" in told
+    assert "missing: 300 mm/s at 1.5 N; run the command again to continue" in told
     assert "interrupted by SIGINT" in warned
     after = pieces_in(oak)
     assert after[: len(before)] == before
@@ -116,7 +116,7 @@ def test_a_recording_that_is_killed_goes_on_and_is_a_recording_set(
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ([], "expected what measures the hand, got neither --rig nor --hand"),
+        ([], "expected a device that measures the hand, got neither --rig nor --hand"),
         (["--hand", "scripted"], "expected the acceleration of a full-scale sample of the input"),
         (["--hand", "pen"], "expected the kind of hand to be"),
         (["--hand", "scripted", *INPUT, "--grid", "none.toml"], "expected a grid (TOML) at none"),
@@ -174,9 +174,7 @@ def test_the_accelerometer_of_a_rig_file_gives_way_to_options(tmp_path: Path, ca
     given = InputOptions("other", 1, 48000.0, 8.0)
     assert input_from(rig, given) == InputSettings(8.0, "other", 1, 48000.0)
     tell_assumed(rig)
-    assert (
-        "note: 50 g per full scale of the input is assumed (data sheet)" in capsys.readouterr().out
-    )
+    assert "50 g per full scale is assumed (data sheet)" in capsys.readouterr().out
 
 
 def test_a_rig_without_an_accelerometer_needs_g_per_full_scale(main, tmp_path: Path) -> None:

@@ -114,7 +114,7 @@ def test_latency_is_measured_from_hand_to_vibration(rig: Path) -> None:
         assert latency is not None
         assert DELAYED_MS < latency.median_ms.value <= latency.p95_ms.value
         assert "simulated; accepted: a server without a card" in latency.p95_ms.source
-        assert "hand to vibration, all of it" in done.stdout
+        assert "hand to vibration, in total" in done.stdout
 
 
 def test_without_an_accelerometer_nothing_is_calibrated(tmp_path: Path) -> None:

@@ -95,5 +95,5 @@ class HaltedSound:
 
 
 def test_a_monitor_that_stood_still_ends_with_the_sentence() -> None:
-    with pytest.raises(InputError, match="look after what plays"):
-        _play_on(HaltedSound(), None, ["the tablet is gone.", "expected … look after what plays …"])  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="poll the rig"):
+        _play_on(HaltedSound(), None, ["the tablet is gone.", "expected … poll the rig …"])  # type: ignore[arg-type]

@@ -20,6 +20,7 @@ from experiments.sessions.manifest import SessionManifest
 from experiments.study.models import ModelSets
 from experiments.study.study import Study
 from modeling import Scene, TextureModel, Threshold, compile_scene
+from modeling.errors import counted
 from modeling.models.loading import load_models
 from modeling.scenes.compiled import load_compiled
 from stimuli.planted.textures import planted_texture
@@ -61,7 +62,7 @@ def test_a_scene_becomes_a_folder_of_least_models(main, place: Path) -> None:
     assert table.loc["MDF", "operations_after"] < table.loc["MDF", "operations_before"]
     assert "full model" in set(pd.read_csv(place / "small/steps.tsv", sep="\t").step)
     told = made.stdout
-    assert f"MDF (simulated): {full.n_layers} → {least.n_layers} layers" in told
+    assert f"MDF (simulated): {full.n_layers} → {counted(least.n_layers, 'layer')}" in told
     assert "the bound is kept in 60 of 60 windows of 1 s" in told
     assert told.endswith("operations per sample: small/before_after.tsv\n")
     # A later run replaces it, with the same bytes: no time of this machine is in them.
@@ -124,7 +125,7 @@ def test_there_is_no_header_of_models_of_different_rates(main, place: Path) -> N
     (place / "light.toml").write_text(SCENE.replace('["MDF"]', '["MDF", "PVC"]'))
     made = main("scene", "light.toml")
     assert made.returncode == 0, made.stderr
-    assert "note: no header in C: models of different rates need a rate_hz" in made.stdout
+    assert "note: no C header: models of different rates need a rate_hz" in made.stdout
     assert not list((place / "scene").glob("*.h"))
     (place / "light.toml").write_text(
         SCENE.replace('["MDF"]', '["MDF", "PVC"]') + "actuator.rate_hz = 8000\n"

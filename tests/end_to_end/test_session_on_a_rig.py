@@ -191,7 +191,7 @@ def check_log(events: Any, failed: set[int]) -> None:
         if event["event"] == "fault":
             of[event["trial"]] = of.get(event["trial"], "") + event["told"]
     assert set(of) == failed
-    assert "look after what plays" in of[1]
+    assert "poll the rig" in of[1]
     assert "sound process" in of[2]
     assert "unplugged" in of[3]
     assert "ended by SIGKILL" in of[4]

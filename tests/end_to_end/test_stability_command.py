@@ -36,7 +36,7 @@ def test_stability_prints_and_writes_the_atlas(run, main, tmp_path: Path) -> Non
     assert (margins["margin"] >= 2).all()
     lines = done.stdout.strip().splitlines()
     assert lines[-1] == "simulated: atlas/atlas.html"
-    assert sum("PEQ, logarithmic" in line and "× as far" in line for line in lines) == 1
+    assert sum("PEQ, logarithmic" in line and "× more severe" in line for line in lines) == 1
     assert (out / "atlas.png").read_bytes().startswith(b"\x89PNG")
     assert "SIMULATED" in (out / "atlas.html").read_text(encoding="utf-8")
     provenance = json.loads((out / "provenance.json").read_text())

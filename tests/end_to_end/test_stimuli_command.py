@@ -101,7 +101,7 @@ def test_other_files_among_the_models_are_named_and_passed_over(
     made = main("export", "json", "study/models/PVC.json", "--out", "study/models/x.json")
     assert made.returncode == 0, made.stderr
     (study / "set.toml").write_text(RECIPE.replace("[5000, 44100]", "5000"))
-    note = "note: study/models/x.json says that it is no model and is passed over.\n"
+    note = "note: study/models/x.json states that it is not a model and is skipped.\n"
     every = [path.relative_to(tmp_path) for path in sorted((study / "models").glob("*.json"))]
     for named in (["study/set.toml"], every):
         made = main("stimuli", *named, "--out", "set")
@@ -114,14 +114,19 @@ def test_other_files_among_the_models_are_named_and_passed_over(
 
 
 REFUSED = {
-    ("stimuli", "study/set.toml", "--rate", "8000"): "got both; write all that study/set.toml",
+    (
+        "stimuli",
+        "study/set.toml",
+        "--rate",
+        "8000",
+    ): "got both; write the options into study/set.toml",
     ("stimuli", "study/set.toml", "study/set.toml"): "expected one recipe and --out",
     (
         "stimuli",
         "study/set.toml",
         "--vibrator",
         "v.json",
-    ): "got both; write all that study/set.toml",
+    ): "got both; write the options into study/set.toml",
     (
         "stimuli",
         "study/set.toml",
@@ -133,7 +138,7 @@ REFUSED = {
         "study/set.toml",
         "--out",
         "dangling",
-    ): "link dangling, which leads nowhere",
+    ): "link dangling, which points to nothing",
     ("stimuli", "study/none.toml"): "expected a recipe at study/none.toml",
     (
         "stimuli",

@@ -48,8 +48,7 @@ def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(
     refused = main("study", "init", "a.toml")
     assert refused.returncode == 1
     assert refused.stderr == (
-        "error: expected a new file at a.toml, got one that is there already; choose another "
-        "name.\n"
+        "error: expected a new file at a.toml, got an existing one; choose another name.\n"
     )
     assert Study.load(tmp_path / "a.toml") == first
 
@@ -98,13 +97,14 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
     assert done.returncode == 0, done.stderr
     for told in (
         "full and simplified are identical for MDF",
-        "absolute: 20 participants, 1 session each, 2 + 16 trials in a session; about 20 min",
-        "relative: 24 participants, 2 sessions each, 2 + 21 trials",
+        "absolute: 20 participants, 1 session each, 2 training + 16 main trials per "
+        "session; about 20 min",
+        "relative: 24 participants, 2 sessions each, 2 training + 21 main trials",
         "(an estimate)",
         "10 to 10 of 20",
         "12 to 12 of 24",
         "claims: 3",
-        "as well: No equality unless full models are recognised above chance",
+        "equally well: No equality unless full models are recognised above chance",
         "magnitude feels the same: No equality unless the anchors are rated lower",
     ):
         assert told in done.stdout

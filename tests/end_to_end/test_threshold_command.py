@@ -33,7 +33,7 @@ def test_its_table_goes_into_simplify(main, tmp_path: Path, data: Path) -> None:
     planted_texture("polyester").save(tmp_path / "polyester.json")
     simplified = main("simplify", "polyester.json", "--threshold", "mine.tsv", "--out", "fewer")
     assert simplified.returncode == 0, simplified.stderr
-    assert "threshold: mine (felt with a pen held still" in simplified.stdout
+    assert "threshold: mine (measured with a pen held still" in simplified.stdout
     saved = Simplification.load(tmp_path / "fewer/polyester_simplification.json")
     assert saved.threshold.sha256 == found.sha256
     note = json.loads((tmp_path / "mine.tsv_provenance.json").read_text())

@@ -79,7 +79,7 @@ def test_what_is_found_goes_into_stimuli_and_exports(main, tmp_path: Path, recor
     where = ("--speed", 150, "--force", 1.5, "--rate", 22050, "--out", "x.wav")
     done = main("export", "wav", "canvas.json", "--vibrator", "pen.json", *where)
     assert done.returncode == 0, done.stderr
-    assert "as drive for the vibrator: x.wav" in done.stdout
+    assert "as drive signal for the vibrator: x.wav" in done.stdout
     assert (tmp_path / "x.wav").read_bytes() == (tmp_path / "set" / row["file"]).read_bytes()
     limits = ("--peak", 0.5, "--rms", 0.2, "--duration", 60)
     done = main("export", "c", "canvas.json", "--vibrator", "pen.json", *limits)

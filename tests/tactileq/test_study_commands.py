@@ -71,7 +71,7 @@ def test_nothing_happens_without_a_yes(app, data, command):
 @pytest.mark.parametrize(
     ("command", "left", "told"),
     [
-        ("withdraw", "withdrawn", "1 files deleted, the slot is free"),
+        ("withdraw", "withdrawn", "1 file deleted, the slot is free"),
         ("dropout", "dropped", "the data stay, the slot is free"),
     ],
 )

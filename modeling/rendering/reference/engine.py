@@ -1,4 +1,4 @@
-"""Rendering in Python: what `kernel.h` does, where there is no compiler; and of all-pole models.
+"""Rendering in Python, as `kernel.h` does, without a compiler; and of all-pole models.
 
 The filters pass white noise through orthogonal steps, so that their states keep unit variance (or
 lose some) at every sample, whatever the parameters do from one update to the next. Plain Python

@@ -21,7 +21,7 @@ class Limiter:
         self.touched = [0, 0, 0]
 
     def limit(self, signal: list[float]) -> list[float]:
-        """The next samples, no louder than the limits allow."""
+        """The next samples, within the limits."""
         if self._longest:
             signal = [self._within_duration(y) for y in signal]
         if np.isfinite(self._limits.peak):

@@ -701,7 +701,7 @@ def test_a_folder_that_is_none_is_refused(study_folder, inside, facts):
     ("text", "expected"),
     [
         ("{", "expected JSON"),
-        ("[]", "a value that is no object"),
+        ("[]", "a value that is not an object"),
         (json.dumps({"Name": "x"}), '"Simulated": true or false'),
         (json.dumps({"Simulated": "no"}), '"Simulated": true or false'),
         (None, "dataset_description.json, which is not there"),

@@ -218,7 +218,7 @@ def test_a_session_by_keys_alone(seated: Seated) -> None:
         person.say("ready")
 
         person.wait_for_page("rate")
-        assert begins_with_its_page(person, "virtual", "How alike are the two surfaces?")
+        assert begins_with_its_page(person, "virtual", "How similar are the two surfaces?")
         person.keys("Tab", "Return")
         assert person.wait_for("presented") == "real"
         person.keys("v")
@@ -341,7 +341,7 @@ def test_a_screen_that_is_not_there_is_refused(consoles: Driven) -> None:
         too_high, too_low, there = session.wait_for("result")
     for refusal, number in ((too_high, 2), (too_low, -1)):
         assert refusal == (
-            f"expected the number of a screen (0 to 1, of 2), got {number}; choose one that is "
-            "there, or connect another."
+            f"expected the number of a screen (0 to 1, of 2), got {number}; choose an existing "
+            "one, or connect another."
         )
     assert there == "open"

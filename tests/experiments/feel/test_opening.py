@@ -91,7 +91,7 @@ def test_a_rig_file_plays_and_tells_its_level_its_limits_and_its_faults(
         wait_until(lambda: felt.output().rms_g > 0.01)  # another process plays on
         time.sleep(HEARTBEAT_S + 0.3)
         (told,) = wait_until(felt.take_faults)
-        assert "look after what plays" in told
+        assert "poll the rig" in told
         assert felt.halted
         wait_until(lambda: felt.output().rms_g == 0)
         felt.present_model(planted_texture("canvas"))

@@ -52,6 +52,6 @@ def test_what_cannot_be_felt_is_refused_in_one_sentence(tmp_path: Path) -> None:
     assert "expected one model of each texture, got two of 'canvas'" in refusal("a.json", "a.json")
     told = refusal("a.json", simplified=fewer)
     assert told.startswith("expected a simplified model of canvas in ")
-    assert told.endswith("got PVC; simplify the models that are to be felt.")
+    assert told.endswith("got PVC; simplify these models, too.")
     with refused(InputError, names="canvas", got=[5000, "8000 Hz"]):
         Texture(full=canvas, simplified=canvas.at_rate(8000.0))

@@ -63,7 +63,7 @@ def test_what_an_fsync_refused_does_not_count_and_nothing_before_it_is_lost(
         writer.put_safely({"value": 3})
     sentence = (
         f"expected to write to {path}, got {SENTENCES[number]}; what was answered before is safe: "
-        "make room, then go on with --resume."
+        "free disk space, then continue with --resume."
     )
     assert str(refused.value) == sentence
     assert numbers_in(path) == [1, 2]

@@ -119,7 +119,7 @@ def test_a_changed_file_is_followed(tmp_path: Path) -> None:
 
 def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
     text = SHIPPED_STUDY.read_text(encoding="utf-8")
-    asked = "# [oddity]                # three", "[oddity] # three"
+    asked = "# [oddity]                # which of three", "[oddity] # which of three"
     text = text.replace("repeats = 3\n", "").replace(*asked)
     text = text.replace(
         '# participants = 24\n# schedule = "inter', 'participants = 24\nschedule = "inter'
@@ -187,7 +187,7 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ("longest_gap_min = 30 ", "longest_gap_min = -1 ", "for longest_gap_min, got -1"),
         ("# [consent]\n# version", "[consent]\nwording", "got wording"),
         ("# [consent]\n# version = ", "[consent]\nversion = 3 #", "text for version in"),
-        ('name = "sex"', 'name = "Sex"', "a name of small letters"),
+        ('name = "sex"', 'name = "Sex"', "a name of lower-case letters"),
         ('name = "sex"', 'name = "code"', "another name than"),
         ('name = "sex"', 'name = "age"', "different questions"),
         ('name = "sex"', 'name = "mood"', "expected the question mood in en, ja"),

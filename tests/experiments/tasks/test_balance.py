@@ -52,7 +52,7 @@ def test_a_layout_that_does_not_tell_what_is_right_is_not_counted(
 
     monkeypatch.setattr("experiments.tasks.balance.plan_session", with_words)
     assert balance_of(study, "relative") == [
-        row for row in counted if not row.what.endswith("a button is right")
+        row for row in counted if not row.what.endswith("a button is correct")
     ]
     assert len(counted) > len(balance_of(study, "relative"))
 
@@ -182,7 +182,7 @@ def test_the_page_says_all_that_is_fixed(planned: Study, models: ModelSets) -> N
         "1 to 5 (until strokes stay inside the grid) for practice",
         "real canvas beside the full model of PVC",
         "A break after every 4 trials",
-        "each on a day of its own (2 sessions)",
+        "each on a separate day (2 sessions)",
         "No equality unless the anchors are rated lower",
     ):
         assert told in page
@@ -210,7 +210,7 @@ def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: Mode
     page = plan_page(secret, ModelSets(sets={**models.sets, "simplified": same}))
     assert "7422788540163745" not in page
     assert "The models of MDF in full, simplified are equal: a control" in page
-    assert "None: whatever is found is exploratory." in page
+    assert "None: all findings are exploratory." in page
 
 
 def test_what_is_not_planned_has_no_balance(study: Study) -> None:

@@ -32,7 +32,7 @@ def test_text_is_read_without_its_mark_and_with_one_kind_of_line_end(tmp_path: P
         ("a.txt/b", "nothing there"),
         ("", "a folder"),
         ("pipe", "a pipe, a socket or a device"),
-        ("loop", "a link that leads back to itself"),
+        ("loop", "a link that points back to itself"),
         ("x" * 5000, "a name that is too long"),
         ("a\0b", "a name that no file can have"),
     ],

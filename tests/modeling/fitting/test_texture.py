@@ -418,7 +418,7 @@ def test_hum_is_taken_out_told_of_and_kept_on_request(make_model: ModelMaker) ->
     humming = RecordingSet([with_hum(r) for r in clean])
     measured = recording_spectra(humming)
     notes = [spectrum.notes for _, spectrum in measured]
-    assert notes == [("hum of the mains at 50, 150 Hz taken out",)] * 4
+    assert notes == [("mains hum at 50, 150 Hz removed",)] * 4
     kept = recording_spectra(humming, keep_hum=True)
     for recording, spectrum in kept:
         rms = np.std(recording.samples) / np.sqrt(1 + 9 + 1) * np.array([3, 1])
@@ -505,7 +505,7 @@ def test_hum_of_a_drifting_record_is_taken_out(make_model: ModelMaker) -> None:
         for added in (0.0, hum)
     )
     for (_, without), (_, mended) in zip(clean, hummed, strict=True):
-        assert "hum of the mains at 50 Hz taken out" in mended.notes
+        assert "mains hum at 50 Hz removed" in mended.notes
         assert any("drift" in note for note in mended.notes)
         near = (np.abs(mended.frequency_hz - 50) < 10) & (mended.share > 0)
         left, noise = (np.sum(s.magnitude[near] ** 2) for s in (mended, without))

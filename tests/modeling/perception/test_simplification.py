@@ -387,7 +387,7 @@ def test_flip_probability_agrees_with_monte_carlo(make_model: ModelMaker) -> Non
     result = run(model)
     assert [x.flip_probability for x in result.layers] == pytest.approx(expected, abs=0.004)
     assert verdicts(result) == ["kept", "kept", "dropped", "kept"]
-    assert "too short to be sure" in result.layers[1].reason
+    assert "too short to be certain" in result.layers[1].reason
 
 
 @pytest.mark.parametrize(("level_db", "verdict"), [(-2.2, "kept"), (-2.27, "dropped")])

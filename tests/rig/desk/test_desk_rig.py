@@ -235,7 +235,7 @@ def test_a_session_that_hangs_is_a_fault_and_the_next_presentation_plays(
         rig.read()
         rig.silence()
         (told,) = failures(rig.take_faults())
-        assert "look after what plays" in told
+        assert "poll the rig" in told
         # What plays next is looked after by who waits for its end, however long it is.
         burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.5, duration_s=HEARTBEAT_S + 0.3)
         rig.present_signal(burst)

@@ -142,7 +142,7 @@ def test_refused_layouts(
     ("text", "expected", "got"),
     [
         ("", "header", "0 lines"),
-        ("time,x\n", "header", "1 lines"),
+        ("time,x\n", "header", "1 line"),
         ("time,x\n0,1\n0.1,2\n0.2", "row", "'0.2'"),
         ("time,x\n0,1\n0.1,2\n0.2,", "row", "'0.2,'"),
         ("time,x\n0,1\n0.1,2\n0.2,-", "row", "'0.2,-'"),

@@ -47,12 +47,12 @@ def test_what_real_surfaces_have_raises_no_doubt(
 @pytest.mark.parametrize(
     ("speed_mm_s", "force_n", "reading"),
     [
-        (1.5, 160.0, "or 160 mm/s and 1.5 N with the columns exchanged"),
-        (0.1, 400.0, "or 400 mm/s and 0.1 N with the columns exchanged"),
+        (1.5, 160.0, "or 160 mm/s and 1.5 N with the columns swapped"),
+        (0.1, 400.0, "or 400 mm/s and 0.1 N with the columns swapped"),
         (0.5, 1.5, "or 500 mm/s and 1.5 N with the speed in m/s"),
         (160.0, 1500.0, "or 160 mm/s and 1.5 N with the force in mN"),
         (0.1, 9000.0, "or 100 mm/s and 9 N with m/s and mN"),
-        (0.0, 160.0, "or 160 mm/s and 0 N with the columns exchanged"),
+        (0.0, 160.0, "or 160 mm/s and 0 N with the columns swapped"),
         (9e4, 9e3, "9000 N; correct them"),
     ],
 )

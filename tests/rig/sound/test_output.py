@@ -583,7 +583,7 @@ def test_a_session_that_is_stopped_or_hangs_leaves_silence_until_it_presents_aga
     check_halted(parent.blocks_until_silent(before), by_s=stopped_s)
     before = parent.live.blocks_written
     parent.process.send_signal(signal.SIGCONT)
-    assert "look after what plays" in parent.hears()
+    assert "poll the rig" in parent.hears()
     rows = wait_for_blocks(parent.live, before, 20)
     assert not rows["peak_g"].any()  # nothing resumes by itself
     parent.tell("play")
