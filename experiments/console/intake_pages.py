@@ -55,9 +55,10 @@ def welcome(runner: PageRunner, intake: Intake) -> dict[str, str | int]:
 
 
 def message(runner: PageRunner, page: str, *, values: dict[str, object]) -> None:
-    """A title, a text, and a button to continue."""
+    """A title, a text, and a button to continue; the last page is ended by it, and by Escape."""
     of = runner.texts.of
-    label = runner.texts.by_key.get(f"{page}.continue")
+    last = page.endswith(".closing")
+    label = of("button.finish") if last else runner.texts.by_key.get(f"{page}.continue")
     proceed = runner.proceed(label, y=-0.24)
     runner.show(
         page,
@@ -67,11 +68,12 @@ def message(runner: PageRunner, page: str, *, values: dict[str, object]) -> None
             runner.body(of(f"{page}.text", **values), y=0.03),
         ],
         focus=proceed,
+        stoppable=not last,
     )
 
 
 def _ask(runner: PageRunner, page: str, *, yes: str, no: str, values: dict[str, object]) -> bool:
-    """A text with two answers, neither of which has the focus at first."""
+    """A text with two answers, neither of which has the focus or stands out at first."""
     said: list[bool] = []
 
     def say(agreed: bool) -> None:
@@ -79,14 +81,15 @@ def _ask(runner: PageRunner, page: str, *, yes: str, no: str, values: dict[str, 
         runner.finish()
 
     agree = runner.button("yes", yes, at=(-0.2, -0.24), action=lambda: say(True))
-    refuse = runner.button("no", no, at=(0.2, -0.24), action=lambda: say(False), color=GREY)
-    refuse.lit = False
+    refuse = runner.button("no", no, at=(0.2, -0.24), action=lambda: say(False))
+    agree.lit = refuse.lit = False
     runner.show(
         page,
         widgets=[agree, refuse],
         decoration=[
             runner.title(runner.texts.of(f"{page}.title", **values), y=0.24),
             runner.body(runner.texts.of(f"{page}.text", **values), y=0.03),
+            *runner.foot(runner.texts.of("keys")),
         ],
     )
     return said[-1]

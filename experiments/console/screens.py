@@ -23,7 +23,7 @@ def open_window(*, size: tuple[int, int], fullscreen: bool, screen: int) -> Any:
         check_screen(screen)
         logging.console.setLevel(logging.ERROR)  # no monitor calibration is needed: not a warning
         return visual.Window(
-            size=size,
+            size=size_within(size, _screen_size(screen)),
             fullscr=fullscreen,
             screen=screen,
             units="height",
@@ -63,6 +63,21 @@ def check_screen(screen: int) -> None:
             f"expected the number of a screen ({there_are}), got {screen}; choose an "
             "existing one, or connect another."
         )
+
+
+def size_within(wanted: tuple[int, int], screen: tuple[int, int]) -> tuple[int, int]:
+    """The largest size up to the wanted one that a screen shows whole, at least as wide as 4:3."""
+    width = min(wanted[0], screen[0])
+    return width, min(wanted[1], screen[1], width * 3 // 4)
+
+
+def _screen_size(screen: int) -> tuple[int, int]:
+    import pyglet  # late: needs a display
+
+    # Where monitors are screens of their own, pyglet lists the first one alone: all of one size.
+    there = pyglet.canvas.get_display().get_screens()
+    one = there[min(screen, len(there) - 1)]
+    return one.width, one.height
 
 
 def _screen_count() -> int:

@@ -187,7 +187,8 @@ def _told(of: Callable[..., str], surfaces: Surfaces) -> str:
     if surfaces.chosen is not None:
         told = of("choice.so_far", number=surfaces.chosen + 1)
     else:
-        told = of("choice.choose_one" if surfaces.felt else "choice.press")
+        may_confirm = surfaces.felt and _remaining(surfaces) == 0
+        told = of("choice.choose_one" if may_confirm else "choice.press")
     if count := _remaining(surfaces):
         told += "\n" + of("choice.remaining", count=count)
     return told

@@ -191,10 +191,10 @@ class Surfaces:
             raise InputError(
                 f"expected a button from 0 to {len(self._models) - 1}, got {index}; press another."
             )
-        self._last = index
         shown = self._models[index]
         if isinstance(shown, ToneBurst) and index in self.felt:
             return
+        self._last = index
         left_s = present(self._rig, shown)
         self.presses += 1
         self.felt.add(index)

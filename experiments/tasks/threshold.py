@@ -65,13 +65,19 @@ class ThresholdTrial(Trial):
 
 
 def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
-    """Rounds of all frequencies, each in random order; either interval equally often (± 1)."""
+    """Rounds of all frequencies, each in random order; either interval equally often (± 1).
+
+    Where the repeats are odd, neighbouring frequencies have one more of different intervals: else
+    one interval would be right more often all over the session.
+    """
     frequencies_hz = PRACTICE_HZ if occasion.phase == "training" else FREQUENCIES_HZ
     repeats = occasion.study.plan_of("threshold").repeats
     pair = fisher_yates((1, 2), occasion.rng)
     intervals = {
-        frequency_hz: fisher_yates([pair[n % 2] for n in range(repeats)], occasion.rng)
-        for frequency_hz in frequencies_hz
+        frequency_hz: fisher_yates(
+            [*pair * (repeats // 2), *[pair[place % 2]] * (repeats % 2)], occasion.rng
+        )
+        for place, frequency_hz in enumerate(frequencies_hz)
     }
     return [
         {

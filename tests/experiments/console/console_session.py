@@ -152,8 +152,8 @@ def hold(language, parts, *, done):
 
 def open_on(screen):
     try:
-        with Console(screen=screen):
-            return "open"
+        with Console(screen=screen, size=(2000, 1500)) as console:
+            return [int(pixels) for pixels in console._window.winHandle.get_size()]
     except ValueError as refusal:
         return str(refusal)
 

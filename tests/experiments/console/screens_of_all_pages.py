@@ -3,9 +3,9 @@
     python screens_of_all_pages.py FOLDER LANGUAGE:WIDTHxHEIGHT ...
 
 Standard output: one JSON object per page, {"screen": "en:1024x768", "page": …,
-"texts": [[words, box]], "shapes": [box], "places": [[x, y]] of the texts}; boxes are (left, bottom,
-right, top), all in pixels from the window's middle. Each page is kept in the folder as a picture;
-for the folder "-", none is.
+"texts": [[words, box]], "shapes": [box], "fills": [color] of the shapes, "places": [[x, y]] of the
+texts}; boxes are (left, bottom, right, top), all in pixels from the window's middle. Each page is
+kept in the folder as a picture; for the folder "-", none is.
 """
 
 import json
@@ -19,6 +19,7 @@ from pyglet.window import key
 
 from experiments.console import page_runner
 from experiments.console.console import Console
+from experiments.console.drawing import HALF_RISE
 from experiments.console.languages import Texts
 from experiments.sessions.surfaces import Intake, SessionAborted, Surfaces
 from experiments.study.questions import MOST_LEVELS, Question
@@ -46,10 +47,13 @@ def noted(kind):
 
 noted(visual.TextStim)
 noted(visual.shape.BaseShapeStim)
+noted(visual.ShapeStim)  # buttons and cards, which it draws in a way of its own
 
 
 def text_box(stimulus):
     (x, y), (width, height) = stimulus.posPix, stimulus.boundingBox
+    if spacing := stimulus._pygletTextObj.get_style("line_spacing"):
+        y -= round(spacing / 2 - HALF_RISE * stimulus._heightPix)  # the empty part above the lines
     left = x - {"left": 0, "center": 0.5, "right": 1}[stimulus.anchorHoriz] * width
     return [float(v) for v in (left, y - height / 2, left + width, y + height / 2)]
 
@@ -88,12 +92,13 @@ class Visitor:
 
     def tell(self, name):
         texts = [[s.text, text_box(s)] for s in drawn if isinstance(s, visual.TextStim) and s.text]
-        shapes = [shape_box(s) for s in drawn if isinstance(s, visual.shape.BaseShapeStim)]
+        shapes = [s for s in drawn if isinstance(s, visual.shape.BaseShapeStim)]
         places = [
             [float(v) for v in s.posPix] for s in drawn if isinstance(s, visual.TextStim) and s.text
         ]
-        told = {"screen": self.screen, "page": name, "texts": texts, "shapes": shapes}
-        told["places"] = places
+        told = {"screen": self.screen, "page": name, "texts": texts, "places": places}
+        told["shapes"] = [shape_box(s) for s in shapes]
+        told["fills"] = ["#" + s._fillColor.hex.strip("#").upper() for s in shapes]
         print(json.dumps(told), flush=True)
         if self.folder is not None:
             self.window.getMovieFrame(buffer="back")

@@ -176,6 +176,8 @@ def test_a_session_by_mouse_alone(seated: Seated) -> None:
         assert "real" not in person.handles
         person.click("button 3")
         assert person.wait_for("presented") == "virtual"
+        to_feel = words["choice.remaining"].format(count=2)  # the first one began by itself
+        assert f"{words['choice.press']}\n{to_feel}" in person.heard[-1]["shown"]
         person.click("answer 3")
         person.wait_for_note("chosen")
         person.click("continue")  # the second has not been felt: no effect
@@ -315,6 +317,15 @@ def test_before_the_first_trial_nobody_is_asked_for_a_reason(seated: Seated) -> 
         assert person.wait_for("result") == ["not stated", "participant"]
 
 
+def test_on_the_last_page_there_is_nothing_to_stop(seated: Seated) -> None:
+    with seated("en", "closing") as person:
+        person.wait_for_page("absolute.closing")
+        assert list(person.handles) == ["continue"]
+        person.keys("Escape")
+        assert person.wait_for("result") == [None]
+    assert not person.noted("stop_asked")
+
+
 def test_who_refuses_or_has_another_code_ends_the_session(seated: Seated) -> None:
     with seated("en", "new") as person:
         person.wait_for_page("consent")
@@ -344,4 +355,4 @@ def test_a_screen_that_is_not_there_is_refused(consoles: Driven) -> None:
             f"expected the number of a screen (0 to 1, of 2), got {number}; choose an existing "
             "one, or connect another."
         )
-    assert there == "open"
+    assert there == [1280, 800]  # more was asked for than the screen shows

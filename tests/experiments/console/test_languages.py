@@ -40,6 +40,18 @@ def test_every_page_that_is_announced_has_a_text() -> None:
     assert {f"stopping.{reason}" for reason in REASONS} <= texts.keys()
 
 
+def test_keys_are_told_without_numbers_that_a_page_may_lack() -> None:
+    for language in languages():
+        assert not any(map(str.isdigit, Texts.load(language).of("choice.keys"))), language
+
+
+def test_who_is_asked_for_thresholds_is_told_to_hold_the_pen_still() -> None:
+    for language, pen in (("en", "pen still"), ("ja", "ペンを動かさず")):
+        texts = Texts.load(language)
+        for phase in ("training", "main"):
+            assert pen in texts.of(f"threshold.{phase}.text")
+
+
 def test_the_shipped_study_can_be_asked_in_every_language() -> None:
     for language in languages():
         texts = Texts.load(language)

@@ -12,7 +12,8 @@ from typing import Any
 import pytest
 
 from experiments.console import screens
-from experiments.console.languages import languages
+from experiments.console.drawing import BLUE, ORANGE
+from experiments.console.languages import Texts, languages
 from experiments.study.study import Study
 from modeling import InputError
 from tests.refusals import refused
@@ -21,6 +22,7 @@ ROOT = Path(__file__).parents[3]
 SCRIPT = Path(__file__).with_name("screens_of_all_pages.py")
 SIZES = ((1024, 768), (1920, 1080))
 Box = list[float]
+UNFOCUSED = ("consent", "known", "stop-first", "stop")  # at first, no key but Tab does anything
 
 
 def test_the_only_screen_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -28,6 +30,20 @@ def test_the_only_screen_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     screens.check_screen(0)
     with refused(InputError, expected=["screen", 0], got=1):
         screens.check_screen(1)
+
+
+@pytest.mark.parametrize(
+    ("screen", "size"),
+    [
+        ((1920, 1080), (1280, 800)),
+        ((1280, 800), (1280, 800)),
+        ((1024, 768), (1024, 768)),
+        ((1366, 640), (1280, 640)),
+        ((768, 1024), (768, 576)),
+    ],
+)
+def test_a_window_fits_its_screen(screen: tuple[int, int], size: tuple[int, int]) -> None:
+    assert screens.size_within((1280, 800), screen) == size
 
 
 def test_without_psychopy_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,7 +109,12 @@ def test_on_no_page_is_anything_cut_or_covered(display: str) -> None:
     for page in pages:
         where = (page["screen"], page["page"])
         assert faults(page, windows[page["screen"]]) == [], where
-        assert tells_nothing([words for words, _ in page["texts"]]), where
+        told = [words for words, _ in page["texts"]]
+        assert tells_nothing(told), where
+        if page["page"] in UNFOCUSED:
+            assert Texts.load(page["screen"][:2]).of("keys") in told, where
+        if page["page"] in ("consent", "known"):  # neither answer looks like one that was given
+            assert not {BLUE, ORANGE} & set(page["fills"]), where
         # Between two pixels thin strokes fade.
         off = [abs(value - round(value)) for place in page["places"] for value in place]
         assert max(off) < 1e-6, where

@@ -251,9 +251,17 @@ def test_the_rigs_button_toggles_and_old_presses_do_not_count(models: ModelSets,
     assert surfaces.presses == 1
 
 
-def test_bursts_wait_for_a_press(models: ModelSets, rig: Any) -> None:
+def test_bursts_wait_for_a_press_and_the_next_one_presents_nothing(
+    models: ModelSets, rig: Any
+) -> None:
     burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.1)
-    assert surfaces_of(rig, [burst, burst]).bursts
+    twin = SimulatedRig()
+    twin.open()
+    surfaces = surfaces_of(twin, [burst, burst])
+    assert surfaces.bursts
+    for index in (0, 1, 0):
+        surfaces.present_virtual(index)
+    assert (surfaces.presses, surfaces.last) == (2, 1)  # nor is it shown as presented
     assert not surfaces_of(rig, [models.of("MDF", "full")]).bursts
 
 

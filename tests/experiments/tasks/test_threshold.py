@@ -79,7 +79,7 @@ def run(
 # --- The plan -------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("repeats", [5, 40])
+@pytest.mark.parametrize("repeats", [1, 5, 40])
 def test_each_round_has_all_frequencies_and_intervals_are_balanced(
     study: Study, repeats: int
 ) -> None:
@@ -96,6 +96,7 @@ def test_each_round_has_all_frequencies_and_intervals_are_balanced(
     counts = Counter((t.frequency_hz, t.interval) for t in main)
     for frequency_hz in FREQUENCIES_HZ:
         assert abs(counts[frequency_hz, 1] - counts[frequency_hz, 2]) == repeats % 2
+    assert Counter(t.interval for t in main) == {1: 4 * repeats, 2: 4 * repeats}
     assert all(t.amplitude_g is None and t.tray == "" and t.texture == "n/a" for t in trials)
 
 
