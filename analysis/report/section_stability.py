@@ -42,6 +42,9 @@ from analysis.report.sections import Section
 from analysis.report.sentences import described
 
 BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
+UNEXPLAINED = (
+    "unexplained, unless by the limited resolution of the edges (see the caption of the table)"
+)
 # The most important columns first; sentences are above the tables, and in the files.
 SHOWN_MARGINS = chosen(
     MARGIN_COLUMNS,
@@ -113,7 +116,7 @@ def _outcomes(margins: pd.DataFrame, edges: pd.DataFrame) -> list[Outcome]:
     ] * bool(len(margins))
     sentences += [
         f"The default of {row['method']} ({row['family']}, {row['axis']}) {_how_close(row)}; "
-        f"{row['exception'] or 'this small margin is unexplained'}."
+        f"{row['exception'] or UNEXPLAINED}."
         for row in margins[~margins["enough"].astype(bool)].to_dict("records")
     ]
     factors = edges["disagreement"].to_numpy(dtype=np.float64)
