@@ -78,6 +78,6 @@ def _tell_sessions(plan: Study) -> None:
 def _tell_balance(plan: Study) -> None:
     from experiments.tasks.balance import balance_of
 
-    print("balance of the orders (lowest to highest count, of how many trials):")
+    print("balance of the orders (lowest to highest count, of the total):")
     for row in (row for task in plan.tasks for row in balance_of(plan, task)):
         print(f"  {row.task:9} {row.what:56} {row.least} to {row.most} of {row.of}")

@@ -199,7 +199,7 @@ def test_free_strokes_give_a_grid_to_record(main, tmp_path: Path) -> None:
     assert grid.forces_n.tolist() == [1.5]
     assert "simulated = true" in (tmp_path / "grid.toml").read_text()
     assert "note: the hand is simulated." in made.stdout
-    assert "grid of 7 speeds x 1 forces in grid.toml" in made.stdout
+    assert "grid of 7 speeds x 1 force in grid.toml" in made.stdout
     told = json.loads((tmp_path / "grid.toml_provenance.json").read_text())
     assert told["command"] == "tactileq rig range"
     (tmp_path / "other.toml").write_text("mine = 1\n")

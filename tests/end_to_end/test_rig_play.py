@@ -72,11 +72,11 @@ def test_a_tone_and_a_file_leave_at_their_level(
         recorder.communicate(timeout=30)
         told = run("rig", "play", "--rig", "rig.toml", "--set", "set", "--file", file.name)
     assert tone.returncode == 0
-    assert "signal of 1 s played 1 times" in said
+    assert "signal of 1 s played 1 time" in said
     captured = np.load(tmp_path / "out.npy")[:, 0] * 20.0  # 20 g at full scale, of 1 V
     assert np.abs(captured).max() == pytest.approx(1.5, rel=1e-3)
     assert told.returncode == 0, told.stderr
-    assert "simulated signal of 0.5 s played 1 times" in told.stdout
+    assert "simulated signal of 0.5 s played 1 time" in told.stdout
 
 
 @pytest.mark.parametrize(
