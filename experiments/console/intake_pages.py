@@ -89,7 +89,7 @@ def _ask(runner: PageRunner, page: str, *, yes: str, no: str, values: dict[str, 
         decoration=[
             runner.title(runner.texts.of(f"{page}.title", **values), y=0.24),
             runner.body(runner.texts.of(f"{page}.text", **values), y=0.03),
-            *runner.foot(runner.texts.of("keys")),
+            runner.keys(runner.texts.of("keys")),
         ],
     )
     return said[-1]

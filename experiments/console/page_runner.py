@@ -237,7 +237,7 @@ class PageRunner(Parts):
             decoration=[
                 self.title(of("stopping.title"), y=0.33),
                 self.body(of("stopping.text" if asked else "stopping.at_first"), y=0.24),
-                *self.foot(of("keys")),
+                self.keys(of("keys")),
             ],
             update=update,
             stoppable=False,

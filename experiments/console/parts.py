@@ -88,19 +88,21 @@ class Parts:
             height=height,
         )
 
+    def keys(self, content: str) -> Any:
+        """Which keys a page knows, at its foot."""
+        return text(
+            self.window,
+            content,
+            at=(HALF_WIDTH, FOOT_Y),
+            height=FOOT_HEIGHT,
+            color=GREY,
+            anchor="right",
+        )
+
     def foot(self, keys: str) -> list[Any]:
         """Which keys a page of a trial knows, and how many trials are done."""
-        parts = [
-            text(
-                self.window,
-                keys,
-                at=(HALF_WIDTH, FOOT_Y),
-                height=FOOT_HEIGHT,
-                color=GREY,
-                anchor="right",
-            )
-        ]
-        return parts if self.progress is None else [*parts, *self._progress(*self.progress)]
+        done = () if self.progress is None else self._progress(*self.progress)
+        return [self.keys(keys), *done]
 
     def _progress(self, done: int, of: int) -> list[Any]:
         from psychopy import visual

@@ -52,10 +52,12 @@ def tell_made(made: Exported) -> None:
 
 def table_of(progress: StudyProgress) -> Table:
     """One row for each person; each task of the study has a column."""
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
-    table = Table("Subject", "Code", "Slot", *(t.task for t in progress.tasks), "Next")
+    # Where a terminal is narrow, a word goes on below: cut off, one could not tell how it ends.
+    tasks = (Column(t.task, overflow="fold") for t in progress.tasks)
+    table = Table("Subject", "Code", "Slot", *tasks, "Next")
     for person in progress.people:
         cells = [_sessions(person, task.task) for task in progress.tasks]
         due = {"": person.due, "dropped": "dropped out", "withdrawn": "withdrawn, data deleted"}

@@ -43,6 +43,22 @@ def test_every_person_and_session_has_its_place():
     assert any("withdrawn, data deleted" in line for line in shown)
 
 
+def test_on_a_narrow_terminal_no_word_is_cut_off():
+    names = ("absolute", "relative", "oddity", "threshold")
+    sessions = tuple(
+        SessionProgress(task=name, session=1, status="complete", answered=16, planned=16)
+        for name in names
+    )
+    person = PersonProgress(
+        subject=1, slot=1, code="TAKI-46", left="", sessions=sessions, due="relative 2, not before"
+    )
+    tasks = tuple(TaskProgress(task=name, complete=1, planned=4) for name in names)
+    screen = io.StringIO()
+    table = table_of(StudyProgress(people=(person,), tasks=tasks))
+    Console(file=screen, width=80).print(table)
+    assert "…" not in screen.getvalue()
+
+
 @pytest.fixture
 def app() -> typer.Typer:
     app = typer.Typer()
