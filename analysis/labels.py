@@ -26,11 +26,6 @@ def sentence_case(words: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def counted(number: int, noun: str) -> str:
-    """A count with its noun, which takes an s in the plural: `1 layer`, `2 layers`."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 ALL_TEXTURES = "all textures"
 
 ALL_LAYERS = "all layers"

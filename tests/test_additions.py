@@ -219,7 +219,7 @@ def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, work:
     assert "|pair>" in run(house, "-m", "tactileq", "session", "--help").stdout
     succeed(house, "-c", MODELS, folder=work)
     checked = succeed(house, "-m", "tactileq", "study", "check", "study.toml", folder=work)
-    assert "pair: 4 participants, 1 session each, 1 + 12 trials" in checked
+    assert "pair: 4 participants, 1 session each, 1 training + 12 main trials" in checked
     assert "pairs are told alike: No equality in any case" in checked
     succeed(house, "-m", "tactileq", "simulate", "--study", "study.toml", folder=work)
     succeed(house, "-c", ANSWERS, folder=work)

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
-from analysis.labels import counted
 from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.arrays import Floats
+from modeling.errors import counted
 from modeling.fitting.autoregressive import fit_filter
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.models.parameter_table import ParameterTable

@@ -22,8 +22,9 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import MODELS, counted
+from analysis.labels import MODELS
 from analysis.spectra.comparison import SpectrumComparison, SpectrumPanel
+from modeling.errors import counted
 from modeling.recordings.spectrum import HIGH_PASS_HZ
 
 PANELS_IN_A_ROW = 3

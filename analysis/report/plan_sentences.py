@@ -9,8 +9,9 @@ import numpy as np
 from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.answers.responses import Responses
 from analysis.columns import shortened_hash
-from analysis.labels import MEASURES, TASKS, counted
+from analysis.labels import MEASURES, TASKS
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, incomplete
+from modeling.errors import counted
 
 MOST_NAMED = 12
 

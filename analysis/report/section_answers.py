@@ -11,7 +11,7 @@ from analysis.answers.responses import Responses
 from analysis.columns import chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
-from analysis.labels import ALL_TEXTURES, MODELS, TASKS, counted, sentence_case
+from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
@@ -27,6 +27,7 @@ from analysis.statistics.verdicts import (
     models_of,
     planted_verdicts,
 )
+from modeling.errors import counted
 from modeling.files.writing import file_stem
 
 TESTS_SHOWN = chosen(

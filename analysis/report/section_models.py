@@ -9,7 +9,7 @@ import pandas as pd
 from analysis.columns import chosen, without
 from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import figure_spectra_and_threshold
-from analysis.labels import MODELS, counted
+from analysis.labels import MODELS
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Section
 from analysis.report.sentences import described, left_out_outcomes, simplification_outcomes
@@ -23,6 +23,7 @@ from analysis.textures.results import (
     reference_condition,
     simplification_table,
 )
+from modeling.errors import counted
 from modeling.files.writing import file_stem
 
 GFC_SHOWN = without(GFC_COLUMNS, "conditions", "gfc30_deficit")

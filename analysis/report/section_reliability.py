@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import Column, names
-from analysis.labels import SCALES, TASKS, counted
+from analysis.labels import SCALES, TASKS
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Item, Table
 from analysis.report.sections import Section
@@ -28,6 +28,7 @@ from analysis.statistics.reliability import (
     same_ratings,
     within_participant_sd,
 )
+from modeling.errors import counted
 
 # Exploring two or more surfaces takes longer.
 FASTEST_S = 2.0

@@ -13,7 +13,6 @@ from analysis.answers.imported import Imported
 from analysis.columns import p_value
 from analysis.figures.confusions import plot_confusion
 from analysis.figures.factorial import figure_factorial
-from analysis.labels import counted
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section
@@ -32,6 +31,7 @@ from analysis.statistics.factorial import (
     participant_cells,
     repeated_measures_anova,
 )
+from modeling.errors import counted
 
 WORDS = {"correct": "accuracy", "value": "mean"}
 LABELS = {"correct": "accuracy (share of right answers, 0–1)", "value": "mean (unit of the table)"}

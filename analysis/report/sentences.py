@@ -13,12 +13,12 @@ from analysis.labels import (
     ALL_TEXTURES,
     IDENTICAL,
     TASKS,
-    counted,
     sentence_case,
 )
 from analysis.report.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 from analysis.statistics.rates import UNKNOWN_CHANCE
+from modeling.errors import counted
 
 ALPHA = 0.05
 

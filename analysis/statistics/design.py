@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.labels import counted
 from analysis.statistics.paired import participant_means
 from modeling.arrays import Floats
+from modeling.errors import counted
 
 MODEL, SESSION, ORDER = "model, other to reference", "each further session", "first to last trial"
 

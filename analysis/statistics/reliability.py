@@ -14,8 +14,8 @@ import pandas as pd
 from scipy import stats
 
 from analysis.columns import Column, names
-from analysis.labels import counted
 from analysis.statistics.paired import ignoring_case, sign_flips_p
+from modeling.errors import counted
 from modeling.files.answer_tables import ENDS
 
 ALPHA = 0.05

@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.columns import MODEL, TEXTURE, Column, P, names
-from analysis.labels import counted
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.mixed import mixed_effects
 from analysis.statistics.paired import (
@@ -23,6 +22,7 @@ from analysis.statistics.paired import (
 )
 from modeling import InputError
 from modeling.arrays import Floats
+from modeling.errors import counted
 
 MEASURES = {
     "time_s": "response time (s, geometric mean)",

@@ -11,10 +11,9 @@ import numpy as np
 
 from analysis.benches.chart.fitted import Fitted, Itself, Layered, Predictor, Shaped, block_samples
 from analysis.benches.chart.shaped_noise import fit_shaped_noise
-from analysis.labels import counted
 from analysis.textures.between import Measured, Truth
 from modeling import InputError, Spectrum, TextureModel, Threshold, regressed, simplify
-from modeling.errors import shown
+from modeling.errors import counted, shown
 from modeling.estimation.likelihood import is_silent
 from modeling.fitting.autoregressive import fit_ar_spectra
 from modeling.fitting.conditions import spectra_by_condition

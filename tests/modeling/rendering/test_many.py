@@ -253,9 +253,9 @@ HAND: tuple[Floats, Floats] = (np.zeros(3), np.zeros(3))
 @pytest.mark.parametrize(
     ("arguments", "expected", "got"),
     [
-        ({"seeds": [0]}, "seeds", ["2 models", "2 hands", "1 seeds"]),
+        ({"seeds": [0]}, "seeds", ["2 models", "2 hands", "1 seed"]),
         ({"streams": [0, 1, 2]}, "streams", ["2 seeds", "3 streams"]),
-        ({"hands": [HAND]}, "hands", ["2 models", "1 hands"]),
+        ({"hands": [HAND]}, "hands", ["2 models", "1 hand"]),
         ({"hands": [HAND, (np.zeros(3), np.zeros(4))]}, "signal 1", ["(3,)", "(4,)"]),
         ({"hands": [HAND, (1.0, 1.0)]}, "signal 1", "()"),
         ({"hands": [(*HAND, np.zeros(3)), HAND]}, "signal 0", 3),

@@ -67,7 +67,7 @@ def test_every_key_of_the_documentation_is_read(tmp_path: Path) -> None:
     """The recipe in the module's own text, with what its comments offer instead."""
     import stimuli.sets.recipe
 
-    block = (stimuli.sets.recipe.__doc__ or "").split("::\n")[1].split("\nWhat stands")[0]
+    block = (stimuli.sets.recipe.__doc__ or "").split("::\n")[1].split("\nValues in brackets")[0]
     text = block.replace('"as modelled"', '"loudness"').replace('"float32"', '"pcm24"')
     text = "\n".join(line for line in text.splitlines() if "rms_db" not in line)
     recipe = load(tmp_path, text)
