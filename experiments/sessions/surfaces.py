@@ -125,6 +125,8 @@ class Surfaces:
         self._note = note
         self._shown: str | None = None
         self._last: int | None = None
+        self._last_left_s = 0.0
+        self._cut_off = False
         self._chosen: int | None = None
         self.feel_all = feel_all
         self.started = False
@@ -195,10 +197,10 @@ class Surfaces:
         if isinstance(shown, ToneBurst) and index in self.felt:
             return
         self._last = index
-        left_s = present(self._rig, shown)
+        self._last_left_s = present(self._rig, shown)
         self.presses += 1
         self.felt.add(index)
-        self._presented("virtual", left_s, index=index)
+        self._presented("virtual", self._last_left_s, index=index)
 
     def choose(self, index: int) -> None:
         """Choose a virtual surface that was felt (index from 0); the last choice counts.
@@ -228,17 +230,21 @@ class Surfaces:
 
     def pause(self) -> None:
         """Present nothing for a while, as long as the participant is asked something else."""
+        last = None if self._last is None else self._models[self._last]
+        if isinstance(last, ToneBurst):
+            self._cut_off = self._rig.now_s() < self._last_left_s + last.duration_s
         self._rig.silence()
 
     def resume(self) -> None:
-        """Present again what was presented before the pause."""
+        """Present again what was presented before the pause; of bursts only one that it cut off."""
         self._rig.read()  # a press of the rig's button meanwhile is not one in the trial
         if self.shows_real:
             self._again("real", self._rig.present_real(self._texture))
         elif self._last is not None:
             shown = self._models[self._last]
-            if not isinstance(shown, ToneBurst):
-                self._again("virtual", present(self._rig, shown), index=self._last)
+            if self._cut_off or not isinstance(shown, ToneBurst):
+                self._last_left_s = present(self._rig, shown)
+                self._again("virtual", self._last_left_s, index=self._last)
 
     def follow_rig_button(self) -> None:
         """Toggle if the rig's button has been pressed since the last call."""

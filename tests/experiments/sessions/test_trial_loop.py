@@ -318,6 +318,24 @@ def test_a_pause_is_silent_and_changes_no_count(models: ModelSets, rig: Any) -> 
         assert (surfaces.presses, surfaces.switches) == counted
 
 
+@pytest.mark.parametrize(("paused_after_s", "again"), [(0.4, True), (0.8, False)])
+def test_a_burst_that_a_pause_cut_off_is_presented_again(
+    rig: Any, paused_after_s: float, again: bool
+) -> None:
+    now = [10.0]
+    rig.now_s = lambda: now[0]
+    rig.present_signal = lambda shown: rig._note("burst", shown) or now[0]
+    burst = ToneBurst(frequency_hz=100.0, amplitude_g=0.1, duration_s=0.7)
+    surfaces = surfaces_of(rig, [burst, burst])
+    surfaces.present_virtual(0)
+    now[0] += paused_after_s
+    surfaces.pause()
+    now[0] += 5.0
+    surfaces.resume()
+    assert rig.notes[1:] == [("silence", None), *[("burst", burst)] * again]
+    assert (surfaces.presses, surfaces.felt) == (1, {0})
+
+
 def test_a_response_begins_with_the_first_sample_on_whatever_clock_the_rig_has(
     models: ModelSets, rig: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
