@@ -164,7 +164,12 @@ def _filled(line: str, width_em: float) -> list[str]:
 
 
 def _split(line: str, begins: Any) -> list[str]:
-    cuts = [i for i in range(1, len(line)) if begins(line[i - 1], line[i])]
+    # Spaces at a line's end are cut off: what stands before them must not be an opening bracket.
+    cuts = [
+        i
+        for i in range(1, len(line))
+        if begins(line[i - 1], line[i]) and line[:i].rstrip()[-1:] not in NOT_LAST
+    ]
     return [line[a:b] for a, b in zip([0, *cuts], [*cuts, len(line)], strict=True)]
 
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from experiments.console import languages as module
@@ -161,6 +161,7 @@ JAPANESE = st.text(
 
 
 @given(JAPANESE, st.integers(8, 30))
+@example("111「 1、、、、", 8)
 def test_no_line_is_too_long_or_breaks_a_rule(content: str, width: int) -> None:
     lines = wrapped(content, width).split("\n")
     assert "".join(lines).replace(" ", "") == content.replace(" ", "")
@@ -169,7 +170,7 @@ def test_no_line_is_too_long_or_breaks_a_rule(content: str, width: int) -> None:
         assert after[:1] not in NOT_FIRST
     # A line is longer only where its first part that may be broken off is.
     for line in map(str.rstrip, lines):
-        cuts = [i for i in range(1, len(line)) if may_break(line[i - 1], line[i])]
+        cuts = [i for i in range(1, len(line)) if may_break(line[:i], line[i])]
         assert width_em(line) <= width or all(width_em(line[:cut]) > width for cut in cuts)
 
 
@@ -178,6 +179,6 @@ def width_em(line: str) -> float:
 
 
 def may_break(before: str, after: str) -> bool:
-    if after in NOT_FIRST or before in NOT_LAST or after == " ":
+    if after in NOT_FIRST or before.rstrip()[-1:] in NOT_LAST or after == " ":
         return False
-    return before == " " or not (before + after).isascii()
+    return before[-1] == " " or not (before[-1] + after).isascii()
