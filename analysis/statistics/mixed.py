@@ -20,6 +20,7 @@ from analysis.statistics.paired import CONFIDENCE, paired_test
 from modeling.arrays import Floats
 
 MOST_SIMPLEX_STEPS = 1000
+LEAST_VARIANCE = 0.01  # of the noise's: where the search begins
 MIXED_MODEL, PAIRED = "mixed model", "paired t"
 MIXED_COLUMNS = (
     Column("term", is_name=True),
@@ -64,8 +65,8 @@ def fit_mixed(
 ) -> MixedFit | None:
     """Fit values = fixed effects + a random intercept and slope per person + noise.
 
-    Restricted maximum likelihood by `statsmodels.MixedLM`: L-BFGS from two starting points, and
-    other optimizers from the better one. docs/method/mixed-models.md#fitting
+    Restricted maximum likelihood by `statsmodels.MixedLM`, from the covariance of moments.
+    docs/method/mixed-models.md#fitting
 
     Parameters
     ----------
@@ -95,8 +96,8 @@ def fit_mixed(
     # It warns of variances below 0.01, whatever their unit.
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
-        best = _most_likely(model, starts=(None, moments))
-        if best is None or not best.converged:
+        best = _most_likely(model, start=moments)
+        if best is None:
             return None
         errors = np.asarray(best.bse_fe, dtype=float)
     if not (np.isfinite(errors) & (errors > 0)).all():
@@ -112,45 +113,44 @@ def fit_mixed(
     )
 
 
-def _most_likely(model: Any, *, starts: tuple[Any, ...]) -> Any:
-    """The fit with the highest likelihood, or None; Nelder and Mead only where BFGS fails, too."""
-    fits = [fit for start in starts if (fit := _fit(model, start, "lbfgs"))]
-    best = max(fits, key=_likelihood, default=None)
-    for method in ("bfgs", "nm"):
-        if best is None or (method == "nm" and best.converged):
-            break
-        polished = _fit(model, best.params_object, method)
-        # At one likelihood the last one counts: it says whether it has converged from there.
-        best = max(filter(None, (polished, best)), key=_likelihood)
-    return best
-
-
-def _fit(model: Any, start: Any, method: str) -> Any:
-    limits = {"maxiter": MOST_SIMPLEX_STEPS} if method == "nm" else {}
-    try:
-        return model.fit(start_params=start, method=method, **limits)
-    except np.linalg.LinAlgError:
-        return None
-
-
-def _likelihood(fit: Any) -> float:
-    return float(fit.llf)
+def _most_likely(model: Any, *, start: Any) -> Any:
+    """The fit of BFGS; where it does not converge, Nelder and Mead go on from there; or None."""
+    for options in ({"method": "bfgs"}, {"method": "nm", "maxiter": MOST_SIMPLEX_STEPS}):
+        try:
+            fit = model.fit(start_params=start, **options)
+        except np.linalg.LinAlgError:
+            continue
+        if fit.converged:
+            return fit
+        start = fit.params_object
+    return None
 
 
 def _random_covariance(
     values: Floats, fixed: Floats, *, random: Floats, people: NDArray[Any]
 ) -> Floats:
-    """Covariance of each person's least-squares coefficients, over the variance of residuals."""
+    """Covariance of intercepts and slopes, (2, 2), over the variance of the noise, by moments.
+
+    That of each person's least-squares coefficients, less what the noise adds to it; made positive
+    definite, as where it is not the maximum is on the boundary.
+    """
     residuals = values - fixed @ np.linalg.lstsq(fixed, values, rcond=None)[0]
-    coefficients, squares = [], 0.0
+    coefficients, added, squares = [], [], 0.0
     for who in np.unique(people):
         own = people == who
         found = np.linalg.lstsq(random[own], residuals[own], rcond=None)[0]
         coefficients.append(found)
+        added.append(np.linalg.pinv(random[own].T @ random[own]))
         squares += float(np.sum((residuals[own] - random[own] @ found) ** 2))
-    variance = squares / max(len(values) - 2 * len(coefficients), 1)
-    spread: Floats = np.cov(np.array(coefficients).T) + variance * 1e-3 * np.eye(2)
-    return spread / variance if variance > 0 else np.eye(2)
+    shared = fixed.shape[1] - random.shape[1]
+    variance = squares / max(len(values) - 2 * len(coefficients) - shared, 1)
+    if variance <= 0:
+        return np.eye(2)
+    size, axes = np.linalg.eigh(
+        np.cov(np.array(coefficients).T) / variance - np.mean(added, axis=0)
+    )
+    covariance: Floats = (axes * np.maximum(size, LEAST_VARIANCE)) @ axes.T
+    return covariance
 
 
 def mixed_effects(

@@ -8,12 +8,12 @@ speed).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import InputError, Recording, RecordingSet, TextureModel, render_many
+from modeling import PEQ, InputError, Recording, RecordingSet, TextureModel, render_many
 from modeling.arrays import Floats
 from modeling.checks import check_duration
 from modeling.equalizer.bands import band_rms
@@ -166,39 +166,39 @@ def planted_texture(
             f"expected a planted texture among {', '.join(TEXTURES)}, got {shown(name)}; choose "
             "one."
         )
-    planted = CATALOGUE[name]
-    v = (np.asarray(speeds_mm_s) / REFERENCE_SPEED_MM_S)[:, None]
-    f = (np.asarray(forces_n) / REFERENCE_FORCE_N)[None, :]
-    layers = planted.layers
-    shape = (v.size, f.size)
-    bandwidths = [np.full(shape, float(layer.bandwidth_hz)) for layer in layers]
-    # Gain of a layer of 1 g RMS, the inverse of the PEQ's band variance.
-    gain_per_rms = [
-        1 / band_rms(1.0, layer.bandwidth_hz, rate_hz=MODEL_RATE_HZ) for layer in layers
-    ]
+    speed, force = np.meshgrid(speeds_mm_s, forces_n, indexing="ij")
+    noise_gains, frequencies, bandwidths, gains = _parameters(CATALOGUE[name], speed, force)
     at_5_khz = TextureModel(
         texture=name,
         rate_hz=MODEL_RATE_HZ,
         speeds_mm_s=np.asarray(speeds_mm_s),
         forces_n=np.asarray(forces_n),
-        noise_gains=planted.noise_g * v**NOISE_GROWTH_SPEED * np.ones_like(f),
-        frequencies_hz=np.stack(
-            [np.broadcast_to(x.frequency_hz * v**x.speed_law, shape) for x in layers], axis=-1
-        ),
-        bandwidths_hz=np.stack(bandwidths, axis=-1),
-        gains=np.stack(
-            [
-                x.sign * x.rms_g * per_rms * v**x.growth_speed * f**x.growth_force
-                for x, per_rms in zip(layers, gain_per_rms, strict=True)
-            ],
-            axis=-1,
-        ),
-        level_sd_db=np.zeros((*shape, len(layers))),
+        noise_gains=noise_gains,
+        frequencies_hz=frequencies,
+        bandwidths_hz=bandwidths,
+        gains=gains,
+        level_sd_db=np.zeros(gains.shape),
         estimator="planted",
         simulated=True,
         blending="logarithmic",
     )
     return at_5_khz.at_rate(rate_hz)
+
+
+def _parameters(
+    planted: PlantedTexture, speed_mm_s: Floats, force_n: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Noise gain (…), frequencies, widths and gains (…, m) at speeds and forces (…), at 5 kHz."""
+    v = np.asarray(speed_mm_s / REFERENCE_SPEED_MM_S)[..., None]
+    f = np.asarray(force_n / REFERENCE_FORCE_N)[..., None]
+    frequency, speed_law, bandwidth, rms_g, sign, growth_speed, growth_force = np.array(
+        [astuple(layer) for layer in planted.layers], dtype=np.float64
+    ).T
+    # Gain of a layer of 1 g RMS, the inverse of the PEQ's band variance.
+    per_rms = 1 / band_rms(1.0, bandwidth, rate_hz=MODEL_RATE_HZ)
+    gains = sign * rms_g * per_rms * v**growth_speed * f**growth_force
+    noise_gain = planted.noise_g * v[..., 0] ** NOISE_GROWTH_SPEED
+    return noise_gain, frequency * v**speed_law, np.broadcast_to(bandwidth, gains.shape), gains
 
 
 @dataclass(frozen=True)
@@ -209,14 +209,19 @@ class PlantedSurface:
 
     def magnitude(self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float) -> Floats:
         """True magnitude (n,) in g per unit noise at 5 kHz; speed and force above 0."""
-        here = planted_texture(
-            self.texture,
-            speeds_mm_s=np.array([speed_mm_s]),
-            forces_n=np.array([force_n]),
+        planted = CATALOGUE[self.texture]
+        noise_gain, frequencies, bandwidths, gains = _parameters(
+            planted, np.asarray(speed_mm_s), np.asarray(force_n)
+        )
+        # Gains per unit noise at 5 kHz, bands at the recorder's rate.
+        here = PEQ(
+            noise_gain=float(noise_gain),
+            frequencies_hz=frequencies,
+            bandwidths_hz=bandwidths,
+            gains=gains,
             rate_hz=RECORDER_RATE_HZ,
         )
-        scale = float(np.sqrt(MODEL_RATE_HZ / RECORDER_RATE_HZ))
-        return here.peq(speed_mm_s, force_n).response(frequency_hz) * scale
+        return here.response(frequency_hz)
 
 
 def record_texture(truth: TextureModel, *, duration_s: float = 1.0, seed: int = 0) -> RecordingSet:

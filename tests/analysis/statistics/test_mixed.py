@@ -110,7 +110,7 @@ def covariance_of_moments(answers: pd.DataFrame) -> tuple[np.ndarray, float]:
 
 @settings(max_examples=8, deadline=None)
 @given(seed=st.integers(0, 2**20), effect=st.floats(-20, 20))
-@example(seed=230, effect=0.0)  # L-BFGS stops short of the maximum from both starting points
+@example(seed=230, effect=0.0)  # L-BFGS stops before the maximum from several starting points
 def test_of_balanced_answers_it_is_the_paired_test(seed: int, effect: float):
     answers = planted(effect, mirrored=True, seed=seed)
     # Within the boundary of covariances; what holds on it, the next test says.
