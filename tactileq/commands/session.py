@@ -117,7 +117,7 @@ def session(
     if result.completed:
         print(f"completed: {manifest.parent}")
     else:
-        left = f"{result.answered} of {result.planned} trials answered"
+        left = f"{result.answered} of {result.planned} trials answered, training included"
         print(f"ended early ({result.reason}), {left}; continue with --resume: {manifest.parent}")
 
 
