@@ -255,14 +255,11 @@ def who_took_part(responses: Responses, task: str) -> tuple[str, tuple[str, str]
     kind = "simulated participant" if responses.simulated_participants else "participant"
     rig = " with the simulated rig" if responses.simulated_rig else ""
     trials = f"{counted(len(responses.answers[task]), 'trial')} (without training)"
-    if planned is None:
-        took_part = f"{counted(done.participants, kind)}{rig}"
-        sentence = f"{sentence_case(where)}: {took_part}, {trials}."
-        return sentence, (people, f"{took_part.removeprefix(people).strip()}, {where}")
-    people += f" of {planned.participants}"
-    who = f"planned {kind}{'s' * (planned.participants != 1)}{rig}"
-    sentence = (
-        f"{sentence_case(where)}: {people} {who}, {done.sessions} of "
-        f"{counted(planned.sessions, 'planned session')}, {trials}."
-    )
+    last, sessions = done.participants, ""
+    if planned is not None:
+        last, kind = planned.participants, f"planned {kind}"
+        people += f" of {last}"
+        sessions = f", {done.sessions} of {counted(planned.sessions, 'planned session')}"
+    who = f"{kind}{'s' * (last != 1)}{rig}"
+    sentence = f"{sentence_case(where)}: {people} {who}{sessions}, {trials}."
     return sentence, (people, f"{who}, {where}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +145,7 @@ def compare_condition(
     _require_within_grid(full, speed_mm_s, force_n=force_n)
     frequency = np.arange(full.rate_hz // 2 + 1) if measured is None else measured.frequency_hz
     peq, fewer = (m.peq(speed_mm_s, force_n) for m in (full, simplification.model))
-    respond = _smoothed_response if measured is None else _prepared_response
+    respond = partial(_smoothed_response, frequency_hz=frequency, high_passed=measured is not None)
     return SpectrumComparison(
         texture=full.texture,
         speed_mm_s=speed_mm_s,
@@ -152,8 +153,8 @@ def compare_condition(
         simulated=full.simulated,
         frequency_hz=frequency,
         recording=np.full(frequency.size, np.nan) if measured is None else measured.smoothed(),
-        full=respond(peq, frequency),
-        simplified=respond(fewer, frequency),
+        full=respond(peq),
+        simplified=respond(fewer),
         layer_frequency_hz=peq.frequencies_hz,
         layer_amplitude_g=layer_amplitudes_g(peq, criterion=simplification.criterion),
         layer_response=np.abs(peq.gains)[:, None] * np.abs(_bands(peq, frequency)),
@@ -165,17 +166,16 @@ def compare_condition(
     )
 
 
-def _smoothed_response(peq: PEQ, frequency_hz: Floats) -> Floats:
-    """The model's response, smoothed as recordings are (Gaussian, σ = 30 Hz)."""
-    step_hz = float(frequency_hz[1] - frequency_hz[0])
-    return smooth(peq.response(frequency_hz), SMOOTHING_HZ, step_hz=step_hz)
+def _smoothed_response(peq: PEQ, frequency_hz: Floats, *, high_passed: bool) -> Floats:
+    """The model's response, smoothed as recordings are (Gaussian, σ = 30 Hz).
 
-
-def _prepared_response(peq: PEQ, frequency_hz: Floats) -> Floats:
-    """The same behind the high-pass that recordings go through before they are modelled."""
+    With the high-pass that recordings go through before they are modelled, if so asked.
+    """
+    response = peq.response(frequency_hz)
+    if high_passed:
+        response = response * high_pass_response(frequency_hz, rate_hz=peq.rate_hz)
     step_hz = float(frequency_hz[1] - frequency_hz[0])
-    passed = high_pass_response(frequency_hz, rate_hz=peq.rate_hz)
-    return smooth(peq.response(frequency_hz) * passed, SMOOTHING_HZ, step_hz=step_hz)
+    return smooth(response, SMOOTHING_HZ, step_hz=step_hz)
 
 
 def _layer_thresholds(peq: PEQ, simplification: Simplification, *, frequency_hz: Floats) -> Floats:
@@ -285,7 +285,8 @@ def _panel(
     magnitude = measured.smoothed(SMOOTHING_HZ)
     response = np.zeros(0)
     if model is not None:
-        response = _prepared_response(model.peq(*recording.condition), measured.frequency_hz)
+        peq = model.peq(*recording.condition)
+        response = _smoothed_response(peq, measured.frequency_hz, high_passed=True)
     return SpectrumPanel(
         title=f"{recording.texture}, {recording.speed_mm_s:g} mm/s, {recording.force_n:g} N",
         unit=recording.unit,

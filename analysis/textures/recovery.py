@@ -12,15 +12,12 @@ from scipy.optimize import linear_sum_assignment, minimize_scalar
 
 from analysis.columns import ESTIMATOR, LAYER, TEXTURE, Column, names
 from analysis.labels import ALL_LAYERS
-from modeling import InputError, TextureModel
+from modeling import InputError, TextureModel, similarity
 from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.peq import PEQ
 from modeling.errors import shown
-from modeling.recordings.spectrum import HIGH_PASS_HZ
 
-# Where a truth and its form at a lower rate are compared, and how finely.
-HIGHEST_SHARE_OF_NYQUIST = 0.98
-GRID_STEP_HZ = 5.0
+GRID_STEP_HZ = 5.0  # where a truth and its form at a lower rate are compared
 LEAST_TOLERANCE_HZ = 10.0
 NO_PARTNER = -1
 _PARAMETERS = {"frequency_hz": "frequencies_hz", "bandwidth_hz": "bandwidths_hz", "gain": "gains"}
@@ -91,8 +88,8 @@ def truth_at_rate(truth: TextureModel, rate_hz: float) -> TextureModel:
 
 def _nearest_noise_gain(scaled: PEQ, truth: PEQ) -> float:
     """The noise gain with which `scaled` comes nearest to `truth`, another rate's equalizer."""
-    end_hz = HIGHEST_SHARE_OF_NYQUIST * min(scaled.rate_hz, truth.rate_hz) / 2
-    frequency_hz = np.arange(HIGH_PASS_HZ, end_hz, GRID_STEP_HZ)
+    end_hz = similarity.HIGHEST_SHARE * min(scaled.rate_hz, truth.rate_hz) / 2
+    frequency_hz = np.arange(similarity.LOWEST_HZ, end_hz, GRID_STEP_HZ)
     layers = scaled.complex_response(frequency_hz) - scaled.noise_gain
     power = truth.response(frequency_hz) ** 2 * (scaled.rate_hz / truth.rate_hz)
 

@@ -18,11 +18,11 @@ from modeling.arrays import Floats
 from modeling.checks import check_duration
 from modeling.equalizer.bands import band_rms
 from modeling.errors import shown
+from modeling.recordings.spectrum import MODEL_RATE_HZ
 from modeling.seeds import noise_seed
 
 SPEEDS_MM_S = np.linspace(50.0, 350.0, 7)
 FORCES_N = np.linspace(0.5, 3.5, 7)
-MODEL_RATE_HZ = 5000.0
 RECORDER_RATE_HZ = 22704.0
 REFERENCE_SPEED_MM_S = 200.0
 REFERENCE_FORCE_N = 2.0

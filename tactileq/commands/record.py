@@ -11,8 +11,6 @@ from modeling.errors import counted
 from tactileq.options import AssumedForce, CountsPerMm, HandDevice, HandKind, OptionalRigPath, Seed
 from tactileq.telling import progress
 
-SILICO_RATE_HZ = 22704.0
-
 
 def record(
     folder: Annotated[Path, typer.Argument(help="Folder for the recordings.")],
@@ -87,9 +85,9 @@ def record_in_silico(
     """Record a planted texture, 7 speeds x 7 forces."""
     from modeling.files.folders import folder_behind, replace_folder
     from modeling.files.provenance import write_provenance
-    from stimuli.planted.textures import planted_texture, record_texture
+    from stimuli.planted.textures import RECORDER_RATE_HZ, planted_texture, record_texture
 
-    rate_hz = SILICO_RATE_HZ if rate_hz is None else rate_hz
+    rate_hz = RECORDER_RATE_HZ if rate_hz is None else rate_hz
     folder_behind(folder)
     if folder.exists() and (folder.is_file() or any(folder.iterdir())):
         raise ValueError(f"expected a new folder, got {folder}, which exists; choose another name.")

@@ -15,7 +15,7 @@ from analysis.benches.accuracy import stroke
 from analysis.textures.between import Measured, Truth, chessboard, halfway
 from modeling import InputError, RecordingSet
 from modeling.arrays import Floats
-from modeling.errors import shown
+from modeling.errors import counted, shown
 from modeling.fitting.conditions import recording_spectra
 from modeling.hand import Hand
 from modeling.models.grid import Condition, grid_axes
@@ -52,7 +52,7 @@ RECORD_S = 1.0
 
 def counted_kind(count: int, kind: Kind) -> str:
     """A number of surfaces of a kind: `1 planted texture (simulated)`."""
-    return f"{count} {(_ONE_OF if count == 1 else KINDS)[kind]}"
+    return counted(count, _ONE_OF[kind], KINDS[kind])
 
 
 # A stroke over half of which filters are judged; it starts from rest, where no slope is known.

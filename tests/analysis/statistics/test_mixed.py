@@ -87,8 +87,8 @@ def test_a_published_model_of_reaction_times():
     assert_allclose(spread, [24.741, 5.922, 25.592], atol=1e-3)
 
 
-def covariance_of_moments(answers: pd.DataFrame) -> tuple[np.ndarray, float]:
-    """Of balanced answers: covariance of intercepts and slopes, and the variance of the noise.
+def covariance_of_moments(answers: pd.DataFrame) -> np.ndarray:
+    """Of balanced answers: the covariance of intercepts and slopes.
 
     Of each person's least-squares coefficients, less what the noise adds to it. Where it is
     positive definite, it is what restricted maximum likelihood finds (Searle, Casella and
@@ -105,7 +105,7 @@ def covariance_of_moments(answers: pd.DataFrame) -> tuple[np.ndarray, float]:
     )
     noise = np.sum(left**2) / (left.size - 2 * len(people) - (fixed.shape[1] - 2))
     own = random[people[0]]
-    return np.cov(found.T) - noise * np.linalg.inv(own.T @ own), float(noise)
+    return np.cov(found.T) - noise * np.linalg.inv(own.T @ own)
 
 
 @settings(max_examples=8, deadline=None)
@@ -114,7 +114,7 @@ def covariance_of_moments(answers: pd.DataFrame) -> tuple[np.ndarray, float]:
 def test_of_balanced_answers_it_is_the_paired_test(seed: int, effect: float):
     answers = planted(effect, mirrored=True, seed=seed)
     # Within the boundary of covariances; what holds on it, the next test says.
-    assume(np.linalg.eigvalsh(covariance_of_moments(answers)[0]).min() > 0)
+    assume(np.linalg.eigvalsh(covariance_of_moments(answers)).min() > 0)
     row = model_row(answers)
     whole = complete_participants(answers, "rating", models=MODELS)
     paired = paired_test(whole["full"], whole["simplified"], rng=rng())
@@ -130,7 +130,7 @@ def test_where_intercepts_and_slopes_are_perfectly_correlated_the_maximum_is_fou
     There another restricted likelihood, written out here, is maximised over both deviations.
     """
     answers = planted(1.5, mirrored=True, seed=6604)
-    assert np.linalg.eigvalsh(covariance_of_moments(answers)[0]).min() < 0
+    assert np.linalg.eigvalsh(covariance_of_moments(answers)).min() < 0
     built = design(answers, "rating", models=MODELS)
     values, fixed = built.values, built.columns
     same = built.people[:, None] == built.people[None, :]
