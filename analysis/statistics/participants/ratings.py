@@ -1,0 +1,359 @@
+"""The posterior of what people rate, by Gibbs sampling; many studies, or chains, at once.
+
+docs/method/participants.md#sampler
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import gammaln, ndtr, ndtri
+
+from analysis.statistics.participants.mixture import MixtureOfEffects
+from modeling.arrays import Bools, Floats
+from modeling.participants.effects import EffectMixture
+from modeling.participants.ratings import (
+    AT_END,
+    HIGHEST,
+    LOWEST,
+    WITHIN,
+    RatingPriors,
+    RatingStudies,
+)
+
+_NORMAL = 1 / np.sqrt(2 * np.pi)
+_HALVES = np.array([-0.5, 0.5])[:, None]
+_UNKNOWN = 1e8  # variance of an effect that no answer tells about
+_TINY = 1e-300
+
+
+class RatingSampler:
+    """The state of the chains of B studies; `step` draws everything once.
+
+    Parameters
+    ----------
+    studies : RatingStudies
+        Missing people have missing answers alone.
+    priors : RatingPriors
+    rng : Generator
+    """
+
+    def __init__(
+        self, studies: RatingStudies, priors: RatingPriors, *, rng: np.random.Generator
+    ) -> None:
+        self._priors, self._rng = priors, rng
+        self._main = _Answers(studies.values)
+        self._anchors = _Answers(studies.anchors)
+        self._trends = studies.trends
+        self._varying = [c for c, one in enumerate(studies.trends) if np.ptp(one) > 0]
+        b, n, t, _, _ = studies.values.shape
+        # Who is there at all; the others follow the priors and change nothing.
+        self.people = self._main.answered.any(axis=(2, 3, 4)) | self._anchors.answered.any(axis=2)
+        self._mixture = MixtureOfEffects(priors.effects, b, rng=rng)
+        self._level = np.full(b, priors.level[0])
+        self._person = self._main.means(self._level)
+        self._person_variance = np.full(b, priors.person_sd**2)
+        self._cell, self._cell_variance = np.zeros((b, n, t)), np.full(b, priors.cell_sd**2)
+        self._texture, self.texture_effects = np.zeros((b, t)), np.zeros((b, t))
+        self.effects = np.zeros((b, n))
+        self._slopes = np.zeros((len(studies.trends), b))
+        anchors = studies.anchors.shape[2]
+        self._anchor, self._own_anchor = (
+            np.full((b, anchors), priors.anchor[0]),
+            np.zeros((b, n, anchors)),
+        )
+        self._anchor_variance = np.full(b, priors.anchor_sd**2)
+        self._variance = np.full((b, n), priors.rating_sd**2)
+        self._typical = np.full(b, priors.rating_sd**2)
+        self.attends = np.ones((b, n), dtype=bool)
+        self.lapses = np.full(b, 0.05)
+        self._careless_share = np.full(b, 0.05)
+
+    @property
+    def mixture(self) -> EffectMixture:
+        """The distribution of people's effects as it is now."""
+        return self._mixture.mixture
+
+    def step(self) -> None:
+        """Draw every unknown once, given all others."""
+        self._draw_classes()
+        self._draw_anchors()
+        self._draw_effects()
+        self._draw_levels()
+        self._draw_cells()
+        self._draw_textures()
+        self._draw_trends()
+        self._draw_variances()
+        self._draw_shares()
+
+    # What the state predicts; all (B, n, T, 2, R) or broadcast to it.
+
+    def _trend(self) -> Floats | float:
+        if not self._varying:
+            return 0.0
+        return sum(
+            self._slopes[c][:, None, None, None, None] * self._trends[c] for c in self._varying
+        )
+
+    def _felt(self) -> Floats:
+        """(B, n, T, 2, 1): what people who attend add to their own levels."""
+        effects = self.effects[..., None] + self.texture_effects[:, None]
+        felt: Floats = self._texture[:, None, :, None, None] + _HALVES * effects[..., None, None]
+        return felt
+
+    def _draw_classes(self) -> None:
+        """Who attends, which trials lapsed, and the latent judgements beyond the ends."""
+        own = (self._person[..., None] + self._cell)[..., None, None] + self._trend()
+        sd = np.sqrt(self._variance)[..., None, None, None]
+        felt = self._felt()
+        attending = self._main.likelihoods(own + felt, sd)
+        careless = self._main.likelihoods(own, sd)
+        sd_own = np.sqrt(self._variance)[..., None]
+        sd_anchor = np.sqrt(self._variance + self._anchor_variance[:, None])[..., None]
+        level = self._person[..., None]
+        expected = level + self._anchor[:, None]
+        anchors = (
+            self._anchors.likelihoods(expected, sd_anchor),
+            self._anchors.likelihoods(level, sd_own),
+        )
+        lapses = self.lapses[:, None, None]
+        log = np.log(1 - self._careless_share)[:, None] - np.log(self._careless_share)[:, None]
+        log = log + self._main.log_ratio(attending, careless, self.lapses)
+        log += self._anchors.log_ratio(*anchors, self.lapses) + self._log_prior_ratio()
+        self.attends = self._rng.random(log.shape) < 1 / (1 + np.exp(-np.clip(log, -500, 500)))
+        chosen = np.where(self.attends[..., None, None, None], attending, careless)
+        self._main.draw_lapses(chosen, lapses[..., None, None], self._rng)
+        shown = self.attends[..., None]
+        self._anchors.draw_lapses(np.where(shown, *anchors), lapses, self._rng)
+        middle = own + self.attends[..., None, None, None] * felt
+        self._main.draw_latent(middle, sd, self._rng)
+        middle = np.where(shown, expected, level)
+        self._anchors.draw_latent(middle, np.where(shown, sd_anchor, sd_own), self._rng)
+
+    def _log_prior_ratio(self) -> Floats:
+        """Log density of each person's variance if they attend, over that if they do not."""
+        half, scale = self._priors.rating_df / 2, self._priors.careless_scale
+        spread = half * self._typical[:, None]
+        log = np.log(self._variance)
+        attends = half * np.log(spread) - gammaln(half) - (half + 1) * log - spread / self._variance
+        found: Floats = attends - (np.log(scale) - 2 * log - scale / self._variance)
+        return found
+
+    def _rest(self) -> Floats:
+        """Latent judgements without what the state predicts of them."""
+        own = (self._person[..., None] + self._cell)[..., None, None] + self._trend()
+        found: Floats = self._main.latent - own - self.attends[..., None, None, None] * self._felt()
+        return found
+
+    def _weights(self) -> Floats:
+        """(B, n, T, 2, R) precisions of the latent judgements; 0 of lapsed and missing trials."""
+        return self._main.counts / self._variance[..., None, None, None]
+
+    def _draw_effects(self) -> None:
+        rest = self._rest() + (
+            self.attends[..., None, None, None] * _HALVES * self.effects[..., None, None, None]
+        )
+        weights = self._main.counts
+        precision = 0.25 * weights.sum(axis=(2, 3, 4)) / self._variance
+        total = np.einsum("bntmr,m->bn", weights * rest, _HALVES[:, 0]) / self._variance
+        known = precision > 0
+        safe = np.where(known, precision, 1 / _UNKNOWN)
+        who = self.attends & self.people
+        self.effects = self._mixture.draw(np.where(known, total / safe, 0.0), 1 / safe, who)
+
+    def _draw_levels(self) -> None:
+        rest = self._rest() + self._person[..., None, None, None]
+        weights = self._main.counts
+        own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
+        count = weights.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
+        total = (weights * rest).sum(axis=(2, 3, 4))
+        total += (self._anchors.counts * (self._anchors.latent - own)).sum(axis=2)
+        prior = 1 / self._person_variance[:, None]
+        precision = count / self._variance + prior
+        middle = (total / self._variance + self._level[:, None] * prior) / precision
+        self._person = self._normal(middle, precision)
+        people = self.people.sum(axis=1)
+        mean, sd = self._priors.level
+        precision = people / self._person_variance + 1 / sd**2
+        total = (self._person * self.people).sum(axis=1) / self._person_variance + mean / sd**2
+        self._level = self._normal(total / precision, precision)
+        squares = ((self._person - self._level[:, None]) ** 2 * self.people).sum(axis=1)
+        self._person_variance = self._inverse_gamma(self._priors.person_sd, people, squares)
+
+    def _draw_cells(self) -> None:
+        rest = self._rest() + self._cell[..., None, None]
+        weights = self._main.counts
+        prior = 1 / self._cell_variance[:, None, None]
+        precision = weights.sum(axis=(3, 4)) / self._variance[..., None] + prior
+        total = (weights * rest).sum(axis=(3, 4)) / self._variance[..., None]
+        self._cell = self._normal(total / precision, precision)
+        held = self.people[..., None]
+        squares = (self._cell**2 * held).sum(axis=(1, 2))
+        count = self.people.sum(axis=1) * self._cell.shape[2]
+        self._cell_variance = self._inverse_gamma(self._priors.cell_sd, count, squares)
+
+    def _draw_textures(self) -> None:
+        """Levels and effects of the textures, each without a mean over them."""
+        weights = self._weights() * self.attends[..., None, None, None]
+        rest = self._rest()
+        precision = weights.sum(axis=(1, 3, 4))
+        total = (weights * rest).sum(axis=(1, 3, 4)) + precision * self._texture
+        new = self._without_mean(total, precision, self._priors.texture_sd)
+        rest = rest - (new - self._texture)[:, None, :, None, None]
+        self._texture = new
+        total = np.einsum("bntmr,m->bt", weights * rest, _HALVES[:, 0])
+        total += 0.25 * precision * self.texture_effects
+        self.texture_effects = self._without_mean(
+            total, 0.25 * precision, self._priors.texture_effect_sd
+        )
+
+    def _without_mean(self, total: Floats, precision: Floats, sd: float) -> Floats:
+        """Normal draws (B, T) under the condition that their sum is 0.
+
+        The prior is that of `sd` times independent normal values without their mean.
+        """
+        precision = precision + 1 / sd**2
+        free = self._normal(total / precision, precision)
+        share = (1 / precision) / (1 / precision).sum(axis=1, keepdims=True)
+        found: Floats = free - share * free.sum(axis=1, keepdims=True)
+        return found
+
+    def _draw_trends(self) -> None:
+        for c in self._varying:
+            trend, weights = self._trends[c], self._weights()
+            old = self._slopes[c][:, None, None, None, None]
+            rest = self._rest() + old * trend
+            precision = (weights * trend**2).sum(axis=(1, 2, 3, 4)) + self._priors.trend_sd**-2
+            total = (weights * trend * rest).sum(axis=(1, 2, 3, 4))
+            self._slopes[c] = self._normal(total / precision, precision)
+
+    def _draw_anchors(self) -> None:
+        if not self._anchor.size:
+            return
+        shown = self._anchors.counts * self.attends[..., None] / self._variance[..., None]
+        above = self._anchors.latent - self._person[..., None]
+        # The mean of an anchor, then each person's deviation.
+        mean, sd = self._priors.anchor
+        spread = self._anchor_variance[:, None, None]
+        own = np.where(shown > 0, 1 / (1 / np.maximum(shown, _TINY) + spread), 0.0)
+        precision = own.sum(axis=1) + sd**-2
+        self._anchor = self._normal(
+            ((own * above).sum(axis=1) + mean * sd**-2) / precision, precision
+        )
+        precision = shown + 1 / spread
+        middle = shown * (above - self._anchor[:, None]) / precision
+        self._own_anchor = self._normal(middle, precision)
+        held = self.people[..., None]
+        count = self.people.sum(axis=1) * self._anchor.shape[1]
+        squares = (self._own_anchor**2 * held).sum(axis=(1, 2))
+        self._anchor_variance = self._inverse_gamma(self._priors.anchor_sd, count, squares)
+
+    def _draw_variances(self) -> None:
+        squares = (self._main.counts * self._rest() ** 2).sum(axis=(2, 3, 4))
+        own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
+        rest = self._anchors.latent - self._person[..., None] - own
+        squares += (self._anchors.counts * rest**2).sum(axis=2)
+        count = self._main.counts.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
+        half = self._priors.rating_df / 2
+        shape = np.where(self.attends, half, 1.0) + count / 2
+        scale = np.where(self.attends, half * self._typical[:, None], self._priors.careless_scale)
+        gammas = np.maximum(self._rng.standard_gamma(shape), _TINY)
+        self._variance = np.maximum((scale + squares / 2) / gammas, 1e-4)
+        who = self.attends & self.people
+        shape = 2.0 + half * who.sum(axis=1)
+        rate = 2.0 / self._priors.rating_sd**2 + half * np.where(who, 1 / self._variance, 0.0).sum(
+            axis=1
+        )
+        self._typical = self._rng.standard_gamma(shape) / rate
+
+    def _draw_shares(self) -> None:
+        lapsed = self._main.lapsed() + self._anchors.lapsed()
+        kept = self._main.counts.sum(axis=(1, 2, 3, 4)) + self._anchors.counts.sum(axis=(1, 2))
+        self.lapses = np.clip(self._beta(self._priors.lapses, lapsed, kept), 1e-6, 0.999)
+        careless = (self.people & ~self.attends).sum(axis=1)
+        attending = (self.people & self.attends).sum(axis=1)
+        shares = self._beta(self._priors.careless, careless, attending)
+        self._careless_share = np.clip(shares, 1e-9, 1 - 1e-9)
+
+    def _normal(self, middle: Floats, precision: Floats) -> Floats:
+        found: Floats = middle + self._rng.standard_normal(middle.shape) / np.sqrt(precision)
+        return found
+
+    def _inverse_gamma(self, typical: float, count: Floats, squares: Floats) -> Floats:
+        """Variances whose prior is inverse gamma of shape 2 and mean typical²."""
+        gammas = np.maximum(self._rng.standard_gamma(2.0 + count / 2), _TINY)
+        found: Floats = np.maximum((typical**2 + squares / 2) / gammas, 1e-4)
+        return found
+
+    def _beta(self, prior: tuple[float, float], yes: Floats, no: Floats) -> Floats:
+        found: Floats = self._rng.beta(prior[0] + yes, prior[1] + no)
+        return found
+
+
+class _Answers:
+    """Ratings with the latent judgements behind them, and which of them lapsed.
+
+    `counts` is 1 where a judgement counts, 0 where the trial lapsed or was not answered.
+    """
+
+    def __init__(self, values: Floats) -> None:
+        self.answered: Bools = np.isfinite(values)
+        self.latent = np.where(self.answered, values, 0.0)
+        self.counts = self.answered.astype(float)
+        self._values = self.latent.copy()
+        self._unanswered = ~self.answered
+        low = self.answered & (values <= LOWEST)
+        high = self.answered & (values >= HIGHEST)
+        self._low, self._high = np.nonzero(low), np.nonzero(high)
+        self._lapse = np.where(low | high, AT_END, WITHIN)
+
+    def means(self, otherwise: Floats) -> Floats:
+        """Each person's mean; of people without answers `otherwise`."""
+        axes = tuple(range(2, self.latent.ndim))
+        count = self.counts.sum(axis=axes)
+        means = self.latent.sum(axis=axes) / np.maximum(count, 1)
+        return np.where(count > 0, means, otherwise[:, None])
+
+    def likelihoods(self, middle: Floats, sd: Floats) -> Floats:
+        """Density of each rating by a normal judgement, probability of one at an end."""
+        scaled = (self._values - middle) / sd
+        found = np.exp(-0.5 * scaled * scaled) * (_NORMAL / sd)
+        shape = scaled.shape
+        for places, low in ((self._low, True), (self._high, False)):
+            if places[0].size:
+                z = scaled[places]
+                found[places] = ndtr(z) if low else ndtr(-z)
+        assert found.shape == shape
+        return found
+
+    def log_ratio(self, first: Floats, second: Floats, lapses: Floats) -> Floats:
+        """(B, n) log ratio of two likelihoods of all answers of a person, lapses considered."""
+        rate = lapses.reshape(-1, *(1,) * (first.ndim - 1))
+        blind = rate * self._lapse
+        ratio = ((1 - rate) * first + blind) / ((1 - rate) * second + blind)
+        axes = tuple(range(2, first.ndim))
+        found: Floats = (np.log(ratio) * self.answered).sum(axis=axes)
+        return found
+
+    def draw_lapses(self, likelihood: Floats, rate: Floats, rng: np.random.Generator) -> None:
+        """Which trials lapsed, given the likelihood of each answer if it did not."""
+        blind = rate * self._lapse
+        kept = rng.random(likelihood.shape) * ((1 - rate) * likelihood + blind) >= blind
+        self.counts = (kept & self.answered).astype(float)
+
+    def draw_latent(self, middle: Floats, sd: Floats, rng: np.random.Generator) -> None:
+        """Judgements beyond an end of the scale, where a rating lies at it."""
+        shape = self._values.shape
+        for places, end in ((self._low, LOWEST), (self._high, HIGHEST)):
+            if places[0].size:
+                sign = 1.0 if end == LOWEST else -1.0
+                at = np.broadcast_to(middle, shape)[places]
+                scale = np.broadcast_to(sd, shape)[places]
+                limit = sign * (end - at) / scale
+                share = np.maximum(ndtr(limit) * rng.random(limit.shape), _TINY)
+                self.latent[places] = at + sign * scale * np.minimum(ndtri(share), limit)
+
+    def lapsed(self) -> Floats:
+        """(B,) number of lapsed trials."""
+        axes = tuple(range(1, self.counts.ndim))
+        found: Floats = self.answered.sum(axis=axes) - self.counts.sum(axis=axes)
+        return found
