@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from experiments.study.models import ModelSets
-from experiments.study.plan import RATINGS, Claim
+from experiments.study.plan import RATINGS, Claim, Plan
 from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
@@ -118,8 +118,26 @@ def _models(study: Study, models: ModelSets) -> Iterator[str]:
 def _claims(study: Study) -> Iterator[str]:
     if not study.plan.claims:
         yield "None: all findings are exploratory."
+    else:
+        yield _rule(study.plan)
+        yield ""
     for number, claim in enumerate(study.plan.claims, start=1):
-        yield f"{number}. **{claim.name}.** {_claimed(claim)} {proof_of_sensitivity(study, claim)}"
+        yield (
+            f"{number}. **{claim.name}.** {_claimed(claim)} {_tested(study.plan, claim)} "
+            f"{proof_of_sensitivity(study, claim)}"
+        )
+
+
+def _rule(plan: Plan) -> str:
+    """What decides the verdicts."""
+    if plan.rule == "tests":
+        return "Rule of verdicts: the tests that each claim names."
+    return (
+        "Rule of verdicts: the hierarchical model of the participants. Two sets of models are "
+        "equivalent where the mean effect lies inside the bounds and the share of people outside "
+        f"them is below {100 * plan.few:g} %, both at 95 %. Paired t-test and TOST are reported "
+        "beside it."
+    )
 
 
 def proof_of_sensitivity(study: Study, claim: Claim) -> str:
@@ -147,9 +165,14 @@ def _claimed(claim: Claim) -> str:
     low, high = claim.bounds
     return (
         f"Measure: {what}, {against}. Smallest differences that matter: {low:g} and {high:g} "
-        f"{unit}. Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the "
-        "textures."
+        f"{unit}."
     )
+
+
+def _tested(plan: Plan, claim: Claim) -> str:
+    if plan.rule == "model":
+        return f"Claimed: {claim.test}."
+    return f"Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the textures."
 
 
 def _exclusions(study: Study) -> Iterator[str]:

@@ -57,7 +57,10 @@ def _tell_claims(plan: Study) -> None:
     from experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
-    print(f"claims: {len(claims)}" if claims else "claims: none; all findings are exploratory")
+    told = "none; all findings are exploratory"
+    if claims:
+        told = f'{len(claims)}, rule of verdicts "{plan.plan.rule}"'
+    print(f"claims: {told}")
     for claim in claims:
         print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 

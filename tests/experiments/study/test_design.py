@@ -24,6 +24,7 @@ from experiments.study.design import (
     fisher_yates,
     models_of_session,
 )
+from experiments.study.plan import Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
@@ -231,7 +232,7 @@ def test_as_many_begin_with_each_of_several_models(
 def test_an_odd_number_of_participants_is_one_apart(participants: int) -> None:
     plan = TaskPlan(participants=participants, schedule="interleaved")
     for seed in range(20):
-        study = shipped(seed=seed, tasks={"absolute": plan})
+        study = shipped(seed=seed, tasks={"absolute": plan}, plan=Plan())
         sessions = [main_of(study, "absolute", slot) for slot in range(1, participants + 1)]
         for texture in study.textures:
             full = sum(firsts(trials)[texture] == "full" for trials in sessions)

@@ -112,9 +112,9 @@ def test_the_hash_of_the_plan_is_of_the_study_and_of_the_models() -> None:
 
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
     study = Study.load(
-        edited(tmp_path, "participants = 24\nschedule", "participants = 6\nschedule")
+        edited(tmp_path, "participants = 24\nschedule", "participants = 8\nschedule")
     )
-    assert study.plan_of("relative").participants == 6
+    assert study.plan_of("relative").participants == 8
 
 
 def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
@@ -210,6 +210,16 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('"right", "left", "both"', '"right", "right"', "different levels"),
         ("highest_share_at_ends = 0.2 ", "highest_share_at_ends = 2 ", "ends, got 2"),
         ("exclusions = [", "exclusion = [", "got exclusion"),
+        ('rule = "model" ', 'rule = "bayes" ', "the rule in .* got 'bayes'"),
+        ('rule = "model" ', "rule = 1 ", "the rule in .* got 1"),
+        ('rule = "model" ', 'rule = "tests" ', "few in .* beside rule .* got 0.15"),
+        ('rule = "model" ', "", "few in .* beside rule .* got 0.15"),
+        ("few = 0.15 ", "few = 0.51 ", "from 0 to 0.5 for few, got 0.51"),
+        ("few = 0.15 ", "few = -0.01 ", "from 0 to 0.5 for few, got -0.01"),
+        ("few = 0.15 ", "few = true ", "for few, got True"),
+        ("few = 0.15 ", 'few = "15 %" ', "for few, got '15 %'"),
+        ("few = 0.15 ", "few = nan ", "for few, got nan"),
+        (ABSOLUTE, ABSOLUTE.replace("20", "7"), r"8 participants or more in \[absolute.* got 7"),
         ('measure = "correct"', 'measure = "accuracy"', "got 'accuracy'"),
         ('measure = "correct"', 'measure = "magnitude_similarity"', 'to be "correct"'),
         ('task = "relative"', 'task = "oddity"', "expected a planned task"),
@@ -239,6 +249,37 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told
         Study.load(path)
     assert str(path) in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_study_of_an_earlier_version_keeps_its_values_and_its_hash() -> None:
+    """Its verdicts rest on tests; the hashes are those of the version before rules and catches."""
+    trays = {"canvas": "A", "MDF": "B", "PVC": "C"}
+    oddity = TaskPlan(participants=6, schedule="interleaved", repeats=6)
+    study = Study(
+        name="Before", seed=11, textures=tuple(trays), trays=trays, tasks={"oddity": oddity}
+    )
+    assert study.plan.rule == "tests"
+    assert not {"rule", "few"} & set(study.to_dict()["plan"])
+    assert study.sha256 == "dc688debd8aa2ed689d8bc132e4f7e5b6ec26e9d9cb1719237524cbe9fd5d220"
+    assert Study.from_dict(study.to_dict()) == study
+
+
+def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
+    shipped = Study.load()
+    assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)
+    fewer = replace(shipped.plan, few=0.1)
+    assert len({p.sha256 for p in (shipped.plan, fewer, replace(shipped.plan, rule="tests"))}) == 3
+    assert Plan.from_dict(fewer.to_dict()) == fewer
+    assert Plan.from_dict({"rule": "model"}).few == 0.15
+    with refused(InputError, expected="model", got=[0.1, "tests"]):
+        Plan(few=0.1)
+    with refused(InputError, expected=8, got=7, names=["absolute", 'rule = "tests"']):
+        replace(shipped, tasks={"absolute": replace(shipped.plan_of("absolute"), participants=7)})
+    seven = {"absolute": replace(shipped.plan_of("absolute"), participants=7)}
+    tested = replace(shipped, plan=replace(shipped.plan, rule="tests"), tasks=seven)
+    assert tested.plan_of("absolute").participants == 7
+    unclaimed = replace(shipped, plan=replace(shipped.plan, claims=()), tasks=seven)
+    assert unclaimed.plan_of("absolute").participants == 7
 
 
 def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:

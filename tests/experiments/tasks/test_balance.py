@@ -204,6 +204,21 @@ def test_each_claim_says_what_its_equality_hangs_on(planned: Study) -> None:
     assert "No equality in any case" in proof_of_sensitivity(study, odd)
 
 
+def test_the_page_says_which_rule_decides(planned: Study, models: ModelSets) -> None:
+    tested = plan_page(planned, models)
+    eight = replace(planned.plan_of("absolute"), participants=8)
+    plan = replace(planned.plan, rule="model", few=0.125)
+    modelled = plan_page(
+        replace(planned, plan=plan, tasks={**planned.tasks, "absolute": eight}), models
+    )
+    for fact in ("hierarchical model", "12.5 %", "95 %", "beside"):
+        assert fact in modelled
+    assert "hierarchical model" not in tested
+    # The tests decide nothing there, so no claim names them as its own.
+    assert "Test of equivalence" in tested
+    assert "Test of equivalence" not in modelled
+
+
 def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:
     secret = replace(planned, seed=7_422_788_540_163_745, plan=Plan())
     same = {**models.sets["simplified"], "MDF": models.sets["full"]["MDF"]}
