@@ -10,7 +10,12 @@ from experiments.study.plan import RATINGS, Claim, Plan
 from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
-from experiments.tasks.durations import minutes_of_session, trials_of_session
+from experiments.tasks.durations import (
+    minutes_of_catch_trials,
+    minutes_of_session,
+    trials_of_session,
+)
+from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 
 TESTED = {
@@ -82,11 +87,28 @@ def _design(study: Study, task: str) -> Iterator[str]:
             "presented as a pair like any other, once in each session; not part of the "
             "comparison of models."
         )
+    if plan.catch_trials:
+        yield (
+            f"- {told_of_catch_trials(study, task)}, at random places: the odd surface models "
+            f"another texture than the other two ({_pairs(plan)}), all with the {plan.models[0]} "
+            "models; not part of the comparison of models."
+        )
     if plan.break_after:
         yield f"- A break after every {plan.break_after} trials."
     if plan.feel_all:
         yield "- No answer is taken before all virtual surfaces of the trial were felt."
     yield ""
+
+
+def told_of_catch_trials(study: Study, task: str) -> str:
+    """How many catch trials a session of a task has, and what they cost."""
+    number = counted(study.plan_of(task).catch_trials or 0, "catch trial")
+    minutes = counted(minutes_of_catch_trials(study, task), "minute")
+    return f"{number}, about {minutes} of each session"
+
+
+def _pairs(plan: TaskPlan) -> str:
+    return ", ".join(f"{surface} and {other}" for surface, other in plan.catch.items())
 
 
 def _schedule(study: Study, task: str) -> str:
@@ -147,8 +169,13 @@ def proof_of_sensitivity(study: Study, claim: Claim) -> str:
         return f"No equality unless {claim.models[0]} models are recognised above chance."
     if claim.task == "absolute" and plan.anchors:
         return "No equality unless the anchors are rated lower than the textures' own models."
-    advice = "; give it anchors" if claim.task == "absolute" else ""
-    return f"No equality in any case, as nothing in it tests sensitivity{advice}."
+    if plan.catch_trials:
+        told = told_of_catch_trials(study, claim.task)
+        return f"No equality unless the odd one of catch trials is found above chance ({told})."
+    advice = {"absolute": "; give it anchors", "oddity": "; give it catch trials"}
+    return (
+        f"No equality in any case, as nothing in it tests sensitivity{advice.get(claim.task, '')}."
+    )
 
 
 def _claimed(claim: Claim) -> str:

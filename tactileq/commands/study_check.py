@@ -67,6 +67,7 @@ def _tell_claims(plan: Study) -> None:
 
 def _tell_sessions(plan: Study) -> None:
     from experiments.tasks.durations import minutes_of_session, trials_of_session
+    from experiments.tasks.page import told_of_catch_trials
 
     for task, planned in plan.tasks.items():
         training, main = trials_of_session(plan, task)
@@ -76,6 +77,8 @@ def _tell_sessions(plan: Study) -> None:
             f"{counted(sessions, 'session')} each, {training} training + {main} main trials per "
             f"session; about {minutes_of_session(plan, task)} min per session (an estimate)"
         )
+        if planned.catch_trials:
+            print(f"  {told_of_catch_trials(plan, task)}, among the main trials")
 
 
 def _tell_balance(plan: Study) -> None:
