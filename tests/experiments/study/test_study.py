@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -178,6 +179,27 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             '[threshold]\nparticipants = 2\nschedule = "by-day"\n[plan]\n',
             r"the schedule interleaved in \[threshold\]",
         ),
+        *(
+            (
+                "[plan]\n",
+                f'[oddity]\nparticipants = 8\nschedule = "interleaved"\n{key}\n[plan]\n',
+                told,
+            )
+            for key, told in (
+                ("catch_trials = 4", "4 catch trials of .*without a surface .*catch_trials = 0"),
+                ("catch = {}\ncatch_trials = 1", "1 catch trials of .*without a surface"),
+                ("catch_trials = 101", "from 0 to 100 for catch_trials, got 101"),
+                ("catch_trials = -1", "from 0 to 100 for catch_trials, got -1"),
+                ("catch_trials = 2.5", "for catch_trials, got 2.5"),
+                ("catch_trials = true", "for catch_trials, got True"),
+                ('catch = ["canvas"]', r"a table catch in \[oddity\]"),
+                ('catch = {canvas = "canvas"}', "catch, got 'canvas' = 'canvas'"),
+                ('catch = {canvas = "silk"}', "catch, got 'canvas' = 'silk'"),
+                ('catch = {silk = "canvas"}', "catch, got 'silk' = 'canvas'"),
+            )
+        ),
+        ("repeats = 3\n", 'repeats = 3\ncatch = {canvas = "PVC"}\n', r"got one in \[relative"),
+        (ABSOLUTE, f"{ABSOLUTE}\ncatch_trials = 0", r"got one in \[absolute"),
         ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
         ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
         ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
@@ -280,6 +302,57 @@ def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
     assert tested.plan_of("absolute").participants == 7
     unclaimed = replace(shipped, plan=replace(shipped.plan, claims=()), tasks=seven)
     assert unclaimed.plan_of("absolute").participants == 7
+
+
+PAIRS = {"wall paper": "aluminum", "canvas": "PVC"}
+
+
+@pytest.mark.parametrize(
+    ("rule", "said", "expected"),
+    [
+        ("model", {}, (PAIRS, 6)),
+        ("model", {"catch": {"MDF": "PVC"}}, ({"MDF": "PVC"}, 6)),
+        ("model", {"catch": {"MDF": "PVC"}, "catch_trials": 9}, ({"MDF": "PVC"}, 9)),
+        ("model", {"catch_trials": 0}, ({}, 0)),
+        ("tests", {}, ({}, None)),
+        ("tests", {"catch": {"MDF": "PVC"}}, ({"MDF": "PVC"}, 6)),
+        ("tests", {"catch": {"MDF": "PVC"}, "catch_trials": 0}, ({"MDF": "PVC"}, 0)),
+    ],
+)
+def test_new_studies_have_catch_trials_of_their_anchors(
+    rule: str, said: dict[str, Any], expected: tuple[dict[str, str], int | None]
+) -> None:
+    shipped = Study.load()
+    plain = {"participants": 8, "schedule": "interleaved", **said}
+    plan = TaskPlan.from_dict("oddity", plain)
+    study = replace(
+        shipped,
+        plan=replace(shipped.plan, rule=rule),
+        tasks={**shipped.tasks, "oddity": plan},
+    )
+    found = study.plan_of("oddity")
+    assert (found.catch, found.catch_trials) == expected
+    again = Study.from_dict(study.to_dict())
+    assert again == study
+    assert again.sha256 == study.sha256
+    # A study that has none, and says nothing of them, has the values of an earlier version.
+    stored = set(study.to_dict()["oddity"]) & {"catch", "catch_trials"}
+    assert stored == {
+        name
+        for name, value in zip(("catch", "catch_trials"), expected, strict=True)
+        if value not in ({}, None)
+    }
+
+
+def test_new_studies_without_anchors_have_to_name_their_catch_trials_or_to_want_none() -> None:
+    shipped = Study.load()
+    bare = replace(shipped.plan_of("absolute"), anchors={})
+    oddity = TaskPlan(participants=8, schedule="interleaved", repeats=6)
+    tasks = {**shipped.tasks, "absolute": bare, "oddity": oddity}
+    with refused(InputError, names=["[oddity]", "catch = {", "catch_trials = 0"], expected=6):
+        replace(shipped, tasks=tasks)
+    for said in ({"catch_trials": 0}, {"catch": PAIRS}):
+        replace(shipped, tasks={**tasks, "oddity": replace(oddity, **said)})
 
 
 def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:
