@@ -191,13 +191,8 @@ class Plan:
                     f"expected models of [{claim.task}] ({', '.join(tasks[claim.task].models)}) in "
                     f"the claim {claim.name}, got {shown(unknown[0])}; correct it."
                 )
-            people = tasks[claim.task].participants
-            if self.rule == "model" and people < FEWEST_OF_MODEL:
-                raise InputError(
-                    f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the "
-                    f'rule "model" of the claim {claim.name}, got {people}; plan '
-                    f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan].'
-                )
+            if self.rule == "model":
+                _check_people(claim, tasks[claim.task].participants)
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, as in a study file; a rule of tests goes without saying."""
@@ -232,6 +227,15 @@ class Plan:
         claims = as_list(table.get("claims", ()), where="claims", example="[[plan.claims]]")
         table["claims"] = tuple(map(Claim.from_dict, claims))
         return Plan(**table)
+
+
+def _check_people(claim: Claim, participants: int) -> None:
+    if participants < FEWEST_OF_MODEL:
+        raise InputError(
+            f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the rule "
+            f'"model" of the claim {claim.name}, got {participants}; plan {FEWEST_OF_MODEL} or '
+            'more, or write rule = "tests" in [plan] and leave few out.'
+        )
 
 
 def _few_without_model(few: object) -> InputError:

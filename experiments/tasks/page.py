@@ -81,6 +81,17 @@ def _design(study: Study, task: str) -> Iterator[str]:
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
         f"about {minutes_of_session(study, task)} minutes (an estimate)."
     )
+    yield from _proofs(study, task)
+    if plan.break_after:
+        yield f"- A break after every {plan.break_after} trials."
+    if plan.feel_all:
+        yield "- No answer is taken before all virtual surfaces of the trial were felt."
+    yield ""
+
+
+def _proofs(study: Study, task: str) -> Iterator[str]:
+    """The trials that show whether people tell surfaces apart."""
+    plan = study.plan_of(task)
     for real, virtual in plan.anchors.items():
         yield (
             f"- Anchor: real {real} beside the {plan.models[0]} model of {virtual}, "
@@ -89,15 +100,10 @@ def _design(study: Study, task: str) -> Iterator[str]:
         )
     if plan.catch_trials:
         yield (
-            f"- {told_of_catch_trials(study, task)}, at random places: the odd surface models "
+            f"- {told_of_catch_trials(study, task)}, at random places: the odd one models "
             f"another texture than the other two ({_pairs(plan)}), all with the {plan.models[0]} "
             "models; not part of the comparison of models."
         )
-    if plan.break_after:
-        yield f"- A break after every {plan.break_after} trials."
-    if plan.feel_all:
-        yield "- No answer is taken before all virtual surfaces of the trial were felt."
-    yield ""
 
 
 def told_of_catch_trials(study: Study, task: str) -> str:
