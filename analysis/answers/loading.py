@@ -18,7 +18,7 @@ from analysis.answers.order import (
     told_of_unordered,
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
-from analysis.answers.responses import PlannedTask, Responses
+from analysis.answers.responses import PlannedTask, Responses, stands_apart
 from analysis.columns import shortened_hash
 from analysis.labels import MODELS
 from modeling import InputError
@@ -433,7 +433,7 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
     """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
-    columns = ANSWER_TABLES[task].columns
+    columns = [c for c in ANSWER_TABLES[task].columns if not c.optional or c.name in table]
     _require_columns(table, tuple(column.name for column in columns), path=path)
     for column in columns:
         found = table[column.name]
@@ -459,8 +459,9 @@ def _check_known(table: pd.DataFrame, gathered: _Gathered, *, path: Path) -> Non
     if not gathered.sets:
         return
     sets, textures = gathered.sets, sorted(gathered.textures)
-    named = (("model", sets, "sets of models"), ("texture", textures, "textures"))
-    for column, known, what in (*named, ("virtual_texture", textures, "textures")):
+    of_textures = ("texture", *(known.other_texture for known in ANSWER_TABLES.values()))
+    named = [(column, textures, "textures") for column in dict.fromkeys(of_textures) if column]
+    for column, known, what in (("model", sets, "sets of models"), *named):
         if column in table:
             other = ~table[column].isin(list(known)) & table[column].notna()
             expected = f"{' or '.join(known)}, the study's {what}, in column {column}"
@@ -553,7 +554,10 @@ def _read_lines(path: Path) -> pd.DataFrame:
 def _split(
     table: pd.DataFrame | None, task: str
 ) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame | None]:
-    """Main trials, training and anchors (None of a task without); or tables without rows."""
+    """Main trials, training, and anchors or catch trials (None of a task that can have none).
+
+    Tables without rows where there are no sessions.
+    """
     if table is None:
         columns = ANSWER_TABLES[task].columns
         kinds = {c.name: object if c.limits is None else float for c in columns}
@@ -561,8 +565,6 @@ def _split(
         table = pd.DataFrame({name: pd.Series(dtype=kind) for name, kind in kinds.items()})
     main = table["phase"] == "main"
     training = table[~main].reset_index(drop=True)
-    if "virtual_texture" not in table:
-        return table[main].reset_index(drop=True), training, None
-    anchor = main & (table["virtual_texture"] != table["texture"])
-    own, other = (table[rows].reset_index(drop=True) for rows in (main & ~anchor, anchor))
-    return own, training, other
+    apart = stands_apart(table, task)
+    own, other = (table[main & rows].reset_index(drop=True) for rows in (~apart, apart))
+    return own, training, other if ANSWER_TABLES[task].other_texture else None

@@ -8,9 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from modeling import InputError
+from modeling.checks import is_number
+from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 
 EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
+MODEL_RULE, TESTS_RULE = "model", "tests"
+LARGEST_FEW = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,12 +58,20 @@ class AnalysisPlan:
         Share of ratings at either end of a scale (0 … 1) above which no equality is concluded.
     sha256 : tuple of str
         Of the pages to preregister that sessions ran under; several where the study was changed.
+    rule : {"tests", "model"}
+        What decides the verdicts: paired t-test and TOST, as in studies that name no rule, or the
+        hierarchical model of the participants.
+    few : float
+        Share of people outside the bounds (0 … 0.5) below which the model calls two sets of models
+        equivalent.
     """
 
     claims: tuple[Claim, ...]
     exclusions: tuple[str, ...] = ()
     highest_share_at_ends: float = 0.2
     sha256: tuple[str, ...] = ()
+    rule: str = TESTS_RULE
+    few: float = 0.15
 
 
 def plan_from(
@@ -79,7 +91,7 @@ def plan_from(
     Raises
     ------
     InputError
-        For claims that are not such as a study file can state.
+        For claims, a rule or a share that are not such as a study file can state.
     """
     try:
         claims = tuple(_claim(one) for one in values.get("claims", ()))
@@ -88,12 +100,26 @@ def plan_from(
             exclusions=tuple(map(str, values.get("exclusions", ()))),
             highest_share_at_ends=float(values.get("highest_share_at_ends", 0.2)),
             sha256=sha256,
+            rule=_rule(values.get("rule", TESTS_RULE)),
+            few=_few(values.get("few", 0.15)),
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
             f"expected the claims of a study's [plan] in {path}, got something else ({error}); "
             "restore the file."
         ) from None
+
+
+def _rule(value: object) -> str:
+    if value not in (MODEL_RULE, TESTS_RULE):
+        raise ValueError(f"rule {shown(value)}")
+    return str(value)
+
+
+def _few(value: object) -> float:
+    if not (is_number(value) and 0 <= value <= LARGEST_FEW):
+        raise ValueError(f"few {shown(value)}")
+    return float(value)
 
 
 def _claim(values: Mapping[str, Any]) -> Claim:

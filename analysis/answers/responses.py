@@ -10,6 +10,7 @@ import pandas as pd
 from analysis.answers.plan import AnalysisPlan
 from analysis.labels import MODELS
 from modeling.errors import InputError, shown
+from modeling.files.answer_tables import ANSWER_TABLES
 
 BETWEEN = "/"  # a set-up's name and a participant's: leipzig/sub-01
 
@@ -54,8 +55,10 @@ class Responses:
     training : mapping of task to DataFrame
         The training trials, same columns; no statistic uses them.
     anchors : mapping of task to DataFrame
-        Of tasks that have them the main trials whose virtual surface modelled another texture than
-        the real one's, same columns; no statistic of the models uses them.
+        Of tasks that can have them the main trials that show whether people tell surfaces apart,
+        same columns: anchors, whose virtual surface modelled another texture than the real one's,
+        and catch trials, whose odd one modelled another texture than the other two; no statistic
+        of the models uses them.
     left_out : mapping of task to DataFrame
         The main trials of participants who were left out by hand (`leave_out`); of a session of
         theirs that cannot be read, or has no answer, one row with participant and session alone.
@@ -136,7 +139,7 @@ class Responses:
         return _done(self._kept(task))
 
     def trials_done(self, task: str) -> int:
-        """How many main trials, anchors included, those of `done` have answered so far."""
+        """How many main trials those of `done` have answered so far, `anchors` included."""
         anchors = self.anchors.get(task, self.answers[task][:0])
         return len(self._kept(task)) + len(self._without_dropouts(anchors))
 
@@ -224,6 +227,25 @@ def leave_out(responses: Responses, reasons: Mapping[str, str]) -> Responses:
         under_way={task: who - reasons.keys() for task, who in responses.under_way.items()},
         warnings=(*responses.warnings, *left_out),
     )
+
+
+def stands_apart(table: pd.DataFrame, task: str) -> pd.Series:
+    """Which answers are to anchors or catch trials; none of a table that cannot say.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Answers to the task, with the column texture.
+    task : str
+
+    Returns
+    -------
+    Series of bool
+    """
+    other = table.get(ANSWER_TABLES[task].other_texture)
+    if other is None:
+        return pd.Series(False, index=table.index)
+    return other.notna() & (other != table["texture"])
 
 
 def setup_of(participants: pd.Series) -> pd.Series:

@@ -149,6 +149,7 @@ def _sensitivity(found: Sequence[ClaimFound]) -> str:
     return (
         "Equivalence was not concluded where the data do not show that participants could tell "
         "different surfaces apart (ratings: anchors rated lower than the textures' own models; "
-        "forced choice: the reference recognised above chance) or where too many ratings lie at an "
+        "forced choice: the reference recognised above chance; odd one out: catch trials answered "
+        "above chance) or where too many ratings lie at an "
         f"end of the scale{f' (sensitivity: {states})' if states else ''}."
     )

@@ -196,7 +196,8 @@ def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generat
 def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
     """Whether participants told different surfaces apart, as `Standing.sensitivity` states it.
 
-    Ratings show it by anchors, the forced choice by its reference; no other task can so far.
+    Ratings show it by anchors, the forced choice by its reference, the odd one out by catch trials;
+    no other task can so far.
     """
     anchors = responses.anchors.get(claim.task)
     if claim.task == "absolute" and anchors is not None and len(anchors):
@@ -209,6 +210,9 @@ def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator
         values = claim_values(responses, claim).table.groupby("participant_id")["reference"].mean()
         above = values - chance_of("relative", responses.relative)
         failed = f"answers on {claim.models[0]} models were not above chance"
+    elif claim.task == "oddity" and anchors is not None and len(anchors):
+        above = anchors.groupby("participant_id")["correct"].mean() - chance_of("oddity", anchors)
+        failed = "catch trials were not answered above chance"
     else:
         return NOT_TESTED
     return SHOWN if _one_sided_p(above.dropna(), rng=rng) < ALPHA else failed

@@ -142,10 +142,13 @@ class Felt:
         In level and in shape: by set of models, real texture, and texture of the virtual surface.
     between : (2, K, K, T) ndarray
         Between two sets' models of one texture.
+    among : (2, K, T, T) ndarray
+        Between one set's models of two textures.
     """
 
     from_real: Floats
     between: Floats
+    among: Floats
 
 
 class Perception:
@@ -208,6 +211,7 @@ class Perception:
         return Felt(
             from_real=_distances(real[:, None], virtual[:, None]),
             between=_distances(virtual[:, None], virtual),
+            among=_distances(virtual[:, :, None], virtual[:, None]),
         )
 
     def distance(self, texture: str, model: str, other: str) -> Distance:

@@ -32,6 +32,7 @@ from experiments.sessions.surfaces import (
 )
 from experiments.study.questions import Question
 from experiments.study.study import TASKS
+from experiments.tasks.oddity import OddityTrial
 from experiments.tasks.threshold import ThresholdTrial
 from modeling import InputError
 from modeling.seeds import generator
@@ -77,6 +78,7 @@ class SimulatedParticipant:
         felt = perception.felt(self.person.threshold_db)
         self._from_real = (self.person.sensitivity * felt.from_real).tolist()
         self._between = (self.person.sensitivity * felt.between).tolist()
+        self._among = (self.person.sensitivity * felt.among).tolist()
         self._rng = generator(seed, subject, *occasion)
 
     def hear(self, note: Note, page: Callable[[str], None]) -> None:
@@ -218,13 +220,23 @@ class SimulatedParticipant:
         if self._rng.random() < self.person.lapse_rate:
             return self._drawn(choice_shares([0.0] * len(liked), 1.0, liked))
         percepts = self._rng.standard_normal(len(liked))
-        odd = np.array([name == trial.model for name in trial.layout])
+        if isinstance(trial, OddityTrial):
+            odd = np.arange(1, percepts.size + 1) == trial.odd_position
+        else:
+            odd = np.array([name == trial.model for name in trial.layout])
         percepts[odd] += self.odd_distance_db(trial) / self._temperature_db(trial)
         others = (percepts.sum() - percepts) / (percepts.size - 1)
         return int(np.argmax(np.abs(percepts - others) + liked))
 
     def odd_distance_db(self, trial: ChoiceTrial) -> float:
-        """How far the odd model feels from the other one; planted effects count as distances."""
+        """How far the odd surface feels from the others; planted effects count as distances.
+
+        In a catch trial it is another texture, of which no effect is planted.
+        """
+        if isinstance(trial, OddityTrial) and trial.is_catch:
+            number = self._perception.set_number[trial.model]
+            two = [self._perception.place[name] for name in (trial.texture, trial.odd_texture)]
+            return hypot(*(scale[number][two[0]][two[1]] for scale in self._among))
         first, second = sorted({self._perception.set_number[name] for name in trial.layout})
         place = self._perception.place[trial.texture]
         apart = []

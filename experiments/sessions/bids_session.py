@@ -19,7 +19,7 @@ from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_rows
 from experiments.sessions.traces import HAND_COLUMNS
 from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_paths
 
@@ -48,15 +48,21 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
             "DerivedFrom": sources,
             **({"Damaged": damaged} if damaged else {}),
             "Files": {path.name: hashlib.sha256(data).hexdigest() for path, data in made.items()},
-            **{c.name: c.sidecar() for c in ANSWER_TABLES[held.manifest.task].columns},
+            **{column.name: column.sidecar() for column in _columns(held)},
         }
     )
     return made, (*lost_rows, *lost_readings)
 
 
 def _answers(held: Held) -> Made:
-    names = [column.name for column in ANSWER_TABLES[held.manifest.task].columns]
+    names = [column.name for column in _columns(held)]
     return {held.files.answers: table_bytes(names, held.state.rows)}
+
+
+def _columns(held: Held) -> list[AnswerColumn]:
+    """The columns of the answers, without optional ones that no answer has."""
+    columns = ANSWER_TABLES[held.manifest.task].columns
+    return [c for c in columns if not c.optional or any(c.name in row for row in held.state.rows)]
 
 
 def _events(held: Held, presentations: list[dict[str, str]]) -> Made:

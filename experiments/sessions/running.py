@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +135,7 @@ def run_session(
                 session=session,
                 slot=person.slot,
                 code=person.code,
-                trials=[asdict(trial) for trial in plan.trials],
+                trials=[trial.to_dict() for trial in plan.trials],
             )
             files = manifest.files(root)
             if said.resume and files.manifest.exists():

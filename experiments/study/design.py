@@ -80,6 +80,10 @@ class Trial:
     model: str
     tray: str
 
+    def to_dict(self) -> dict[str, Any]:
+        """The trial as plain values, as a session stores it."""
+        return asdict(self)
+
 
 Order = Sequence[tuple[str, str]]
 
@@ -230,5 +234,5 @@ class SessionPlan:
             "subject": self.subject,
             "session": self.session,
             "slot": self.slot,
-            "trials": [asdict(trial) for trial in self.trials],
+            "trials": [trial.to_dict() for trial in self.trials],
         }

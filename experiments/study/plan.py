@@ -22,6 +22,12 @@ from modeling.files.hashes import sha256_of_values
 
 Test = Literal["equivalence", "difference"]
 TESTS: tuple[Test, ...] = ("equivalence", "difference")
+Rule = Literal["model", "tests"]
+RULES: tuple[Rule, ...] = ("model", "tests")
+FEW = 0.15
+LARGEST_FEW = 0.5
+# Fewer people say too little about the spread between people, on which the model's rule rests.
+FEWEST_OF_MODEL = 8
 RATINGS = tuple(dict.fromkeys(c.name for t in ANSWER_TABLES.values() for c in t.columns if c.scale))
 # The largest difference that there can be: in points of a scale, or between two shares.
 LARGEST = {**dict.fromkeys(RATINGS, ENDS[1] - ENDS[0]), "correct": 1.0}
@@ -132,11 +138,24 @@ class Plan:
         One sentence for each reason to leave a participant or an answer out.
     highest_share_at_ends : float
         Share of ratings at an end of a scale, 0 … 1, above which a scale is said to be exhausted.
+    rule : {"tests", "model"}
+        What decides the verdicts: paired t-test and TOST, as in study files that name no rule, or
+        the hierarchical model of the participants.
+    few : float
+        Share of people outside the bounds, 0 … 0.5, below which models count as equivalent; of the
+        rule "model" alone.
+
+    Raises
+    ------
+    InputError
+        For values out of range.
     """
 
     claims: tuple[Claim, ...] = ()
     exclusions: tuple[str, ...] = ()
     highest_share_at_ends: float = 0.2
+    rule: Rule = "tests"
+    few: float = FEW
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "claims", tuple(self.claims))
@@ -146,9 +165,14 @@ class Plan:
         require_different("names of claims", [claim.name for claim in self.claims])
         check_number("highest_share_at_ends", self.highest_share_at_ends, high=1.0)
         object.__setattr__(self, "highest_share_at_ends", float(self.highest_share_at_ends))
+        check_choice("the rule in [plan]", self.rule, RULES)
+        check_number("few", self.few, high=LARGEST_FEW)
+        object.__setattr__(self, "few", float(self.few))
+        if self.rule == "tests" and self.few != FEW:
+            raise _few_without_model(self.few)
 
     def check(self, tasks: Mapping[str, TaskPlan]) -> None:
-        """Refuse claims about tasks or models that are not planned.
+        """Refuse claims about tasks or models that are not planned, or about too few people.
 
         Raises
         ------
@@ -167,12 +191,15 @@ class Plan:
                     f"expected models of [{claim.task}] ({', '.join(tasks[claim.task].models)}) in "
                     f"the claim {claim.name}, got {shown(unknown[0])}; correct it."
                 )
+            if self.rule == "model":
+                _check_people(claim, tasks[claim.task].participants)
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as plain values, as in a study file."""
+        """The plan as plain values, as in a study file; a rule of tests goes without saying."""
         return {
             "exclusions": list(self.exclusions),
             "highest_share_at_ends": self.highest_share_at_ends,
+            **({"rule": self.rule, "few": self.few} if self.rule == "model" else {}),
             "claims": [claim.to_dict() for claim in self.claims],
         }
 
@@ -192,9 +219,27 @@ class Plan:
         """
         table = as_table(values, where="[plan]", example="[plan] above its keys")
         check_keys(table, tuple(f.name for f in fields(Plan)), where="[plan]")
+        if "few" in table and table.get("rule", "tests") == "tests":
+            raise _few_without_model(table["few"])
         table["exclusions"] = as_list(
             table.get("exclusions", ()), where="exclusions", example='exclusions = ["…"]'
         )
         claims = as_list(table.get("claims", ()), where="claims", example="[[plan.claims]]")
         table["claims"] = tuple(map(Claim.from_dict, claims))
         return Plan(**table)
+
+
+def _check_people(claim: Claim, participants: int) -> None:
+    if participants < FEWEST_OF_MODEL:
+        raise InputError(
+            f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the rule "
+            f'"model" of the claim {claim.name}, got {participants}; plan {FEWEST_OF_MODEL} or '
+            'more, or write rule = "tests" in [plan] and leave few out.'
+        )
+
+
+def _few_without_model(few: object) -> InputError:
+    return InputError(
+        f'expected few in [plan] beside rule = "model" alone, got {shown(few)} beside the rule '
+        '"tests"; write rule = "model", or remove it.'
+    )

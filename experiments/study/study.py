@@ -21,7 +21,7 @@ from experiments.study.tables import (
     require_keys,
     require_label,
 )
-from experiments.study.task_plan import PAPER_PLANS, TaskPlan, check_plan
+from experiments.study.task_plan import PAPER_PLANS, TaskPlan, check_plan, with_catch_trials
 from modeling import InputError
 from modeling.checks import check_keys, check_number, check_whole
 from modeling.errors import shown
@@ -174,6 +174,10 @@ class Study:
             check_keys(named, tuple(self.models), where=f"the models of [{task}]")
             models = tuple(name for name in self.models if name in named)
             in_order[task] = replace(plan, models=models)
+            if task == "oddity":
+                in_order[task] = with_catch_trials(
+                    in_order[task], rule=self.plan.rule, anchors=in_order["absolute"].anchors
+                )
             check_plan(task, in_order[task], textures=self.textures)
         object.__setattr__(self, "tasks", in_order)
 

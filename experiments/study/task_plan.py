@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any, Literal
 
 from experiments.study.tables import (
@@ -25,6 +25,9 @@ SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
 # The usual repeats of a task whose table does not say; 1 in any other.
 REPEATS = {"relative": 3, "oddity": 6, "threshold": 60}
 MOST_TRAINING_TRIALS = 100
+# Of a session, where the rule of verdicts is the model and the study does not say.
+CATCH_TRIALS = 6
+MOST_CATCH_TRIALS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +58,12 @@ class TaskPlan:
         correspond (docs/method/protocols.md#anchors); once in each session.
     feel_all : bool
         Whether all virtual surfaces of a trial have to be felt before an answer.
+    catch : mapping of texture to texture
+        Of the odd-one-out task: surfaces with one that everybody can tell from it, the odd one of
+        a catch trial and the other two in either way (docs/method/protocols.md#catch-trials).
+    catch_trials : int, optional
+        Main trials of a session that are catch trials, 0 … 100; without it as many as the study's
+        rule of verdicts asks for.
 
     Raises
     ------
@@ -71,10 +80,13 @@ class TaskPlan:
     break_after: int = 0
     anchors: Mapping[str, str] = field(default_factory=dict)
     feel_all: bool = False
+    catch: Mapping[str, str] = field(default_factory=dict)
+    catch_trials: int | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "models", tuple(self.models))
-        object.__setattr__(self, "anchors", dict(self.anchors))
+        for name in ("anchors", "catch"):
+            object.__setattr__(self, name, dict(getattr(self, name)))
         self._check_numbers()
         if self.schedule not in SCHEDULES:
             raise InputError(
@@ -99,6 +111,8 @@ class TaskPlan:
         check_whole(
             "most_training_trials", self.most_training_trials, low=0, high=MOST_TRAINING_TRIALS
         )
+        if self.catch_trials is not None:
+            check_whole("catch_trials", self.catch_trials, low=0, high=MOST_CATCH_TRIALS)
         most = self.most_training_trials or self.training_trials
         if most < self.training_trials:
             raise InputError(
@@ -108,8 +122,10 @@ class TaskPlan:
         object.__setattr__(self, "most_training_trials", most)
 
     def to_dict(self) -> dict[str, Any]:
-        """The plan as plain values, as in a study file."""
-        return {**asdict(self), "models": list(self.models)}
+        """The plan as plain values, as in a study file; of catch trials only what it says."""
+        values = {**asdict(self), "models": list(self.models)}
+        unsaid: dict[str, object] = {"catch": {}, "catch_trials": None}
+        return {name: value for name, value in values.items() if unsaid.get(name, ()) != value}
 
     @staticmethod
     def from_dict(task: str, values: object) -> TaskPlan:
@@ -128,11 +144,12 @@ class TaskPlan:
         table["models"] = as_list(
             table.get("models", ()), where=f"models in [{task}]", example=f"models = {example}"
         )
-        table["anchors"] = as_table(
-            table.get("anchors", {}),
-            where=f"anchors in [{task}]",
-            example='anchors = {canvas = "PVC"}',
-        )
+        for name in ("anchors", "catch"):
+            table[name] = as_table(
+                table.get(name, {}),
+                where=f"{name} in [{task}]",
+                example=f'{name} = {{canvas = "PVC"}}',
+            )
         return TaskPlan(**table)
 
 
@@ -140,6 +157,22 @@ PAPER_PLANS = {
     "absolute": TaskPlan(participants=20, schedule="interleaved"),
     "relative": TaskPlan(participants=24, schedule="by-day", repeats=REPEATS["relative"]),
 }
+
+
+def with_catch_trials(plan: TaskPlan, *, rule: str, anchors: Mapping[str, str]) -> TaskPlan:
+    """A plan of the odd-one-out task with its catch trials, where it does not number them.
+
+    Parameters
+    ----------
+    plan : TaskPlan
+    rule : {"tests", "model"}
+        Of the study's verdicts; under "model" there are catch trials unless the plan says no.
+    anchors : mapping of texture to texture
+        Of the absolute task: the pairs of a plan that names none.
+    """
+    if plan.catch_trials is not None or not (plan.catch or rule == "model"):
+        return plan
+    return replace(plan, catch=plan.catch or anchors, catch_trials=CATCH_TRIALS)
 
 
 def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:
@@ -157,6 +190,7 @@ def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:
             "remove it there."
         )
     _check_anchors(task, plan.anchors, textures)
+    _check_catch(task, plan, textures)
     if ANSWER_TABLES[task].both_models:
         _check_both_models(task, plan)
     if not ANSWER_TABLES[task].of_surfaces and plan.schedule != "interleaved":
@@ -177,6 +211,27 @@ def _check_anchors(task: str, anchors: Mapping[str, str], textures: tuple[str, .
                 f"expected two different textures of the study in each anchor, got {shown(real)} "
                 f"= {shown(virtual)}; name the real surface, then that of the virtual one."
             )
+
+
+def _check_catch(task: str, plan: TaskPlan, textures: tuple[str, ...]) -> None:
+    if task != "oddity" and (plan.catch or plan.catch_trials is not None):
+        raise InputError(
+            f"expected catch and catch_trials in [oddity] alone, got one in [{task}]; remove it "
+            "there."
+        )
+    for surface, other in plan.catch.items():
+        if surface not in textures or other not in textures or surface == other:
+            raise InputError(
+                f"expected two different textures of the study in each pair of catch, got "
+                f"{shown(surface)} = {shown(other)}; name two that everybody can tell apart."
+            )
+    if plan.catch_trials and not plan.catch:
+        first, second = textures[:2]
+        raise InputError(
+            f"expected a pair of textures for the {plan.catch_trials} catch trials of [{task}], "
+            "got catch trials without a surface that differs; name two that everybody can tell "
+            f'apart, as in catch = {{"{first}" = "{second}"}}, or write catch_trials = 0.'
+        )
 
 
 def _check_both_models(task: str, plan: TaskPlan) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from experiments.study.design import Trial
 from experiments.study.study import Study
 from experiments.tasks import plan_session
+from modeling.files.answer_tables import ANSWER_TABLES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +45,7 @@ def balance_of(study: Study, task: str) -> list[Balance]:
     plan = study.plan_of(task)
     sessions = [
         [
-            [trial for trial in _trials(study, task, slot, session) if not _is_anchor(trial)]
+            [trial for trial in _trials(study, task, slot, session) if not _is_apart(trial, task)]
             for session in range(1, study.sessions(task) + 1)
         ]
         for slot in range(1, plan.participants + 1)
@@ -74,8 +75,10 @@ def _trials(study: Study, task: str, slot: int, session: int) -> list[Trial]:
     return [trial for trial in order if trial.phase == "main"]
 
 
-def _is_anchor(trial: Trial) -> bool:
-    return bool(getattr(trial, "virtual_texture", trial.texture) != trial.texture)
+def _is_apart(trial: Trial, task: str) -> bool:
+    """Whether it is an anchor or a catch trial, which stand apart from the comparison of models."""
+    other = getattr(trial, ANSWER_TABLES[task].other_texture, "")
+    return other not in ("", trial.texture)
 
 
 def _begin(sessions: Sequence[Sequence[Sequence[Trial]]], models: Sequence[str]) -> Found:

@@ -26,6 +26,18 @@ def trials_of_session(study: Study, task: str) -> tuple[int, int]:
     return study.plan_of(task).training_trials, main
 
 
+def minutes_of_catch_trials(study: Study, task: str) -> int:
+    """About how much of each session the catch trials of a task take; 0 without any.
+
+    Raises
+    ------
+    InputError
+        If the study has no such task.
+    """
+    seconds = (study.plan_of(task).catch_trials or 0) * TRIAL_S.get(task, OTHER_TRIAL_S)
+    return round(seconds / 60)
+
+
 def minutes_of_session(study: Study, task: str) -> int:
     """About how long a session of a task takes.
 

@@ -29,20 +29,36 @@ BUTTONS = 3
 
 @dataclass(frozen=True, kw_only=True)
 class OddityTrial(Trial):
-    """One trial: three virtual surfaces of one texture, no real one.
+    """One trial: three virtual surfaces of one texture, or in a catch trial of two; no real one.
 
     Parameters
     ----------
     trial, phase, texture, model, tray
-        As in `Trial`; `model` is the odd one.
+        As in `Trial`; `texture` is that of the two that are alike, `model` that of the odd one.
     layout : tuple of str
         Model behind each button, from button 1 on.
     odd_position : int
         The right answer, from 1.
+    odd_texture : str
+        What the odd one models: `texture`, except in a catch trial. Empty in a session without
+        catch trials, which stores nothing of it.
     """
 
     layout: tuple[str, ...]
     odd_position: int
+    odd_texture: str = ""
+
+    @property
+    def is_catch(self) -> bool:
+        """Whether the odd one models another texture."""
+        return self.odd_texture not in ("", self.texture)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The trial as plain values, as a session stores it."""
+        values = super().to_dict()
+        if not self.odd_texture:
+            del values["odd_texture"]
+        return values
 
 
 # --- The trials -----------------------------------------------------------------------------
@@ -60,6 +76,8 @@ def _trials(occasion: Occasion, order: Order) -> list[dict[str, Any]]:
         drafts.append(
             {"texture": texture, "model": odd, "layout": tuple(layout), "odd_position": position}
         )
+    if occasion.study.plan_of(occasion.task).catch_trials:
+        return _with_catch_trials(occasion, drafts)
     return drafts
 
 
@@ -81,8 +99,44 @@ def _positions(occasion: Occasion, order: Order) -> dict[tuple[str, str], list[i
     return positions
 
 
+def _with_catch_trials(occasion: Occasion, drafts: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Catch trials at random places among the main trials, which stay in their order."""
+    drafts = [{**draft, "odd_texture": draft["texture"]} for draft in drafts]
+    if occasion.phase == "main":
+        for catch in _catch_trials(occasion):
+            drafts.insert(int(occasion.rng.integers(0, len(drafts) + 1)), catch)
+    return drafts
+
+
+def _catch_trials(occasion: Occasion) -> list[dict[str, Any]]:
+    """The catch trials of a session in random order, all surfaces with the reference model.
+
+    Pairs, which surface of a pair is odd, and buttons come equally often (± 1), each of the last
+    two also within a pair; over three neighbouring slots each button comes equally often.
+    """
+    plan = occasion.study.plan_of(occasion.task)
+    rng, place = occasion.block(BUTTONS, "catch trials")
+    pairs = fisher_yates(sorted(plan.catch.items()), rng)
+    turn = int(occasion.rng.integers(0, 2))
+    drafts = []
+    for number, which in enumerate(sorted(n % len(pairs) for n in range(plan.catch_trials or 0))):
+        odd = (number + turn) % 2
+        drafts.append(
+            {
+                "texture": pairs[which][1 - odd],
+                "model": occasion.models[0],
+                "layout": (occasion.models[0],) * BUTTONS,
+                "odd_position": (number + place) % BUTTONS + 1,
+                "odd_texture": pairs[which][odd],
+            }
+        )
+    return fisher_yates(drafts, occasion.rng)
+
+
 def _virtual(models: ModelSets, trial: OddityTrial) -> list[Presentable]:
-    return [models.of(trial.texture, name) for name in trial.layout]
+    textures = [trial.texture] * BUTTONS
+    textures[trial.odd_position - 1] = trial.odd_texture or trial.texture
+    return [models.of(*shown) for shown in zip(textures, trial.layout, strict=True)]
 
 
 def _begin(trial: OddityTrial, surfaces: Surfaces) -> None:
@@ -99,6 +153,7 @@ def _ask(respondent: Respondent, trial: OddityTrial, surfaces: Surfaces) -> Mapp
         "correct": int(answer == trial.odd_position),
         "presses": surfaces.presses,
         "response_time_s": choice.response_time_s,
+        **({"odd_texture": trial.odd_texture} if trial.odd_texture else {}),
     }
 
 

@@ -6,11 +6,16 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from experiments.study.models import ModelSets
-from experiments.study.plan import RATINGS, Claim
+from experiments.study.plan import RATINGS, Claim, Plan
 from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
-from experiments.tasks.durations import minutes_of_session, trials_of_session
+from experiments.tasks.durations import (
+    minutes_of_catch_trials,
+    minutes_of_session,
+    trials_of_session,
+)
+from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 
 TESTED = {
@@ -76,17 +81,40 @@ def _design(study: Study, task: str) -> Iterator[str]:
         f"- A session has {main} trials after {_training(training, plan)} for practice, and takes "
         f"about {minutes_of_session(study, task)} minutes (an estimate)."
     )
+    yield from _proofs(study, task)
+    if plan.break_after:
+        yield f"- A break after every {plan.break_after} trials."
+    if plan.feel_all:
+        yield "- No answer is taken before all virtual surfaces of the trial were felt."
+    yield ""
+
+
+def _proofs(study: Study, task: str) -> Iterator[str]:
+    """The trials that show whether people tell surfaces apart."""
+    plan = study.plan_of(task)
     for real, virtual in plan.anchors.items():
         yield (
             f"- Anchor: real {real} beside the {plan.models[0]} model of {virtual}, "
             "presented as a pair like any other, once in each session; not part of the "
             "comparison of models."
         )
-    if plan.break_after:
-        yield f"- A break after every {plan.break_after} trials."
-    if plan.feel_all:
-        yield "- No answer is taken before all virtual surfaces of the trial were felt."
-    yield ""
+    if plan.catch_trials:
+        yield (
+            f"- {told_of_catch_trials(study, task)}, at random places: the odd one models "
+            f"another texture than the other two ({_pairs(plan)}), all with the {plan.models[0]} "
+            "models; not part of the comparison of models."
+        )
+
+
+def told_of_catch_trials(study: Study, task: str) -> str:
+    """How many catch trials a session of a task has, and what they cost."""
+    number = counted(study.plan_of(task).catch_trials or 0, "catch trial")
+    minutes = counted(minutes_of_catch_trials(study, task), "minute")
+    return f"{number}, about {minutes} of each session"
+
+
+def _pairs(plan: TaskPlan) -> str:
+    return ", ".join(f"{surface} and {other}" for surface, other in plan.catch.items())
 
 
 def _schedule(study: Study, task: str) -> str:
@@ -118,8 +146,26 @@ def _models(study: Study, models: ModelSets) -> Iterator[str]:
 def _claims(study: Study) -> Iterator[str]:
     if not study.plan.claims:
         yield "None: all findings are exploratory."
+    else:
+        yield _rule(study.plan)
+        yield ""
     for number, claim in enumerate(study.plan.claims, start=1):
-        yield f"{number}. **{claim.name}.** {_claimed(claim)} {proof_of_sensitivity(study, claim)}"
+        yield (
+            f"{number}. **{claim.name}.** {_claimed(claim)} {_tested(study.plan, claim)} "
+            f"{proof_of_sensitivity(study, claim)}"
+        )
+
+
+def _rule(plan: Plan) -> str:
+    """What decides the verdicts."""
+    if plan.rule == "tests":
+        return "Rule of verdicts: the tests that each claim names."
+    return (
+        "Rule of verdicts: the hierarchical model of the participants. Two sets of models are "
+        "equivalent where the mean effect lies inside the bounds and the share of people outside "
+        f"them is below {100 * plan.few:g} %, both at 95 %. Paired t-test and TOST are reported "
+        "beside it."
+    )
 
 
 def proof_of_sensitivity(study: Study, claim: Claim) -> str:
@@ -129,8 +175,13 @@ def proof_of_sensitivity(study: Study, claim: Claim) -> str:
         return f"No equality unless {claim.models[0]} models are recognised above chance."
     if claim.task == "absolute" and plan.anchors:
         return "No equality unless the anchors are rated lower than the textures' own models."
-    advice = "; give it anchors" if claim.task == "absolute" else ""
-    return f"No equality in any case, as nothing in it tests sensitivity{advice}."
+    if plan.catch_trials:
+        told = told_of_catch_trials(study, claim.task)
+        return f"No equality unless the odd one of catch trials is found above chance ({told})."
+    advice = {"absolute": "; give it anchors", "oddity": "; give it catch trials"}
+    return (
+        f"No equality in any case, as nothing in it tests sensitivity{advice.get(claim.task, '')}."
+    )
 
 
 def _claimed(claim: Claim) -> str:
@@ -147,9 +198,14 @@ def _claimed(claim: Claim) -> str:
     low, high = claim.bounds
     return (
         f"Measure: {what}, {against}. Smallest differences that matter: {low:g} and {high:g} "
-        f"{unit}. Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the "
-        "textures."
+        f"{unit}."
     )
+
+
+def _tested(plan: Plan, claim: Claim) -> str:
+    if plan.rule == "model":
+        return f"Claimed: {claim.test}."
+    return f"Test of {claim.test}: {TESTED[claim.test]}, corrected after Holm over the textures."
 
 
 def _exclusions(study: Study) -> Iterator[str]:

@@ -36,6 +36,9 @@ class AnswerColumn:
         answer.
     scale : str
         Of a column of ratings, whose `limits` are then `ENDS`: the similarity of what is rated.
+    optional : bool
+        Whether a session whose rows do not have it is stored without the column, as sessions of
+        earlier versions are.
     """
 
     name: str
@@ -46,6 +49,7 @@ class AnswerColumn:
     required: bool = False
     right: str = "texture"
     scale: str = ""
+    optional: bool = False
 
     def __post_init__(self) -> None:
         if self.scale and self.limits != ENDS:
@@ -96,6 +100,10 @@ class AnswerTable:
     models_in : str
         The column that lists the models of a trial that holds both, separated by |; without it
         all trials hold the two that the task compares.
+    other_texture : str
+        The column that names another texture than `texture` in trials that show whether people
+        tell surfaces apart (anchors, catch trials), and the same one elsewhere. Such trials stand
+        apart from the answers about models.
     """
 
     title: str
@@ -105,15 +113,16 @@ class AnswerTable:
     chance: float = nan
     alternatives: str = ""
     models_in: str = ""
+    other_texture: str = ""
 
     def __post_init__(self) -> None:
         names = [column.name for column in self.columns]
         if not (isnan(self.chance) or 0 < self.chance < 1):
             raise ValueError(f"expected a chance between 0 and 1, got {self.chance}; correct it.")
-        for listed in (self.alternatives, self.models_in):
+        for listed in (self.alternatives, self.models_in, self.other_texture):
             if listed and listed not in names:
                 raise ValueError(
-                    f"expected a column of the {self.title} that lists what a trial holds, got "
+                    f"expected a column of the {self.title} that says what a trial holds, got "
                     f"{listed!r}; name one of {', '.join(names)}."
                 )
         if self.alternatives and not isnan(self.chance):
@@ -153,6 +162,7 @@ def answer_table(
     chance: float = nan,
     alternatives: str = "",
     models_in: str = "",
+    other_texture: str = "",
 ) -> AnswerTable:
     """The table of a task: the columns of every task, with its own among them.
 
@@ -162,7 +172,7 @@ def answer_table(
         What only this task has.
     texture, model : str
         What these two columns mean in it.
-    title, of_surfaces, both_models, chance, alternatives, models_in
+    title, of_surfaces, both_models, chance, alternatives, models_in, other_texture
         As in `AnswerTable`.
     """
     return AnswerTable(
@@ -173,6 +183,7 @@ def answer_table(
         chance=chance,
         alternatives=alternatives,
         models_in=models_in,
+        other_texture=other_texture,
     )
 
 
@@ -295,6 +306,7 @@ ANSWER_TABLES = {
         title="absolute evaluation",
         texture="Real surface",
         model="Model behind the virtual surface",
+        other_texture="virtual_texture",
     ),
     "relative": answer_table(
         AnswerColumn(
@@ -330,12 +342,19 @@ ANSWER_TABLES = {
         CORRECT,
         PRESSES,
         RESPONSE_TIME,
+        AnswerColumn(
+            name="odd_texture",
+            description="Texture that the odd one models: in a catch trial another one than the "
+            "other two, else the same",
+            optional=True,
+        ),
         title="oddity task",
         texture="Texture that all three virtual surfaces model",
         model="Model of the odd one",
         both_models=True,
         chance=1 / 3,
         models_in="layout",
+        other_texture="odd_texture",
     ),
     "threshold": answer_table(
         AnswerColumn(

@@ -263,12 +263,14 @@ def _with_reason(text: str) -> tuple[str, str]:
 
 
 def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
-    """The claims of a study file; those that were not registered are exploratory."""
+    """The plan of a study file; claims not registered with its rule of verdicts are exploratory."""
     from analysis.answers.plan import plan_from
     from experiments.study.study import Study
 
     later = plan_from(Study.load(path).to_dict()["plan"], path=path, sha256=registered.sha256)
-    claims = (replace(claim, planned=claim in registered.claims) for claim in later.claims)
+    same_rule = (later.rule, later.few) == (registered.rule, registered.few)
+    known = registered.claims if same_rule else ()
+    claims = (replace(claim, planned=claim in known) for claim in later.claims)
     return replace(later, claims=tuple(claims))
 
 

@@ -376,17 +376,15 @@ def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Respo
     import pandas as pd
 
     from analysis.answers.plan import plan_from
-    from analysis.answers.responses import Responses
+    from analysis.answers.responses import Responses, stands_apart
 
     answers, anchors = {}, {}
     for task, of_task in rows.items():
         table = pd.DataFrame(of_task)
         table = table[(table["participant"] <= n) & (table["phase"] == "main")]
         table = table.assign(participant_id=table["participant"].map("sub-{:04d}".format))
-        answers[task] = table
-        if "virtual_texture" in table:
-            other = table["virtual_texture"] != table["texture"]
-            answers[task], anchors[task] = table[~other], table[other]
+        apart = stands_apart(table, task)
+        answers[task], anchors[task] = table[~apart], table[apart]
     return Responses(
         answers=answers,
         simulated_participants=True,

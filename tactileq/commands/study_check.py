@@ -57,13 +57,17 @@ def _tell_claims(plan: Study) -> None:
     from experiments.tasks.page import proof_of_sensitivity
 
     claims = plan.plan.claims
-    print(f"claims: {len(claims)}" if claims else "claims: none; all findings are exploratory")
+    told = "none; all findings are exploratory"
+    if claims:
+        told = f'{len(claims)}, rule of verdicts "{plan.plan.rule}"'
+    print(f"claims: {told}")
     for claim in claims:
         print(f"  {claim.name}: {proof_of_sensitivity(plan, claim)}")
 
 
 def _tell_sessions(plan: Study) -> None:
     from experiments.tasks.durations import minutes_of_session, trials_of_session
+    from experiments.tasks.page import told_of_catch_trials
 
     for task, planned in plan.tasks.items():
         training, main = trials_of_session(plan, task)
@@ -73,6 +77,8 @@ def _tell_sessions(plan: Study) -> None:
             f"{counted(sessions, 'session')} each, {training} training + {main} main trials per "
             f"session; about {minutes_of_session(plan, task)} min per session (an estimate)"
         )
+        if planned.catch_trials:
+            print(f"  {told_of_catch_trials(plan, task)}, among the main trials")
 
 
 def _tell_balance(plan: Study) -> None:

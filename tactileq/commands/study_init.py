@@ -92,7 +92,7 @@ def _textures_in(folders: Sequence[Path]) -> list[str]:
 def _of_models(
     text: str, textures: Sequence[str], folders: Sequence[Path], *, beside: Path, seed: int
 ) -> str:
-    """The shipped study with these textures: models, trays, and no anchors that it lacks."""
+    """The shipped study with these textures: models, trays, and no pairs of others."""
     from experiments.study.design import fisher_yates
     from experiments.study.study import Study
     from modeling.seeds import generator
@@ -111,7 +111,8 @@ def _of_models(
     named = {name for pair in Study.load().tasks["absolute"].anchors.items() for name in pair}
     if not named <= set(textures):
         first, second = map(as_toml, textures[:2])
-        changes[r"(?m)^anchors = .*$"] = f"# anchors = {{{first} = {second}}}"
+        for key in ("anchors", "catch"):
+            changes[rf"(?m)^(# )?{key} = .*$"] = f"# {key} = {{{first} = {second}}}"
     for pattern, replacement in changes.items():
         text = re.sub(pattern, replacement.replace("\\", r"\\"), text)
     return text

@@ -28,7 +28,7 @@ def paper(timed: bool) -> Study:
     study = Study.load()
     participants = 4 if timed else 2
     plans = {task: replace(plan, participants=participants) for task, plan in study.tasks.items()}
-    return replace(study, tasks=plans)
+    return replace(study, tasks=plans, plan=replace(study.plan, rule="tests"))
 
 
 @pytest.fixture(scope="module")

@@ -142,6 +142,14 @@ def test_claims_are_those_of_the_study_and_others_exploratory(
     assert main("analyze", "data", "--plan", "later.toml", "--out", "third").returncode == 0
     tests = claims(data.parent / "third")
     assert set(tests[tests["claim"] == "as strong"]["planned"]) == {"yes"}
+    later.write_text(
+        LATER.replace("[-9, 9]", "[-7.5, 7.5]")
+        .replace("participants = 4", "participants = 8")
+        .replace("[[plan.claims]]", '[plan]\nrule = "model"\n[[plan.claims]]')
+    )
+    assert main("analyze", "data", "--plan", "later.toml", "--out", "fourth").returncode == 0
+    tests = claims(data.parent / "fourth")
+    assert set(tests[tests["claim"] == "as strong"]["planned"]) == {"no"}  # another rule
 
 
 def contents(folder: Path) -> dict[Path, tuple[bytes, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -74,6 +75,11 @@ def test_a_study_of_the_models_that_are_there_passes_its_check(place: Path, main
     study = Study.load(place / "other.toml")
     assert sorted(study.trays) == sorted(study.textures) == ["[oak]", "say 'aah'"]
     assert not study.plan_of("absolute").anchors
+    # Nor in the commented lines, which somebody may take as they are.
+    lines = (place / "other.toml").read_text(encoding="utf-8").splitlines()
+    (catch,) = [line for line in lines if line.startswith("# catch = ")]
+    pairs = tomllib.loads(catch.removeprefix("# "))["catch"]
+    assert {name for pair in pairs.items() for name in pair} <= set(study.textures)
 
 
 def test_a_study_of_models_that_lack_a_simplified_one_is_not_written(
@@ -109,6 +115,22 @@ def test_a_study_is_checked_with_its_models_design_and_balance(place: Path, main
     ):
         assert told in done.stdout
     assert "warning" not in done.stdout
+
+
+def test_the_check_says_what_catch_trials_cost(place: Path, main: Main) -> None:
+    file = place / "study.toml"
+    begun = '[oddity]\nparticipants = 24\nschedule = "interleaved"\nrepeats = 6\n'
+    whole = file.read_text(encoding="utf-8")
+    file.write_text(whole.replace("# [threshold]", f"{begun}# [threshold]"), encoding="utf-8")
+    done = main("study", "check", "study.toml")
+    assert done.returncode == 0, done.stderr
+    for told in ("2 training + 48 main trials", "6 catch trials, about 6 minutes of each session"):
+        assert told in done.stdout
+    off = whole.replace("# [threshold]", f"{begun}catch_trials = 0\n# [threshold]")
+    file.write_text(off, encoding="utf-8")
+    done = main("study", "check", "study.toml")
+    assert "2 training + 42 main trials" in done.stdout
+    assert "catch" not in done.stdout
 
 
 def test_the_same_models_twice_are_refused(place: Path, main: Main) -> None:

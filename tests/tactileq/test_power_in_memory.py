@@ -158,6 +158,25 @@ def test_without_anchors_equalities_are_counted_as_withheld(study: Study, models
     assert not {EQUIVALENT, WITHIN_BOUNDS} & set(table[table["hits"] > 0]["verdict"])
 
 
+def test_with_catch_trials_an_equality_of_the_odd_one_can_be_concluded(
+    study: Study, models: ModelSets
+):
+    caught = replace(study.plan_of("oddity"), catch={"canvas": "PVC"}, catch_trials=6)
+    tasks = {"absolute": study.plan_of("absolute"), "oddity": caught}
+    with_catch = replace(study, plan=Plan(claims=(ODD,)), tasks=tasks)
+    planted = [f"{scale}=0" for scale in ("magnitude_similarity", "frequency_similarity")]
+    who = people_of(
+        planned_for(with_catch, [12]),
+        models,
+        threshold="codec",
+        planted=planted_effects(planted, TEXTURES),
+    )
+    table = chances(who, (12,), simulations=6, seed=1, jobs=1)
+    verdicts = set(table[table["hits"] > 0]["verdict"])
+    assert EQUIVALENT in verdicts
+    assert WITHHELD not in verdicts
+
+
 def test_answers_in_memory_are_those_of_the_disk(tmp_path, study: Study, models: ModelSets):
     who = people(study, models, most=4)
     parts = {"models": models, "psychometrics": who.psychometrics, "seed": 9}

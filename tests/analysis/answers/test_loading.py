@@ -464,6 +464,17 @@ def test_claims_come_from_the_study_that_was_run(study_folder, write_task, absol
     assert found.claims[0].planned
     assert (found.exclusions, found.highest_share_at_ends) == (("who slept",), 0.3)
     assert found.sha256 == ("ab",)
+    assert (found.rule, found.few) == ("tests", 0.15)  # as of a version that named no rule
+    for stated_rule, few in (({"rule": "model"}, 0.15), ({"rule": "model", "few": 0.2}, 0.2)):
+        _describe(study_folder, StudyDesign={"plan": {"claims": [stated], **stated_rule}})
+        found = load_responses(study_folder).plan
+        assert (found.rule, found.few) == ("model", few)
+    for wrong in ({"rule": "bayes"}, {"few": 0.6}, {"few": "0.1"}, {"few": True}):
+        _describe(study_folder, StudyDesign={"plan": {"claims": [stated], **wrong}})
+        (fact,) = wrong.values()
+        with refused(InputError, names=description, got=repr(fact)) as caught:
+            load_responses(study_folder)
+        _one_sentence(caught.value, description)
     for wrong in ({"bounds": [1, 2]}, {"measure": "toggle"}, {"models": ["full"]}, {"task": "?"}):
         _describe(study_folder, StudyDesign={"plan": {"claims": [stated | wrong]}})
         with pytest.raises(
@@ -623,7 +634,8 @@ def test_anchors_stand_apart(study_folder, write_task, absolute_rows):
     assert responses.anchors["absolute"]["trial"].tolist() == [5, 7]
     assert len(responses.absolute) == 12
     assert not {5, 7} & set(responses.absolute["trial"])
-    assert set(responses.anchors) == {"absolute"}
+    assert set(responses.anchors) == {"absolute", "oddity"}
+    assert responses.anchors["oddity"].empty
 
 
 ODDITY = "trial phase texture model layout odd_position answer correct presses response_time_s"
@@ -665,6 +677,57 @@ def test_tasks_without_a_real_surface_are_read(study_folder, write_task, task):
     with pytest.raises(InputError, match=f"exactly where answer and {right} agree") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)
+
+
+def test_catch_trials_stand_apart(study_folder, write_task):
+    columns, rows = _others("oddity")
+    columns = [*columns, "odd_texture"]
+    rows = [[*row, "PVC" if row[0] == "2" else "canvas"] for row in rows]
+    rows[1][columns.index("layout")] = "full|full|full"
+    write_task("oddity", rows, columns=columns)
+    (manifest,) = study_folder.rglob("*_manifest.json")
+    stored = json.loads(manifest.read_text())
+    stored["trials"] = [
+        {"trial": n, "phase": "main", "texture": "canvas", "odd_texture": odd}
+        for n, odd in ((1, "canvas"), (2, "PVC"), (3, "canvas"))
+    ]
+    manifest.write_text(json.dumps(stored))
+    responses = load_responses(study_folder)
+    assert responses.anchors["oddity"]["trial"].tolist() == [2]
+    assert responses.answers["oddity"]["trial"].tolist() == [1, 3]
+    assert responses.trials_done("oddity") == 3
+    stored["trials"][1]["odd_texture"] = "canvas"
+    manifest.write_text(json.dumps(stored))
+    with refused(InputError, expected=["odd_texture", "canvas", "answer 2"], got="PVC"):
+        load_responses(study_folder)
+
+
+def test_catch_trials_name_textures_of_the_study(study_folder, write_task):
+    columns, rows = _others("oddity")
+    path = write_task("oddity", [[*row, "silk"] for row in rows], columns=[*columns, "odd_texture"])
+    path.with_suffix(".json").write_text("{}")
+    _describe(study_folder, ModelsSHA256=_models_of_all())
+    with refused(InputError, names=["odd_texture", "'silk'", path, "answer 1"]):
+        load_responses(study_folder)
+
+
+def test_an_oddity_table_of_an_earlier_version_has_no_catch_trials(study_folder, write_task):
+    columns, rows = _others("oddity")
+    write_task("oddity", rows, columns=columns)
+    (manifest,) = study_folder.rglob("*_manifest.json")
+    trials = [{"trial": n, "phase": "main", "texture": "canvas"} for n in (1, 2, 3)]
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "trials": trials}))
+    newer = [[*row, "PVC"] for row in rows]
+    times = columns.index("response_time_s")
+    for number, row in enumerate(newer):
+        row[times] = str(number)
+    write_task("oddity", newer, columns=[*columns, "odd_texture"], participant="sub-02")
+    (_, manifest) = sorted(study_folder.rglob("*_manifest.json"))
+    trials = [{**trial, "odd_texture": "PVC"} for trial in trials]
+    manifest.write_text(json.dumps({**json.loads(manifest.read_text()), "trials": trials}))
+    responses = load_responses(study_folder)
+    assert responses.answers["oddity"]["participant_id"].tolist() == ["sub-01"] * 3
+    assert responses.anchors["oddity"]["participant_id"].tolist() == ["sub-02"] * 3
 
 
 def test_an_order_without_trials_is_refused(study_folder, write_task, write_order, relative_rows):

@@ -46,7 +46,12 @@ def folder(tmp_path_factory) -> Path:
                     participants=4, schedule="by-day", repeats=2, training_trials=1
                 ),
                 "oddity": TaskPlan(
-                    participants=1, schedule="interleaved", repeats=2, training_trials=1
+                    participants=1,
+                    schedule="interleaved",
+                    repeats=2,
+                    training_trials=1,
+                    catch={"leather": "PVC"},
+                    catch_trials=2,
                 ),
                 "threshold": TaskPlan(
                     participants=1, schedule="interleaved", repeats=1, training_trials=1
@@ -82,6 +87,12 @@ def test_every_answer_arrives(responses):
     assert set(responses.anchors["absolute"]["virtual_texture"]) == {"PVC"}
     assert len(responses.relative) == 4 * 3 * 2 * 2
     assert len(responses.answers["oddity"]) == 3 * 2
+    caught = responses.anchors["oddity"]
+    assert len(caught) == 2
+    assert set(caught["texture"]) | set(caught["odd_texture"]) == {"leather", "PVC"}
+    assert set(caught["layout"]) == {"full|full|full"}
+    own = responses.answers["oddity"]
+    assert (own["odd_texture"] == own["texture"]).all()
     assert len(responses.answers["threshold"]) >= 7
     assert (responses.answers["threshold"]["frequency_hz"] > 0).all()
     assert len(responses.training["absolute"]) == 3
@@ -90,9 +101,9 @@ def test_every_answer_arrives(responses):
     assert responses.absolute["magnitude_similarity"].between(0, 100).all()
 
 
-def test_as_many_trials_are_done_as_were_planned_anchors_included(responses):
+def test_as_many_trials_are_done_as_were_planned_anchors_and_catch_trials_included(responses):
     done = {task: responses.trials_done(task) for task in ("absolute", "relative", "oddity")}
-    assert done == {"absolute": 3 * (3 * 2 + 1), "relative": 48, "oddity": 6}
+    assert done == {"absolute": 3 * (3 * 2 + 1), "relative": 48, "oddity": 6 + 2}
     assert done == {task: responses.planned[task].trials for task in done}
 
 

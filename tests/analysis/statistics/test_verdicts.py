@@ -274,6 +274,39 @@ def test_the_odd_one_out_is_compared_with_chance(answers, plan):
     assert (one.tests["n"] == 24).all()
 
 
+@pytest.mark.parametrize(
+    ("right", "shown"), [(1.0, True), (0.6, True), (1 / 3, False), (0.0, False)]
+)
+def test_catch_trials_show_that_the_odd_one_would_have_been_found(answers, plan, right, shown):
+    """Six catch trials each of 24 people; the same share of right answers, with some spread."""
+    claim = replace(plan.claims[2], task="oddity", bounds=(-0.15, 0.15))
+    draws = np.random.default_rng(7)
+    # Numbers of right answers that scatter about the share, and have exactly its mean.
+    spread = draws.permutation([-1, 0, 1] * 8) * (0 < right < 1)
+    numbers = np.round(6 * right).astype(int) + spread
+    caught = pd.DataFrame(
+        {"participant_id": f"sub-{person:02d}", "correct": float(trial < number)}
+        for person, number in enumerate(numbers)
+        for trial in range(6)
+    )
+    here = replace(
+        answers,
+        answers={"oddity": caught.assign(texture="canvas", model="full")},
+        anchors={"oddity": caught},
+        plan=AnalysisPlan(claims=(claim,)),
+        planned={"oddity": PlannedTask(24, 24, repeats=6)},
+    )
+    found = claim_standing(here, claim, rng=rng()).sensitivity
+    assert (found == SHOWN) is shown
+    assert found != NOT_TESTED
+    if not shown:
+        assert "catch trials" in found
+    nothing = {"oddity": caught.iloc[:0], "absolute": caught}
+    for none in ({}, nothing):
+        standing = claim_standing(replace(here, anchors=none), claim, rng=rng())
+        assert standing.sensitivity == NOT_TESTED
+
+
 def test_verdicts_stand_beside_what_was_planted(found):
     points = {texture: {"magnitude_similarity": 0.0} for texture in found[0].values["texture"]}
     points["PVC"] = {"magnitude_similarity": -30.0}

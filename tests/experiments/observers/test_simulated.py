@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from experiments.observers.percepts import Perception
+from experiments.observers.percepts import Perception, distance, sensation_levels
 from experiments.observers.psychometrics import Psychometrics, Trait, choice_shares
 from experiments.observers.simulated import SimulatedParticipant, require_plantable
 from experiments.sessions.surfaces import Intake, Surfaces
@@ -311,6 +311,56 @@ def test_odd_ones_are_found_as_in_a_triangle_test(
     expected = 0.9 * triangle(apart / 3.0) + 0.1 / 3
     assert 0.4 < expected < 0.95
     assert stats.binomtest(sum(found), len(found), expected).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("model", ["full", "simplified"])
+def test_catch_trials_are_found_by_how_far_two_textures_feel(
+    perception: Perception, surfaces: MakeSurfaces, model: str
+) -> None:
+    population = replace(
+        EXACT,
+        temperature_db=3.0,
+        lapse_rate=Trait(0.1),
+        planted={"canvas": {"magnitude_similarity": 0.0, "frequency_similarity": 0.0}},
+    )
+    person, one = somebody(perception, population), surfaces(3)
+    number, place = perception.set_number[model], perception.place
+    among = perception.felt().among[:, number]
+    apart = float(np.hypot(*among[:, place["canvas"], place["PVC"]]))
+    np.testing.assert_allclose(among, among.transpose(0, 2, 1))
+    assert not among[:, range(3), range(3)].any()
+
+    def caught(position: int, *textures: str) -> OddityTrial:
+        return OddityTrial(
+            trial=1,
+            phase="main",
+            tray="A",
+            texture=textures[0],
+            odd_texture=textures[1],
+            model=model,
+            layout=(model,) * 3,
+            odd_position=position,
+        )
+
+    for pair in (("canvas", "PVC"), ("PVC", "canvas")):
+        assert person.odd_distance_db(caught(1, *pair)) == pytest.approx(apart)
+        found = [person.choose(caught(1 + n % 3, *pair), one).button == n % 3 for n in range(1500)]
+        expected = 0.9 * triangle(apart / 3.0) + 0.1 / 3
+        assert 0.4 < expected < 0.95
+        assert stats.binomtest(sum(found), len(found), expected).pvalue > 1e-3
+
+
+def test_the_distance_of_two_textures_is_that_of_their_percepts(
+    perception: Perception, models: ModelSets
+) -> None:
+    percepts = [
+        sensation_levels(models.of(name, "simplified"), perception.threshold)
+        for name in ("canvas", "PVC")
+    ]
+    wanted = distance(*percepts)
+    one, two = (perception.place[name] for name in ("canvas", "PVC"))
+    found = perception.felt().among[:, perception.set_number["simplified"], one, two]
+    np.testing.assert_allclose(found, [wanted.magnitude_db, wanted.frequency_db])
 
 
 def test_without_a_difference_the_odd_one_is_found_by_chance(

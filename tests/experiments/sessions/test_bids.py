@@ -129,7 +129,7 @@ def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, thr
             tasks={
                 "absolute": TaskPlan(**plan, anchors={"canvas": "PVC"}),
                 "relative": TaskPlan(**plan, repeats=1),
-                "oddity": TaskPlan(**plan, repeats=2),
+                "oddity": TaskPlan(**plan, repeats=2, catch={"canvas": "PVC"}, catch_trials=2),
                 "threshold": TaskPlan(**plan, repeats=1),
             },
         ),
@@ -175,6 +175,15 @@ def test_every_answer_stands_in_its_table(write_session):
     assert all(sidecar[name]["Description"] for name in found)
     assert (sidecar["Masking"], sidecar["Status"]) == ("pink noise", "complete")
     assert sidecar["SimulatedParticipant"] is True
+
+
+def test_a_session_without_catch_trials_has_no_column_of_them(write_session):
+    """As those of earlier versions, whose tables stay what their logs say, to the byte."""
+    files = write_session("oddity")
+    export_session(files.root, files.manifest)
+    needed = [c.name for c in ANSWER_TABLES["oddity"].columns if not c.optional]
+    assert list(table(beh(files, "beh.tsv"))) == needed
+    assert "odd_texture" not in json.loads(beh(files, "beh.json").read_text())
 
 
 def test_every_column_of_every_table_is_described(study_on_disk):

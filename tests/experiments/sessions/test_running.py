@@ -21,6 +21,7 @@ from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.roster import Roster
 from experiments.sessions.running import Circumstances, run_session
 from experiments.sessions.state import session_state
+from experiments.sessions.status import study_progress
 from experiments.sessions.store import SessionStore
 from experiments.sessions.surfaces import Intake, Rating, SessionAborted, Surfaces
 from experiments.sessions.trial_loop import People, SessionResult
@@ -223,6 +224,37 @@ def test_an_aborted_session_goes_on_at_the_next_open_trial(run: Callable[..., An
     assert [row["run"] for row in rows] == [1, 1, 1, 2, 2]
     with refused(InputError, got=[STEM, "complete"]):
         run(resume=True)
+
+
+def test_a_session_with_catch_trials_goes_on_with_those_that_it_planned(
+    run: Callable[..., Any], small: Study, tmp_path: Path
+) -> None:
+    class Leaving(Scripted):
+        def choose(self, trial: Any, surfaces: Surfaces) -> Any:
+            if self.answered == 4:
+                raise SessionAborted("tired")
+            return super().choose(trial, surfaces)
+
+    plan = TaskPlan(
+        participants=2,
+        schedule="interleaved",
+        repeats=2,
+        training_trials=1,
+        catch={"canvas": "PVC"},
+        catch_trials=4,
+    )
+    study = replace(small, tasks={**small.tasks, "oddity": plan})
+    run(Leaving(), task="oddity", study=study)
+    none = replace(small, tasks={**small.tasks, "oddity": replace(plan, catch_trials=0)})
+    result, manifest = run(task="oddity", study=none, resume=True, override="none left")
+    assert result.completed
+    planned = SessionManifest.load(manifest).trials
+    rows = rows_of(manifest)
+    assert [row["run"] for row in rows] == [1] * 4 + [2] * 5
+    assert [row["odd_texture"] for row in rows] == [trial["odd_texture"] for trial in planned]
+    assert sum(row["odd_texture"] != row["texture"] for row in rows) == 4
+    done = {one.task: one.complete for one in study_progress(tmp_path).tasks}
+    assert done["oddity"] == 1
 
 
 def test_both_tries_of_a_trial_that_broke_off_keep_their_own_hand_and_presentations(

@@ -24,10 +24,12 @@ from experiments.study.design import (
     fisher_yates,
     models_of_session,
 )
+from experiments.study.plan import Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from modeling import InputError
+from modeling.files.hashes import sha256_of_values
 from tests.refusals import refused
 
 SEEDS = range(200)
@@ -231,7 +233,7 @@ def test_as_many_begin_with_each_of_several_models(
 def test_an_odd_number_of_participants_is_one_apart(participants: int) -> None:
     plan = TaskPlan(participants=participants, schedule="interleaved")
     for seed in range(20):
-        study = shipped(seed=seed, tasks={"absolute": plan})
+        study = shipped(seed=seed, tasks={"absolute": plan}, plan=Plan())
         sessions = [main_of(study, "absolute", slot) for slot in range(1, participants + 1)]
         for texture in study.textures:
             full = sum(firsts(trials)[texture] == "full" for trials in sessions)
@@ -442,6 +444,105 @@ def test_every_place_among_the_others_is_as_likely_for_an_anchor() -> None:
         places[anchor.trial - 2] += 1
     assert set(places) == set(range(1, 16))
     assert stats.chisquare(list(places.values())).pvalue > 0.001
+
+
+def odd_ones(study: Study, slot: int = 1, subject: int = 1) -> list[Any]:
+    trials = plan_session(study, task="oddity", subject=subject, session=1, slot=slot).trials
+    return list(trials)
+
+
+def test_orders_of_the_oddity_task_are_those_of_earlier_versions() -> None:
+    """The hash was computed before there were catch trials."""
+    trays = {"canvas": "A", "MDF": "B", "PVC": "C"}
+    oddity = TaskPlan(participants=6, schedule="interleaved", repeats=6)
+    study = Study(
+        name="Before", seed=11, textures=tuple(trays), trays=trays, tasks={"oddity": oddity}
+    )
+    orders = [
+        plan_session(study, task="oddity", subject=subject, session=1).to_dict()
+        for subject in range(1, 7)
+    ]
+    assert sha256_of_values({"orders": orders}) == (
+        "829afbbac3ad1bab00913449f20cfd32a394a54b3f543f2362456b15d3b061b1"
+    )
+
+
+@settings(max_examples=50)
+@given(
+    st.integers(0, 2**40),
+    st.integers(1, 20),
+    st.dictionaries(st.sampled_from(NAMES), st.integers(1, 6), min_size=1),
+    st.randoms(use_true_random=False),
+)
+def test_catch_trials_are_balanced_and_leave_the_rest_as_it_is(
+    seed: int, count: int, steps: dict[str, int], shuffled: Random
+) -> None:
+    catch = {name: NAMES[(NAMES.index(name) + step) % 7] for name, step in steps.items()}
+    order = list(catch.items())
+    shuffled.shuffle(order)
+    plan = TaskPlan(participants=6, schedule="interleaved", repeats=2)
+    caught, same, plain = (
+        shipped(seed=seed, tasks={"oddity": replace(plan, **said)})
+        for said in (
+            {"catch": catch, "catch_trials": count},
+            {"catch": dict(order), "catch_trials": count},
+            {"catch_trials": 0},
+        )
+    )
+    over: Counter[int] = Counter()
+    for slot in (1, 2, 3):
+        trials = odd_ones(caught, slot, 4)
+        assert trials == odd_ones(same, slot, 4)
+        assert [trial.trial for trial in trials] == list(range(1, len(trials) + 1))
+        rest = [replace(trial, odd_texture="") for trial in trials if not trial.is_catch]
+        assert without_numbers(rest) == without_numbers(odd_ones(plain, slot, 4))
+        found = [trial for trial in trials if trial.is_catch]
+        assert len(found) == count
+        assert {(t.phase, t.model, *t.layout) for t in found} == {("main", *["full"] * 4)}
+        assert all(t.tray == caught.trays[t.texture] for t in found)
+        known = [frozenset(pair) for pair in catch.items()]
+        pairs = Counter(frozenset((t.texture, t.odd_texture)) for t in found)
+        assert set(pairs) <= set(known)
+        if len(set(known)) == len(known):
+            assert {pairs[pair] for pair in known} <= {count // len(known), -(-count // len(known))}
+        positions = Counter(trial.odd_position for trial in found)
+        assert {positions[button] for button in (1, 2, 3)} <= {count // 3, -(-count // 3)}
+        swapped = sum(catch.get(t.texture) == t.odd_texture for t in found)
+        if not any(catch.get(other) == name for name, other in catch.items()):
+            assert abs(2 * swapped - count) <= 1
+        over += positions
+    assert set(over.values()) == {count}
+
+
+def test_every_place_among_the_others_is_as_likely_for_a_catch_trial() -> None:
+    plan = TaskPlan(
+        participants=6,
+        schedule="interleaved",
+        repeats=2,
+        catch={"canvas": "PVC"},
+        catch_trials=1,
+    )
+    places: Counter[int] = Counter()
+    for seed in range(600):
+        trials = odd_ones(shipped(seed=seed, tasks={"oddity": plan}))
+        (caught,) = [trial for trial in trials if trial.is_catch]
+        places[caught.trial - 2] += 1
+    assert set(places) == set(range(1, 16))
+    assert stats.chisquare(list(places.values())).pvalue > 0.001
+
+
+def test_six_catch_trials_of_two_pairs_hold_every_button_with_either_surface() -> None:
+    plan = TaskPlan(participants=8, schedule="interleaved", repeats=6)
+    study = shipped(tasks={**Study.load().tasks, "oddity": plan})
+    for slot in range(1, 9):
+        found = [trial for trial in odd_ones(study, slot, slot) if trial.is_catch]
+        assert len(found) == 6
+        catch = study.plan_of("oddity").catch
+        of = {frozenset(pair): set() for pair in catch.items()}
+        for trial in found:
+            of[frozenset((trial.texture, trial.odd_texture))].add(trial.odd_position)
+        assert set(map(len, of.values())) == {3}
+        assert len({(t.odd_position, t.texture in catch) for t in found}) == 6
 
 
 def test_an_order_follows_from_study_seed_subject_session_slot_and_task() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -112,9 +113,9 @@ def test_the_hash_of_the_plan_is_of_the_study_and_of_the_models() -> None:
 
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
     study = Study.load(
-        edited(tmp_path, "participants = 24\nschedule", "participants = 6\nschedule")
+        edited(tmp_path, "participants = 24\nschedule", "participants = 8\nschedule")
     )
-    assert study.plan_of("relative").participants == 6
+    assert study.plan_of("relative").participants == 8
 
 
 def test_what_a_task_does_not_say_is_as_usual(tmp_path: Path) -> None:
@@ -178,6 +179,27 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             '[threshold]\nparticipants = 2\nschedule = "by-day"\n[plan]\n',
             r"the schedule interleaved in \[threshold\]",
         ),
+        *(
+            (
+                "[plan]\n",
+                f'[oddity]\nparticipants = 8\nschedule = "interleaved"\n{key}\n[plan]\n',
+                told,
+            )
+            for key, told in (
+                ("catch_trials = 4", "4 catch trials of .*without a surface .*catch_trials = 0"),
+                ("catch = {}\ncatch_trials = 1", "1 catch trials of .*without a surface"),
+                ("catch_trials = 101", "from 0 to 100 for catch_trials, got 101"),
+                ("catch_trials = -1", "from 0 to 100 for catch_trials, got -1"),
+                ("catch_trials = 2.5", "for catch_trials, got 2.5"),
+                ("catch_trials = true", "for catch_trials, got True"),
+                ('catch = ["canvas"]', r"a table catch in \[oddity\]"),
+                ('catch = {canvas = "canvas"}', "catch, got 'canvas' = 'canvas'"),
+                ('catch = {canvas = "silk"}', "catch, got 'canvas' = 'silk'"),
+                ('catch = {silk = "canvas"}', "catch, got 'silk' = 'canvas'"),
+            )
+        ),
+        ("repeats = 3\n", 'repeats = 3\ncatch = {canvas = "PVC"}\n', r"got one in \[relative"),
+        (ABSOLUTE, f"{ABSOLUTE}\ncatch_trials = 0", r"got one in \[absolute"),
         ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
         ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
         ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
@@ -210,6 +232,16 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('"right", "left", "both"', '"right", "right"', "different levels"),
         ("highest_share_at_ends = 0.2 ", "highest_share_at_ends = 2 ", "ends, got 2"),
         ("exclusions = [", "exclusion = [", "got exclusion"),
+        ('rule = "model" ', 'rule = "bayes" ', "the rule in .* got 'bayes'"),
+        ('rule = "model" ', "rule = 1 ", "the rule in .* got 1"),
+        ('rule = "model" ', 'rule = "tests" ', "few in .* beside rule .* got 0.15"),
+        ('rule = "model" ', "", "few in .* beside rule .* got 0.15"),
+        ("few = 0.15 ", "few = 0.51 ", "from 0 to 0.5 for few, got 0.51"),
+        ("few = 0.15 ", "few = -0.01 ", "from 0 to 0.5 for few, got -0.01"),
+        ("few = 0.15 ", "few = true ", "for few, got True"),
+        ("few = 0.15 ", 'few = "15 %" ', "for few, got '15 %'"),
+        ("few = 0.15 ", "few = nan ", "for few, got nan"),
+        (ABSOLUTE, ABSOLUTE.replace("20", "7"), r"8 participants or more in \[absolute.* got 7"),
         ('measure = "correct"', 'measure = "accuracy"', "got 'accuracy'"),
         ('measure = "correct"', 'measure = "magnitude_similarity"', 'to be "correct"'),
         ('task = "relative"', 'task = "oddity"', "expected a planned task"),
@@ -239,6 +271,88 @@ def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told
         Study.load(path)
     assert str(path) in str(refusal.value)
     assert "\n" not in str(refusal.value)
+
+
+def test_a_study_of_an_earlier_version_keeps_its_values_and_its_hash() -> None:
+    """Its verdicts rest on tests; the hashes are those of the version before rules and catches."""
+    trays = {"canvas": "A", "MDF": "B", "PVC": "C"}
+    oddity = TaskPlan(participants=6, schedule="interleaved", repeats=6)
+    study = Study(
+        name="Before", seed=11, textures=tuple(trays), trays=trays, tasks={"oddity": oddity}
+    )
+    assert study.plan.rule == "tests"
+    assert not {"rule", "few"} & set(study.to_dict()["plan"])
+    assert study.sha256 == "dc688debd8aa2ed689d8bc132e4f7e5b6ec26e9d9cb1719237524cbe9fd5d220"
+    assert Study.from_dict(study.to_dict()) == study
+
+
+def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
+    shipped = Study.load()
+    assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)
+    fewer = replace(shipped.plan, few=0.1)
+    assert len({p.sha256 for p in (shipped.plan, fewer, replace(shipped.plan, rule="tests"))}) == 3
+    assert Plan.from_dict(fewer.to_dict()) == fewer
+    assert Plan.from_dict({"rule": "model"}).few == 0.15
+    with refused(InputError, expected="model", got=[0.1, "tests"]):
+        Plan(few=0.1)
+    with refused(InputError, expected=8, got=7, names=["absolute", 'rule = "tests"']):
+        replace(shipped, tasks={"absolute": replace(shipped.plan_of("absolute"), participants=7)})
+    seven = {"absolute": replace(shipped.plan_of("absolute"), participants=7)}
+    tested = replace(shipped, plan=replace(shipped.plan, rule="tests"), tasks=seven)
+    assert tested.plan_of("absolute").participants == 7
+    unclaimed = replace(shipped, plan=replace(shipped.plan, claims=()), tasks=seven)
+    assert unclaimed.plan_of("absolute").participants == 7
+
+
+PAIRS = {"wall paper": "aluminum", "canvas": "PVC"}
+
+
+@pytest.mark.parametrize(
+    ("rule", "said", "expected"),
+    [
+        ("model", {}, (PAIRS, 6)),
+        ("model", {"catch": {"MDF": "PVC"}}, ({"MDF": "PVC"}, 6)),
+        ("model", {"catch": {"MDF": "PVC"}, "catch_trials": 9}, ({"MDF": "PVC"}, 9)),
+        ("model", {"catch_trials": 0}, ({}, 0)),
+        ("tests", {}, ({}, None)),
+        ("tests", {"catch": {"MDF": "PVC"}}, ({"MDF": "PVC"}, 6)),
+        ("tests", {"catch": {"MDF": "PVC"}, "catch_trials": 0}, ({"MDF": "PVC"}, 0)),
+    ],
+)
+def test_new_studies_have_catch_trials_of_their_anchors(
+    rule: str, said: dict[str, Any], expected: tuple[dict[str, str], int | None]
+) -> None:
+    shipped = Study.load()
+    plain = {"participants": 8, "schedule": "interleaved", **said}
+    plan = TaskPlan.from_dict("oddity", plain)
+    study = replace(
+        shipped,
+        plan=replace(shipped.plan, rule=rule),
+        tasks={**shipped.tasks, "oddity": plan},
+    )
+    found = study.plan_of("oddity")
+    assert (found.catch, found.catch_trials) == expected
+    again = Study.from_dict(study.to_dict())
+    assert again == study
+    assert again.sha256 == study.sha256
+    # A study that has none, and says nothing of them, has the values of an earlier version.
+    stored = set(study.to_dict()["oddity"]) & {"catch", "catch_trials"}
+    assert stored == {
+        name
+        for name, value in zip(("catch", "catch_trials"), expected, strict=True)
+        if value not in ({}, None)
+    }
+
+
+def test_new_studies_without_anchors_have_to_name_their_catch_trials_or_to_want_none() -> None:
+    shipped = Study.load()
+    bare = replace(shipped.plan_of("absolute"), anchors={})
+    oddity = TaskPlan(participants=8, schedule="interleaved", repeats=6)
+    tasks = {**shipped.tasks, "absolute": bare, "oddity": oddity}
+    with refused(InputError, names=["[oddity]", "catch = {", "catch_trials = 0"], expected=6):
+        replace(shipped, tasks=tasks)
+    for said in ({"catch_trials": 0}, {"catch": PAIRS}):
+        replace(shipped, tasks={**tasks, "oddity": replace(oddity, **said)})
 
 
 def test_by_day_takes_as_many_people_as_make_whole_blocks() -> None:

@@ -17,7 +17,12 @@ from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from experiments.tasks.balance import balance_of
-from experiments.tasks.durations import minutes_of_session, trials_of_session
+from experiments.tasks.durations import (
+    TRIAL_S,
+    minutes_of_catch_trials,
+    minutes_of_session,
+    trials_of_session,
+)
 from experiments.tasks.page import plan_page, proof_of_sensitivity
 from modeling import InputError, TextureModel, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES
@@ -63,6 +68,21 @@ def test_anchors_count_for_nothing(study: Study) -> None:
     assert trials_of_session(with_anchor, "absolute") == (1, 7)
     for row in balance_of(with_anchor, "absolute"):
         assert row.most - row.least <= 1
+
+
+def test_catch_trials_count_for_no_balance_but_for_the_time(study: Study) -> None:
+    plain = TaskPlan(participants=3, schedule="interleaved", repeats=2, catch_trials=0)
+    caught = replace(plain, catch={"canvas": "PVC"}, catch_trials=5)
+    bare, longer = (
+        replace(study, tasks={**study.tasks, "oddity": plan}) for plan in (plain, caught)
+    )
+    assert balance_of(longer, "oddity") == balance_of(bare, "oddity")
+    assert trials_of_session(bare, "oddity") == (2, 6)
+    assert trials_of_session(longer, "oddity") == (2, 11)
+    minutes = minutes_of_session(longer, "oddity") - minutes_of_session(bare, "oddity")
+    assert minutes == minutes_of_catch_trials(longer, "oddity") == round(5 * TRIAL_S["oddity"] / 60)
+    assert minutes_of_catch_trials(bare, "oddity") == 0
+    assert minutes_of_catch_trials(longer, "relative") == 0
 
 
 @pytest.mark.parametrize("repeats", [1, 2])
@@ -202,6 +222,40 @@ def test_each_claim_says_what_its_equality_hangs_on(planned: Study) -> None:
     assert "give it anchors" in proof_of_sensitivity(study, rated)
     assert "full models are recognised" in proof_of_sensitivity(study, chosen)
     assert "No equality in any case" in proof_of_sensitivity(study, odd)
+    assert "catch trials" in proof_of_sensitivity(study, odd)  # as advice
+    caught = replace(oddity, catch={"canvas": "PVC"}, catch_trials=6)
+    study = replace(study, tasks={**study.tasks, "oddity": caught})
+    told = proof_of_sensitivity(study, odd)
+    for fact in ("above chance", "6 catch trials", "6 minutes of each session"):
+        assert fact in told
+    assert "in any case" not in told
+
+
+def test_the_page_states_catch_trials_and_what_they_cost(planned: Study, models: ModelSets) -> None:
+    plain = TaskPlan(participants=3, schedule="interleaved", repeats=2)
+    caught = replace(plain, catch={"canvas": "PVC"}, catch_trials=4)
+    pages = [
+        plan_page(replace(planned, tasks={**planned.tasks, "oddity": plan}), models)
+        for plan in (plain, caught)
+    ]
+    for fact in ("4 catch trials", "4 minutes of each session", "canvas and PVC", "full models"):
+        assert fact in pages[1]
+    assert "catch trials" not in pages[0]
+
+
+def test_the_page_says_which_rule_decides(planned: Study, models: ModelSets) -> None:
+    tested = plan_page(planned, models)
+    eight = replace(planned.plan_of("absolute"), participants=8)
+    plan = replace(planned.plan, rule="model", few=0.125)
+    modelled = plan_page(
+        replace(planned, plan=plan, tasks={**planned.tasks, "absolute": eight}), models
+    )
+    for fact in ("hierarchical model", "12.5 %", "95 %", "beside"):
+        assert fact in modelled
+    assert "hierarchical model" not in tested
+    # The tests decide nothing there, so no claim names them as its own.
+    assert "Test of equivalence" in tested
+    assert "Test of equivalence" not in modelled
 
 
 def test_the_page_keeps_the_seed_and_names_controls(planned: Study, models: ModelSets) -> None:

@@ -34,7 +34,7 @@ def test_every_answer_has_the_columns_of_its_table(
     task: str, study: Study, models: ModelSets, rig: Any
 ) -> None:
     for row in run(task, with_oddity(study), models, rig).rows:
-        assert list(row) == [column.name for column in ANSWER_TABLES[task].columns]
+        assert list(row) == [c.name for c in ANSWER_TABLES[task].columns if not c.optional]
 
 
 def with_oddity(study: Study) -> Study:
@@ -117,6 +117,37 @@ def test_an_oddity_trial_has_one_odd_model_behind_each_button_equally_often(
     first = [models.of(trials[0].texture, name) for name in trials[0].layout]
     shown = [note for note in rig.notes if note[0] != "silence"]
     assert shown[:4] == [("virtual", model) for model in (first[0], *first)]
+
+
+def test_a_catch_trial_presents_another_texture_as_the_odd_one(
+    study: Study, models: ModelSets, rig: Any
+) -> None:
+    plan = TaskPlan(
+        participants=2,
+        schedule="interleaved",
+        repeats=2,
+        catch={"canvas": "PVC"},
+        catch_trials=4,
+        models=("full", "simplified"),
+    )
+    study = replace(study, tasks={**study.tasks, "oddity": plan})
+    trials = plan_session(study, task="oddity", subject=1, session=1).trials
+    store = run("oddity", study, models, rig)
+    shown = [note for note in rig.notes if note[0] == "virtual"]
+    caught = 0
+    for place, (row, trial) in enumerate(zip(store.rows, trials, strict=True)):
+        assert list(row) == [column.name for column in ANSWER_TABLES["oddity"].columns]
+        textures = [trial.texture] * 3
+        if row["odd_texture"] != row["texture"]:
+            caught += 1
+            assert {row["texture"], row["odd_texture"]} == {"canvas", "PVC"}
+            assert row["layout"] == "full|full|full"
+            textures[row["odd_position"] - 1] = row["odd_texture"]
+        felt = [models.of(*one) for one in zip(textures, trial.layout, strict=True)]
+        # The first one with the page, then each once.
+        assert shown[4 * place : 4 * place + 4] == [("virtual", m) for m in (felt[0], *felt)]
+        assert row["correct"] == int(row["answer"] == row["odd_position"])
+    assert caught == 4
 
 
 def test_every_declared_table_has_its_task_and_another_name_is_refused() -> None:

@@ -49,6 +49,7 @@ def test_trials_of_both_models_need_right_answers_and_their_chance(
     ("own", "declared", "named"),
     [
         ((CORRECT,), {"alternatives": "layouts"}, "layouts"),
+        ((CORRECT,), {"other_texture": "odd"}, "odd"),
         ((CORRECT, RESPONSE_TIME), {"alternatives": RESPONSE_TIME.name, "chance": 0.5}, "both"),
         ((RESPONSE_TIME,), {"chance": 0.5}, "correct"),
         ((RESPONSE_TIME,), {"alternatives": RESPONSE_TIME.name}, "correct"),
