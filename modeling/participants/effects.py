@@ -31,7 +31,7 @@ class EffectPriors:
 
     mean_sd: float
     spread: float
-    weight: float = 1 / COMPONENTS
+    weight: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -22,7 +22,7 @@ LOWEST, HIGHEST = ENDS
 AT_END = 0.02  # chance that a lapsed rating lies at the lower end, and at the upper one
 WITHIN = (1 - 2 * AT_END) / (HIGHEST - LOWEST)  # density of a lapsed rating between the ends
 
-_EFFECTS = EffectPriors(mean_sd=12.0, spread=5.0)
+_EFFECTS = EffectPriors(mean_sd=25.0, spread=1.9, weight=0.02)
 
 
 @dataclass(frozen=True, kw_only=True)

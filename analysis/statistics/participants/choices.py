@@ -298,17 +298,14 @@ class ChoiceSampler:
 
     # What is asked of the posterior, in shares of right answers.
 
-    def effects(self) -> Floats:
+    def person_effects(self) -> Floats:
         """(B, n) effect of each participant over all textures, lapses aside."""
         shares = self._model.share(self._state.d_prime(self._models))
         found: Floats = mean_effect(shares, self._model.chance).mean(axis=-1)
         return found
 
-    def population(self, bounds: tuple[float, float]) -> tuple[Floats, Floats, Floats]:
-        """Mean effect (B,), share of people outside the bounds (B,), mean by texture (B, T).
-
-        Of people who attend, over the distributions of abilities and effects.
-        """
+    def mean_effects(self) -> tuple[Floats, Floats]:
+        """Mean effect (B,) of people who attend, and on each texture (B, T), lapses aside."""
         return population_effects(
             self._model,
             self._state,
@@ -316,7 +313,6 @@ class ChoiceSampler:
             level=self._level,
             person_sd=np.sqrt(self._person_variance),
             models=self._models,
-            bounds=bounds,
         )
 
 
@@ -328,9 +324,8 @@ def population_effects(
     level: Floats,
     person_sd: Floats,
     models: int,
-    bounds: tuple[float, float],
-) -> tuple[Floats, Floats, Floats]:
-    """As `ChoiceSampler.population`, of any population."""
+) -> tuple[Floats, Floats]:
+    """As `ChoiceSampler.mean_effects`, of any population: over its abilities and effects."""
     b = len(level)
     nodes = mixture.means[..., None] + mixture.spread[:, None, None] * _likely(_EFFECTS)
     abilities = level[:, None] + person_sd[:, None] * _likely(_ABILITIES if models == 2 else 1)
@@ -341,9 +336,7 @@ def population_effects(
     weights = np.tile(weights, (1, abilities.shape[1])) / abilities.shape[1]
     found = mean_effect(model.share(everybody.d_prime(models)), model.chance)
     textures = np.einsum("bnt,bn->bt", found, weights)
-    own = found.mean(axis=-1)
-    outside = (own < bounds[0]) | (own > bounds[1])
-    return textures.mean(axis=1), (outside * weights).sum(axis=1), textures
+    return textures.mean(axis=1), textures
 
 
 def _likely(count: int) -> Floats:

@@ -5,8 +5,6 @@ docs/method/participants.md#effects
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
@@ -20,6 +18,7 @@ from modeling.participants.effects import (
 )
 
 _SPREADS = 24  # places on the grid of the SD within a component
+_NOTHING = 1e-300
 _HIGHEST_SPREAD = 4.0  # the grid ends there, in scales of the prior
 
 
@@ -123,30 +122,32 @@ class MixtureOfEffects:
         return EffectMixture(weights=self.weights, means=self.means, spread=self.spread)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Draws:
-    """Draws from the posterior of one study, chains and steps together.
+def vague_mean(
+    estimates: Floats, variances: Floats, who: Bools, *, widest: float, rng: np.random.Generator
+) -> Floats:
+    """(B,) draws of the mean effect of a normal population with flat priors of mean and SD.
+
+    Beside the mixture, whose prior, informative about people, would narrow the interval of the
+    mean (docs/method/participants.md#mean).
 
     Parameters
     ----------
-    mean, share : (chains, S) ndarray
-        Mean effect of people who attend, and the share of them outside the bounds.
-    effects : (chains, S, n) ndarray
-        Of each participant.
-    careless : (n,) ndarray
-        Probability that a participant does not attend.
-    textures : (chains, S, T) ndarray
-        Mean effect on each texture.
-    outside : (chains, S) ndarray
-        Number of attending participants whose effect lies outside the bounds.
-    lapses : (chains, S) ndarray
-        Share of lapsed trials.
+    estimates, variances : (B, n) ndarray
+        As in `MixtureOfEffects.draw`.
+    who : (B, n) ndarray of bool
+    widest : float
+        The SD of people is flat between 0 and this.
+    rng : Generator
     """
-
-    mean: Floats
-    share: Floats
-    effects: Floats
-    careless: Floats
-    textures: Floats
-    outside: Floats
-    lapses: Floats
+    places = (np.arange(_SPREADS) + 0.5) / _SPREADS
+    grid = widest * places**2
+    weights = who[..., None] / (variances[..., None] + grid**2)
+    total = weights.sum(axis=1) + _NOTHING
+    middle = (weights * estimates[..., None]).sum(axis=1) / total
+    rest = (weights * (estimates[..., None] - middle[:, None]) ** 2).sum(axis=1)
+    log = np.where(who[..., None], np.log(weights + _NOTHING), 0.0).sum(axis=1)
+    log = np.log(places) + 0.5 * (log - np.log(total) - rest)
+    at = drawn_places(np.exp(log - log.max(axis=1, keepdims=True)), rng)[:, None]
+    mean, precision = (np.take_along_axis(one, at, axis=1)[:, 0] for one in (middle, total))
+    found: Floats = mean + rng.standard_normal(mean.shape) / np.sqrt(precision)
+    return found

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import gammaln, ndtr, ndtri
 
-from analysis.statistics.participants.mixture import MixtureOfEffects
+from analysis.statistics.participants.mixture import MixtureOfEffects, vague_mean
 from modeling.arrays import Bools, Floats
 from modeling.participants.effects import EffectMixture
 from modeling.participants.ratings import (
@@ -23,7 +23,15 @@ from modeling.participants.ratings import (
 _NORMAL = 1 / np.sqrt(2 * np.pi)
 _HALVES = np.array([-0.5, 0.5])[:, None]
 _UNKNOWN = 1e8  # variance of an effect that no answer tells about
+_WIDEST = 2.0  # SD of people that the mean effect allows for, in SDs of the components' means
 _TINY = 1e-300
+
+
+def _summed(values: Floats, *, keep: int) -> Floats:
+    """Sums over all axes but the first few; a product is much faster than short sums."""
+    flat = values.reshape(*values.shape[:keep], -1)
+    found: Floats = flat @ np.ones(flat.shape[-1])
+    return found
 
 
 class RatingSampler:
@@ -56,6 +64,8 @@ class RatingSampler:
         self._texture, self.texture_effects = np.zeros((b, t)), np.zeros((b, t))
         self.effects = np.zeros((b, n))
         self._slopes = np.zeros((len(studies.trends), b))
+        self._rest = np.zeros_like(studies.values)
+        self.estimates = np.zeros((b, n)), np.ones((b, n))
         anchors = studies.anchors.shape[2]
         self._anchor, self._own_anchor = (
             np.full((b, anchors), priors.anchor[0]),
@@ -72,6 +82,21 @@ class RatingSampler:
     def mixture(self) -> EffectMixture:
         """The distribution of people's effects as it is now."""
         return self._mixture.mixture
+
+    def settle(self) -> None:
+        """Nothing in these steps is adapted."""
+
+    def person_effects(self) -> Floats:
+        """(B, n) effect of each participant over all textures, in points."""
+        return self.effects
+
+    def mean_effects(self) -> tuple[Floats, Floats]:
+        """Mean effect (B,) of people who attend, and on each texture (B, T), in points."""
+        who = self.attends & self.people
+        mean = vague_mean(
+            *self.estimates, who, widest=_WIDEST * self._priors.effects.mean_sd, rng=self._rng
+        )
+        return mean, mean[:, None] + self.texture_effects
 
     def step(self) -> None:
         """Draw every unknown once, given all others."""
@@ -126,6 +151,8 @@ class RatingSampler:
         self._anchors.draw_lapses(np.where(shown, *anchors), lapses, self._rng)
         middle = own + self.attends[..., None, None, None] * felt
         self._main.draw_latent(middle, sd, self._rng)
+        # From here on what is left of the latent judgements is kept up to date by every step.
+        self._rest = self._main.latent - middle
         middle = np.where(shown, expected, level)
         self._anchors.draw_latent(middle, np.where(shown, sd_anchor, sd_own), self._rng)
 
@@ -138,39 +165,36 @@ class RatingSampler:
         found: Floats = attends - (np.log(scale) - 2 * log - scale / self._variance)
         return found
 
-    def _rest(self) -> Floats:
-        """Latent judgements without what the state predicts of them."""
-        own = (self._person[..., None] + self._cell)[..., None, None] + self._trend()
-        found: Floats = self._main.latent - own - self.attends[..., None, None, None] * self._felt()
-        return found
-
-    def _weights(self) -> Floats:
-        """(B, n, T, 2, R) precisions of the latent judgements; 0 of lapsed and missing trials."""
-        return self._main.counts / self._variance[..., None, None, None]
-
     def _draw_effects(self) -> None:
-        rest = self._rest() + (
-            self.attends[..., None, None, None] * _HALVES * self.effects[..., None, None, None]
-        )
-        weights = self._main.counts
-        precision = 0.25 * weights.sum(axis=(2, 3, 4)) / self._variance
-        total = np.einsum("bntmr,m->bn", weights * rest, _HALVES[:, 0]) / self._variance
+        counts = self._main.counts
+        precision = 0.25 * _summed(counts, keep=2) / self._variance
+        left = _summed(counts * self._rest, keep=4)
+        total = _summed(left * _HALVES[:, 0], keep=2) / self._variance + precision * self.effects
         known = precision > 0
         safe = np.where(known, precision, 1 / _UNKNOWN)
-        who = self.attends & self.people
-        self.effects = self._mixture.draw(np.where(known, total / safe, 0.0), 1 / safe, who)
+        self.estimates = np.where(known, total / safe, 0.0), 1 / safe
+        old, who = self.effects, self.attends & self.people
+        self.effects = self._mixture.draw(*self.estimates, who)
+        self._apart(self.attends[..., None] * (self.effects - old)[..., None])
+
+    def _apart(self, change: Floats) -> None:
+        """Take changed effects (B, n, T or 1) of the other model from what is left."""
+        change = 0.5 * change[..., None]
+        self._rest[:, :, :, 0] += change
+        self._rest[:, :, :, 1] -= change
 
     def _draw_levels(self) -> None:
-        rest = self._rest() + self._person[..., None, None, None]
-        weights = self._main.counts
+        counts, old = self._main.counts, self._person
         own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
-        count = weights.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
-        total = (weights * rest).sum(axis=(2, 3, 4))
+        answers = _summed(counts, keep=2)
+        count = answers + self._anchors.counts.sum(axis=2)
+        total = _summed(counts * self._rest, keep=2) + answers * old
         total += (self._anchors.counts * (self._anchors.latent - own)).sum(axis=2)
         prior = 1 / self._person_variance[:, None]
         precision = count / self._variance + prior
         middle = (total / self._variance + self._level[:, None] * prior) / precision
         self._person = self._normal(middle, precision)
+        self._rest -= (self._person - old)[..., None, None, None]
         people = self.people.sum(axis=1)
         mean, sd = self._priors.level
         precision = people / self._person_variance + 1 / sd**2
@@ -180,12 +204,13 @@ class RatingSampler:
         self._person_variance = self._inverse_gamma(self._priors.person_sd, people, squares)
 
     def _draw_cells(self) -> None:
-        rest = self._rest() + self._cell[..., None, None]
-        weights = self._main.counts
+        counts, old = self._main.counts, self._cell
         prior = 1 / self._cell_variance[:, None, None]
-        precision = weights.sum(axis=(3, 4)) / self._variance[..., None] + prior
-        total = (weights * rest).sum(axis=(3, 4)) / self._variance[..., None]
+        known = _summed(counts, keep=3) / self._variance[..., None]
+        precision = known + prior
+        total = _summed(counts * self._rest, keep=3) / self._variance[..., None] + known * old
         self._cell = self._normal(total / precision, precision)
+        self._rest -= (self._cell - old)[..., None, None]
         held = self.people[..., None]
         squares = (self._cell**2 * held).sum(axis=(1, 2))
         count = self.people.sum(axis=1) * self._cell.shape[2]
@@ -193,18 +218,24 @@ class RatingSampler:
 
     def _draw_textures(self) -> None:
         """Levels and effects of the textures, each without a mean over them."""
-        weights = self._weights() * self.attends[..., None, None, None]
-        rest = self._rest()
-        precision = weights.sum(axis=(1, 3, 4))
-        total = (weights * rest).sum(axis=(1, 3, 4)) + precision * self._texture
-        new = self._without_mean(total, precision, self._priors.texture_sd)
-        rest = rest - (new - self._texture)[:, None, :, None, None]
-        self._texture = new
-        total = np.einsum("bntmr,m->bt", weights * rest, _HALVES[:, 0])
-        total += 0.25 * precision * self.texture_effects
+        counts = self._main.counts
+        share = (self.attends / self._variance)[..., None]
+        by_model = _summed(counts, keep=4) * share[..., None]
+        left = _summed(counts * self._rest, keep=4) * share[..., None]
+        precision, total = by_model.sum(axis=(1, 3)), left.sum(axis=(1, 3))
+        old = self._texture
+        total += precision * old
+        self._texture = self._without_mean(total, precision, self._priors.texture_sd)
+        change = (self._texture - old)[:, None]
+        self._rest -= (self.attends[..., None] * change)[..., None, None]
+        left -= by_model * change[..., None]
+        total = 0.5 * (left[..., 1] - left[..., 0]).sum(axis=1)
+        old = self.texture_effects
+        total += 0.25 * precision * old
         self.texture_effects = self._without_mean(
             total, 0.25 * precision, self._priors.texture_effect_sd
         )
+        self._apart(self.attends[..., None] * (self.texture_effects - old)[:, None])
 
     def _without_mean(self, total: Floats, precision: Floats, sd: float) -> Floats:
         """Normal draws (B, T) under the condition that their sum is 0.
@@ -219,12 +250,14 @@ class RatingSampler:
 
     def _draw_trends(self) -> None:
         for c in self._varying:
-            trend, weights = self._trends[c], self._weights()
-            old = self._slopes[c][:, None, None, None, None]
-            rest = self._rest() + old * trend
-            precision = (weights * trend**2).sum(axis=(1, 2, 3, 4)) + self._priors.trend_sd**-2
-            total = (weights * trend * rest).sum(axis=(1, 2, 3, 4))
-            self._slopes[c] = self._normal(total / precision, precision)
+            trend, old = self._trends[c], self._slopes[c]
+            weighted = self._main.counts / self._variance[..., None, None, None] * trend
+            known = _summed(weighted * trend, keep=1)
+            total = _summed(weighted * self._rest, keep=1) + known * old
+            precision = known + self._priors.trend_sd**-2
+            new = self._normal(total / precision, precision)
+            self._slopes[c] = new
+            self._rest -= (new - old)[:, None, None, None, None] * trend
 
     def _draw_anchors(self) -> None:
         if not self._anchor.size:
@@ -248,11 +281,11 @@ class RatingSampler:
         self._anchor_variance = self._inverse_gamma(self._priors.anchor_sd, count, squares)
 
     def _draw_variances(self) -> None:
-        squares = (self._main.counts * self._rest() ** 2).sum(axis=(2, 3, 4))
+        squares = _summed(self._main.counts * self._rest**2, keep=2)
         own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
         rest = self._anchors.latent - self._person[..., None] - own
         squares += (self._anchors.counts * rest**2).sum(axis=2)
-        count = self._main.counts.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
+        count = _summed(self._main.counts, keep=2) + self._anchors.counts.sum(axis=2)
         half = self._priors.rating_df / 2
         shape = np.where(self.attends, half, 1.0) + count / 2
         scale = np.where(self.attends, half * self._typical[:, None], self._priors.careless_scale)
@@ -267,7 +300,7 @@ class RatingSampler:
 
     def _draw_shares(self) -> None:
         lapsed = self._main.lapsed() + self._anchors.lapsed()
-        kept = self._main.counts.sum(axis=(1, 2, 3, 4)) + self._anchors.counts.sum(axis=(1, 2))
+        kept = _summed(self._main.counts, keep=1) + self._anchors.counts.sum(axis=(1, 2))
         self.lapses = np.clip(self._beta(self._priors.lapses, lapsed, kept), 1e-6, 0.999)
         careless = (self.people & ~self.attends).sum(axis=1)
         attending = (self.people & self.attends).sum(axis=1)
@@ -300,6 +333,7 @@ class _Answers:
         self.latent = np.where(self.answered, values, 0.0)
         self.counts = self.answered.astype(float)
         self._values = self.latent.copy()
+        self._known = self.counts.copy()
         self._unanswered = ~self.answered
         low = self.answered & (values <= LOWEST)
         high = self.answered & (values >= HIGHEST)
@@ -330,15 +364,13 @@ class _Answers:
         rate = lapses.reshape(-1, *(1,) * (first.ndim - 1))
         blind = rate * self._lapse
         ratio = ((1 - rate) * first + blind) / ((1 - rate) * second + blind)
-        axes = tuple(range(2, first.ndim))
-        found: Floats = (np.log(ratio) * self.answered).sum(axis=axes)
-        return found
+        return _summed(np.log(ratio) * self._known, keep=2)
 
     def draw_lapses(self, likelihood: Floats, rate: Floats, rng: np.random.Generator) -> None:
         """Which trials lapsed, given the likelihood of each answer if it did not."""
         blind = rate * self._lapse
         kept = rng.random(likelihood.shape) * ((1 - rate) * likelihood + blind) >= blind
-        self.counts = (kept & self.answered).astype(float)
+        self.counts = kept * self._known
 
     def draw_latent(self, middle: Floats, sd: Floats, rng: np.random.Generator) -> None:
         """Judgements beyond an end of the scale, where a rating lies at it."""
@@ -354,6 +386,4 @@ class _Answers:
 
     def lapsed(self) -> Floats:
         """(B,) number of lapsed trials."""
-        axes = tuple(range(1, self.counts.ndim))
-        found: Floats = self.answered.sum(axis=axes) - self.counts.sum(axis=axes)
-        return found
+        return _summed(self._known - self.counts, keep=1)
