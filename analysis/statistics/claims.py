@@ -11,13 +11,17 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 import pandas as pd
 
-from analysis.answers.plan import Claim
+from analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
 from analysis.columns import TEXTURE, Column, P, chosen, names
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.statistics.equivalence import (
+    ALL_BUT,
     ALPHA,
+    AVERAGE_FELT,
     DIFFERENT,
+    EQUAL_ON_AVERAGE,
     EQUIVALENT,
+    FELT,
     WITHIN_BOUNDS,
     Bounds,
     bayes_factor_null,
@@ -33,13 +37,21 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
+from analysis.statistics.participants.verdict import PeopleFound
 from modeling.arrays import Floats
 
 WITHHELD = "equivalence withheld"
 BOUNDS_WITHHELD = "different, bounds withheld"
-# What remains of a verdict of equivalence where equivalence must not be concluded.
-_WITHOUT_EQUALITY = {EQUIVALENT: WITHHELD, WITHIN_BOUNDS: BOUNDS_WITHHELD}
-WITHOUT_EQUALITY = tuple(_WITHOUT_EQUALITY.values())
+# What remains of a word of equality where equality must not be concluded.
+_WITHOUT_EQUALITY = {
+    EQUIVALENT: WITHHELD,
+    WITHIN_BOUNDS: BOUNDS_WITHHELD,
+    EQUAL_ON_AVERAGE: WITHHELD,
+    AVERAGE_FELT: FELT,
+    ALL_BUT: FELT,
+}
+EQUALITY = tuple(_WITHOUT_EQUALITY)
+WITHOUT_EQUALITY = (WITHHELD, BOUNDS_WITHHELD)
 DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
 SHOWN, NOT_TESTED = "shown", "sensitivity not tested"
 INTERIM = "interim, no verdict"
@@ -83,6 +95,17 @@ CLAIM_COLUMNS = (
     Column("share_at_ends", "share at ends"),
     Column("doubt", "no equivalence because"),
     Column("excluded"),
+    Column("rule", is_name=True),
+    Column("tests_verdict", "verdict of the tests", is_name=True),
+    Column("model_mean", "mean effect by the model"),
+    Column("model_low", "95% interval from"),
+    Column("model_high", "to"),
+    Column("share_outside", "share of people outside the bounds", format=".2f"),
+    Column("share_low", "95% interval from", format=".2f"),
+    Column("share_high", "to", format=".2f"),
+    Column("share_most", "at most (95%)", format=".2f"),
+    Column("somebody", "probability that somebody is", format=".2f"),
+    Column("p_of_model", "probability of lying beyond a bound", format=".3f"),
     Column("note"),
 )
 
@@ -165,10 +188,20 @@ class Standing:
         share_at_ends : float
             As for `doubt`.
         """
+        return self.allowed(verdict(p_difference, p_equivalence), share_at_ends=share_at_ends)
+
+    def allowed(self, word: str, *, share_at_ends: float = np.nan) -> str:
+        """A verdict as it may be said: without equality where there is doubt.
+
+        Parameters
+        ----------
+        word : str
+        share_at_ends : float
+            As for `doubt`.
+        """
         if self.unfinished:
             return INTERIM
-        found = verdict(p_difference, p_equivalence)
-        return _WITHOUT_EQUALITY.get(found, found) if self.doubt(share_at_ends) else found
+        return _WITHOUT_EQUALITY.get(word, word) if self.doubt(share_at_ends) else word
 
 
 def claim_tests(
@@ -201,15 +234,20 @@ def claim_tests(
         table = _without_effects(table)
     reference, other = claim.models
     low, high = claim.bounds or (np.nan, np.nan)
-    return table.reset_index(drop=True).assign(
-        claim=claim.name,
-        measure=MEASURES[claim.measure],
-        planned="yes" if claim.planned else "no",
-        reference=reference,
-        other=other,
-        bound_low=low,
-        bound_high=high,
-    )[names(CLAIM_COLUMNS)]
+    return (
+        table.reset_index(drop=True)
+        .assign(
+            claim=claim.name,
+            measure=MEASURES[claim.measure],
+            planned="yes" if claim.planned else "no",
+            rule=TESTS_RULE,
+            reference=reference,
+            other=other,
+            bound_low=low,
+            bound_high=high,
+        )
+        .reindex(columns=names(CLAIM_COLUMNS))
+    )
 
 
 def _tests(
@@ -239,6 +277,64 @@ def _tests(
     return table
 
 
+def with_people(
+    tests: pd.DataFrame, found: PeopleFound, claim: Claim, *, standing: Standing, few: float
+) -> pd.DataFrame:
+    """The tests of a claim, with the verdicts of the model of the participants.
+
+    Parameters
+    ----------
+    tests : DataFrame
+        From `claim_tests`.
+    found : PeopleFound
+    claim : Claim
+        With bounds.
+    standing : Standing
+    few : float
+        Of the plan.
+
+    Returns
+    -------
+    DataFrame
+        `CLAIM_COLUMNS`. The verdicts of the tests stay in `tests_verdict`. Posterior probabilities
+        of the single textures are corrected after Holm, as p values are.
+    """
+    assert claim.bounds is not None
+    summary, table = found.summary, tests.assign(tests_verdict=tests["verdict"])
+    of_model = found.textures.set_index("texture").reindex(table["texture"]).reset_index(drop=True)
+    overall = (table["texture"] == ALL_TEXTURES).to_numpy()
+    judged = (~overall) & (table["verdict"] != CONTROL).to_numpy()
+    words = dict.fromkeys(table.index[overall], summary.verdict(claim.bounds, few=few))
+    p = holm(of_model["p_difference"][judged]), holm(of_model["p_equivalence"][judged])
+    for row, differs, equals in zip(table.index[judged], *p, strict=True):
+        word = verdict(float(differs), float(equals))
+        words[row] = EQUAL_ON_AVERAGE if word in (EQUIVALENT, WITHIN_BOUNDS) else word
+    for row, word in words.items():
+        share = float(table.loc[row, "share_at_ends"])
+        table.loc[row, "verdict"] = standing.allowed(word, share_at_ends=share)
+    table["rule"] = np.where(overall | judged, MODEL_RULE, "")
+    for column, name in (
+        ("model_mean", "mean"),
+        ("model_low", "ci_low"),
+        ("model_high", "ci_high"),
+    ):
+        table[column] = of_model[name].to_numpy()
+    table["p_of_model"] = of_model["p_equivalence"].to_numpy()
+    row = {
+        "model_mean": summary.mean,
+        "model_low": summary.mean_low,
+        "model_high": summary.mean_high,
+        "share_outside": summary.share,
+        "share_low": summary.share_low,
+        "share_high": summary.share_high,
+        "share_most": summary.share_most,
+        "somebody": summary.somebody,
+    }
+    for column, value in row.items():
+        table.loc[overall, column] = value
+    return table
+
+
 def _without_effects(table: pd.DataFrame) -> pd.DataFrame:
     """The rows of an unfinished task, without effects, to prevent optional stopping."""
     notes = table["note"].where(table["note"] == IDENTICAL, "")
@@ -248,7 +344,8 @@ def _without_effects(table: pd.DataFrame) -> pd.DataFrame:
 def all_equivalent(tests: pd.DataFrame) -> bool:
     """Whether every texture that is compared is equivalent: the largest unadjusted p of TOST.
 
-    An intersection–union test (Berger 1982), which needs no correction.
+    An intersection–union test (Berger 1982), which needs no correction. Where the model of the
+    participants decides: the largest probability of a mean effect beyond a bound.
     docs/method/statistics.md#all-textures-equivalent
 
     Parameters
@@ -257,7 +354,9 @@ def all_equivalent(tests: pd.DataFrame) -> bool:
         Of one claim, from `claim_tests`.
     """
     textures = tests[(tests["texture"] != ALL_TEXTURES) & (tests["verdict"] != CONTROL)]
-    return every_equivalent(textures["p_equivalence"].to_numpy(float), doubts=textures["doubt"])
+    by_model = (textures["rule"] == MODEL_RULE).any()
+    p = textures["p_of_model" if by_model else "p_equivalence"]
+    return every_equivalent(p.to_numpy(float), doubts=textures["doubt"])
 
 
 def every_equivalent(p_equivalence: Floats, *, doubts: Iterable[str]) -> bool:

@@ -16,6 +16,11 @@ EQUIVALENT = "equivalent"
 DIFFERENT = "different"
 WITHIN_BOUNDS = "different but within bounds"
 INCONCLUSIVE = "inconclusive"
+# Said by the model of the participants alone (docs/method/participants.md#verdict).
+EQUAL_ON_AVERAGE = "equal on average"  # of single textures, whose people are not counted
+AVERAGE_FELT = "equal on average, felt by some"
+ALL_BUT = "equal for all but a few"
+FELT = "felt by some"
 Bounds = tuple[float, float]
 
 

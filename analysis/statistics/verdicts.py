@@ -12,13 +12,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.answers.plan import DIFFERENCE, Claim
+from analysis.answers.plan import DIFFERENCE, MODEL_RULE, Claim
 from analysis.answers.responses import Responses, setup_of
 from analysis.columns import TEXTURE, Column, names
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
 from analysis.statistics.claims import (
     CONTROL,
     DIFFERENCES,
+    EQUALITY,
     NOT_TESTED,
     SHOWN,
     Standing,
@@ -26,18 +27,29 @@ from analysis.statistics.claims import (
     claim_tests,
     complete_means,
     share_at_ends,
+    with_people,
 )
 from analysis.statistics.draws import generators
-from analysis.statistics.equivalence import ALPHA, EQUIVALENT, WITHIN_BOUNDS
+from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.paired import (
     sign_flips_p,
     t_test,
     why_undefined,
     without_rounding_noise,
 )
+from analysis.statistics.participants.design import choice_studies, rating_studies, textures_of
+from analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
 from modeling import InputError
 from modeling.arrays import Floats
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from modeling.participants.choices import (
+    ODDITY,
+    ChoiceStudies,
+    DecisionModel,
+    forced_choice,
+)
+from modeling.participants.ratings import RatingStudies
+from modeling.seeds import number_of
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,12 +64,15 @@ class ClaimFound:
     values : DataFrame
         texture, participant_id, reference, other.
     standing : Standing
+    people : PeopleFound, optional
+        Where the model of the participants decides.
     """
 
     claim: Claim
     tests: pd.DataFrame
     values: pd.DataFrame
     standing: Standing
+    people: PeopleFound | None = None
 
 
 def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[ClaimFound]:
@@ -80,8 +95,100 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
         values = claim_values(responses, claim)
         standing = claim_standing(responses, claim, rng=own[claim.task])
         tests = claim_tests(claim, values, standing=standing, rng=own[claim.task])
-        found.append(ClaimFound(claim=claim, tests=tests, values=values.table, standing=standing))
+        people = None if standing.unfinished else claim_people(responses, claim, rng=rng)
+        if people is not None:
+            few = responses.plan.few
+            tests = with_people(tests, people, claim, standing=standing, few=few)
+        found.append(
+            ClaimFound(
+                claim=claim, tests=tests, values=values.table, standing=standing, people=people
+            )
+        )
     return found
+
+
+def claim_people(
+    responses: Responses, claim: Claim, *, rng: np.random.Generator
+) -> PeopleFound | None:
+    """What the model of the participants says of a claim; None where it does not decide.
+
+    Parameters
+    ----------
+    responses : Responses
+    claim : Claim
+    rng : Generator
+        Seeds the draws from the posterior.
+    """
+    data = people_data(responses, claim)
+    if data is None or claim.bounds is None:
+        return None
+    own = np.random.default_rng([int(rng.integers(2**32)), number_of(claim.name)])
+    return people_found(
+        data.studies,
+        claim.bounds,
+        model=data.model,
+        people=data.people,
+        textures=data.textures,
+        rng=own,
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PeopleData:
+    """The answers about one claim as the model of the participants takes them.
+
+    Parameters
+    ----------
+    studies : RatingStudies or ChoiceStudies
+        One study.
+    model : DecisionModel, optional
+        Of choices.
+    people, textures : sequence of str
+        In the order of the arrays.
+    """
+
+    studies: RatingStudies | ChoiceStudies
+    model: DecisionModel | None
+    people: Sequence[str]
+    textures: Sequence[str]
+
+
+def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
+    """Every answer about a claim, complete or not; None where the plan's rule is not the model's.
+
+    Nor is there any of a task whose decision model is unknown, of claims without bounds, of fewer
+    than eight people, or where all models are identical.
+    """
+    if responses.plan.rule != MODEL_RULE or not claim.planned or claim.bounds is None:
+        return None
+    same = list(responses.identical(claim.models))
+    answers = answers_about(responses, claim)
+    answers = answers[~answers["texture"].isin(same) & answers[claim.measure].notna()]
+    people = sorted(answers["participant_id"].unique())
+    checks = responses.anchors.get(claim.task, answers[:0])
+    checks = checks[checks["participant_id"].isin(people)]
+    if len(people) < FEWEST:
+        return None
+    textures = textures_of(answers)
+    if claim.measure in SCALES:
+        ratings = rating_studies(answers, checks, claim.measure, models=claim.models, people=people)
+        return PeopleData(studies=ratings, model=None, people=people, textures=textures)
+    model = decision_model(claim.task, answers)
+    if model is None:
+        return None
+    compared = claim.models[1:] if model.both_models else claim.models
+    choices = choice_studies(answers, checks, models=compared, people=people)
+    return PeopleData(studies=choices, model=model, people=people, textures=textures)
+
+
+def decision_model(task: str, answers: pd.DataFrame) -> DecisionModel | None:
+    """The decision model of a task with right answers, by its chance; None where none is known."""
+    chance = chance_of(task, answers)
+    if ANSWER_TABLES[task].both_models:
+        return ODDITY if np.isclose(chance, ODDITY.chance) else None
+    if np.isnan(chance) or not np.isclose(1 / chance, round(1 / chance)):
+        return None
+    return forced_choice(round(1 / chance))
 
 
 def all_claims(responses: Responses) -> tuple[Claim, ...]:
@@ -343,11 +450,11 @@ def planted_verdicts(
 
 def _agreement(verdict: str, truth: float, *, bounds: tuple[float, float] | None) -> str:
     within = bounds is not None and bounds[0] < truth < bounds[1]
-    wrong_equality = not within and verdict in (EQUIVALENT, WITHIN_BOUNDS)
+    wrong_equality = not within and verdict in EQUALITY
     wrong_difference = truth == 0 and verdict in DIFFERENCES
     if wrong_equality or wrong_difference:
         return "contradicts"
-    return "agrees" if verdict in (EQUIVALENT, *DIFFERENCES) else "undecided"
+    return "agrees" if verdict in (*EQUALITY, *DIFFERENCES) else "undecided"
 
 
 def check_complete(responses: Responses) -> None:

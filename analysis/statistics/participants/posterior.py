@@ -6,7 +6,7 @@ docs/method/participants.md
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def _drawn(
     for _ in range(effort.warm_up):
         sampler.step()
     sampler.settle()
-    kept: list[dict[str, Floats]] = []
+    kept: list[dict[str, Any]] = []
     for step in range(effort.steps):
         sampler.step()
         if step % effort.every == 0:
@@ -154,7 +154,7 @@ def _drawn(
     return [Draws(**{name: part[k] for name, part in parts.items()}) for k in range(studies)]
 
 
-def _observed(sampler: _Sampler, bounds: Bounds, rng: np.random.Generator) -> dict[str, Floats]:
+def _observed(sampler: _Sampler, bounds: Bounds, rng: np.random.Generator) -> dict[str, Any]:
     mean, textures = sampler.mean_effects()
     effects, who = sampler.person_effects(), sampler.attends & sampler.people
     outside = (((effects < bounds[0]) | (effects > bounds[1])) & who).sum(axis=1)

@@ -55,7 +55,8 @@ class RatingSampler:
         self._varying = [c for c, one in enumerate(studies.trends) if np.ptp(one) > 0]
         b, n, t, _, _ = studies.values.shape
         # Who is there at all; the others follow the priors and change nothing.
-        self.people = self._main.answered.any(axis=(2, 3, 4)) | self._anchors.answered.any(axis=2)
+        shown = self._main.counts.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
+        self.people: Bools = shown > 0
         self._mixture = MixtureOfEffects(priors.effects, b, rng=rng)
         self._level = np.full(b, priors.level[0])
         self._person = self._main.means(self._level)
@@ -115,9 +116,10 @@ class RatingSampler:
     def _trend(self) -> Floats | float:
         if not self._varying:
             return 0.0
-        return sum(
-            self._slopes[c][:, None, None, None, None] * self._trends[c] for c in self._varying
+        found: Floats = np.einsum(
+            "cb,cb...->b...", self._slopes[self._varying], self._trends[self._varying]
         )
+        return found
 
     def _felt(self) -> Floats:
         """(B, n, T, 2, 1): what people who attend add to their own levels."""
@@ -350,13 +352,11 @@ class _Answers:
     def likelihoods(self, middle: Floats, sd: Floats) -> Floats:
         """Density of each rating by a normal judgement, probability of one at an end."""
         scaled = (self._values - middle) / sd
-        found = np.exp(-0.5 * scaled * scaled) * (_NORMAL / sd)
-        shape = scaled.shape
+        found: Floats = np.exp(-0.5 * scaled * scaled) * (_NORMAL / sd)
         for places, low in ((self._low, True), (self._high, False)):
             if places[0].size:
                 z = scaled[places]
                 found[places] = ndtr(z) if low else ndtr(-z)
-        assert found.shape == shape
         return found
 
     def log_ratio(self, first: Floats, second: Floats, lapses: Floats) -> Floats:

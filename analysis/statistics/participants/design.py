@@ -1,0 +1,151 @@
+"""From tables of answers to what the samplers take.
+
+docs/method/participants.md#data
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pandas as pd
+
+from modeling.arrays import Floats, Integers
+from modeling.participants.choices import ChoiceStudies
+from modeling.participants.ratings import RatingStudies
+
+
+def rating_studies(
+    answers: pd.DataFrame,
+    checks: pd.DataFrame,
+    column: str,
+    *,
+    models: Sequence[str],
+    people: Sequence[str],
+) -> RatingStudies:
+    """One study of ratings.
+
+    Parameters
+    ----------
+    answers : DataFrame
+        participant_id, session, trial, texture, model and `column`; a row for each rating.
+    checks : DataFrame
+        Ratings of anchors, with virtual_texture; none where there are no rows.
+    column : str
+    models : (str, str)
+        The reference first.
+    people : sequence of str
+        Participants, in the order of the arrays.
+    """
+    known = answers[answers[column].notna()]
+    cells, places = _cells(known, models, people)
+    values = np.full((1, *places), np.nan)
+    trends = np.zeros((2, 1, *places))
+    values[0][cells] = known[column]
+    for trend, one in zip(trends[:, 0], _trends(known), strict=True):
+        trend[cells] = one
+    return RatingStudies(values=values, anchors=_anchors(checks, column, people), trends=trends)
+
+
+def choice_studies(
+    answers: pd.DataFrame,
+    checks: pd.DataFrame,
+    *,
+    models: Sequence[str],
+    people: Sequence[str],
+) -> ChoiceStudies:
+    """One study of right answers, as `rating_studies`; one model where trials hold both.
+
+    Parameters
+    ----------
+    answers, checks : DataFrame
+        With correct (0 or 1); `checks` are catch trials.
+    models, people : sequence of str
+    """
+    known = answers[answers["correct"].notna()]
+    cells, places = _cells(known, models, people)
+    right, asked = np.zeros(places), np.zeros(places)
+    right[cells] = known["correct"]
+    asked[cells] = 1.0
+    trends = np.zeros((2, *places))
+    for trend, one in zip(trends, _trends(known), strict=True):
+        trend[cells] = one
+    count = asked.sum(axis=-1)
+    caught = checks[checks["correct"].notna()] if len(checks) else checks
+    of_people = [caught[caught["participant_id"] == who] for who in people]
+    return ChoiceStudies(
+        right=right.sum(axis=-1)[None],
+        asked=count[None],
+        catch_right=np.array([[one["correct"].sum() if len(one) else 0.0 for one in of_people]]),
+        catch_asked=np.array([[float(len(one)) for one in of_people]]),
+        trends=(trends.sum(axis=-1) / np.maximum(count, 1))[:, None],
+    )
+
+
+def first_people(
+    studies: RatingStudies | ChoiceStudies, sizes: Sequence[int]
+) -> RatingStudies | ChoiceStudies:
+    """Studies of the first people of one study alone, one for each size."""
+    changed = {}
+    for name, values in vars(studies).items():
+        axis = 1 if name == "trends" else 0
+        tiled = np.repeat(values, len(sizes), axis=axis)
+        if name != "trends":
+            nothing = np.nan if isinstance(studies, RatingStudies) else 0.0
+            for one, size in zip(tiled, sizes, strict=True):
+                one[size:] = nothing
+        changed[name] = tiled
+    return type(studies)(**changed)
+
+
+def _cells(
+    answers: pd.DataFrame, models: Sequence[str], people: Sequence[str]
+) -> tuple[tuple[Integers, ...], tuple[int, ...]]:
+    """Where each answer stands among (people, textures, models, repeats), and how many of each."""
+    textures = textures_of(answers)
+    keys = ["participant_id", "texture"] + ["model"] * (len(models) > 1)
+    ordered = answers.sort_values(["session", "trial"], kind="stable")
+    repeat = ordered.groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
+    person = _places(answers["participant_id"], people)
+    texture = _places(answers["texture"], textures)
+    model = np.zeros(len(answers), dtype=np.intp)
+    if len(models) > 1:
+        model = _places(answers["model"], models)
+    repeats = int(repeat.max()) + 1 if len(repeat) else 1
+    shape = (len(people), max(len(textures), 1), len(models), repeats)
+    found: tuple[Integers, ...] = (person, texture, model, np.asarray(repeat, dtype=np.intp))
+    return found, shape
+
+
+def _places(column: pd.Series, names: Sequence[str]) -> Integers:
+    places = {name: place for place, name in enumerate(names)}
+    return np.array([places[name] for name in column], dtype=np.intp)
+
+
+def textures_of(answers: pd.DataFrame) -> list[str]:
+    """Textures in the order of the arrays."""
+    return sorted(answers["texture"].unique())
+
+
+def _trends(answers: pd.DataFrame) -> tuple[Floats, Floats]:
+    """Session, and place of the trial in its session, −½ … ½ each."""
+    days = answers["session"].to_numpy(dtype=float)
+    span = np.ptp(days) if days.size else 0.0
+    day = (days - days.min()) / span - 0.5 if span > 0 else np.zeros(days.size)
+    of_session = answers.groupby(["participant_id", "session"])["trial"]
+    rank, count = of_session.rank(method="first") - 1, of_session.transform("size") - 1
+    place = (rank / count.clip(lower=1) - 0.5 * (count > 0)).to_numpy(dtype=float)
+    return np.asarray(day, dtype=float), place
+
+
+def _anchors(checks: pd.DataFrame, column: str, people: Sequence[str]) -> Floats:
+    """(1, n, A) ratings of anchors, each kind and repeat in a place of its own."""
+    if checks.empty:
+        return np.empty((1, len(people), 0))
+    known = checks[checks[column].notna()].sort_values(["session", "trial"], kind="stable")
+    kind = known["texture"].astype(str) + "|" + known["virtual_texture"].astype(str)
+    repeat = known.groupby([known["participant_id"], kind]).cumcount().astype(str)
+    wide = known.assign(place=kind + "|" + repeat).pivot(
+        index="participant_id", columns="place", values=column
+    )
+    return wide.reindex(list(people)).to_numpy(dtype=float)[None]
