@@ -229,7 +229,7 @@ def aims(name: str, n: int, *, row: Mapping[str, Any]) -> list[tuple[str, float,
 
     docs/method/validation.md#aims
     """
-    kind, _, which = name.partition(": ")
+    which = name.partition(": ")[2]
     bound = all_situations()[name].bounds[1]
     found = []
     if np.isclose(abs(float(row["planted"])), bound):
