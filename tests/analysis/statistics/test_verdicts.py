@@ -18,6 +18,7 @@ from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.plan_sentences import methods_paragraph
 from analysis.statistics.claims import (
     BOUNDS_WITHHELD,
+    EQUALITY,
     INTERIM,
     NOT_TESTED,
     SHOWN,
@@ -344,3 +345,56 @@ def test_who_is_left_out_by_hand_is_gone_and_told(answers):
     for who, why in (("sub-99", "?"), ("sub-03", " ")):
         with refused(InputError, expected=["participant", "reason"], got=[f"'{who}'", f"'{why}'"]):
             leave_out(answers, {who: why})
+
+
+def by_model(answers: Responses, **changes: object) -> Responses:
+    """The same answers under a plan that names the model of the participants."""
+    plan = replace(answers.plan, rule="model", claims=answers.plan.claims[:1], **changes)
+    return replace(answers, plan=plan)
+
+
+def test_the_plan_names_the_rule_that_decides(answers):
+    tested = claims_found(answers, rng=rng())[0]
+    judged = claims_found(by_model(answers), rng=rng())[0]
+    assert tested.people is None
+    assert set(tested.tests["rule"]) == {"tests"}
+    assert judged.people is not None
+    # What the tests say stays beside it, with the same p values.
+    same = [*("t", "p", "p_equivalence", "mean_difference"), "n"]
+    pd.testing.assert_frame_equal(judged.tests[same], tested.tests[same])
+    assert judged.tests["tests_verdict"].tolist() == tested.tests["verdict"].tolist()
+    overall = judged.tests.iloc[0]
+    assert overall["verdict"] == judged.people.summary.verdict(judged.claim.bounds, few=0.15)
+    assert overall["model_low"] < overall["model_mean"] < overall["model_high"]
+    assert overall["model_mean"] == pytest.approx(overall["mean_difference"], abs=2.0)
+    assert 0 <= overall["share_low"] <= overall["share_outside"] <= overall["share_high"] <= 1
+    assert sorted(judged.people.people["participant_id"]) == sorted(
+        answers.absolute["participant_id"].unique()
+    )
+    textures = judged.tests.set_index("texture")
+    assert textures.loc["PVC", "verdict"] == DIFFERENT  # 30 points are planted there
+    assert textures.loc["PVC", "model_high"] < 0
+    assert "exploratory" not in set(judged.tests["planned"])
+    # Measures that nobody planned a claim about are tested as before.
+    assert all(one.people is None for one in claims_found(by_model(answers), rng=rng())[1:])
+
+
+def test_the_model_calls_nothing_equal_without_proof_of_sensitivity(answers):
+    blind = claims_found(replace(by_model(answers), anchors={}), rng=rng())[0]
+    assert not set(blind.tests["verdict"]) & set(EQUALITY)
+    assert blind.tests["doubt"].iloc[0] == NOT_TESTED
+
+
+def test_the_same_seed_gives_the_same_verdicts_of_the_model(answers):
+    first, again = (claims_found(by_model(answers), rng=rng())[0] for _ in range(2))
+    pd.testing.assert_frame_equal(first.tests, again.tests)
+    pd.testing.assert_frame_equal(first.people.people, again.people.people)
+
+
+def test_fewer_than_eight_people_are_left_to_the_tests(answers):
+    few = sorted(answers.absolute["participant_id"].unique())[:7]
+    kept = answers.absolute["participant_id"].isin(few)
+    small = replace(by_model(answers), answers={"absolute": answers.absolute[kept]})
+    (one, *_) = claims_found(small, rng=rng())
+    assert one.people is None
+    assert set(one.tests["rule"]) == {"tests"}
