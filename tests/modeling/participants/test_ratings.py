@@ -100,7 +100,8 @@ def test_doubled_priors_have_twice_the_sds_and_the_same_means() -> None:
         assert getattr(two, name) == (getattr(one, name)[0], 2 * getattr(one, name)[1])
     for name in ("lapses", "careless"):
         share = [stats.beta(*getattr(priors, name)).mean() for priors in (one, two)]
-        assert 1.8 < share[1] / share[0] < 2.0
+        odds = [mean / (1 - mean) for mean in share]
+        assert odds[1] == pytest.approx(2 * odds[0])
     kept = ("rating_df", "careless_scale")
     assert all(getattr(two, name) == getattr(one, name) for name in kept)
 
