@@ -8,19 +8,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import exp, log
+from typing import Any
 
 import numpy as np
 
 from experiments.study.study import MOST_TEXTURES
 from modeling import InputError
+from modeling.arrays import Floats
 from modeling.checks import check_keys, check_number
 from modeling.errors import shown
+from modeling.participants.ratings import RatingPriors, careless_sds
 
 SCALES = ("magnitude_similarity", "frequency_similarity")
 EFFECTS = (*SCALES, "choice")
 FURTHEST_SD = 3.0  # nobody is further from the mean of a trait
-LOWEST_MEAN, HIGHEST_MEAN = 3.0, 95.0  # of a person's ratings of one surface, in points
-MOST_POINTS = 90.0  # between anybody's mean ratings of two models
+LOWEST_FELT, HIGHEST_FELT = 3.0, 95.0  # ratings that distances can stand for, in points
+MOST_POINTS = 90.0  # between anybody's judgements of two models
 
 
 @dataclass(frozen=True)
@@ -45,7 +48,20 @@ class Trait:
 
 @dataclass(frozen=True, kw_only=True)
 class Person:
-    """One participant, drawn from `Psychometrics`; its traits are described there."""
+    """One participant, drawn from `Psychometrics`; its traits are described there.
+
+    Parameters
+    ----------
+    threshold_db, sensitivity, magnitude_bias, frequency_bias, lapse_rate, learning, care : float
+    preferences : tuple of float
+        Of the buttons, log odds.
+    careless : bool
+        Whether nothing that is presented matters.
+    level, level_sd : float
+        Mean and SD of a careless person's judgements, in points.
+    deviations : tuple of float
+        Points by which planted effects are larger than the average person's, for each of `EFFECTS`.
+    """
 
     threshold_db: float
     sensitivity: float
@@ -55,6 +71,15 @@ class Person:
     learning: float
     care: float
     preferences: tuple[float, ...]
+    careless: bool = False
+    level: float = 0.0
+    level_sd: float = 0.0
+    deviations: tuple[float, ...] = (0.0,) * len(EFFECTS)
+
+    @property
+    def blind_rate(self) -> float:
+        """Share of choices that follow preference alone: all of a careless person."""
+        return 1.0 if self.careless else self.lapse_rate
 
 
 # What any participant may have of a trait.
@@ -69,11 +94,13 @@ _LIMITS = {
 }
 _NUMBERS = {
     "preference_sd": (0.0, 5.0),
-    "best_rating": (LOWEST_MEAN, HIGHEST_MEAN),
+    "best_rating": (LOWEST_FELT, HIGHEST_FELT),
     "scale_db": (0.1, 1000.0),
     "noise_sd": (0.0, 25.0),
     "temperature_db": (0.01, 1000.0),
     "learning_trials": (0.1, 1000.0),
+    "careless": (0.0, 1.0),
+    "effect_sd": (0.0, 25.0),
 }
 
 
@@ -90,32 +117,39 @@ class Psychometrics:
     sensitivity : Trait
         What distances and planted effects are multiplied by.
     magnitude_bias, frequency_bias : Trait
-        Points added to all ratings on a scale.
+        Points added to all judgements on a scale.
     lapse_rate : Trait
         Share of trials answered blindly; 0 … 0.5 of anybody.
     learning : Trait
         Noise is 1 + learning times as large in the first trial, and falls towards 1.
     care : Trait
         How often (2·care on average, beside one) and how long (20·care s) a person compares; the
-        SD of ratings is divided by √care.
+        SD of judgements is divided by √care.
     preference_sd : float
         SD of the log odds of the buttons, between buttons and people.
     best_rating : float
-        Average rating of surfaces that feel alike, in points.
+        Average judgement of surfaces that feel alike, in points.
     scale_db : float
-        Distance at which a rating has fallen to best_rating/e.
+        Distance at which a judgement has fallen to best_rating/e.
     noise_sd : float
-        SD of ratings around the middle of the scale from trial to trial, in points.
+        SD of judgements from trial to trial, in points; ratings are judgements censored at the ends
+        of the scale (`modeling.participants.ratings`).
     temperature_db : float
         τ: distance that makes a surface e times less likely to be chosen; the noise of percepts in
         the oddity task.
     learning_trials : float
         After so many trials learning is 1/e of what it was.
+    careless : float
+        Share of people, 0 … 1, who rate near an own level whatever is presented, and choose by
+        preference alone.
+    effect_sd : float
+        SD between people of each planted effect, in points (in percentage points of `choice`), in
+        addition to what sensitivity does: normal, but nobody is more than 3 SD from the mean.
     planted : mapping of texture to mapping of what to points
-        What another model than the reference does to the ratings of a texture on a scale
+        What another model than the reference does to the judgements of a texture on a scale
         (magnitude_similarity, frequency_similarity), or to the share of right answers in the
-        relative task (choice, percentage points), on average; instead of what percepts do. So small
-        that nobody's ratings differ by more than 90.
+        relative task (choice, percentage points), on average over people who are not careless;
+        instead of what percepts do. So small that nobody's judgements differ by more than 90.
 
     Raises
     ------
@@ -136,6 +170,8 @@ class Psychometrics:
     noise_sd: float = 8.0
     temperature_db: float = 1.0
     learning_trials: float = 8.0
+    careless: float = 0.0
+    effect_sd: float = 0.0
     planted: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -158,11 +194,11 @@ class Psychometrics:
         object.__setattr__(self, "planted", planted)
 
     def _checked(self, texture: str, effects: Mapping[str, float]) -> dict[str, float]:
-        """The effects on a texture, which nobody may feel so strongly that no rating shows it."""
+        """The effects on a texture, which nobody may feel so strongly that no scale shows it."""
         where = f"what is planted for {texture}"
         check_keys(effects, EFFECTS, where=where)
         strongest = self.sensitivity.ends[1] / self.sensitivity.mean
-        most = MOST_POINTS * (1 - self.lapse_rate.ends[1]) / strongest
+        most = (MOST_POINTS - FURTHEST_SD * self.effect_sd) / strongest
         for what, points in effects.items():
             check_number(f"{what} in {where}", points, low=-most, high=most)
         return dict(effects)
@@ -173,51 +209,48 @@ class Psychometrics:
         Parameters
         ----------
         rng : numpy.random.Generator
-            Asked once, for 19 normal numbers.
+            Asked once, for 19 normal numbers; whether somebody is careless, and how effects differ
+            between people, follows from a generator that it spawns.
         """
-        drawn = rng.standard_normal(len(_LIMITS) + MOST_TEXTURES)
-        drawn = np.minimum(np.maximum(drawn, -FURTHEST_SD), FURTHEST_SD)
-        own = drawn.tolist()
+        own = _cut(rng.standard_normal(len(_LIMITS) + MOST_TEXTURES))
         traits = {}
         for name, z in zip(_LIMITS, own, strict=False):
             trait = getattr(self, name)
             traits[name] = trait.mean + trait.sd * z
         liked = tuple(self.preference_sd * z for z in own[len(_LIMITS) :])
-        return Person(**traits, preferences=liked)
+        return Person(**traits, preferences=liked, **self._beside(rng))
+
+    def _beside(self, rng: np.random.Generator) -> dict[str, Any]:
+        """Carelessness and deviations; what else `rng` is asked for does not depend on them."""
+        if not (self.careless or self.effect_sd):
+            return {}
+        [own] = rng.spawn(1)
+        priors = RatingPriors()
+        return {
+            "careless": bool(own.random() < self.careless),
+            "deviations": tuple(
+                self.effect_sd * z for z in _cut(own.standard_normal(len(EFFECTS)))
+            ),
+            "level": float(own.normal(*priors.level)),
+            "level_sd": float(careless_sds(priors, (1,), rng=own)[0]),
+        }
 
     def effect(self, texture: str, what: str) -> float | None:
         """The points planted for a texture, None where percepts decide."""
         return self.planted.get(texture, {}).get(what)
 
     def felt_rating(self, distance_db: float) -> float:
-        """Rating by distance alone: best_rating·exp(−distance/scale)."""
+        """Mean judgement by distance alone: best_rating·exp(−distance/scale)."""
         return self.best_rating * exp(-distance_db / self.scale_db)
 
     def as_distance_db(self, points: float) -> float:
         """The distance from an identical surface that lowers a rating by |points|, in dB."""
-        left = max(self.best_rating - abs(points), LOWEST_MEAN) / self.best_rating
+        left = max(self.best_rating - abs(points), LOWEST_FELT) / self.best_rating
         return -self.scale_db * log(left)
 
     def unpractised(self, person: Person, trial: int) -> float:
         """How many times as large noise is in a trial (from 1) as after much practice."""
         return 1.0 + person.learning * exp(-(trial - 1) / self.learning_trials)
-
-
-def mean_ratings(felt: float, *, bias: float, effect: float) -> tuple[float, float]:
-    """A person's mean ratings of the reference and of the other model, `effect` points apart.
-
-    Both are moved inward together where one would leave 3 … 95, so the difference is kept.
-
-    Parameters
-    ----------
-    felt : float
-        Rating by distance alone.
-    bias, effect : float
-        In points.
-    """
-    low, high = LOWEST_MEAN - min(effect, 0.0), HIGHEST_MEAN - max(effect, 0.0)
-    reference = min(max(felt + bias, low), high)
-    return reference, reference + effect
 
 
 def choice_shares(
@@ -279,6 +312,11 @@ def _softmax(log_odds: Sequence[float]) -> list[float]:
     weights = [exp(value - highest) for value in log_odds]
     total = sum(weights)
     return [weight / total for weight in weights]
+
+
+def _cut(normal: Floats) -> list[float]:
+    found: list[float] = np.minimum(np.maximum(normal, -FURTHEST_SD), FURTHEST_SD).tolist()
+    return found
 
 
 def _check_trait(name: str, trait: object, limits: tuple[float, float]) -> None:

@@ -8,20 +8,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from math import expm1, hypot, isnan, log, log10
+from math import expm1, hypot, isnan, log, log10, sqrt
 
 import numpy as np
 
 from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import (
+    EFFECTS,
     SCALES,
     Psychometrics,
     choice_shares,
-    mean_ratings,
     with_effect,
 )
 from experiments.sessions.surfaces import (
-    HIGHEST_RATING,
     Choice,
     ChoiceTrial,
     Intake,
@@ -35,6 +34,7 @@ from experiments.study.study import TASKS
 from experiments.tasks.oddity import OddityTrial
 from experiments.tasks.threshold import ThresholdTrial
 from modeling import InputError
+from modeling.participants.ratings import censored, lapsed_ratings
 from modeling.seeds import generator
 
 MEDIAN_TIME_S = 20.0
@@ -110,16 +110,18 @@ class SimulatedParticipant:
         """Simulated participants do not look at it."""
 
     def rate(self, trial: RatedTrial, surfaces: Surfaces) -> Rating:
-        """Switch a few times, then rate by the distance to the real surface."""
+        """Switch a few times, then rate by the distance to the real surface.
+
+        The rating is a normal judgement, censored at the ends of the scale.
+        """
         surfaces.start()
         for _ in range(1 + self._looks()):
             surfaces.toggle()
-        means = self.mean_ratings(trial)
         if self._rng.random() < self.person.lapse_rate:
-            given = [HIGHEST_RATING * value for value in self._rng.random(len(SCALES)).tolist()]
+            given = lapsed_ratings(self._rng, (len(SCALES),))
         else:
-            given = [self._around(mean, trial.trial) for mean in means]
-        magnitude, frequency = (round(value, 2) for value in given)
+            given = censored(self._rng.normal(self.judgements(trial), self._noise_sd(trial)))
+        magnitude, frequency = (round(value, 2) for value in given.tolist())
         surfaces.note("slider", scale="magnitude", value=magnitude)
         surfaces.note("slider", scale="frequency", value=frequency)
         return Rating(
@@ -128,42 +130,50 @@ class SimulatedParticipant:
             response_time_s=self._response_time_s(),
         )
 
-    def mean_ratings(self, trial: RatedTrial) -> tuple[float, float]:
-        """The participant's mean ratings on the two scales in such a trial, without lapses."""
-        biases = (self.person.magnitude_bias, self.person.frequency_bias)
-        magnitude, frequency = (
-            self._mean_rating(trial, scale, bias=bias) for scale, bias in enumerate(biases)
-        )
-        return magnitude, frequency
+    def judgements(self, trial: RatedTrial) -> tuple[float, float]:
+        """Means of the participant's judgements on the two scales in such a trial.
 
-    def _mean_rating(self, trial: RatedTrial, scale: int, *, bias: float) -> float:
+        They may lie beyond the ends of the scale, as no rating does.
+        """
+        if self.person.careless:
+            return self.person.level, self.person.level
+        magnitude, frequency = (self._felt(trial, scale) for scale in range(len(SCALES)))
+        return magnitude + self.person.magnitude_bias, frequency + self.person.frequency_bias
+
+    def _felt(self, trial: RatedTrial, scale: int) -> float:
+        """Mean judgement on a scale, without the person's bias."""
         real, virtual = (
             self._perception.place[texture] for texture in (trial.texture, trial.virtual_texture)
         )
         model = self._perception.set_number[trial.model]
-        points = self._psychometrics.effect(trial.texture, SCALES[scale])
-        planted = points is not None and real == virtual
-        # Lapses hide some of an effect: the other trials show so much more of it.
-        effect = self._strength(points or 0.0) / (1 - self.person.lapse_rate) if planted else 0.0
-        apart = self._from_real[scale][0 if planted else model][real][virtual]
+        effect = self.own_effect(trial.texture, SCALES[scale]) if real == virtual else None
+        apart = self._from_real[scale][model if effect is None else 0][real][virtual]
         felt = self._psychometrics.felt_rating(apart)
-        reference, other = mean_ratings(felt, bias=bias, effect=effect)
-        return other if planted and model else reference
+        return felt + effect if effect is not None and model else felt
 
-    def _strength(self, effect: float) -> float:
-        """A planted effect as this person feels it: on average as it was planted."""
-        return effect * self.person.sensitivity / self._psychometrics.sensitivity.mean
+    def own_effect(self, texture: str, what: str) -> float | None:
+        """A planted effect as this person feels it, in points: on average as it was planted.
 
-    def _around(self, mean: float, trial: int) -> float:
-        """A rating of this mean: of a beta distribution, so that none is beyond the scale."""
-        sd = self._psychometrics.noise_sd * self._unpractised(trial) / self.person.care**0.5
-        if sd == 0:
-            return mean
-        half = HIGHEST_RATING / 2
-        # The variance at the middle of the scale, half²/(1 + size), is sd².
-        size = max(half**2 / sd**2 - 1, 1.0)
-        share = mean / HIGHEST_RATING
-        return HIGHEST_RATING * float(self._rng.beta(share * size, (1 - share) * size))
+        None where percepts decide.
+        """
+        points = self._psychometrics.effect(texture, what)
+        if points is None:
+            return None
+        strength = self.person.sensitivity / self._psychometrics.sensitivity.mean
+        return points * strength + self._deviation(texture, what)
+
+    def _deviation(self, texture: str, what: str) -> float:
+        """By how much this person's effect is larger; of identical models nobody's is."""
+        if texture in self._perception.identical:
+            return 0.0
+        return self.person.deviations[EFFECTS.index(what)]
+
+    def _noise_sd(self, trial: RatedTrial) -> float:
+        """SD of the person's judgements in such a trial."""
+        if self.person.careless:
+            return self.person.level_sd
+        noise_sd = self._psychometrics.noise_sd * self._unpractised(trial.trial)
+        return noise_sd / sqrt(self.person.care)
 
     def choose(self, trial: ChoiceTrial, surfaces: Surfaces) -> Choice:
         """Feel all; choose what is most like the real one, the odd one out, or what was felt."""
@@ -190,15 +200,15 @@ class SimulatedParticipant:
         above_db = 20 * log10(trial.amplitude_g / threshold_g) - self.person.threshold_db
         # Where no threshold is known nothing is felt.
         felt = 0.0 if isnan(above_db) else -expm1(-log(2) * 10 ** (DETECTION_SLOPE * above_db / 20))
-        attentive = self._rng.random() >= self.person.lapse_rate
+        attentive = self._rng.random() >= self.person.blind_rate
         right = self._rng.random() < (0.5 + 0.5 * felt if attentive else 0.5)
         return trial.interval if right else 3 - trial.interval
 
     def shares(self, trial: ChoiceTrial) -> list[float]:
         """Probabilities of the buttons in such a trial of the relative task."""
         place, number = self._perception.place, self._perception.set_number[trial.model]
-        points = self._psychometrics.effect(trial.texture, "choice")
-        model = number if points is None else 0
+        effect = self.own_effect(trial.texture, "choice")
+        model = number if effect is None else 0
         magnitude, frequency = (
             self._from_real[scale][model][place[trial.texture]] for scale in (0, 1)
         )
@@ -207,17 +217,21 @@ class SimulatedParticipant:
             -hypot(magnitude[place[other]], frequency[place[other]]) / temperature_db
             for other in trial.layout
         ]
-        shares = choice_shares(evidence, self.person.lapse_rate, self._liked(trial))
-        if points is None:
+        shares = choice_shares(evidence, self.person.blind_rate, self._liked(trial))
+        if effect is None or self.person.careless:
             return shares
         right = trial.layout.index(trial.texture)
-        reference, other = with_effect(shares, right, effect=self._strength(points) / 100)
+        reference, other = with_effect(shares, right, effect=effect / 100)
         return other if number else reference
 
     def _odd_one(self, trial: ChoiceTrial) -> int:
-        """The button whose percept, with noise, is farthest from those of the other two."""
+        """The button whose percept, with noise, is farthest from those of the other two.
+
+        Without preferences and lapses its share of right answers is
+        `modeling.participants.choices.oddity_share` of the distance divided by the noise.
+        """
         liked = self._liked(trial)
-        if self._rng.random() < self.person.lapse_rate:
+        if self._rng.random() < self.person.blind_rate:
             return self._drawn(choice_shares([0.0] * len(liked), 1.0, liked))
         percepts = self._rng.standard_normal(len(liked))
         if isinstance(trial, OddityTrial):
@@ -245,7 +259,8 @@ class SimulatedParticipant:
             if points is None:
                 apart.append(self._between[scale][first][second][place])
             else:
-                as_db = self._psychometrics.as_distance_db(points)
+                own = points + self._deviation(trial.texture, name)
+                as_db = self._psychometrics.as_distance_db(own)
                 apart.append(self.person.sensitivity * as_db)
         return hypot(*apart)
 

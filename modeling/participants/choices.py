@@ -13,7 +13,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from modeling.arrays import Bools, Floats
-from modeling.checks import check_whole
+from modeling.checks import is_whole
+from modeling.errors import InputError, shown
 from modeling.participants.effects import (
     EffectMixture,
     EffectPriors,
@@ -27,7 +28,7 @@ _STEP = 0.01  # of the tables, in d′
 _LOWEST, _HIGHEST = -5.0, 10.0
 
 
-def m_afc_share(d_prime: Floats, *, alternatives: int) -> Floats:
+def m_afc_share(d_prime: Floats | float, *, alternatives: int) -> Floats:
     """Share of right answers of an unbiased observer in m-alternative forced choice.
 
     The largest of m independent normal values is chosen; that of the right answer has the mean d′
@@ -35,19 +36,28 @@ def m_afc_share(d_prime: Floats, *, alternatives: int) -> Floats:
 
     Parameters
     ----------
-    d_prime : ndarray
+    d_prime : float or ndarray
         Any shape.
     alternatives : int
         m ≥ 2.
+
+    Raises
+    ------
+    InputError
+        For fewer than two alternatives.
     """
-    check_whole("the number of alternatives", alternatives, low=2, high=1000)
+    if not is_whole(alternatives) or alternatives < 2:
+        raise InputError(
+            f"expected two alternatives or more, got {shown(alternatives)}; give the number of "
+            "buttons."
+        )
     x, weights = _FURTHEST * _NODES, _FURTHEST * _WEIGHTS * _density(_FURTHEST * _NODES)
     # Values about the right answer's, so that the nodes lie where the density is.
-    shares: Floats = ndtr(x + np.asarray(d_prime)[..., None]) ** (alternatives - 1) @ weights
-    return shares
+    shares = ndtr(x + np.asarray(d_prime)[..., None]) ** (alternatives - 1) @ weights
+    return _shares(shares)
 
 
-def oddity_share(d_prime: Floats) -> Floats:
+def oddity_share(d_prime: Floats | float) -> Floats:
     """Share of right answers of an observer who finds the odd one of three.
 
     The one farthest from the other two is chosen (triangular method: Frijters, Kooistra and
@@ -55,15 +65,18 @@ def oddity_share(d_prime: Floats) -> Floats:
 
     Parameters
     ----------
-    d_prime : ndarray
+    d_prime : float or ndarray
         Of the odd one from the other two, ≥ 0; any shape.
     """
     x = _FURTHEST * (_NODES + 1) / 2
     weights = _FURTHEST * _WEIGHTS * _density(x)
     apart = np.sqrt(2 / 3) * np.asarray(d_prime)[..., None]
     right = ndtr(apart - np.sqrt(3) * x) + ndtr(-apart - np.sqrt(3) * x)
-    shares: Floats = right @ weights
-    return shares
+    return _shares(right @ weights)
+
+
+def _shares(found: Floats) -> Floats:
+    return np.clip(found, 0.0, 1.0)  # which rounding could pass
 
 
 def _density(x: Floats) -> Floats:
@@ -95,7 +108,10 @@ class DecisionModel:
         return _table(self)
 
     def share(self, d_prime: Floats) -> Floats:
-        """Shares by linear interpolation of the table, to 1e-5; any shape."""
+        """Shares by linear interpolation of the table, to 1e-5; any shape.
+
+        Beyond the table's ends, −5 and 10, they are those at the ends.
+        """
         place = np.clip(d_prime, _LOWEST, _HIGHEST - 2 * _STEP)
         place -= _LOWEST
         place /= _STEP
@@ -289,7 +305,7 @@ def drawn_choices(
     mixture = drawn_mixture(priors.effects, studies, rng=rng)
     level, person_sd = np.zeros(studies), np.zeros(studies)
     if models == 2:
-        level = rng.normal(*priors.ability, studies)
+        level = np.asarray(rng.normal(*priors.ability, studies), dtype=float)
         person_sd = np.sqrt(priors.person_sd**2 / rng.standard_gamma(2.0, studies))
     own = rng.standard_normal((2, studies, textures))
     drawn = People(
@@ -299,12 +315,11 @@ def drawn_choices(
         texture_effects=priors.texture_effect_sd * own[1] * (models == 2),
         slopes=rng.normal(0.0, priors.trend_sd, (len(trends), studies)),
     )
-    careless = rng.random((studies, people)) < rng.beta(*priors.careless, studies)[:, None]
-    lapses = rng.beta(*priors.lapses, studies)
-    catch = rng.beta(*priors.catch, studies)[:, None]
+    careless = rng.random((studies, people)) < _betas(rng, priors.careless, studies)[:, None]
+    lapses = _betas(rng, priors.lapses, studies)
+    catch = _betas(rng, priors.catch, studies)[:, None]
     shares = model.share(drawn.d_prime(models, trends))
-    blind = careless | np.zeros_like(careless)
-    rate = np.where(blind, 1.0, lapses[:, None])
+    rate = np.where(careless, 1.0, lapses[:, None])
     seen = rate[..., None, None] * model.chance + (1 - rate[..., None, None]) * shares
     caught = rate * model.chance + (1 - rate) * catch
     return DrawnChoices(
@@ -322,3 +337,7 @@ def drawn_choices(
         careless=careless,
         lapses=lapses,
     )
+
+
+def _betas(rng: np.random.Generator, prior: tuple[float, float], count: int) -> Floats:
+    return np.asarray(rng.beta(*prior, count), dtype=float)

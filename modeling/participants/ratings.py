@@ -103,6 +103,17 @@ def lapsed_ratings(rng: np.random.Generator, shape: tuple[int, ...]) -> Floats:
     return censored(rng.uniform(LOWEST - AT_END / WITHIN, HIGHEST + AT_END / WITHIN, shape))
 
 
+def careless_sds(
+    priors: RatingPriors, shape: tuple[int, ...], *, rng: np.random.Generator
+) -> Floats:
+    """SDs of the ratings of careless people, who rate near a level of their own.
+
+    The variance is inverse gamma, of shape 1 and scale `careless_scale`: some move the slider
+    hardly at all, some over the whole scale.
+    """
+    return np.sqrt(priors.careless_scale / rng.standard_gamma(1.0, shape))
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RatingStudies:
     """Ratings of B studies with n people, T textures, two models, R repeats and A anchors.
@@ -177,7 +188,7 @@ def drawn_ratings(
         return np.asarray(np.sqrt(typical**2 / rng.standard_gamma(2.0, studies)))
 
     mixture = drawn_mixture(priors.effects, studies, rng=rng)
-    person = rng.normal(*priors.level, studies)[:, None]
+    person = np.asarray(rng.normal(*priors.level, studies))[:, None]
     person = person + sd(priors.person_sd)[:, None] * rng.standard_normal(few)
     texture = priors.texture_sd * centred(rng.standard_normal((studies, textures)))
     own = priors.texture_effect_sd * centred(rng.standard_normal((studies, textures)))
@@ -185,13 +196,12 @@ def drawn_ratings(
     slopes = rng.normal(0.0, priors.trend_sd, (len(trends), studies))
     anchor = rng.normal(*priors.anchor, (studies, 1, anchors))
     anchor = anchor + sd(priors.anchor_sd)[:, None, None] * rng.standard_normal((*few, anchors))
-    careless = rng.random(few) < rng.beta(*priors.careless, studies)[:, None]
-    lapses = rng.beta(*priors.lapses, studies)
+    careless = rng.random(few) < np.asarray(rng.beta(*priors.careless, studies))[:, None]
+    lapses = np.asarray(rng.beta(*priors.lapses, studies), dtype=float)
     typical = priors.rating_sd * np.sqrt(rng.standard_gamma(2.0, studies) / 2)
     half = priors.rating_df / 2
     variance = half * typical[:, None] ** 2 / rng.standard_gamma(half, few)
-    own_variance = priors.careless_scale / rng.standard_gamma(1.0, few)
-    rating_sd = np.sqrt(np.where(careless, own_variance, variance))
+    rating_sd = np.where(careless, careless_sds(priors, few, rng=rng), np.sqrt(variance))
     attends = ~careless
     effects = drawn_effects(mixture, people, rng=rng)
     effect = effects[..., None] + own[:, None]

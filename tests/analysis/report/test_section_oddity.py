@@ -16,10 +16,11 @@ from analysis.labels import ALL_TEXTURES
 from analysis.report.page import Table, table_html
 from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section, oddity_sensitivity
 from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
-from analysis.statistics.dprime import oddity_d_prime, oddity_share
+from analysis.statistics.dprime import oddity_d_prime
 from analysis.statistics.equivalence import DIFFERENT
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.participants.choices import oddity_share
 
 pytestmark = pytest.mark.filterwarnings("error")
 MakeFound = Callable[..., ClaimFound]

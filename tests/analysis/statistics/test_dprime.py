@@ -14,13 +14,12 @@ from scipy.stats import norm
 from analysis.statistics.dprime import (
     d_primes,
     m_afc_d_prime,
-    m_afc_share,
     oddity_d_prime,
-    oddity_share,
     same_different_d_prime,
     same_different_differencing_d_prime,
 )
 from modeling import InputError
+from modeling.participants.choices import m_afc_share, oddity_share
 from tests.refusals import refused
 
 

@@ -52,6 +52,14 @@ def test_no_answer_depends_on_the_number_of_workers(simulate: Any) -> None:
     assert simulate(workers=2) == alone
 
 
+def test_careless_people_and_people_who_differ_are_planned_for_by_seed(simulate: Any) -> None:
+    planted = {"MDF": {"magnitude_similarity": 0.0, "choice": 0.0}}
+    population = Psychometrics(planted=planted, careless=0.5, effect_sd=5.0)
+    found = simulate(psychometrics=population)
+    assert found == simulate(psychometrics=population, workers=2)
+    assert found != simulate(psychometrics=Psychometrics(planted=planted))
+
+
 def test_no_answer_depends_on_who_else_takes_part(simulate: Any) -> None:
     everybody = simulate()["relative"]
     third = simulate(subjects=[3], tasks=["relative"])

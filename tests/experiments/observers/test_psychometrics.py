@@ -10,17 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy import stats
 
 from experiments.observers.psychometrics import (
-    HIGHEST_MEAN,
-    LOWEST_MEAN,
+    EFFECTS,
+    Person,
     Psychometrics,
     Trait,
     choice_shares,
-    mean_ratings,
     with_effect,
 )
 from modeling import InputError
+from modeling.participants.ratings import RatingPriors
+from modeling.seeds import generator
 from tests.refusals import refused
 
 TRAITS = (
@@ -59,6 +61,58 @@ def test_traits_end_at_three_standard_deviations() -> None:
     assert person.sensitivity == pytest.approx(1.9)
 
 
+def drawn(count: int, **of: Any) -> list[Person]:
+    population = Psychometrics(**of)
+    return [population.draw(generator(3, subject)) for subject in range(count)]
+
+
+def test_some_people_are_careless_and_differ_in_level_and_noise() -> None:
+    people = drawn(2000, careless=0.2)
+    careless = [person for person in people if person.careless]
+    assert stats.binomtest(len(careless), len(people), 0.2).pvalue > 1e-3
+    assert all(person.blind_rate == 1.0 for person in careless)
+    assert all(p.blind_rate == p.lapse_rate for p in people if not p.careless)
+    priors = RatingPriors()
+    levels = [person.level for person in people]
+    assert stats.kstest(levels, stats.norm(*priors.level).cdf).pvalue > 1e-3
+    variances = [person.level_sd**2 for person in people]
+    expected = stats.invgamma(1.0, scale=priors.careless_scale)
+    assert stats.kstest(variances, expected.cdf).pvalue > 1e-3
+    assert not any(person.careless for person in drawn(50))
+    assert all(person.careless for person in drawn(50, careless=1.0))
+
+
+def test_effects_differ_between_people_as_much_as_they_were_told_to() -> None:
+    people = drawn(4000, effect_sd=5.0)
+    deviations = np.array([person.deviations for person in people])
+    assert deviations.shape == (4000, len(EFFECTS))
+    assert (np.abs(deviations.mean(axis=0)) < 4 * 5.0 / np.sqrt(4000)).all()
+    # The SD of normal numbers that are cut off at 3 SD is 0.996; its standard error 1.1 %.
+    np.testing.assert_allclose(deviations.std(axis=0), 5.0, rtol=0.04)
+    assert np.abs(deviations).max() <= 15.0
+    apart = np.corrcoef(deviations.T)[~np.eye(len(EFFECTS), dtype=bool)]
+    assert np.abs(apart).max() < 5 / np.sqrt(4000)
+
+
+def test_traits_do_not_depend_on_carelessness_or_on_how_effects_differ() -> None:
+    new = ("careless", "level", "level_sd", "deviations")
+    plain, other = drawn(20), drawn(20, careless=0.4, effect_sd=4.0)
+    for before, after in zip(plain, other, strict=True):
+        kept = {name: value for name, value in asdict(before).items() if name not in new}
+        assert kept == {name: value for name, value in asdict(after).items() if name not in new}
+        assert before.deviations == (0.0, 0.0, 0.0)
+    # Nor who is careless on how effects differ; nor anything else that is drawn afterwards.
+    alone = drawn(20, careless=0.4)
+    assert [p.careless for p in alone] == [p.careless for p in other]
+    assert [p.level_sd for p in alone] == [p.level_sd for p in other]
+    after_draw = []
+    for of in ({}, {"careless": 0.4, "effect_sd": 4.0}):
+        rng = generator(3, 1)
+        Psychometrics(**of).draw(rng)  # type: ignore[arg-type]
+        after_draw.append(rng.random())
+    assert after_draw[0] == after_draw[1]
+
+
 def test_a_rating_falls_by_e_with_each_scale() -> None:
     exact = Psychometrics(scale_db=10.0, best_rating=90.0)
     assert exact.felt_rating(0.0) == 90.0
@@ -78,20 +132,6 @@ def test_practice_takes_the_noise_of_beginners_away() -> None:
     assert population.unpractised(person, 1) == pytest.approx(1.5)
     assert population.unpractised(person, 5) == pytest.approx(1 + 0.5 / np.e)
     assert population.unpractised(person, 1000) == pytest.approx(1.0)
-
-
-@given(st.floats(0.0, 100.0), st.floats(-100.0, 100.0), st.floats(-90.0, 90.0))
-def test_mean_ratings_stay_on_the_scale_and_as_far_apart_as_planted(
-    felt: float, bias: float, effect: float
-) -> None:
-    reference, other = mean_ratings(felt, bias=bias, effect=effect)
-    assert other - reference == pytest.approx(effect, abs=1e-9)
-    lowest, highest = min(reference, other), max(reference, other)
-    assert lowest >= LOWEST_MEAN - 1e-9
-    assert highest <= HIGHEST_MEAN + 1e-9
-    alone = {felt + bias, felt + bias + effect}
-    if min(alone) >= LOWEST_MEAN and max(alone) <= HIGHEST_MEAN:
-        assert reference == pytest.approx(felt + bias, abs=1e-9)
 
 
 def test_choice_shares_by_hand() -> None:
@@ -157,6 +197,10 @@ def test_the_other_buttons_keep_their_proportions() -> None:
         {"temperature_db": float("nan")},
         {"preference_sd": True},
         {"learning_trials": 0},
+        {"careless": 1.1},
+        {"careless": float("nan")},
+        {"effect_sd": -1.0},
+        {"effect_sd": 26.0},
         {"planted": 5.0},
         {"planted": {"MDF": -12.0}},
         {"planted": {"MDF": {"magnitude": -12.0}}},
@@ -178,6 +222,13 @@ def test_what_is_planted_is_kept_as_it_was() -> None:
     assert population.effect("MDF", "magnitude_similarity") == -12.0
     assert population.effect("MDF", "choice") is None
     assert population.effect("PVC", "choice") is None
+
+
+def test_nobody_may_differ_by_more_than_a_scale_can_show() -> None:
+    strong = {"MDF": {"magnitude_similarity": 50.0}}  # 80 for whoever is the most sensitive
+    assert Psychometrics(planted=strong, effect_sd=3.0).effect_sd == 3.0
+    with refused(InputError, names=["magnitude_similarity", "MDF"], got=50.0):
+        Psychometrics(planted=strong, effect_sd=4.0)
 
 
 def test_the_default_population_may_be_planted_with_what_studies_look_for() -> None:
