@@ -173,9 +173,10 @@ def simulate_ranks(kind: str, *, simulations: int, seed: int) -> list[dict[str, 
         rng = generator(seed, number_of(f"ranks of {kind}"), start)
         truth, draws = KINDS[kind](min(AT_ONCE, simulations - start), rng)
         for name, value in truth.items():
-            below = np.mean([one[name] < value for one in draws], axis=0)
-            same = np.mean([one[name] == value for one in draws], axis=0)
-            ranks.setdefault(name, []).append(below + same * rng.random(len(value)))
+            below = np.sum([one[name] < value for one in draws], axis=0)
+            places = 1 + np.sum([one[name] == value for one in draws], axis=0)
+            rank = (below + places * rng.random(len(value))) / (len(draws) + 1)
+            ranks.setdefault(name, []).append(rank)
     return [_row(kind, name, np.concatenate(found)) for name, found in ranks.items()]
 
 

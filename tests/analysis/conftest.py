@@ -180,7 +180,9 @@ def _as_presented(rows: Rows) -> pd.DataFrame:
     draws = np.random.default_rng(11)
     answers = pd.DataFrame(rows).assign(response_time_s=draws.lognormal(2.3, 0.4, len(rows)))
     mixed = answers.iloc[draws.permutation(len(rows))]
-    return mixed.sort_values("participant_id", kind="stable", ignore_index=True)
+    mixed = mixed.sort_values("participant_id", kind="stable", ignore_index=True)
+    trial = mixed.groupby("participant_id").cumcount() + 1
+    return mixed.assign(session="ses-01", trial=trial)
 
 
 def claim(

@@ -104,8 +104,7 @@ def _cells(
     """Where each answer stands among (people, textures, models, repeats), and how many of each."""
     textures = textures_of(answers)
     keys = ["participant_id", "texture"] + ["model"] * (len(models) > 1)
-    ordered = answers.sort_values(["session", "trial"], kind="stable")
-    repeat = ordered.groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
+    repeat = _in_order(answers).groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
     person = _places(answers["participant_id"], people)
     texture = _places(answers["texture"], textures)
     model = np.zeros(len(answers), dtype=np.intp)
@@ -115,6 +114,11 @@ def _cells(
     shape = (len(people), max(len(textures), 1), len(models), repeats)
     found: tuple[Integers, ...] = (person, texture, model, np.asarray(repeat, dtype=np.intp))
     return found, shape
+
+
+def _in_order(answers: pd.DataFrame) -> pd.DataFrame:
+    """As they were given."""
+    return answers.sort_values(["session", "trial"], kind="stable")
 
 
 def _places(column: pd.Series, names: Sequence[str]) -> Integers:
@@ -129,9 +133,8 @@ def textures_of(answers: pd.DataFrame) -> list[str]:
 
 def _trends(answers: pd.DataFrame) -> tuple[Floats, Floats]:
     """Session, and place of the trial in its session, −½ … ½ each."""
-    days = answers["session"].to_numpy(dtype=float)
-    span = np.ptp(days) if days.size else 0.0
-    day = (days - days.min()) / span - 0.5 if span > 0 else np.zeros(days.size)
+    days, names = pd.factorize(answers["session"], sort=True)
+    day = days / (len(names) - 1) - 0.5 if len(names) > 1 else np.zeros(days.size)
     of_session = answers.groupby(["participant_id", "session"])["trial"]
     rank, count = of_session.rank(method="first") - 1, of_session.transform("size") - 1
     place = (rank / count.clip(lower=1) - 0.5 * (count > 0)).to_numpy(dtype=float)
@@ -142,7 +145,7 @@ def _anchors(checks: pd.DataFrame, column: str, people: Sequence[str]) -> Floats
     """(1, n, A) ratings of anchors, each kind and repeat in a place of its own."""
     if checks.empty:
         return np.empty((1, len(people), 0))
-    known = checks[checks[column].notna()].sort_values(["session", "trial"], kind="stable")
+    known = _in_order(checks[checks[column].notna()])
     kind = known["texture"].astype(str) + "|" + known["virtual_texture"].astype(str)
     repeat = known.groupby([known["participant_id"], kind]).cumcount().astype(str)
     wide = known.assign(place=kind + "|" + repeat).pivot(

@@ -26,7 +26,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """A few steps instead of hundreds."""
     few = Effort(chains=1, warm_up=80, steps=120, every=3)
     monkeypatch.setattr(validation_model, "EFFORT", few)
-    monkeypatch.setattr(validation_ranks, "STEPS", 200)
+    monkeypatch.setattr(validation_ranks, "STEPS", 300)
     monkeypatch.setattr(validation_ranks, "WARM_UP", 100)
 
 
