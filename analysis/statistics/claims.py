@@ -105,14 +105,15 @@ CLAIM_COLUMNS = (
     Column("share_high", "to", format=".2f"),
     Column("share_most", "at most (95%)", format=".2f"),
     Column("somebody", "probability that somebody is", format=".2f"),
-    Column("p_of_model", "probability of lying beyond a bound", format=".3f"),
+    Column("p_of_model", "probability of a mean beyond a bound", is_p_value=True),
     Column("note"),
 )
 
 VERDICT_COLUMNS = chosen(
     CLAIM_COLUMNS,
     *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
-    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends", "doubt"),
+    *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "rule", "tests_verdict"),
+    *("model_mean", "model_low", "model_high", "p_of_model", "share_at_ends", "doubt"),
 )
 # For a claim with incomplete data: amount and quality of the data, and no effect.
 _INTERIM = ("texture", "verdict", "n", "share_at_ends", "excluded")
