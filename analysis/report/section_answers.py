@@ -74,9 +74,10 @@ def verdict_section(
         "equal weight for each texture, over participants who answered completely. Then each "
         "texture: a family of its own, with Holm's correction separately for tests of a "
         "difference and of equivalence (TOST); identical models are controls. Differences and "
-        "bounds are in points of the scale, or shares of right answers. Where the last column gives a reason, "
-        "neither equivalence nor a difference within the bounds is concluded, whatever p is. No effect is shown for a task "
-        "that lacks participants or sessions. The tests themselves are below.",
+        "bounds are in points of the scale, or shares of right answers. Where the last column "
+        "gives a reason, neither equivalence nor a difference within the bounds is concluded, "
+        "whatever p is. No effect is shown for a task that lacks participants or sessions. The "
+        "tests themselves are below.",
         tests[names(VERDICT_COLUMNS)],
         _verdicts_shown(by_model=by_model),
         simulated,

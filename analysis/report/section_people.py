@@ -54,7 +54,8 @@ def people_items(found: Sequence[ClaimFound], *, simulated: bool) -> tuple[Item,
         "People outside the bounds, and what other priors would change",
         "Share: of people whose own effect lies outside the bounds (who “feel it” in the words of "
         "the answer). Below each claim: the same with the standard deviations of all priors "
-        "doubled. Effects are in points of the scale, or shares of right answers. Where equivalence is withheld, a small share is no evidence for it.",
+        "doubled. Effects are in points of the scale, or shares of right answers. "
+        "Where equivalence is withheld, a small share is no evidence for it.",
         priors_table(own),
         PRIORS_COLUMNS,
         simulated,
