@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,11 +34,12 @@ from analysis.statistics.participants.posterior import Effort
 from analysis.statistics.participants.verdict import DOUBLED_CHAINS, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound, claims_found
 from modeling.files.writing import file_stem
-from modeling.participants.choices import ODDITY, ChoicePriors
+from modeling.participants.choices import ODDITY, ChoicePriors, forced_choice
 from modeling.participants.ratings import RatingPriors
 from tests.analysis.conftest import by_model, people_summary, rating_table
 from tests.analysis.conftest import people_table as people
 
+ROOT = Path(__file__).parents[3]
 SOME = {"share": (0.42, 0.25, 0.58), "most": 0.55, "somebody": 1.0}
 FEW = {"share": (0.09, 0.04, 0.16), "most": 0.14, "somebody": 0.99}
 SUMMARIES = {
@@ -262,6 +264,34 @@ def test_priors_of_the_odd_one_out_are_its_own(responses, found, choices):
     priors = ChoicePriors.of(ODDITY)
     assert f"means normal (0, {priors.effects.mean_sd:g})" in text
     assert f"beta({priors.catch[0]:g}, {priors.catch[1]:g})" in text
+
+
+def values_of(row: str, *, cell: int) -> list[float]:
+    """Numbers in a cell of a row of the page's table."""
+    return [float(one) for one in row.split("|")[cell].replace("−", "-").split(",") if one.strip()]
+
+
+def priors_by_name(priors: RatingPriors | ChoicePriors) -> dict[str, list[float]]:
+    """Every number of the priors, by the name that the page gives it."""
+    own = {f"effects.{name}": value for name, value in vars(priors.effects).items()}
+    own |= {name: value for name, value in vars(priors).items() if name != "effects"}
+    return {name: list(np.atleast_1d(value)) for name, value in own.items()}
+
+
+def test_the_page_on_the_model_states_the_priors_that_are_used():
+    text = (ROOT / "docs/method/participants.md").read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| `")]
+    split = next(k for k, row in enumerate(rows) if k and "effects.mean_sd" in row)
+    of_choices = [ChoicePriors.of(model) for model in (forced_choice(7), ODDITY)]
+    tables = [(rows[:split], RatingPriors(), 2)]
+    tables += [(rows[split:], priors, cell) for cell, priors in enumerate(of_choices, start=2)]
+    for own, priors, cell in tables:
+        known = priors_by_name(priors)
+        stated = {row.split("`")[1]: values_of(row, cell=cell) for row in own}
+        assert set(stated) == set(known)
+        for name, values in stated.items():
+            assert values in ([], known[name]), name
+        assert sum(map(bool, stated.values())) >= 7
 
 
 def test_claims_that_tests_decide_in_spite_of_the_plan_are_named(responses, found):
