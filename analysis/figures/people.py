@@ -134,8 +134,10 @@ def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame, unit: str) 
 
 
 def _title(found: ClaimFound) -> str:
-    """The claim, its verdict, and the share of people outside."""
+    """The claim, its verdict, and the share of people outside; without a limit where in doubt."""
     summary, overall = _people(found).summary, found.tests.iloc[0]
     share = f"{summary.share:.0%} (95% CI {summary.share_low:.0%} to {summary.share_high:.0%})"
+    if overall["doubt"]:
+        share = f"at least {summary.share_low:.0%}, no upper limit"
     claim = fill(f"{found.claim.name}: {overall['verdict']}", TITLE_WIDTH)
     return f"{claim}\npeople outside the bounds (grey): {share}"

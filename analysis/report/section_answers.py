@@ -160,8 +160,8 @@ def _planted_table(
         "planted_effects",
         "Verdicts compared with the planted differences",
         "Planted: by how many points simulated participants rate the other model higher; the "
-        "verdict is based on their answers. Undecided: inconclusive, or a verdict that was "
-        "withheld.",
+        "verdict is based on their answers. Undecided: inconclusive, felt by some, or a "
+        "verdict that was withheld.",
         planted_verdicts(found, planted or {}),
         PLANTED_COLUMNS,
         simulated=True,

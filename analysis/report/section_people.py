@@ -97,7 +97,8 @@ def _table(found: Sequence[ClaimFound], simulated: bool) -> Table:
         "Own effect: median and 95% interval, as the mean over textures, in points of the scale or "
         "shares of right answers; it draws on the other participants as well, so that a single "
         "one's deviates less than the mean of their answers. Careless participants are not left "
-        "out by hand: the model weighs everybody by the probability that they attend.",
+        "out by hand: the model weighs everybody by the probability that they attend. The signs of "
+        "carelessness in the section on reliability are others, and are not used here.",
         people_table(found),
         PEOPLE_COLUMNS,
         simulated,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -62,6 +63,13 @@ def test_share_bounds_and_careless_people_are_written_into_the_figure(judged):
     assert band.get_extents().transformed(ax.transData.inverted()).intervaly == pytest.approx(
         [-7.5, 7.5]
     )
+
+
+def test_no_upper_limit_of_people_is_drawn_where_there_is_doubt(judged):
+    doubted = replace(judged, tests=judged.tests.assign(doubt="anchors failed"))
+    title = plot_people(doubted, simulated=True).get_title(loc="left")
+    assert "25%" in title
+    assert "58%" not in title
 
 
 def test_choices_are_drawn_in_percentage_points(found):
