@@ -241,7 +241,7 @@ def claim_tests(
             claim=claim.name,
             measure=MEASURES[claim.measure],
             planned="yes" if claim.planned else "no",
-            rule=TESTS_RULE,
+            rule="" if standing.unfinished else TESTS_RULE,
             reference=reference,
             other=other,
             bound_low=low,
