@@ -21,6 +21,11 @@ MEASURES = {
 }
 
 
+def unit_of(measure: str) -> tuple[str, float]:
+    """The unit in which differences of a measure are told, and the factor that leads to it."""
+    return ("percentage points", 100.0) if measure == "correct" else ("points of 100", 1.0)
+
+
 def sentence_case(words: str) -> str:
     """Words at the beginning of a sentence; unlike `str.capitalize` it leaves the others alone."""
     return words[:1].upper() + words[1:]

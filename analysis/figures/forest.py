@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from analysis.answers.plan import MODEL_RULE
 from analysis.figures.drawing import (
     BLACK,
     BLUE,
@@ -19,17 +21,31 @@ from analysis.figures.drawing import (
     GREY,
     ORANGE,
     PURPLE,
+    SKY_BLUE,
     VERMILLION,
     stamp_if_simulated,
 )
 from analysis.statistics.claims import BOUNDS_WITHHELD, CONTROL, WITHHELD
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
+from analysis.statistics.equivalence import (
+    ALL_BUT,
+    AVERAGE_FELT,
+    DIFFERENT,
+    EQUAL_ON_AVERAGE,
+    EQUIVALENT,
+    FELT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+)
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
 
 # Distinguished by shape as well as by colour.
 MARKS = {
     EQUIVALENT: ("o", BLUE),
+    ALL_BUT: ("h", BLUE),
+    EQUAL_ON_AVERAGE: ("<", SKY_BLUE),
+    AVERAGE_FELT: (">", ORANGE),
+    FELT: ("*", VERMILLION),
     DIFFERENT: ("D", VERMILLION),
     WITHIN_BOUNDS: ("s", ORANGE),
     INCONCLUSIVE: ("^", PURPLE),
@@ -39,6 +55,9 @@ MARKS = {
     "": ("d", GREY),
 }
 NO_VERDICT = "no test"
+BESIDE = 0.26  # of a row: how far below the model's interval those of the paired test lie
+INTERVALS = (("ci_low", "ci_high", 1.2), ("ci90_low", "ci90_high", 3.5))
+BY_MODEL = ("model_low", "model_high", 2.2)
 PANEL_WIDTH, ROW_HEIGHT = 4.4, 0.36
 MOST_IN_A_ROW = 3
 TITLE_WIDTH = 34  # characters, beside the stamp of what is simulated
@@ -50,7 +69,8 @@ def figure_forest(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:
     Parameters
     ----------
     found : sequence of ClaimFound
-        A panel each, with at least one row; of finished tasks.
+        A panel each, with at least one row; of finished tasks. Where the model of the participants
+        decides, its means and intervals stand above those of the paired tests.
     simulated : bool
         Written into the figure.
     """
@@ -79,14 +99,7 @@ def plot_forest(found: ClaimFound, *, simulated: bool, ax: Axes) -> Axes:
         ax.axvspan(*(factor * bound for bound in claim.bounds), color=GREY, alpha=0.15, lw=0)
     ax.axvline(0, color=BLACK, lw=0.8)
     for place, row in enumerate(tests.to_dict("records")):
-        mark, colour = MARKS[row["verdict"]]
-        for low, high, width in (("ci_low", "ci_high", 1.2), ("ci90_low", "ci90_high", 3.5)):
-            if np.isfinite(row[low]):
-                ax.plot(
-                    [factor * row[low], factor * row[high]], [place] * 2, color=colour, lw=width
-                )
-        edge = colour if mark == "x" else "white"
-        ax.plot(factor * row["mean_difference"], place, mark, color=colour, mec=edge, ms=8)
+        _plot_row(ax, row, place=place, factor=factor)
     ax.set_yticks(range(len(tests)), [_label(row) for row in tests.to_dict("records")])
     ax.get_yticklabels()[0].set_fontweight("bold")
     ax.set_ylim(len(tests) - 0.5, -0.5)
@@ -102,6 +115,36 @@ def plot_forest(found: ClaimFound, *, simulated: bool, ax: Axes) -> Axes:
     return ax
 
 
+def _plot_row(ax: Axes, row: Mapping[Hashable, Any], *, place: float, factor: float) -> None:
+    """The marker of the verdict on the mean it rests on, and the intervals."""
+    mark, colour = MARKS[row["verdict"]]
+    middle = row["mean_difference"]
+    tests_place, tests_colour = place, colour
+    if row["rule"] == MODEL_RULE:
+        middle = row["model_mean"]
+        _plot_interval(ax, row, BY_MODEL, place=place, factor=factor, colour=colour)
+        tests_place, tests_colour = place + BESIDE, GREY
+    for ends in INTERVALS:
+        _plot_interval(ax, row, ends, place=tests_place, factor=factor, colour=tests_colour)
+    edge = colour if mark == "x" else "white"
+    size = 12 if mark == "*" else 8
+    ax.plot(factor * middle, place, mark, color=colour, mec=edge, ms=size)
+
+
+def _plot_interval(
+    ax: Axes,
+    row: Mapping[Hashable, Any],
+    ends: tuple[str, str, float],
+    *,
+    place: float,
+    factor: float,
+    colour: str,
+) -> None:
+    low, high, width = ends
+    if np.isfinite(row[low]):
+        ax.plot([factor * row[low], factor * row[high]], [place] * 2, color=colour, lw=width)
+
+
 def _label(row: Mapping[Hashable, object]) -> str:
     return f"{row['texture']} (n = {row['n']})"
 
@@ -114,9 +157,13 @@ def _legend(found: Sequence[ClaimFound]) -> list[Line2D | Patch]:
         for name, (mark, colour) in MARKS.items()
         if name in occurring
     ]
+    of = ""
+    if any(one.people is not None for one in found):
+        of = " of the paired test"
+        handles.append(Line2D([], [], color=BLACK, lw=BY_MODEL[2], label="95% CI of the model"))
     handles += [
-        Line2D([], [], color=GREY, lw=3.5, label="90% CI"),
-        Line2D([], [], color=GREY, lw=1.2, label="95% CI"),
+        Line2D([], [], color=GREY, lw=width, label=f"{level} CI{of}")
+        for level, (*_, width) in zip(("95%", "90%"), INTERVALS, strict=True)
     ]
     if any(one.claim.bounds is not None for one in found):
         handles.append(Patch(color=GREY, alpha=0.15, label="bounds"))

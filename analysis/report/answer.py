@@ -12,6 +12,7 @@ from analysis.report.claim_sentences import (
     difference,
     overall_row,
 )
+from analysis.report.people_sentences import headline
 from analysis.statistics.claims import (
     BOUNDS_WITHHELD,
     DIFFERENCES,
@@ -98,11 +99,15 @@ def _subject(found: Sequence[ClaimFound]) -> str:
 
 
 def _parts(found: Sequence[ClaimFound]) -> list[str]:
-    """What is said of the claims, those of one verdict together."""
+    """What is said of the claims; those of one verdict of the tests together."""
+    by_model: list[str] = []
     groups: dict[str, list[str]] = {}
     for one in found:
         row = overall_row(one)
         if row is None:
+            continue
+        if one.people is not None:
+            by_model.append(headline(one, row, what=_what(one, found)))
             continue
         verdict = row["verdict"] or NO_TEST
         words = WORDS[verdict]
@@ -115,7 +120,7 @@ def _parts(found: Sequence[ClaimFound]) -> list[str]:
         if verdict in WITHOUT_EQUALITY:
             part += f", since {row['doubt']}"
         groups.setdefault(words, []).append(part)
-    return [f"{words} {' and '.join(parts)}" for words, parts in groups.items()]
+    return by_model + [f"{words} {' and '.join(parts)}" for words, parts in groups.items()]
 
 
 def _what(one: ClaimFound, found: Sequence[ClaimFound]) -> str:

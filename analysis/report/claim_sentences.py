@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from analysis.columns import p_value
-from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
+from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, unit_of
 from analysis.report.outcomes import Outcome, Weight
+from analysis.report.people_sentences import (
+    Row,
+    chains_disagree,
+    disagreement,
+    doubled_priors,
+    model_clause,
+    texture_effect,
+)
 from analysis.report.sentences import signed
 from analysis.statistics.claims import (
     CONTROL,
@@ -21,20 +28,26 @@ from analysis.statistics.claims import (
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
 
-Row = Mapping[Hashable, Any]
 NO_TEST = "no test"
+_JOINTLY = "all textures jointly equivalent (largest p of TOST below .05)"
+_JOINTLY_BY_MODEL = (
+    "all textures jointly equal on average (largest probability of a mean beyond a bound below .05)"
+)
 
 
 def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
     """For each claim a sentence on all textures together, and one on each of them.
 
-    An unfinished task gets a single sentence, without an effect.
+    An unfinished task gets a single sentence, without an effect. Where the model of the
+    participants decides, there are more: that the tests say something else, that its chains
+    disagree, and what other priors would change.
     """
     outcomes = []
     for one in found:
         row = overall_row(one)
         if row is not None:
             outcomes.append(Outcome(Weight.OVERALL, _overall(one, row)))
+            outcomes += _beside(one, row)
         if one.standing.unfinished:
             continue
         textures = by_verdict(one)
@@ -42,6 +55,18 @@ def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
         weight = Weight.TEXTURES if differ else Weight.SECONDARY
         outcomes.append(Outcome(weight, _textures(one, textures)))
     return outcomes
+
+
+def _beside(found: ClaimFound, row: Row) -> list[Outcome]:
+    """What is said of a verdict of the model besides itself."""
+    if found.people is None:
+        return []
+    said = [
+        (Weight.OVERALL, chains_disagree(found)),
+        (Weight.OVERALL, disagreement(found, row)),
+        (Weight.SECONDARY, doubled_priors(found, row)),
+    ]
+    return [Outcome(weight, sentence) for weight, sentence in said if sentence]
 
 
 def overall_row(found: ClaimFound) -> Row | None:
@@ -61,8 +86,7 @@ def by_verdict(found: ClaimFound) -> dict[str, list[Row]]:
 
 def difference(found: ClaimFound, row: Row, *, confidence: str = "95%") -> str:
     """The mean difference with its interval: `−1.7 points of 100 (95% CI −2.9 to −0.5)`."""
-    rate = found.claim.measure == "correct"
-    unit, factor = ("percentage points", 100.0) if rate else ("points of 100", 1.0)
+    unit, factor = unit_of(found.claim.measure)
     ends = ("ci90_low", "ci90_high") if confidence == "90%" else ("ci_low", "ci_high")
     middle, low, high = (factor * row[name] for name in ("mean_difference", *ends))
     if np.isnan(middle):
@@ -91,8 +115,12 @@ def _overall(found: ClaimFound, row: Row) -> str:
     if verdict in WITHOUT_EQUALITY:
         text += f", since {row['doubt']}"
     if verdict != INTERIM:
-        text += f"; {difference(found, row, confidence='90%')}{_tests(row)}"
-    return f"{text[0].upper()}{text[1:]} (participants: {row['n']})."
+        tests = f"{difference(found, row, confidence='90%')}{_tests(row)}"
+        if found.people is not None:
+            shown = row["tests_verdict"] or NO_TEST
+            tests = f"{model_clause(found, row)}; paired tests: {shown}, {tests}"
+        text += f"; {tests}"
+    return f"{sentence_case(text)} (participants: {row['n']})."
 
 
 def _tests(row: Row) -> str:
@@ -116,21 +144,25 @@ def _textures(found: ClaimFound, groups: Mapping[str, Sequence[Row]]) -> str:
     for verdict, rows in groups.items():
         shown = [str(row["texture"]) for row in rows]
         if verdict in DIFFERENCES:
-            shown = [
-                f"{row['texture']} {difference(found, row)}, Holm {_p(row['p_holm'])}"
-                for row in rows
-            ]
+            shown = [f"{row['texture']} {_texture_difference(found, row)}" for row in rows]
         if verdict in WITHOUT_EQUALITY:
             shown = [f"{text} ({row['doubt']})" for text, row in zip(shown, rows, strict=True)]
         apart = "; " if verdict in (*DIFFERENCES, *WITHOUT_EQUALITY) else ", "
         parts.append(f"{verdict}: {apart.join(shown)}")
     if found.claim.bounds is not None and all_equivalent(found.tests):
-        parts.append("all textures jointly equivalent (largest p of TOST below .05)")
+        parts.append(_JOINTLY if found.people is None else _JOINTLY_BY_MODEL)
     same = found.tests[found.tests["note"] == IDENTICAL]["texture"]
     if len(same):
         parts.append(f"{IDENTICAL}: {', '.join(same)}")
     text = f"{found.claim.name}, texture by texture: {'; '.join(parts) or 'nothing to compare'}."
-    return f"{text[0].upper()}{text[1:]}"
+    return sentence_case(text)
+
+
+def _texture_difference(found: ClaimFound, row: Row) -> str:
+    """How a texture differs, by what decides about it."""
+    if found.people is not None:
+        return texture_effect(found, row)
+    return f"{difference(found, row)}, Holm {_p(row['p_holm'])}"
 
 
 def _p(p: float) -> str:

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analysis.answers.plan import EQUIVALENCE, Claim
+from analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
 from analysis.answers.responses import Responses
 from analysis.columns import shortened_hash
 from analysis.labels import MEASURES, TASKS
+from analysis.report.model_sentences import decided_by_tests, model_methods
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, incomplete
 from modeling.errors import counted
 
@@ -23,6 +24,7 @@ def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
         *(f"Planned exclusion: {sentence}" for sentence in responses.plan.exclusions),
         *_changed_plans(responses),
         *_not_planned(found),
+        *(decided_by_tests(responses, found) if responses.plan.rule == MODEL_RULE else ()),
         *_left_out(found),
         *(f"On reading the answers: {warning}" for warning in responses.warnings),
     ]
@@ -31,7 +33,7 @@ def deviations(responses: Responses, found: Sequence[ClaimFound]) -> list[str]:
 def methods_paragraph(responses: Responses, found: Sequence[ClaimFound]) -> str:
     """The statistical methods of this report, worded for a paper."""
     claims = [one.claim for one in found]
-    sentences = [_who(responses, claims)]
+    sentences = [_who(responses, claims), *model_methods(responses, found)]
     sentences.append(
         "Each participant's answers were averaged per texture and model; a cell counts only where "
         "all planned repeats were answered. Two models were compared by paired t-tests over "
@@ -132,10 +134,10 @@ def _bounds(found: Sequence[ClaimFound]) -> list[str]:
     when = "fixed before the first answer" if planned else "some of them fixed after the data"
     return [
         "Equivalence was tested by two one-sided t-tests (TOST; Schuirmann, 1987) at a level of 5% "
-        f"with bounds {when} ({listed}), with a separate Holm correction. A claim is called "
-        "equivalent where only the test of equivalence is significant, different where only the "
-        "test of a difference is, different but within bounds where both are, and inconclusive "
-        f"where neither is. {_sensitivity(found)}"
+        f"with bounds {when} ({listed}), with a separate Holm correction. By these tests a claim "
+        "is called equivalent where only the test of equivalence is significant, different where "
+        "only the test of a difference is, different but within bounds where both are, and "
+        f"inconclusive where neither is. {_sensitivity(found)}"
     ]
 
 

@@ -31,6 +31,7 @@ from analysis.report.page import (
     table_html,
     tiles,
 )
+from analysis.report.people_sentences import FEEL_IT
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
 from analysis.report.section_confusions import confusion_section
@@ -153,7 +154,7 @@ def write_report(
     html = page(
         title=title,
         answer=answered or answer(found, responses),
-        lead="" if answered else LEAD,
+        lead="" if answered else _lead(found),
         banner=_banner(responses, textures),
         sections=[
             ("overview", "At a glance", overview),
@@ -166,6 +167,11 @@ def write_report(
         warnings.warn(undrawn, stacklevel=2)
     report_progress(1.0, "done")
     return target
+
+
+def _lead(found: Sequence[ClaimFound]) -> str:
+    """What stands below the answer: what its words mean, where it is about people."""
+    return f"{FEEL_IT} {LEAD}" if any(one.people is not None for one in found) else LEAD
 
 
 def _model_sections(

@@ -8,12 +8,13 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.columns import chosen, names, without
+from analysis.columns import Columns, chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.page import Fold, Picture, Table
+from analysis.report.section_people import people_items
 from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
@@ -36,6 +37,14 @@ TESTS_SHOWN = chosen(
     *("t", "df", "p", "p_equivalence", "d_z", "d_z_low", "d_z_high", "bf01", "shapiro_p"),
     *("wilcoxon_p", "sign_flips_p", "note", "excluded"),
 )
+# Of the table of verdicts.
+_OF_MODEL = ("rule", "tests_verdict", "model_mean", "model_low", "model_high", "p_of_model")
+BY_MODEL = (
+    "Rule “model”: the verdict is that of the model of the participants, over all textures on the "
+    "mean effect and on the share of people outside the bounds, of single textures on the mean "
+    "alone, with Holm's correction of their posterior probabilities; that of the paired tests "
+    "stands beside it. Rule “tests”, and all other columns: "
+)
 CORRECT_RATES_SHOWN = (
     *without(CORRECT_RATE_COLUMNS, "note"),
     *chosen(CORRECT_RATE_COLUMNS, "note"),
@@ -57,18 +66,20 @@ def verdict_section(
     begun = dict.fromkeys(one.claim.task for one in found if one.standing.unfinished)
     so_far = [who_took_part(responses, task) for task in begun]
     tests = pd.concat([one.tests for one in found], ignore_index=True)
+    by_model = any(one.people is not None for one in judged)
     verdicts = Table(
         "claims",
         "Verdicts",
-        "First row: the mean over the textures whose models differ, with equal weight for each "
-        "texture, over participants who answered completely. Then each texture: a family of its "
-        "own, with Holm's correction separately for tests of a difference and of equivalence "
-        "(TOST); identical models are controls. Differences and bounds are in points of the scale, "
-        "or shares of right answers. Where the last column gives a reason, neither equivalence nor "
-        "a difference within the bounds is concluded, whatever p is. No effect is shown for a task "
-        "that lacks participants or sessions. The tests themselves are below.",
+        f"{BY_MODEL * by_model}First row: the mean over the textures whose models differ, with "
+        "equal weight for each texture, over participants who answered completely. Then each "
+        "texture: a family of its own, with Holm's correction separately for tests of a "
+        "difference and of equivalence (TOST); identical models are controls. Differences and "
+        "bounds are in points of the scale, or shares of right answers. Where the last column "
+        "gives a reason, neither equivalence nor a difference within the bounds is concluded, "
+        "whatever p is. No effect is shown for a task that lacks participants or sessions. The "
+        "tests themselves are below.",
         tests[names(VERDICT_COLUMNS)],
-        VERDICT_COLUMNS,
+        _verdicts_shown(by_model=by_model),
         simulated,
     )
     detail = Table(
@@ -89,6 +100,7 @@ def verdict_section(
         "Verdicts",
         (
             *_forest(judged, simulated=simulated),
+            *people_items(judged, simulated=simulated),
             verdicts,
             *_setups_table(judged, simulated=simulated),
             *(_planted_table(judged, planted),) * bool(planted and judged),
@@ -100,6 +112,11 @@ def verdict_section(
     )
 
 
+def _verdicts_shown(*, by_model: bool) -> Columns:
+    """Columns of the table of verdicts; those of the model only where it decides some."""
+    return VERDICT_COLUMNS if by_model else without(VERDICT_COLUMNS, *_OF_MODEL)
+
+
 def _forest(judged: Sequence[ClaimFound], *, simulated: bool) -> tuple[Picture, ...]:
     """The picture of all claims with a verdict; none where there is no such claim."""
     if not judged:
@@ -107,7 +124,8 @@ def _forest(judged: Sequence[ClaimFound], *, simulated: bool) -> tuple[Picture, 
     picture = Picture(
         "forest",
         "Differences and their bounds",
-        "Mean differences over participants with 90% and 95% confidence intervals. Where the 90% "
+        "Mean differences over participants with 90% and 95% confidence intervals; where the model "
+        "of the participants decides, below its mean and 95% interval. Where the 90% "
         "interval lies within the bounds (grey), a test of equivalence is significant, apart from "
         "Holm's correction; where the 95% interval excludes 0, a test of a difference is. The "
         "marker shows the verdict: an interval within the bounds is not equivalence where "
@@ -142,8 +160,8 @@ def _planted_table(
         "planted_effects",
         "Verdicts compared with the planted differences",
         "Planted: by how many points simulated participants rate the other model higher; the "
-        "verdict is based on their answers. Undecided: inconclusive, or a verdict that was "
-        "withheld.",
+        "verdict is based on their answers. Undecided: inconclusive, felt by some, or a "
+        "verdict that was withheld.",
         planted_verdicts(found, planted or {}),
         PLANTED_COLUMNS,
         simulated=True,

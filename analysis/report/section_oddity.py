@@ -57,7 +57,7 @@ def oddity_section(found: Sequence[ClaimFound], *, simulated: bool) -> Section |
         "decision model of the task (the one farthest from the other two is chosen); its interval "
         "is that of the mean share. Observers who feel no difference are right by chance, so only "
         "the upper one of the claim's bounds matters; it is given as a share and as a d′. Verdicts "
-        "rest on the tests of the shares.",
+        "rest on the shares.",
         sensitivity,
         ODDITY_COLUMNS,
         simulated,

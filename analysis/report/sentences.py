@@ -202,8 +202,8 @@ def cautions(
     if inconclusive:
         sentences.append(
             "Inconclusive means neither different nor equivalent: a test of a difference that is "
-            "not significant does not show that two models are equivalent; only an equivalence "
-            "test with bounds fixed before data collection can show that."
+            "not significant does not show that two models are equivalent; only a verdict of "
+            "equivalence by bounds fixed before data collection can show that."
         )
     if models:
         sentences.append(

@@ -105,13 +105,14 @@ CLAIM_COLUMNS = (
     Column("share_high", "to", format=".2f"),
     Column("share_most", "at most (95%)", format=".2f"),
     Column("somebody", "probability that somebody is", format=".2f"),
-    Column("p_of_model", "probability of lying beyond a bound", format=".3f"),
+    Column("p_of_model", "probability of a mean beyond a bound", is_p_value=True),
     Column("note"),
 )
 
 VERDICT_COLUMNS = chosen(
     CLAIM_COLUMNS,
-    *("claim", "texture", "verdict", "n", "mean_difference", "ci90_low", "ci90_high"),
+    *("claim", "texture", "verdict", "rule", "n", "model_mean", "model_low", "model_high"),
+    *("p_of_model", "tests_verdict", "mean_difference", "ci90_low", "ci90_high"),
     *("bound_low", "bound_high", "p_equivalence_holm", "p_holm", "share_at_ends", "doubt"),
 )
 # For a claim with incomplete data: amount and quality of the data, and no effect.
@@ -240,7 +241,7 @@ def claim_tests(
             claim=claim.name,
             measure=MEASURES[claim.measure],
             planned="yes" if claim.planned else "no",
-            rule=TESTS_RULE,
+            rule="" if standing.unfinished else TESTS_RULE,
             reference=reference,
             other=other,
             bound_low=low,

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.answers.plan import DIFFERENCE, MODEL_RULE, Claim
+from analysis.answers.plan import DIFFERENCE, MODEL_RULE, AnalysisPlan, Claim
 from analysis.answers.responses import Responses, setup_of
 from analysis.columns import TEXTURE, Column, names
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
@@ -66,6 +66,8 @@ class ClaimFound:
     standing : Standing
     people : PeopleFound, optional
         Where the model of the participants decides.
+    few : float
+        Share of people outside the bounds below which they do not count, of the plan.
     """
 
     claim: Claim
@@ -73,6 +75,7 @@ class ClaimFound:
     values: pd.DataFrame
     standing: Standing
     people: PeopleFound | None = None
+    few: float = AnalysisPlan.few
 
 
 def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[ClaimFound]:
@@ -95,13 +98,18 @@ def claims_found(responses: Responses, *, rng: np.random.Generator) -> list[Clai
         values = claim_values(responses, claim)
         standing = claim_standing(responses, claim, rng=own[claim.task])
         tests = claim_tests(claim, values, standing=standing, rng=own[claim.task])
+        few = responses.plan.few
         people = None if standing.unfinished else claim_people(responses, claim, rng=rng)
         if people is not None:
-            few = responses.plan.few
             tests = with_people(tests, people, claim, standing=standing, few=few)
         found.append(
             ClaimFound(
-                claim=claim, tests=tests, values=values.table, standing=standing, people=people
+                claim=claim,
+                tests=tests,
+                values=values.table,
+                standing=standing,
+                people=people,
+                few=few,
             )
         )
     return found

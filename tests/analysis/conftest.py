@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,9 @@ import pytest
 
 from analysis.answers.plan import AnalysisPlan, Claim
 from analysis.answers.responses import Responses
-from analysis.labels import SCALES
+from analysis.labels import ALL_TEXTURES, SCALES
+from analysis.statistics.claims import with_people
+from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound, claims_found
 from analysis.textures.results import TextureResult
 from modeling import TextureModel, Threshold, fit_texture, simplify
@@ -198,6 +200,80 @@ def claim(
         test="equivalence",
         planned=planned,
     )
+
+
+def people_summary(
+    *,
+    mean: tuple[float, float, float] = (0.0, -1.0, 1.0),
+    share: tuple[float, float, float] = (0.02, 0.0, 0.1),
+    most: float = 0.08,
+    somebody: float = 0.2,
+    r_hat: float = 1.0,
+) -> PeopleSummary:
+    """Mean and share with their 95 % intervals; the 90 % interval of the mean is as wide."""
+    return PeopleSummary(
+        mean=mean[0],
+        mean_low=mean[1],
+        mean_high=mean[2],
+        mean90_low=mean[1],
+        mean90_high=mean[2],
+        share=share[0],
+        share_low=share[1],
+        share_high=share[2],
+        share_most=most,
+        somebody=somebody,
+        r_hat=r_hat,
+    )
+
+
+def people_table(
+    effects: Sequence[float], *, outside: Collection[int] = (), careless: Collection[int] = ()
+) -> pd.DataFrame:
+    """Participants with these effects, and the places of those outside and of the careless."""
+    places = range(len(effects))
+    return pd.DataFrame(
+        {
+            "participant_id": [f"sub-{place + 1:02d}" for place in places],
+            "effect": effects,
+            "ci_low": np.array(effects) - 4.0,
+            "ci_high": np.array(effects) + 4.0,
+            "outside": [0.9 if place in outside else 0.1 for place in places],
+            "careless": [0.8 if place in careless else 0.05 for place in places],
+        }
+    )
+
+
+def by_model(
+    found: ClaimFound,
+    summary: PeopleSummary,
+    *,
+    doubled: PeopleSummary | None = None,
+    people: pd.DataFrame | None = None,
+    lapses: float = 0.01,
+) -> ClaimFound:
+    """A claim as if the model of the participants had found this; textures as the mean."""
+    textures = found.tests["texture"][found.tests["texture"] != ALL_TEXTURES]
+    outside = found.claim.bounds is not None and not summary.inside(found.claim.bounds)
+    told = PeopleFound(
+        summary=summary,
+        doubled=doubled or summary,
+        people=people_table([0.0] * 16) if people is None else people,
+        textures=pd.DataFrame(
+            {
+                "texture": textures,
+                "mean": summary.mean,
+                "ci_low": summary.mean_low,
+                "ci_high": summary.mean_high,
+                "p_difference": 0.001 if outside else 0.5,
+                "p_equivalence": 0.5 if outside else 0.001,
+            }
+        ),
+        lapses=lapses,
+    )
+    tests = with_people(
+        found.tests, told, found.claim, standing=found.standing, few=AnalysisPlan.few
+    )
+    return replace(found, tests=tests, people=told)
 
 
 PLAN = AnalysisPlan(

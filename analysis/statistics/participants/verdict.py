@@ -36,6 +36,7 @@ from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionM
 from modeling.participants.ratings import RatingPriors, RatingStudies
 
 FEWEST = 8  # participants
+DOUBLED_CHAINS = 4  # of the posterior with doubled priors
 MINORITY = 0.5  # a share of people below it feels a difference that the mean may not show
 
 PEOPLE_COLUMNS = (
@@ -167,7 +168,7 @@ def people_found(
     """
     (draws,) = _sampler(studies, bounds, model=model, rng=rng)(effort=Effort())
     wide = _sampler(studies, bounds, model=model, rng=rng, doubled=True)
-    (doubled,) = wide(effort=replace(Effort(), chains=4))
+    (doubled,) = wide(effort=replace(Effort(), chains=DOUBLED_CHAINS))
     return PeopleFound(
         summary=summary_of(draws),
         doubled=summary_of(doubled),

@@ -45,6 +45,7 @@ from analysis.report.section_mixed import (
 from analysis.report.section_models import model_section
 from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section
 from analysis.report.section_parameters import parameter_section
+from analysis.report.section_people import PRIORS_COLUMNS
 from analysis.report.section_planted import planted_section
 from analysis.report.section_provenance import PROVENANCE_COLUMNS
 from analysis.report.section_reliability import CARELESS_COLUMNS, reliability_section
@@ -60,6 +61,7 @@ from analysis.statistics.buttons import BUTTON_COLUMNS
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
 from analysis.statistics.hand import HAND_TEST_COLUMNS
+from analysis.statistics.participants.verdict import PEOPLE_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS
 from analysis.statistics.reliability import AGREEMENT_COLUMNS, RATER_COLUMNS
 from analysis.statistics.speed_accuracy import (
@@ -89,11 +91,14 @@ from modeling import Scene, compile_scene, fit_ar
 from modeling.scenes.scene import HandRange
 from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
+from tests.analysis.conftest import by_model, people_summary
 
 PAGE = Path(analysis.report.page.__file__)
 DECLARED = {
     "claims": VERDICT_COLUMNS,
     "claim_tests": CLAIM_COLUMNS,
+    "people": PEOPLE_COLUMNS,
+    "people_priors": PRIORS_COLUMNS,
     "planted_effects": PLANTED_COLUMNS,
     "setups": SETUP_COLUMNS,
     "agreement": AGREEMENT_COLUMNS,
@@ -206,7 +211,11 @@ def tables(results, ratings, choices, found) -> list[Table]:
     sections = (
         model_section(textures, pd.concat([each.gfc for each in compared])),
         parameter_section(textures, driving_table([each.driven for each in compared])),
-        verdict_section(responses, found, planted={"PVC": {"magnitude_similarity": -30.0}}),
+        verdict_section(
+            responses,
+            [by_model(found[0], people_summary()), *found[1:]],
+            planted={"PVC": {"magnitude_similarity": -30.0}},
+        ),
         rating_section(responses, found[:2]),
         choice_section(responses, found[2:], rng=np.random.default_rng(1)),
         confusion_section(

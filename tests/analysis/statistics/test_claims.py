@@ -179,7 +179,7 @@ def test_an_unfinished_task_shows_no_effect():
     assert list(table) == names(CLAIM_COLUMNS)
     assert table["verdict"].tolist() == [*[INTERIM] * 4, CONTROL]
     told = ["claim", "measure", "planned", "texture", "verdict", "reference", "other", "n"]
-    told += ["bound_low", "bound_high", "share_at_ends", "excluded", "note"]
+    told += ["bound_low", "bound_high", "share_at_ends", "excluded", "rule", "note"]
     assert table.drop(columns=told).isna().all(axis=None)
     assert (table["n"] == PEOPLE).all()
     assert table["note"].tolist() == [*[""] * 4, IDENTICAL]

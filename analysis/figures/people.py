@@ -1,0 +1,143 @@
+"""Each person's effect by the model of the participants, beside the bounds."""
+
+from __future__ import annotations
+
+from textwrap import fill
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.figures.drawing import (
+    BLACK,
+    BLUE,
+    GREY,
+    VERMILLION,
+    axes_or_new,
+    finish_axes,
+    shared_legend,
+    stamp_if_simulated,
+)
+from analysis.labels import unit_of
+from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
+from analysis.statistics.verdicts import ClaimFound
+from modeling.arrays import Bools
+from modeling.files.answer_tables import ANSWER_TABLES
+
+LIKELY = 0.5  # probability above which somebody is drawn as outside, or as careless
+INSIDE, OUTSIDE, CARELESS = ("o", BLUE), ("D", VERMILLION), ("s", GREY)
+MOST_TICKS = 40  # participants whose names still fit below the axis
+MOST_NAMED = 6
+LEGEND_WIDTH, TITLE_WIDTH = 58, 72  # characters
+HEIGHT, NARROWEST, WIDEST = 4.6, 7.0, 13.0  # inches
+PLACE = 0.24  # inches for each participant
+
+
+def figure_people(found: ClaimFound, *, simulated: bool) -> Figure:
+    """The effect of each participant, in a figure as wide as their number needs.
+
+    Parameters
+    ----------
+    found : ClaimFound
+        Decided by the model of the participants.
+    simulated : bool
+        Written into the figure.
+    """
+    width = float(np.clip(2.0 + PLACE * len(_people(found).people), NARROWEST, WIDEST))
+    figure = Figure(figsize=(width, HEIGHT), layout="constrained")
+    ax = plot_people(found, simulated=simulated, ax=figure.subplots())
+    shared_legend(figure, [ax], loc="outside lower center")
+    return figure
+
+
+def plot_people(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -> Axes:
+    """The effect of each participant with its 95 % interval, sorted, and the mean beside them.
+
+    Parameters
+    ----------
+    found : ClaimFound
+        Decided by the model of the participants.
+    simulated : bool
+        Written into the figure.
+    ax : Axes, optional
+    """
+    ax = axes_or_new(ax)
+    unit, factor = unit_of(found.claim.measure)
+    people = _people(found).people.sort_values("effect", ignore_index=True)
+    _draw_bounds(ax, found, factor)
+    _draw_people(ax, people, factor)
+    _draw_mean(ax, _people(found).summary, factor=factor, place=len(people) + 0.5)
+    _name_axes(ax, found, people=people, unit=unit)
+    ax.set_title(_title(found), loc="left", fontsize=10)
+    stamp_if_simulated(ax, simulated)
+    return ax
+
+
+def _people(found: ClaimFound) -> PeopleFound:
+    assert found.people is not None
+    return found.people
+
+
+def _draw_bounds(ax: Axes, found: ClaimFound, factor: float) -> None:
+    assert found.claim.bounds is not None
+    ax.axhspan(*(factor * bound for bound in found.claim.bounds), color=GREY, alpha=0.15, lw=0)
+    ax.axhline(0, color=BLACK, lw=0.8)
+
+
+def _draw_people(ax: Axes, people: pd.DataFrame, factor: float) -> None:
+    """Everybody's marker and interval."""
+    careless: Bools = (people["careless"] > LIKELY).to_numpy()
+    outside: Bools = (people["outside"] > LIKELY).to_numpy() & ~careless
+    kinds = (
+        (~careless & ~outside, INSIDE, "participant, 95% CI"),
+        (outside, OUTSIDE, "probably outside the bounds, 95% CI"),
+        (careless, CARELESS, _careless_label(people[careless])),
+    )
+    for which, (mark, colour), label in kinds:
+        if which.any():
+            at, own = np.flatnonzero(which), people[which]
+            ax.vlines(at, factor * own["ci_low"], factor * own["ci_high"], color=colour, lw=1.3)
+            face = "white" if mark == CARELESS[0] else colour
+            ax.plot(at, factor * own["effect"], mark, color=colour, mfc=face, ms=5.5, label=label)
+
+
+def _careless_label(careless: pd.DataFrame) -> str:
+    names = [str(who) for who in careless["participant_id"]]
+    more = len(names) - MOST_NAMED
+    shown = ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    return fill(f"probably did not attend: {shown}", LEGEND_WIDTH)
+
+
+def _draw_mean(ax: Axes, summary: PeopleSummary, *, factor: float, place: float) -> None:
+    """The mean effect on the right of all participants, with a line across."""
+    ax.vlines(place, factor * summary.mean_low, factor * summary.mean_high, color=BLACK, lw=3)
+    ax.axhline(factor * summary.mean, color=BLACK, lw=0.8, ls=":")
+    label = "mean of those who attend, 95% CI"
+    ax.plot(place, factor * summary.mean, "d", color=BLACK, mfc="white", mew=1.5, ms=9, label=label)
+
+
+def _name_axes(ax: Axes, found: ClaimFound, *, people: pd.DataFrame, unit: str) -> None:
+    count = len(people)
+    if count <= MOST_TICKS:
+        ax.set_xticks(range(count), [str(who) for who in people["participant_id"]])
+        ax.tick_params(axis="x", rotation=90, labelsize=8)
+    else:
+        ax.set_xticks([])
+    ax.set_xlim(-0.8, count + 1.3)
+    ax.set_xlabel(f"{count} participants, sorted by their effect")
+    reference, other = found.claim.models
+    if ANSWER_TABLES[found.claim.task].both_models:
+        reference, other = "chance", "share right"
+    ax.set_ylabel(f"{other} − {reference}\n({unit})")
+    finish_axes(ax)
+
+
+def _title(found: ClaimFound) -> str:
+    """The claim, its verdict, and the share of people outside; without a limit where in doubt."""
+    summary, overall = _people(found).summary, found.tests.iloc[0]
+    share = f"{summary.share:.0%} (95% CI {summary.share_low:.0%} to {summary.share_high:.0%})"
+    if overall["doubt"]:
+        share = f"at least {summary.share_low:.0%}, no upper limit"
+    claim = fill(f"{found.claim.name}: {overall['verdict']}", TITLE_WIDTH)
+    return f"{claim}\npeople outside the bounds (grey): {share}"
