@@ -104,7 +104,9 @@ def _cells(
     """Where each answer stands among (people, textures, models, repeats), and how many of each."""
     textures = textures_of(answers)
     keys = ["participant_id", "texture"] + ["model"] * (len(models) > 1)
-    repeat = _in_order(answers).groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
+    repeat = (
+        _in_order(answers).groupby(keys).cumcount().reindex(answers.index).to_numpy(dtype=np.intp)
+    )
     person = _places(answers["participant_id"], people)
     texture = _places(answers["texture"], textures)
     model = np.zeros(len(answers), dtype=np.intp)
