@@ -161,15 +161,15 @@ class ChoicePriors:
     texture_effect_sd: float = 0.2
     trend_sd: float = 0.3
     lapses: tuple[float, float] = (1.0, 14.0)
-    careless: tuple[float, float] = (1.0, 14.0)
-    catch: tuple[float, float] = (30.0, 1.0)
+    careless: tuple[float, float] = (1.0, 6.0)
+    catch: tuple[float, float] = (100.0, 1.0)
 
     @staticmethod
     def of(model: DecisionModel) -> ChoicePriors:
         """Those of a decision model."""
         if model.both_models:
-            return ChoicePriors(effects=EffectPriors(mean_sd=2.0, spread=0.2, weight=0.05))
-        return ChoicePriors(effects=EffectPriors(mean_sd=0.7, spread=0.2, weight=0.05))
+            return ChoicePriors(effects=EffectPriors(mean_sd=2.0, spread=0.4, weight=0.1))
+        return ChoicePriors(effects=EffectPriors(mean_sd=0.7, spread=0.3, weight=0.1))
 
     def doubled(self) -> ChoicePriors:
         """The same with every SD of a prior twice as large, and careless people twice as likely."""

@@ -131,6 +131,8 @@ class DrawnRatings:
     ----------
     studies : RatingStudies
     mixture : EffectMixture
+    effects : (B, n) ndarray
+        Of each person, if they attend.
     careless : (B, n) ndarray of bool
     lapses, rating_sd : (B,) ndarray
         Share of lapsed trials; typical SD of a person's ratings.
@@ -138,6 +140,7 @@ class DrawnRatings:
 
     studies: RatingStudies
     mixture: EffectMixture
+    effects: Floats
     careless: Bools
     lapses: Floats
     rating_sd: Floats
@@ -190,7 +193,8 @@ def drawn_ratings(
     own_variance = priors.careless_scale / rng.standard_gamma(1.0, few)
     rating_sd = np.sqrt(np.where(careless, own_variance, variance))
     attends = ~careless
-    effect = drawn_effects(mixture, people, rng=rng)[..., None] + own[:, None]
+    effects = drawn_effects(mixture, people, rng=rng)
+    effect = effects[..., None] + own[:, None]
     felt = person[..., None] + cell + attends[..., None] * texture[:, None]
     halves = np.array([-0.5, 0.5])
     middle = (felt[..., None] + halves * (attends[..., None] * effect)[..., None])[
@@ -206,6 +210,7 @@ def drawn_ratings(
     return DrawnRatings(
         studies=RatingStudies(values=answered[0], anchors=answered[1], trends=trends),
         mixture=mixture,
+        effects=effects,
         careless=careless,
         lapses=lapses,
         rating_sd=typical,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -145,7 +145,7 @@ def analyze(
         )
     appendix = []
     if validate is not None:
-        appendix = [validation_section(validated(validate, seed=seed, jobs=jobs, dask=dask))]
+        appendix = [validation_section(*validated(validate, seed=seed, jobs=jobs, dask=dask))]
     with replace_folder(out, seen) as fresh, share_of("Reporting") as advance:
         settings = settings_of(responses, results)
         settings |= {"validate": validate} if validate is not None else {}
@@ -276,8 +276,10 @@ def _later_plan(path: Path, registered: AnalysisPlan) -> AnalysisPlan:
 
 def validated(
     simulations: int, *, seed: int, jobs: int | None = None, dask: str | None = None
-) -> pd.DataFrame:
-    """The procedures on planted truth: the same table on any number of workers.
+) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Procedures, and the model of the participants, on planted truth, and ranks of its sampler.
+
+    The same tables on any number of workers.
 
     Parameters
     ----------
@@ -291,18 +293,41 @@ def validated(
         Address of a scheduler.
     """
     from analysis.statistics.validation import cells, simulate_cell, validation_table
+    from analysis.statistics.validation_model import (
+        model_cells,
+        model_table,
+        simulate_model_cell,
+    )
+    from analysis.statistics.validation_ranks import KINDS, rank_table, simulate_ranks
 
-    rows = cells()
-    work = partial(simulate_cell, simulations=simulations, seed=seed)
-    found: dict[int, dict[str, object]] = {}
+    settings: dict[str, int] = {"simulations": simulations, "seed": seed}
+    listed, planted = cells(), model_cells()
+    tasks = [partial(simulate_cell, cell, **settings) for cell in listed]
+    of_model = [partial(simulate_model_cell, cell, **settings) for cell in planted]
+    ranks = [partial(simulate_ranks, kind, **settings) for kind in KINDS]
+    every = [*tasks, *of_model, *ranks]
+    names = [" ".join(map(str, cell)) for cell in (*listed, *planted)] + list(KINDS)
+    found: dict[int, Any] = {}
     with (
-        progress("Validating", len(rows)) as advance,
-        working(work, rows, jobs=jobs, dask=dask) as done,
+        progress("Validating", len(every)) as advance,
+        working(_called, every, jobs=jobs, dask=dask) as done,
     ):
         for number, row in done:
             found[number] = row
-            advance(f"{row['procedure']}, {row['situation']}")
-    return validation_table(found[number] for number in sorted(found))
+            advance(names[number])
+    rows = [found[number] for number in range(len(every))]
+    split, end = len(tasks), len(tasks) + len(of_model)
+    return (
+        validation_table(rows[:split]),
+        model_table(rows[split:end]),
+        rank_table(row for of_kind in rows[end:] for row in of_kind),
+    )
+
+
+def _called(task: object) -> Any:
+    """What a task finds, in a process of its own."""
+    assert callable(task)
+    return task()
 
 
 def settings_of(responses: Responses, results: Sequence[TextureResult]) -> dict[str, object]:

@@ -98,16 +98,26 @@ def test_power_refuses_in_one_sentence_and_replaces_nothing(main, place: Path) -
 
 @pytest.mark.usefixtures("undrawn")
 def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from analysis.statistics import validation
+    from analysis.statistics import validation, validation_model, validation_ranks
 
     few = validation.cells(["TOST, guard on ends"], sizes=[8])
     monkeypatch.setattr(validation, "cells", lambda: few)
+    of_model = [("ratings: split ± 10", 8), ("oddity: nobody feels it", 8)]
+    monkeypatch.setattr(validation_model, "model_cells", lambda: of_model)
+    ranks = {"odd one out": validation_ranks.KINDS["odd one out"]}
+    monkeypatch.setattr(validation_ranks, "KINDS", ranks)
+    monkeypatch.setattr(validation_ranks, "STEPS", 100)
     assert main("simulate", "--study", "study.toml", "--data", "data").returncode == 0
     told = main("analyze", "data", "--validate", 40, "--jobs", 1)
     assert told.returncode == 0, told.stderr
     table = pd.read_csv(place / "analysis-results/tables/validation.tsv", sep="\t")
     assert len(table) == len(few)
     assert set(table["simulations"]) == {40}
+    table = pd.read_csv(place / "analysis-results/tables/validation_model.tsv", sep="\t")
+    assert list(table["situation"]) == [name for name, _ in of_model]
+    assert (table["equality"] + table["different"] + table["inconclusive"] <= 1).all()
+    table = pd.read_csv(place / "analysis-results/tables/validation_ranks.tsv", sep="\t")
+    assert {sum(map(int, ranks.split())) for ranks in table["ranks"]} == {40}
     page = (place / "analysis-results/report.html").read_text()
     assert "Appendix: the procedures on planted truth" in page
     assert main("analyze", "data").returncode == 0

@@ -84,6 +84,11 @@ class RatingSampler:
         """The distribution of people's effects as it is now."""
         return self._mixture.mixture
 
+    @property
+    def typical_sd(self) -> Floats:
+        """(B,) typical SD of a person's ratings."""
+        return np.asarray(np.sqrt(self._typical))
+
     def settle(self) -> None:
         """Nothing in these steps is adapted."""
 
