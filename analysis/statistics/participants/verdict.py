@@ -36,7 +36,7 @@ from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionM
 from modeling.participants.ratings import RatingPriors, RatingStudies
 
 FEWEST = 8  # participants
-SHORT = Effort(chains=2, warm_up=150, steps=200, every=2)  # where verdicts of studies are counted
+SHORT = Effort(chains=4, warm_up=150, steps=200, every=2)  # where verdicts of studies are counted
 MINORITY = 0.5  # a share of people below it feels a difference that the mean may not show
 
 PEOPLE_COLUMNS = (
