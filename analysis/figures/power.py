@@ -26,12 +26,24 @@ from analysis.figures.drawing import (
 )
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.claims import BOUNDS_WITHHELD, WITHHELD
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
-from analysis.statistics.power import EVERY_TEXTURE, NO_VERDICT, TARGET
+from analysis.statistics.equivalence import (
+    ALL_BUT,
+    AVERAGE_FELT,
+    DIFFERENT,
+    EQUIVALENT,
+    FELT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+)
+from analysis.statistics.power import EVERY_TEXTURE, MEAN_ALONE, NO_VERDICT, TARGET
 
 # Distinguished by colour, marker and line style.
 STYLES = {
     EQUIVALENT: (BLUE, "o", "-"),
+    MEAN_ALONE: (BLACK, "d", "--"),
+    AVERAGE_FELT: (GREEN, "<", "-"),
+    ALL_BUT: (SKY_BLUE, "*", "--"),
+    FELT: (PURPLE, "p", "-"),
     WITHIN_BOUNDS: (GREEN, "^", "-."),
     DIFFERENT: (VERMILLION, "s", "-"),
     INCONCLUSIVE: (ORANGE, "D", "--"),
@@ -39,6 +51,11 @@ STYLES = {
     BOUNDS_WITHHELD: (BLACK, "h", "--"),
     NO_VERDICT: (GREY, "X", ":"),
     EVERY_TEXTURE: (SKY_BLUE, "P", "-."),
+}
+# What has a line of its own beside the verdicts over all textures.
+LABELS = {
+    EVERY_TEXTURE: "every single texture equivalent",
+    MEAN_ALONE: "mean inside the bounds, whatever the people",
 }
 PANELS_IN_A_ROW = 3
 LETTERS_IN_A_LINE = 48  # of a panel's title
@@ -87,7 +104,7 @@ def figure_power(table: pd.DataFrame) -> Figure:
 
 
 def plot_power(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
-    """One claim: a line for each verdict over all textures, and for all of them equivalent.
+    """One claim: a line for each verdict over all textures, and for each of `LABELS`.
 
     Parameters
     ----------
@@ -100,8 +117,7 @@ def plot_power(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
         verdict: rows
         for verdict, rows in table[table["texture"] == ALL_TEXTURES].groupby("verdict")
     }
-    every = table[table["texture"] == EVERY_TEXTURE]
-    lines |= {EVERY_TEXTURE: every} if len(every) else {}
+    lines |= {place: rows for place, rows in table.groupby("texture") if place in LABELS}
     ax.axhline(TARGET, color=BLACK, lw=1, ls=":")
     sizes = sorted(table["n"].unique())
     shown = [name for name in STYLES if name in lines]
@@ -120,7 +136,7 @@ def plot_power(table: pd.DataFrame, *, ax: Axes | None = None) -> Axes:
             capsize=2.5,
             ms=5,
             lw=1.6,
-            label="every single texture equivalent" if name == EVERY_TEXTURE else name,
+            label=LABELS.get(name, name),
         )
     ax.set_xlabel("participants")
     ax.set_xticks(sizes)

@@ -5,7 +5,7 @@ docs/method/statistics.md#verdicts
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -37,7 +37,7 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.participants.verdict import PeopleFound
+from analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
 from modeling.arrays import Floats
 
 WITHHELD = "equivalence withheld"
@@ -305,15 +305,17 @@ def with_people(
     of_model = found.textures.set_index("texture").reindex(table["texture"]).reset_index(drop=True)
     overall = (table["texture"] == ALL_TEXTURES).to_numpy()
     judged = (~overall) & (table["verdict"] != CONTROL).to_numpy()
-    words = dict.fromkeys(table.index[overall], summary.verdict(claim.bounds, few=few))
-    p = holm(of_model["p_difference"][judged]), holm(of_model["p_equivalence"][judged])
-    for row, differs, equals in zip(table.index[judged], *p, strict=True):
-        word = verdict(float(differs), float(equals))
-        words[row] = EQUAL_ON_AVERAGE if word in (EQUIVALENT, WITHIN_BOUNDS) else word
-    for row, word in words.items():
-        share = float(table.loc[row, "share_at_ends"])
-        table.loc[row, "verdict"] = standing.allowed(word, share_at_ends=share)
-    table["rule"] = np.where(overall | judged, MODEL_RULE, "")
+    words = words_of_people(
+        found,
+        claim.bounds,
+        textures=list(table["texture"][judged]),
+        shares=dict(zip(table["texture"], table["share_at_ends"].astype(float), strict=True)),
+        standing=standing,
+        few=few,
+    )
+    decided = overall | judged
+    table.loc[decided, "verdict"] = table["texture"][decided].map(words)
+    table["rule"] = np.where(decided, MODEL_RULE, "")
     for column, name in (
         ("model_mean", "mean"),
         ("model_low", "ci_low"),
@@ -334,6 +336,41 @@ def with_people(
     for column, value in row.items():
         table.loc[overall, column] = value
     return table
+
+
+def words_of_people(
+    found: PeopleJudged,
+    bounds: Bounds,
+    *,
+    textures: Sequence[str],
+    shares: Mapping[str, float],
+    standing: Standing,
+    few: float,
+) -> dict[str, str]:
+    """The verdicts of the model of the participants: over all textures, then on each.
+
+    Parameters
+    ----------
+    found : PeopleJudged
+    bounds : (float, float)
+    textures : sequence of str
+        Those that are compared. Their posterior probabilities are corrected after Holm.
+    shares : mapping of texture to float
+        As `Values.share_at_ends`.
+    standing : Standing
+    few : float
+        Of the plan.
+    """
+    words = {ALL_TEXTURES: found.summary.verdict(bounds, few=few)}
+    known = found.textures.set_index("texture").reindex(list(textures))
+    p = holm(known["p_difference"]), holm(known["p_equivalence"])
+    for texture, differs, equals in zip(textures, *p, strict=True):
+        word = verdict(float(differs), float(equals))
+        words[texture] = EQUAL_ON_AVERAGE if word in (EQUIVALENT, WITHIN_BOUNDS) else word
+    return {
+        texture: standing.allowed(word, share_at_ends=shares.get(texture, np.nan))
+        for texture, word in words.items()
+    }
 
 
 def _without_effects(table: pd.DataFrame) -> pd.DataFrame:

@@ -37,18 +37,21 @@ from analysis.statistics.paired import (
     why_undefined,
     without_rounding_noise,
 )
-from analysis.statistics.participants.design import choice_studies, rating_studies, textures_of
+from analysis.statistics.participants.design import (
+    PeopleData,
+    choice_studies,
+    rating_studies,
+    textures_of,
+)
 from analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
 from modeling import InputError
 from modeling.arrays import Floats
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 from modeling.participants.choices import (
     ODDITY,
-    ChoiceStudies,
     DecisionModel,
     forced_choice,
 )
-from modeling.participants.ratings import RatingStudies
 from modeling.seeds import number_of
 
 
@@ -139,26 +142,6 @@ def claim_people(
         textures=data.textures,
         rng=own,
     )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class PeopleData:
-    """The answers about one claim as the model of the participants takes them.
-
-    Parameters
-    ----------
-    studies : RatingStudies or ChoiceStudies
-        One study.
-    model : DecisionModel, optional
-        Of choices.
-    people, textures : sequence of str
-        In the order of the arrays.
-    """
-
-    studies: RatingStudies | ChoiceStudies
-    model: DecisionModel | None
-    people: Sequence[str]
-    textures: Sequence[str]
 
 
 def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
@@ -261,13 +244,15 @@ def claim_values(responses: Responses, claim: Claim) -> Values:
         table = complete_means(both, claim.measure, models=claim.models, repeats=repeats)
         return Values(table=table.assign(reference=chance_of(claim.task, answers)))
     table = complete_means(answers, claim.measure, models=claim.models, repeats=repeats)
+    return Values(table=table, share_at_ends=claim_shares(responses, claim))
+
+
+def claim_shares(responses: Responses, claim: Claim) -> dict[str, float]:
+    """`Values.share_at_ends` of a claim: empty of a measure without ends."""
     if claim.measure not in SCALES:
-        return Values(table=table)
-    same = responses.identical(claim.models)
-    return Values(
-        table=table,
-        share_at_ends=share_at_ends(answers, claim.measure, identical=same, ends=ENDS),
-    )
+        return {}
+    answers, same = answers_about(responses, claim), responses.identical(claim.models)
+    return share_at_ends(answers, claim.measure, identical=same, ends=ENDS)
 
 
 def answers_about(responses: Responses, claim: Claim) -> pd.DataFrame:

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from analysis.answers.responses import PlannedTask, Responses
+    from analysis.statistics.participants.posterior import Effort
     from analysis.statistics.power import Verdict
     from experiments.observers.in_memory import Row
     from experiments.observers.percepts import Perception
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
     from modeling.files.folders import Contents
 
 PICTURE_DPI = 150
-FIRST_ANSWER_S = 15.0
+FIRST_ANSWER_S = 12.0  # then the next simulation to end is waited for
 
 
 def power(
@@ -79,8 +80,9 @@ def power(
 ) -> None:
     """Simulate a study with n participants many times: the chance of each verdict on its claims.
 
-    The planted textures of the same names take the place of the real surfaces. Writes power.tsv,
-    power.png and power.svg. A first estimate is printed within 20 s, with the time remaining.
+    Verdicts follow the rule that the study's plan names. The planted textures of the same names
+    take the place of the real surfaces. Writes power.tsv, power.png and power.svg. A first estimate
+    is printed within 20 s, or after two simulations if these take longer, with the time remaining.
 
     Example: tactileq power study.toml --subjects 12,48,12 --effect magnitude_similarity=0
     """
@@ -186,8 +188,9 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
     ------
     ValueError
         If there is no claim, a claim is about a task that compares no models, or a number of
-        participants leaves the order of models unbalanced.
+        participants is too small for the rule of the plan or leaves the order of models unbalanced.
     """
+    from experiments.study.plan import FEWEST_OF_MODEL
     from modeling.files.answer_tables import ANSWER_TABLES
 
     if not plan.plan.claims:
@@ -201,6 +204,11 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
                 f"expected claims about tasks that compare models, got {claim.name} about "
                 f"{claim.task}; leave it out."
             )
+    if plan.plan.rule == "model" and min(sizes) < FEWEST_OF_MODEL:
+        raise ValueError(
+            f'expected {FEWEST_OF_MODEL} participants or more, as the rule of the plan is "model", '
+            f"got {min(sizes)}; correct --subjects."
+        )
     tasks = {claim.task for claim in plan.plan.claims}
     for n in sizes:  # each has to be a study that can be run
         with_n = {task: replace(plan.plan_of(task), participants=n) for task in tasks}
@@ -286,6 +294,7 @@ def chances(
     seed: int,
     jobs: int | None = None,
     dask: str | None = None,
+    effort: Effort | None = None,
     advance: Callable[[str], None] = lambda item: None,
     first: Callable[[pd.DataFrame, float], None] = lambda table, left_s: None,
 ) -> pd.DataFrame:
@@ -305,6 +314,8 @@ def chances(
         Processes; as many as cores without it. No number of them changes the table.
     dask : str, optional
         Address of a scheduler.
+    effort : Effort, optional
+        Of the model of the participants, where it decides.
     advance : callable, optional
         Called after each simulation.
     first : callable, optional
@@ -318,7 +329,7 @@ def chances(
     """
     from analysis.statistics.power import power_table
 
-    work = partial(simulated_verdicts, people, sizes, seed=seed)
+    work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
     found: dict[int, list[Verdict]] = {}
     began_s = first_s = monotonic()
     told = False
@@ -339,11 +350,15 @@ def chances(
 
 
 def simulated_verdicts(
-    people: People, sizes: Sequence[int], number: int, *, seed: int
+    people: People,
+    sizes: Sequence[int],
+    number: int,
+    *,
+    seed: int,
+    effort: Effort | None = None,
 ) -> list[Verdict]:
     """All verdicts of one simulation: the largest study, and its first n participants."""
-    from analysis.statistics.power import verdicts
-    from analysis.statistics.verdicts import claim_standing, claim_values
+    from analysis.statistics.power import verdicts_by_size
     from experiments.observers.in_memory import simulate_sessions
     from modeling.seeds import generator
 
@@ -357,18 +372,8 @@ def simulated_verdicts(
         subjects=range(1, max(sizes) + 1),
         tasks=people.tasks,
     )
-    found = []
-    for n in sizes:
-        responses = responses_of(people, rows, n=n)
-        for claim in responses.plan.claims:
-            found += verdicts(
-                claim,
-                claim_values(responses, claim),
-                n=n,
-                standing=claim_standing(responses, claim, rng=rng),
-                rng=rng,
-            )
-    return found
+    by_size = {n: responses_of(people, rows, n=n) for n in sizes}
+    return verdicts_by_size(by_size, rng=rng, effort=effort)
 
 
 def responses_of(people: People, rows: dict[str, list[Row]], *, n: int) -> Responses:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from analysis.statistics.participants.posterior import Effort
 from modeling import Threshold, simplify
 from stimuli.planted.textures import planted_texture
 
@@ -46,6 +47,28 @@ def test_power_writes_its_table_and_chart(main, place: Path) -> None:
     assert first["power.svg"].startswith(b"<?xml")
     assert power(main, *words).returncode == 0
     assert {name: (place / "power" / name).read_bytes() for name in files} == first
+
+
+def test_power_counts_by_the_rule_of_the_plan(
+    main, place: Path, claimed_study: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    brief = Effort(chains=1, warm_up=10, steps=20, every=2)
+    monkeypatch.setattr("analysis.statistics.participants.verdict.SHORT", brief)
+    by_model = '[plan]\nrule = "model"\n[[plan.claims]]'
+    study = claimed_study.replace("participants = 2", "participants = 8")
+    (place / "model.toml").write_text(study.replace("[[plan.claims]]", by_model))
+    words = ("--subjects", "[8,9]", "--effect", "magnitude_similarity=0")
+    told = power(main, *words, study="model.toml")
+    assert told.returncode == 0, told.stderr
+    assert "mean alone inside the bounds " in told.stdout
+    table = pd.read_csv(place / "power/power.tsv", sep="\t")
+    assert set(table["n"]) == {8, 9}
+    assert "mean alone" in set(table["texture"])
+    told = power(main, "--subjects", "4,8,4", "--out", "no", study="model.toml")
+    assert told.returncode == 1
+    (line,) = told.stderr.splitlines()
+    assert 'expected 8 participants or more, as the rule of the plan is "model", got 4' in line
+    assert not (place / "no").exists()
 
 
 def test_dask_workers_give_the_same_table(main, place: Path) -> None:

@@ -5,16 +5,18 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
 import pandas as pd
 import pytest
 
 from analysis.answers.loading import load_responses
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.claims import WITHHELD
-from analysis.statistics.equivalence import EQUIVALENT, WITHIN_BOUNDS
-from analysis.statistics.power import EVERY_TEXTURE, POWER_COLUMNS
+from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, EQUIVALENT, WITHIN_BOUNDS
+from analysis.statistics.participants.posterior import Effort
+from analysis.statistics.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
 from analysis.statistics.validation import cells, simulate_cell
-from analysis.statistics.verdicts import claim_values
+from analysis.statistics.verdicts import claim_values, people_data
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
@@ -46,6 +48,7 @@ RATED = Claim(
     bounds=(-7.5, 7.5),
     test="equivalence",
 )
+BRIEF = Effort(chains=1, warm_up=20, steps=40, every=2)
 ODD = replace(RATED, name="no odd one", task="oddity", measure="correct", bounds=(-0.2, 0.2))
 
 
@@ -79,6 +82,12 @@ def people(study: Study, models: ModelSets, *, most: int, points: float = 0.0) -
     return people_of(planned_for(study, [most]), models, threshold="codec", planted=planted)
 
 
+def by_model(study: Study, *claims: Claim) -> Study:
+    """The study with enough people for the model of the participants, which decides."""
+    eight = {task: replace(plan, participants=8) for task, plan in study.tasks.items()}
+    return replace(study, tasks=eight, plan=Plan(claims=claims, rule="model"))
+
+
 def chance(table: pd.DataFrame, claim: str, texture: str, *, n: int, verdict: str) -> float:
     rows = table[(table["claim"] == claim) & (table["texture"] == texture)]
     (row,) = rows[(rows["n"] == n) & (rows["verdict"] == verdict)]["chance"]
@@ -97,6 +106,65 @@ def test_any_number_of_workers_gives_the_same_tables(study: Study, models: Model
         with working(work, rows, jobs=jobs) as done:
             found.append(dict(done))
     assert found[0] == found[1]
+
+
+def test_the_rule_of_the_plan_decides_with_any_number_of_workers(study: Study, models: ModelSets):
+    who = people(by_model(study, RATED, ODD), models, most=10)
+    tables = [
+        chances(who, (8, 10), simulations=4, seed=3, jobs=jobs, effort=BRIEF) for jobs in (1, 2)
+    ]
+    assert tables[0].equals(tables[1])
+    table = tables[0]
+    places = {ALL_TEXTURES, *TEXTURES, EVERY_TEXTURE, MEAN_ALONE}
+    for claim in (RATED, ODD):
+        of_claim = table[table["claim"] == claim.name]
+        assert set(of_claim["texture"]) == places
+        overall = of_claim[of_claim["texture"] == ALL_TEXTURES]
+        assert list(overall.groupby("n")["hits"].sum()) == [4, 4]
+    single = table[table["texture"].isin(TEXTURES) & (table["hits"] > 0)]
+    assert not {EQUIVALENT, WITHIN_BOUNDS} & set(single["verdict"])
+    alone = table[table["texture"] == MEAN_ALONE]
+    assert set(alone["verdict"]) == {EQUAL_ON_AVERAGE}
+
+
+def test_a_planted_difference_is_found_by_the_model(study: Study, models: ModelSets):
+    for points, found in ((0.0, {EQUIVALENT}), (-25.0, {"different"})):
+        who = people(by_model(study, RATED), models, most=16, points=points)
+        table = chances(
+            who, (16,), simulations=3, seed=1, jobs=1, effort=replace(BRIEF, warm_up=100, steps=100)
+        )
+        overall = table[table["texture"] == ALL_TEXTURES]
+        assert set(overall["verdict"][overall["hits"] >= 2]) == found
+
+
+def test_claims_are_sampled_together_as_they_are_planned(study: Study, models: ModelSets):
+    frequency = replace(RATED, name="frequency", measure="frequency_similarity")
+    tight = replace(RATED, name="tight", bounds=(-2.0, 2.0))
+    who = people(by_model(study, RATED, frequency, tight), models, most=10, points=-25.0)
+    rows = simulate_sessions(
+        who.study,
+        models=who.models,
+        perception=who.perception,
+        psychometrics=who.psychometrics,
+        seed=1,
+        tasks=who.tasks,
+    )
+    by_size = {n: responses_of(who, rows, n=n) for n in (8, 10)}
+    judged = judged_claims(by_size, rng=np.random.default_rng(2), effort=BRIEF)
+    means = {key: one.summary.mean for key, one in judged.items()}
+    assert set(means) == {(one, n) for one in (RATED.name, "frequency", "tight") for n in (8, 10)}
+    for n in (8, 10):
+        assert means[RATED.name, n] < -15 < means["frequency", n]
+        assert means["tight", n] == pytest.approx(means[RATED.name, n], abs=6)
+    none = replace(by_size[10], plan=replace(by_size[10].plan, rule="tests"))
+    assert judged_claims({10: none}, rng=np.random.default_rng(2)) == {}
+    # What is left out of the larger study leaves the answers of a smaller one.
+    first, small = (people_data(by_size[n], by_size[n].plan.claims[0]) for n in (10, 8))
+    assert first is not None
+    assert small is not None
+    np.testing.assert_array_equal(first.studies.values[:, :8], small.studies.values)
+    np.testing.assert_array_equal(first.studies.trends[:, :, :8], small.studies.trends)
+    np.testing.assert_array_equal(first.studies.anchors[:, :8], small.studies.anchors)
 
 
 def test_a_first_answer_comes_before_all_simulations_are_done(
@@ -246,6 +314,9 @@ def test_what_cannot_be_planned_is_refused(study: Study, models: ModelSets):
     by_day = {**study.tasks, "absolute": TaskPlan(participants=4, schedule="by-day")}
     with refused(InputError, expected=["even", "by-day", "[absolute]"], got=7):
         planned_for(replace(study, tasks=by_day), [4, 7])
+    rule = replace(study, plan=Plan(claims=(RATED,), rule="model"), tasks=by_model(study).tasks)
+    with refused(ValueError, expected=[8, "participants", "model"], got=[6, "--subjects"]):
+        planned_for(rule, [6, 12])
     with refused(InputError, expected=["magnitude_similarity", "canvas"], got=200.0):
         people(study, models, most=4, points=200.0)
     trays = {"silk": "A", "PVC": "B"}

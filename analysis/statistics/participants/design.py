@@ -6,13 +6,34 @@ docs/method/participants.md#data
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
 from modeling.arrays import Floats, Integers
-from modeling.participants.choices import ChoiceStudies
+from modeling.participants.choices import ChoiceStudies, DecisionModel
 from modeling.participants.ratings import RatingStudies
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PeopleData:
+    """The answers about one claim as the model of the participants takes them.
+
+    Parameters
+    ----------
+    studies : RatingStudies or ChoiceStudies
+        One study.
+    model : DecisionModel, optional
+        Of choices.
+    people, textures : sequence of str
+        In the order of the arrays.
+    """
+
+    studies: RatingStudies | ChoiceStudies
+    model: DecisionModel | None
+    people: Sequence[str]
+    textures: Sequence[str]
 
 
 def rating_studies(
@@ -96,6 +117,20 @@ def first_people(
                 one[size:] = nothing
         changed[name] = tiled
     return type(studies)(**changed)
+
+
+def side_by_side(
+    studies: Sequence[RatingStudies | ChoiceStudies],
+) -> RatingStudies | ChoiceStudies:
+    """Studies of one kind and shape as those of one object, in their order."""
+    return type(studies[0])(
+        **{
+            name: np.concatenate(
+                [getattr(one, name) for one in studies], axis=1 if name == "trends" else 0
+            )
+            for name in vars(studies[0])
+        }
+    )
 
 
 def _cells(

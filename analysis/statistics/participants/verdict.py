@@ -23,7 +23,7 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     Bounds,
 )
-from analysis.statistics.participants.design import first_people
+from analysis.statistics.participants.design import PeopleData, first_people, side_by_side
 from analysis.statistics.participants.posterior import (
     Draws,
     Effort,
@@ -37,6 +37,7 @@ from modeling.participants.ratings import RatingPriors, RatingStudies
 
 FEWEST = 8  # participants
 DOUBLED_CHAINS = 4  # of the posterior with doubled priors
+SHORT = Effort(chains=4, warm_up=150, steps=200, every=2)  # where verdicts of studies are counted
 MINORITY = 0.5  # a share of people below it feels a difference that the mean may not show
 
 PEOPLE_COLUMNS = (
@@ -120,27 +121,39 @@ class PeopleSummary:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class PeopleFound:
-    """The model of the participants applied to one claim.
+class PeopleJudged:
+    """What the verdicts on one claim rest on: all textures, and each.
 
     Parameters
     ----------
     summary : PeopleSummary
+    textures : DataFrame
+        `TEXTURE_COLUMNS`; p values are posterior probabilities: twice that of the less likely sign,
+        and the larger one of lying beyond a bound.
+    """
+
+    summary: PeopleSummary
+    textures: pd.DataFrame
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PeopleFound(PeopleJudged):
+    """The model of the participants applied to one claim.
+
+    Parameters
+    ----------
+    summary, textures
+        As in `PeopleJudged`.
     doubled : PeopleSummary
         With the SDs of all priors twice as large.
     people : DataFrame
         `PEOPLE_COLUMNS` without the claim.
-    textures : DataFrame
-        `TEXTURE_COLUMNS`; p values are posterior probabilities: twice that of the less likely sign,
-        and the larger one of lying beyond a bound.
     lapses : float
         Share of lapsed trials of people who attend (posterior mean).
     """
 
-    summary: PeopleSummary
     doubled: PeopleSummary
     people: pd.DataFrame
-    textures: pd.DataFrame
     lapses: float
 
 
@@ -190,6 +203,42 @@ def summaries_by_size(
     parts = first_people(studies, sizes)
     found = _sampler(parts, bounds, model=model, rng=rng)(effort=replace(Effort(), chains=4))
     return [summary_of(draws) for draws in found]
+
+
+def judged_by_size(
+    data: Sequence[PeopleData],
+    bounds: Bounds,
+    *,
+    sizes: Sequence[int],
+    rng: np.random.Generator,
+    effort: Effort | None = None,
+) -> list[list[PeopleJudged]]:
+    """As `summaries_by_size`, of several claims side by side, and with textures.
+
+    Parameters
+    ----------
+    data : sequence of PeopleData
+        Of each claim; all of the same shape, with the same decision model.
+    bounds : (float, float)
+        Of all of them.
+    sizes : sequence of int
+    rng : Generator
+    effort : Effort, optional
+        `SHORT` without it.
+
+    Returns
+    -------
+    list of list of PeopleJudged
+        Of each claim, by size.
+    """
+    parts = side_by_side([first_people(one.studies, sizes) for one in data])
+    draws = iter(_sampler(parts, bounds, model=data[0].model, rng=rng)(effort=effort or SHORT))
+    return [[_judged(next(draws), bounds, textures=one.textures) for _ in sizes] for one in data]
+
+
+def _judged(draws: Draws, bounds: Bounds, *, textures: Sequence[str]) -> PeopleJudged:
+    table = _texture_table(draws, bounds, textures=textures)
+    return PeopleJudged(summary=summary_of(draws), textures=table)
 
 
 def _sampler(

@@ -18,12 +18,23 @@ from analysis.statistics.claims import (
     Values,
     all_equivalent,
     claim_tests,
+    with_people,
 )
-from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE
+from analysis.statistics.equivalence import (
+    AVERAGE_FELT,
+    DIFFERENT,
+    EQUAL_ON_AVERAGE,
+    EQUIVALENT,
+    FELT,
+    INCONCLUSIVE,
+)
+from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
 from analysis.statistics.power import (
     EVERY_TEXTURE,
+    MEAN_ALONE,
     NO_VERDICT,
     Verdict,
+    people_verdicts,
     power_sentences,
     power_table,
     verdicts,
@@ -83,6 +94,63 @@ def test_verdicts_are_those_of_the_report(
     assert told(values, standing, n=10) == known
 
 
+def found_of(rng: np.random.Generator, *, textures: int) -> PeopleFound:
+    """Any posterior in short."""
+    mean, half = rng.normal(0, 5), rng.uniform(0.5, 6)
+    share, most = sorted(rng.uniform(0, 0.3, 2))
+    summary = PeopleSummary(
+        mean=mean,
+        mean_low=mean - 1.2 * half,
+        mean_high=mean + 1.2 * half,
+        mean90_low=mean - half,
+        mean90_high=mean + half,
+        share=share,
+        share_low=0.0,
+        share_high=1.1 * most,
+        share_most=most,
+        somebody=float(rng.choice([0.2, 0.97])),
+        r_hat=1.0,
+    )
+    table = pd.DataFrame(
+        {
+            "texture": [f"t{number}" for number in range(textures)],
+            **dict.fromkeys(("mean", "ci_low", "ci_high"), 0.0),
+            "p_difference": rng.choice([0.001, 0.02, 0.5], textures),
+            "p_equivalence": rng.choice([0.001, 0.01, 0.3], textures, p=[0.6, 0.3, 0.1]),
+        }
+    )
+    return PeopleFound(
+        summary=summary, textures=table, doubled=summary, people=pd.DataFrame(), lapses=0.0
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    sensitivity=st.sampled_from([SHOWN, SHOWN, NOT_TESTED]),
+    at_end=st.sampled_from([0.0, 0.5]),
+)
+def test_verdicts_on_people_are_those_of_the_report(seed: int, sensitivity: str, at_end: float):
+    rng = np.random.default_rng(seed)
+    values = Values(table=table_of(rng.normal(0, 3, (4, 8))), share_at_ends={"t0": at_end})
+    standing = Standing(identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity)
+    found = found_of(rng, textures=3)
+    tests = claim_tests(CLAIM, values, standing=standing, rng=rng)
+    table = with_people(tests, found, CLAIM, standing=standing, few=0.15)
+    compared = table[table["texture"] != "t3"]
+    known = dict(zip(compared["texture"], compared["verdict"], strict=True))
+    known[EVERY_TEXTURE] = EQUIVALENT if all_equivalent(table) else INCONCLUSIVE
+    told = {
+        one.texture: one.verdict
+        for one in people_verdicts(
+            CLAIM, found, n=8, shares=values.share_at_ends, standing=standing, few=0.15
+        )
+    }
+    inside = EQUAL_ON_AVERAGE if sensitivity == SHOWN else WITHHELD
+    mean = inside if found.summary.inside((-7.5, 7.5)) else INCONCLUSIVE
+    assert told == known | {MEAN_ALONE: mean}
+
+
 def test_what_says_nothing_is_counted_as_no_verdict():
     nobody = table_of(np.full((2, 3), np.nan))
     found = told(Values(table=nobody), Standing(), n=3)
@@ -139,6 +207,52 @@ def test_chances_are_counted_with_every_verdict_at_every_n():
         (20, INCONCLUSIVE, 2),
     ]
     assert ((table["ci_low"] <= table["chance"]) & (table["chance"] <= table["ci_high"])).all()
+
+
+def people_rows(
+    n: int, words: dict[str, int], *, inside: int, simulations: int = 10
+) -> list[Verdict]:
+    """Verdicts under the model: over all textures, and how often the mean lay inside."""
+    found = [
+        Verdict("same", ALL_TEXTURES, n, word)
+        for word, times in words.items()
+        for _ in range(times)
+    ]
+    equal, rest = [EQUAL_ON_AVERAGE] * inside, [INCONCLUSIVE] * (simulations - inside)
+    return [*found, *(Verdict("same", MEAN_ALONE, n, word) for word in equal + rest)]
+
+
+def test_of_people_the_summary_tells_the_mean_alone_and_studies_that_are_too_small():
+    small = people_rows(8, {EQUIVALENT: 1, INCONCLUSIVE: 9}, inside=9)
+    large = people_rows(24, {EQUIVALENT: 8, AVERAGE_FELT: 2}, inside=10)
+    (line,) = power_sentences(power_table(small + large, simulations=10), claims=[CLAIM])
+    assert line == (
+        "same: simulated: 24 participants: equivalent 0.80 (0.44–0.97), equal on average, felt by "
+        "some 0.20 (0.03–0.56), inconclusive 0.00 (0.00–0.31); mean alone inside the bounds 1.00 "
+        "(0.69–1.00)"
+    )
+    (line,) = power_sentences(power_table(small, simulations=10), claims=[CLAIM])
+    assert line.endswith(
+        "mean alone inside the bounds 0.90 (0.55–1.00); equivalent with 80% is not reached, the "
+        "study is too small to count people outside the bounds"
+    )
+    felt = people_rows(48, {FELT: 7, INCONCLUSIVE: 3}, inside=9)
+    (line,) = power_sentences(power_table(felt, simulations=10), claims=[CLAIM])
+    assert line.endswith("equivalent with 80% is not reached")
+
+
+def test_single_textures_of_people_are_equal_on_average():
+    one = [Verdict("same", "canvas", 8, INCONCLUSIVE)] * 10
+    every = [Verdict("same", EVERY_TEXTURE, 8, INCONCLUSIVE)] * 10
+    small = people_rows(8, {INCONCLUSIVE: 10}, inside=2)
+    table = power_table(small + one + every, simulations=10)
+    listed = {place: list(rows["verdict"]) for place, rows in table.groupby("texture")}
+    assert listed == {
+        ALL_TEXTURES: [EQUIVALENT, INCONCLUSIVE],
+        MEAN_ALONE: [EQUAL_ON_AVERAGE],
+        "canvas": [EQUAL_ON_AVERAGE, INCONCLUSIVE],
+        EVERY_TEXTURE: [EQUIVALENT],
+    }
 
 
 def test_the_summary_names_the_fewest_people_with_enough_power():
