@@ -191,20 +191,6 @@ def people_found(
     )
 
 
-def summaries_by_size(
-    studies: RatingStudies | ChoiceStudies,
-    bounds: Bounds,
-    *,
-    model: DecisionModel | None,
-    sizes: Sequence[int],
-    rng: np.random.Generator,
-) -> list[PeopleSummary]:
-    """What a study of the first people alone would say, for each number of them, side by side."""
-    parts = first_people(studies, sizes)
-    found = _sampler(parts, bounds, model=model, rng=rng)(effort=replace(Effort(), chains=4))
-    return [summary_of(draws) for draws in found]
-
-
 def judged_by_size(
     data: Sequence[PeopleData],
     bounds: Bounds,
@@ -213,7 +199,7 @@ def judged_by_size(
     rng: np.random.Generator,
     effort: Effort | None = None,
 ) -> list[list[PeopleJudged]]:
-    """As `summaries_by_size`, of several claims side by side, and with textures.
+    """What studies of the first people alone would say of several claims, all side by side.
 
     Parameters
     ----------
