@@ -66,9 +66,12 @@ class MixtureOfEffects:
         distance = (estimates[..., None] - self.means[:, None]) ** 2 / own[..., None]
         log = -0.5 * (distance - distance.min(axis=-1, keepdims=True))
         likely = np.where(who[..., None], np.exp(log), 1.0)
-        places = self.places = drawn_places(likely * self.weights[:, None], rng)
+        places = drawn_places(likely * self.weights[:, None], rng)
         members = (places[..., None] == np.arange(COMPONENTS)) & who[..., None]
         self.weights = drawn_weights(self._priors.weight + members.sum(axis=1), rng)
+        # The others have no part in the new weights, and so are placed by these, not the old ones.
+        anew = np.broadcast_to(self.weights[:, None], members.shape)
+        self.places = places = np.where(who, places, drawn_places(anew, rng))
         at = np.take_along_axis(self.means, places, axis=1)
         self._index = self._drawn_spread((estimates - at) ** 2, variances, who)
         own = variances + self.spread[:, None] ** 2
