@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import pandas as pd
+
 from analysis.report.page import Fold, Table
 from analysis.report.section_validation import validation_section
 from analysis.statistics.validation import cells, simulate_cell, validation_table
+from analysis.statistics.validation_model import MODEL_COLUMNS
+from analysis.statistics.validation_ranks import RANK_COLUMNS
+
+# What the model of the participants said, and its ranks: two rows, one of which misses an aim.
+OF_MODEL = pd.DataFrame(
+    [["base 60", ""], ["base 90", "coverage"]], columns=["situation", "missed"]
+).reindex(columns=[column.name for column in MODEL_COLUMNS])
+RANKS = pd.DataFrame(columns=[column.name for column in RANK_COLUMNS])
 
 
 def test_what_does_not_hold_stands_on_top_and_everything_below():
@@ -13,8 +23,11 @@ def test_what_does_not_hold_stands_on_top_and_everything_below():
         for one in cells(["TOST, no guard on ends"], sizes=[20, 36])
     ]
     table = validation_table(rows)
-    section = validation_section(table)
-    apart, fold = section.items
+    section = validation_section(table, OF_MODEL, RANKS)
+    apart, fold, model, ranks = section.items
+    assert model.frame is OF_MODEL
+    assert ranks.frame is RANKS
+    assert "1 of 2 rows" in section.done[0]
     assert isinstance(apart, Table)
     assert isinstance(fold, Fold)
     assert apart.frame.to_dict("records") == [
@@ -40,5 +53,5 @@ def test_what_does_not_hold_stands_on_top_and_everything_below():
 def test_a_table_in_which_all_hold_is_no_error():
     rows = [simulate_cell(one, simulations=1, seed=2) for one in cells(["TOST"], sizes=[8])]
     table = validation_table(rows).assign(within="yes", meaning="")
-    apart, _ = validation_section(table).items
+    apart, *_ = validation_section(table, OF_MODEL, RANKS).items
     assert apart.frame.empty
