@@ -20,12 +20,11 @@ from analysis.figures.drawing import (
     stamp_if_simulated,
 )
 from analysis.labels import unit_of
-from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
+from analysis.statistics.participants.verdict import LIKELY, PeopleFound, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Bools
 from modeling.files.answer_tables import ANSWER_TABLES
 
-LIKELY = 0.5  # probability above which somebody is drawn as outside, or as careless
 INSIDE, OUTSIDE, CARELESS = ("o", BLUE), ("D", VERMILLION), ("s", GREY)
 MOST_TICKS = 40  # participants whose names still fit below the axis
 MOST_NAMED = 6

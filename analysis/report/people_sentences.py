@@ -20,12 +20,11 @@ from analysis.statistics.equivalence import (
     INCONCLUSIVE,
     WITHIN_BOUNDS,
 )
-from analysis.statistics.participants.verdict import PeopleFound
+from analysis.statistics.participants.verdict import LIKELY, PeopleFound
 from analysis.statistics.verdicts import ClaimFound
 from modeling.errors import counted
 
 Row = Mapping[Hashable, Any]
-LIKELY = 0.5  # probability above which somebody is said to be careless, or to feel it
 HIGHEST_R_HAT = 1.05
 WORTH_A_WORD = 0.05  # share of lapsed trials, or of ratings at an end, that may part two verdicts
 MOST_NAMED = 6

@@ -103,14 +103,18 @@ def choice_studies(
     )
 
 
+def axis_of_studies(name: str) -> int:
+    """The axis of the studies in the arrays of this name, of `RatingStudies` or `ChoiceStudies`."""
+    return 1 if name == "trends" else 0
+
+
 def first_people(
     studies: RatingStudies | ChoiceStudies, sizes: Sequence[int]
 ) -> RatingStudies | ChoiceStudies:
     """Studies of the first people of one study alone, one for each size."""
     changed = {}
     for name, values in vars(studies).items():
-        axis = 1 if name == "trends" else 0
-        tiled = np.repeat(values, len(sizes), axis=axis)
+        tiled = np.repeat(values, len(sizes), axis=axis_of_studies(name))
         if name != "trends":
             nothing = np.nan if isinstance(studies, RatingStudies) else 0.0
             for one, size in zip(tiled, sizes, strict=True):
@@ -126,7 +130,7 @@ def side_by_side(
     return type(studies[0])(
         **{
             name: np.concatenate(
-                [getattr(one, name) for one in studies], axis=1 if name == "trends" else 0
+                [getattr(one, name) for one in studies], axis=axis_of_studies(name)
             )
             for name in vars(studies[0])
         }
@@ -154,7 +158,7 @@ def _cells(
 
 
 def _in_order(answers: pd.DataFrame) -> pd.DataFrame:
-    """As they were given."""
+    """Answers by session and trial."""
     return answers.sort_values(["session", "trial"], kind="stable")
 
 

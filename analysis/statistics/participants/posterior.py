@@ -5,12 +5,13 @@ docs/method/participants.md
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from analysis.statistics.participants.choices import ChoiceSampler
+from analysis.statistics.participants.design import axis_of_studies
 from analysis.statistics.participants.ratings import RatingSampler
 from modeling.arrays import Bools, Floats
 from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
@@ -128,8 +129,10 @@ def choice_draws(
 
 def _tiled(studies: Studies, chains: int) -> Studies:
     """Each study once for every chain, chains of a study beside each other."""
-    axes = {one.name: int(one.name == "trends") for one in fields(studies)}
-    repeated = {n: np.repeat(getattr(studies, n), chains, axis=axis) for n, axis in axes.items()}
+    repeated = {
+        name: np.repeat(values, chains, axis=axis_of_studies(name))
+        for name, values in vars(studies).items()
+    }
     return type(studies)(**repeated)
 
 

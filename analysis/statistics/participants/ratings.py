@@ -55,8 +55,7 @@ class RatingSampler:
         self._varying = [c for c, one in enumerate(studies.trends) if np.ptp(one) > 0]
         b, n, t, _, _ = studies.values.shape
         # Who is there at all; the others follow the priors and change nothing.
-        shown = self._main.counts.sum(axis=(2, 3, 4)) + self._anchors.counts.sum(axis=2)
-        self.people: Bools = shown > 0
+        self.people: Bools = self._main.of_people + self._anchors.of_people > 0
         self._mixture = MixtureOfEffects(priors.effects, b, rng=rng)
         self._level = np.full(b, priors.level[0])
         self._person = self._main.means(self._level)
@@ -174,7 +173,7 @@ class RatingSampler:
 
     def _draw_effects(self) -> None:
         counts = self._main.counts
-        precision = 0.25 * _summed(counts, keep=2) / self._variance
+        precision = 0.25 * self._main.of_people / self._variance
         left = _summed(counts * self._rest, keep=4)
         total = _summed(left * _HALVES[:, 0], keep=2) / self._variance + precision * self.effects
         known = precision > 0
@@ -193,8 +192,8 @@ class RatingSampler:
     def _draw_levels(self) -> None:
         counts, old = self._main.counts, self._person
         own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
-        answers = _summed(counts, keep=2)
-        count = answers + self._anchors.counts.sum(axis=2)
+        answers = self._main.of_people
+        count = answers + self._anchors.of_people
         total = _summed(counts * self._rest, keep=2) + answers * old
         total += (self._anchors.counts * (self._anchors.latent - own)).sum(axis=2)
         prior = 1 / self._person_variance[:, None]
@@ -292,7 +291,7 @@ class RatingSampler:
         own = self.attends[..., None] * (self._anchor[:, None] + self._own_anchor)
         rest = self._anchors.latent - self._person[..., None] - own
         squares += (self._anchors.counts * rest**2).sum(axis=2)
-        count = _summed(self._main.counts, keep=2) + self._anchors.counts.sum(axis=2)
+        count = self._main.of_people + self._anchors.of_people
         half = self._priors.rating_df / 2
         shape = np.where(self.attends, half, 1.0) + count / 2
         scale = np.where(self.attends, half * self._typical[:, None], self._priors.careless_scale)
@@ -332,16 +331,17 @@ class RatingSampler:
 class _Answers:
     """Ratings with the latent judgements behind them, and which of them lapsed.
 
-    `counts` is 1 where a judgement counts, 0 where the trial lapsed or was not answered.
+    `counts` is 1 where a judgement counts, 0 where the trial lapsed or was not answered;
+    `of_people` is how many of each person's count.
     """
 
     def __init__(self, values: Floats) -> None:
         self.answered: Bools = np.isfinite(values)
         self.latent = np.where(self.answered, values, 0.0)
         self.counts = self.answered.astype(float)
+        self.of_people = _summed(self.counts, keep=2)
         self._values = self.latent.copy()
         self._known = self.counts.copy()
-        self._unanswered = ~self.answered
         low = self.answered & (values <= LOWEST)
         high = self.answered & (values >= HIGHEST)
         self._low, self._high = np.nonzero(low), np.nonzero(high)
@@ -376,6 +376,7 @@ class _Answers:
         blind = rate * self._lapse
         kept = rng.random(likelihood.shape) * ((1 - rate) * likelihood + blind) >= blind
         self.counts = kept * self._known
+        self.of_people = _summed(self.counts, keep=2)
 
     def draw_latent(self, middle: Floats, sd: Floats, rng: np.random.Generator) -> None:
         """Judgements beyond an end of the scale, where a rating lies at it."""

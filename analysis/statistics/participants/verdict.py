@@ -36,6 +36,7 @@ from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionM
 from modeling.participants.ratings import RatingPriors, RatingStudies
 
 FEWEST = 8  # participants
+LIKELY = 0.5  # probability above which somebody is said to be outside the bounds, or careless
 DOUBLED_CHAINS = 4  # of the posterior with doubled priors
 SHORT = Effort(chains=4, warm_up=150, steps=200, every=2)  # where verdicts of studies are counted
 MINORITY = 0.5  # a share of people below it feels a difference that the mean may not show
