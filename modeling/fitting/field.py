@@ -12,12 +12,11 @@ a record are part of the field, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
+from modeling.arrays import Floats
 from modeling.estimation.coherent import (
     FIRST_DAMPING,
     HOPELESS_DAMPING,
@@ -28,6 +27,8 @@ from modeling.estimation.coherent import (
     Slopes,
     slopes,
 )
+from modeling.fitting.blending import Middles
+from modeling.fitting.equations import Blocks, Corners, band_of, rows_of, solve_blocks
 
 # What differences between neighbours are expected to be, beside their trend, before anything is
 # known: a sixth in each parameter, and 3 dB more in the level of all gains together. It counts as
@@ -60,6 +61,10 @@ class Field:
         trend gives.
     trend : (2, p) ndarray
         Change of each parameter per unit of log speed and log force: powers of speed and force.
+    records : Corners
+        Where the records lie in the lattice.
+    middles : Middles, optional
+        The middles of the cells, where the blended response is looked at.
     """
 
     rows: int
@@ -67,6 +72,8 @@ class Field:
     places: Floats
     precision: Floats
     trend: Floats
+    records: Corners
+    middles: Middles | None = None
 
     def pull(self, theta: Floats) -> Floats:
         """Gradient (C, p) of the penalty ½·Σ over neighbours of Δ'·precision·Δ."""
@@ -108,6 +115,12 @@ class Field:
         predicted: Floats = theta - self.laplacian(rest) / neighbours
         return predicted
 
+    def blocks(self) -> Blocks:
+        """The penalty's second derivatives."""
+        own = self.neighbours()[:, None, None] * self.precision
+        beside = np.broadcast_to(-self.precision, own.shape)
+        return Blocks(own, across=beside, down=beside)
+
     @property
     def degrees(self) -> int:
         """Differences that are independent of each other: the conditions less one."""
@@ -133,14 +146,16 @@ def _degrees(rows: int, columns: int) -> Floats:
 
 
 class FieldFit(NamedTuple):
-    """The field's maximum: parameters (C, p) and what `slopes` says there.
+    """The field's maximum: parameters (N, p) of the nodes and what `slopes` says of the records.
 
-    `value` is the objective with the field's penalty, `field` has the trend of the parameters.
+    `value` is the objective with the penalties, `information` that of the records and of the
+    middles of the cells on the nodes, `field` has the trend of the parameters.
     """
 
     theta: Floats
     slopes: Slopes
     value: float
+    information: Blocks
     field: Field
 
 
@@ -154,19 +169,19 @@ def fit_field(
     steps: int = 20,
     enough: float = 0.3,
 ) -> FieldFit:
-    """All conditions at once to the greatest penalised likelihood near a start.
+    """All nodes at once to the greatest penalised likelihood near a start.
 
-    No condition stays worse than its neighbours predict it: such a one converged to a poor maximum,
-    and is started again from their prediction.
+    No record stays worse than the neighbours of its nodes predict it: such nodes converged to a
+    poor maximum, and are started again from their prediction.
 
     Parameters
     ----------
-    theta : (C, p) ndarray
+    theta : (N, p) ndarray
         The start.
     signs : (m,) ndarray, optional
         One sign per layer for the whole texture; without them layers are independent.
     observed : Observed
-        One row per condition of the grid; those without a record have no weight.
+        One row per record; rows without any have no weight.
     field : Field
     limits : pair of (p,) ndarray
     steps, enough
@@ -175,7 +190,8 @@ def fit_field(
     fit = _climb_field(theta, signs, observed, field, limits=limits, steps=steps, enough=enough)
     for _ in range(RESTART_ROUNDS):
         predicted = np.clip(fit.field.predicted(fit.theta), *limits)
-        poor = slopes(predicted, signs, observed).objective < fit.slopes.objective - enough
+        there = slopes(field.records.blended(predicted), signs, observed).objective
+        poor = field.records.touched(there < fit.slopes.objective - enough)
         if not poor.any():
             break
         start = np.where(poor[:, None], predicted, fit.theta)
@@ -186,6 +202,27 @@ def fit_field(
             break
         fit = again
     return fit
+
+
+class _There(NamedTuple):
+    """What is known at one set of parameters: the records' slopes, and the cost of the middles."""
+
+    records: Slopes
+    cost: float
+    information: Blocks
+    score: Floats
+
+
+def _looked_at(theta: Floats, signs: Floats | None, observed: Observed, field: Field) -> _There:
+    at = field.records.blended(theta)
+    found = slopes(at, signs, observed)
+    information = field.records.coupled(found.information)
+    score, cost = field.records.gathered(found.score), float(found.objective.sum())
+    if field.middles is not None and signs is not None and signs.size:
+        held = field.middles.held(theta, signs)
+        cost, score = cost + held.cost, score + held.score
+        information = information.plus(held.information)
+    return _There(found, cost, information, score)
 
 
 def _climb_field(
@@ -203,19 +240,16 @@ def _climb_field(
     theta = np.clip(theta, low, high)
     damping = FIRST_DAMPING
     field = field.following(theta)
-    now = slopes(theta, signs, observed)
-    value = float(now.objective.sum()) + field.penalty(theta)
+    now = _looked_at(theta, signs, observed, field)
+    value = now.cost + field.penalty(theta)
     for _ in range(steps):
-        diagonal = np.einsum("cpp->cp", now.information)
-        blocks = now.information.copy()
-        np.einsum("cpp->cp", blocks)[...] += damping * diagonal + RIDGE
-        step = solve(field, blocks, now.score - field.pull(theta))
+        step = solve(field, _damped(now.information, damping), now.score - field.pull(theta))
         tried = np.clip(theta + np.clip(step, -LONGEST_STEP, LONGEST_STEP), low, high)
-        there = slopes(tried, signs, observed)
-        value_there = float(there.objective.sum()) + field.penalty(tried)
+        there = _looked_at(tried, signs, observed, field)
+        value_there = there.cost + field.penalty(tried)
         if value_there < value:
             field = field.following(tried)
-            value_there = float(there.objective.sum()) + field.penalty(tried)
+            value_there = there.cost + field.penalty(tried)
             gained = value - value_there
             theta, now, value = tried, there, value_there
             damping = max(damping / 10, LEAST_DAMPING)
@@ -225,62 +259,19 @@ def _climb_field(
             break
         else:
             damping *= 10
-    return FieldFit(theta, now, value, field)
+    return FieldFit(theta, now.records, value, now.information, field)
 
 
-def solve(field: Field, blocks: Floats, right: Floats) -> Floats:
-    """x (C, p) of (blocks + field's penalty)·x = right, by banded Cholesky factorisation.
-
-    Parameters
-    ----------
-    blocks : (C, p, p) ndarray
-        Symmetric, one per condition.
-    right : (C, p) ndarray
-    """
-    from scipy.linalg import solveh_banded
-
-    band = _band(field, blocks)
-    solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, check_finite=False)
-    return np.asarray(solution, dtype=np.float64).reshape(right.shape)
+def _damped(information: Blocks, damping: float) -> Blocks:
+    own = information.own.copy()
+    diagonal = np.einsum("cpp->cp", own)  # a view
+    diagonal += damping * diagonal + RIDGE
+    return information._replace(own=own)
 
 
-def _band(field: Field, blocks: Floats) -> Floats:
-    """Lower band of blocks + field's penalty, as SciPy's banded solvers read it."""
-    count, p = blocks.shape[:2]
-    places = _band_places(field.rows, field.columns, p)
-    band = np.zeros((field.columns + 1) * p * count * p)
-    diagonal = blocks + field.neighbours()[:, None, None] * field.precision
-    band[places.diagonal] = diagonal.reshape(count, -1)[:, places.lower]
-    for coupled in places.coupled:
-        band[coupled] = -field.precision.ravel()
-    return band.reshape(-1, count * p)[: count * p]
-
-
-class _BandPlaces(NamedTuple):
-    """Positions of blocks and couplings of neighbours in the band, row by row.
-
-    `lower` (t,) are the places of a block's lower triangle in the block, `diagonal` (C, t) those in
-    the band; `coupled` those of whole blocks that join neighbours in a row, and in a column.
-    """
-
-    lower: Integers
-    diagonal: Integers
-    coupled: tuple[Integers, Integers]
-
-
-@lru_cache(maxsize=64)
-def _band_places(rows: int, columns: int, p: int) -> _BandPlaces:
-    grid = np.arange(rows * columns).reshape(rows, columns)
-    starts, width = grid * p, grid.size * p
-    row, column = np.tril_indices(p)
-    diagonal = (row - column) * width + starts.reshape(-1, 1) + column
-    across, down = (index.ravel() for index in np.indices((p, p)))
-
-    def joined(first: Integers, far: int) -> Integers:
-        return (far * p + across - down) * width + first.reshape(-1, 1) + down
-
-    coupled = (joined(starts[:, :-1], 1), joined(starts[:-1], columns))
-    return _BandPlaces(row * p + column, diagonal, coupled)
+def solve(field: Field, information: Blocks, right: Floats) -> Floats:
+    """x (N, p) of (information + field's penalty)·x = right (N, p)."""
+    return solve_blocks(information.plus(field.blocks()), right, columns=field.columns)
 
 
 def log_evidence(fit: FieldFit) -> float:
@@ -293,8 +284,9 @@ def log_evidence(fit: FieldFit) -> float:
     from scipy.linalg import cholesky_banded
 
     field, p = fit.field, fit.theta.shape[1]
-    blocks = fit.slopes.information + FAINTEST * np.eye(p)
-    factor = cholesky_banded(_band(field, blocks), lower=True, check_finite=False)
+    matrix = _with_faintest(fit.information).plus(field.blocks())
+    band = band_of(matrix, columns=field.columns)
+    factor = cholesky_banded(band, lower=True, check_finite=False)
     expected = field.degrees * np.linalg.slogdet(field.precision)[1] + p * np.log(FAINTEST)
     return -fit.value + 0.5 * float(expected) - float(np.log(factor[0]).sum())
 
@@ -309,34 +301,33 @@ class Covariances(NamedTuple):
     differences: Floats
 
 
-def covariances(field: Field, blocks: Floats) -> Covariances:
-    """Blocks of the inverse of (blocks + field's penalty) that neighbours need.
+def _with_faintest(information: Blocks) -> Blocks:
+    own = information.own + FAINTEST * np.eye(information.own.shape[1])
+    return information._replace(own=own)
 
-    The matrix is block tridiagonal in the rows of the grid, so the wanted part of its inverse
+
+def covariances(field: Field, information: Blocks) -> Covariances:
+    """Blocks of the inverse of (information + field's penalty) that neighbours need.
+
+    The matrix is block tridiagonal in the rows of the lattice, so the wanted part of its inverse
     comes from one sweep down and one up (Takahashi, Fagan and Chin 1973).
     """
-    count, p = blocks.shape[:2]
+    count, p = information.own.shape[:2]
     size = field.columns * p
-    identity = np.eye(field.columns)
-    down = np.kron(identity, field.precision)  # minus the block that joins two rows
-    pivots = []
+    matrix = _with_faintest(information).plus(field.blocks())
+    pivots: list[tuple[Floats, Floats]] = []
     before = np.zeros((size, size))
-    inner = _within_row(field)
-    for row in range(field.rows):
-        own = inner[row]
-        for column in range(field.columns):
-            at = slice(column * p, (column + 1) * p)
-            own[at, at] += blocks[row * field.columns + column] + FAINTEST * np.eye(p)
+    for own, after in rows_of(matrix, columns=field.columns):
         inverse = np.linalg.inv(own - before)
-        pivots.append(inverse)
-        before = down @ inverse @ down
+        pivots.append((inverse, after))
+        before = after.T @ inverse @ after
     each = np.empty((count, p, p))
     differences = np.zeros((p, p))
     below: Floats | None = None
     for row in reversed(range(field.rows)):
-        here = pivots[row]
+        here, after = pivots[row]
         if below is not None:
-            gain = here @ down
+            gain = -here @ after
             cross = gain @ below
             here = here + cross @ gain.T
             between = _of_blocks(cross, p)
@@ -350,13 +341,6 @@ def covariances(field: Field, blocks: Floats) -> Covariances:
             differences -= here[left, other] + here[other, left]
         below = here
     return Covariances(each, differences)
-
-
-def _within_row(field: Field) -> Floats:
-    """The penalty's diagonal blocks, one per row of the grid: (rows, columns·p, columns·p)."""
-    degrees = _degrees(field.rows, field.columns)
-    joined = np.eye(field.columns, k=1) + np.eye(field.columns, k=-1)
-    return np.array([np.kron(np.diag(d) - joined, field.precision) for d in degrees])
 
 
 def _of_blocks(matrix: Floats, p: int) -> Floats:
@@ -375,7 +359,18 @@ def updated_precision(fit: FieldFit) -> Floats:
     p, field = fit.theta.shape[1], fit.field
     rest = fit.theta - field.places @ field.trend
     scatter = rest.T @ field.laplacian(rest)
-    scatter += covariances(field, fit.slopes.information).differences
+    scatter += covariances(field, fit.information).differences
     count = p + 1
     expected = (count * prior_covariance((p - 1) // 3) + scatter) / (count + field.degrees)
     return np.asarray(np.linalg.inv((expected + expected.T) / 2))
+
+
+def effective_parameters(fit: FieldFit) -> float:
+    """How many parameters the records determine: the trace of the share of information that is theirs.
+
+    The neighbours determine the rest (MacKay 1992).
+    """
+    after = covariances(fit.field, fit.information)
+    by_neighbours = float(np.sum(fit.field.precision * after.differences))
+    by_neighbours += FAINTEST * float(np.einsum("cpp->", after.conditions))
+    return fit.theta.size - by_neighbours

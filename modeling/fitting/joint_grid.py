@@ -25,29 +25,26 @@ from modeling.estimation.coherent import (
 from modeling.estimation.joint import NEPER_DB
 from modeling.estimation.layers import Layers
 from modeling.estimation.likelihood import split
+from modeling.fitting.equations import Blocks
 from modeling.fitting.field import (
     Covariances,
     covariances,
-    prior_covariance,
     solve,
-    updated_precision,
 )
-from modeling.fitting.growth import expected_on_lines
 from modeling.fitting.layer_search import (
     LEAST_GAIN,
     Solution,
     completed,
     fitted,
-    hidden,
     in_frequency_order,
+    learned,
     search,
 )
 from modeling.fitting.texture_grid import TextureGrid, texture_grid
 from modeling.models.grid import Condition
 from modeling.recordings.spectrum import Spectrum
 
-EM_ROUNDS = 4
-LARGEST_PREDICTION_LOSS = 20.0  # of log likelihood: no hidden condition counts for more
+EM_ROUNDS = 3
 LARGEST_LEVEL_SD_DB = 12.0
 # A record that leaves more than this of the variance with which its neighbours predict a
 # frequency has not determined it.
@@ -94,57 +91,12 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     grid = texture_grid(spectra)
     if not grid.recorded.any():
         return _silent(grid)
-    best = _chosen(grid, search(grid, count=count))
+    best = min(search(grid, count=count), key=lambda found: found.distance_db)
     best = in_frequency_order(grid, completed(grid, best, count=count))
-    solution = _with_estimated_precision(grid, best)
+    solution = learned(grid, best, rounds=EM_ROUNDS)
     if count is None:
         solution = _merged(grid, solution)
     return _grid_fit(grid, solution)
-
-
-def _chosen(grid: TextureGrid, solutions: Sequence[Solution]) -> Solution:
-    """The most likely solution that also predicts hidden conditions."""
-    if len(solutions) == 1:
-        return solutions[0]
-    losses = np.array([prediction_losses(grid, s) for s in solutions])
-    worse = np.minimum(losses - losses.min(axis=0), LARGEST_PREDICTION_LOSS).sum(axis=1)
-    return solutions[int(np.argmax([s.evidence for s in solutions] - worse))]
-
-
-def prediction_losses(grid: TextureGrid, solution: Solution) -> Floats:
-    """Minus the log likelihood of every second condition, hidden and predicted by the others.
-
-    Whatever its level: that scatters from condition to condition, and would hide how well the
-    shape of the spectrum is predicted.
-    """
-    predicted = hidden(grid, solution).theta
-    losses = []
-    for row in np.flatnonzero(grid.every_second() & grid.recorded):
-        power = grid.powers[row]
-        assert power is not None, "recorded conditions have a power"
-        expected = expected_on_lines(power, predicted[row], solution.signs)
-        level = float(np.average(power.power / expected, weights=power.weight))
-        loss = power.weight.sum() * np.log(level) + power.weight @ np.log(expected)
-        losses.append(power.records * float(loss))
-    return np.array(losses)
-
-
-def _with_estimated_precision(grid: TextureGrid, solution: Solution) -> Solution:
-    """The solution in a field whose smoothness is estimated from it."""
-    theta, observed = solution.theta, solution.observed
-    precision = np.asarray(np.linalg.inv(prior_covariance(solution.count)))
-    for _ in range(EM_ROUNDS):
-        solution = fitted(
-            grid,
-            theta,
-            solution.signs,
-            precision=precision,
-            observed=observed,
-            steps=8,
-            enough=0.5,
-        )
-        theta, precision = solution.theta, updated_precision(solution.fit)
-    return fitted(grid, theta, solution.signs, precision=precision, steps=8, enough=0.3)
 
 
 def _merged(grid: TextureGrid, solution: Solution) -> Solution:
@@ -161,10 +113,8 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
         least = LEAST_LEFT * np.exp(theta[:, gain + stays])
         theta[:, gain + stays] = np.log(np.maximum(amplitude, least))
         start = without_layer(theta, goes), np.delete(solution.signs, goes)
-        one = _with_estimated_precision(grid, fitted(grid, *start))
-        power = response(one.theta, one.signs, solution.observed).power
-        lost = misfits(power, solution.observed) - solution.fit.slopes.misfit
-        if lost.sum() > LEAST_GAIN * grid.recorded.sum():
+        one = learned(grid, fitted(grid, *start), rounds=EM_ROUNDS)
+        if one.distance_db > solution.distance_db:
             return solution
         solution = one
     return solution
@@ -191,7 +141,7 @@ def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     top = max(range(len(theta)), key=lambda row: grid.conditions[row])
     order = np.argsort(frequency[top], kind="stable")
     records = record_information(theta, solution.signs, solution.observed)
-    after = covariances(solution.fit.field, records)
+    after = covariances(solution.fit.field, Blocks(records))
     level_sd = level_deviations(theta, after.conditions, rate_hz=grid.rate_hz)
     inherited = absent | _determined_by_neighbours(after, records, m)
     width = np.exp(bandwidth)
@@ -247,7 +197,7 @@ def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:
     theta = solution.theta
     for _ in range(TREND_ROUNDS):  # the trend is that of the layers that are shown
         trend = alone.places @ alone.trend
-        rest = solve(alone, blocks, held * (solution.theta - trend))
+        rest = solve(alone, Blocks(blocks), held * (solution.theta - trend))
         theta = np.where(undetermined, rest + trend, solution.theta)
         alone = alone.following(theta)
     return theta

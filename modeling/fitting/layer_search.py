@@ -22,7 +22,14 @@ from modeling.equalizer.signs import neighbouring_patterns
 from modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
 from modeling.estimation.given_count import starts_of
 from modeling.estimation.likelihood import split
-from modeling.fitting.field import FieldFit, fit_field, log_evidence, prior_covariance
+from modeling.fitting.field import (
+    FieldFit,
+    effective_parameters,
+    fit_field,
+    log_evidence,
+    prior_covariance,
+    updated_precision,
+)
 from modeling.fitting.growth import (
     CLEAR_EVIDENCE,
     candidates,
@@ -37,11 +44,12 @@ STIFFNESS = 3.0  # of the field while searching: layers must not change places
 LEAST_GAIN = 4.0
 DECIDING_CONDITIONS = 6
 STARTING_CONDITIONS = 2
-CARRIED_CONDITIONS = 3
 MOST_SPREAD_LAYERS = 3
+NEPER_POWER_DB = 10 / np.log(10)
 ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
 TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
 CONTENDERS = 2  # per number of layers
+ROUGH_ROUNDS = 1
 NOT_WORSE = 3.0  # in log evidence per record, for a solution to be looked at in full
 
 
@@ -70,6 +78,23 @@ class Solution:
         return log_evidence(self.fit) + float(self.observed.scatter.sum())
 
 
+    @cached_property
+    def distance_db(self) -> float:
+        """Expected distance from the true spectra, at the records and between them.
+
+        At them, what the misfit has above scatter, and as much for each parameter that the records
+        determine as it costs in other records than these (Akaike 1974); between them the response
+        should be near that of its nodes.
+        """
+        excess = float((self.fit.slopes.misfit - self.observed.scatter).sum())
+        spent = effective_parameters(self.fit)
+        at = 2 * NEPER_POWER_DB**2 * (excess + spent) / float(self.observed.weight.sum())
+        middles = self.fit.field.middles
+        if middles is not None:
+            at += float(np.mean(middles.defects_db(self.theta, self.signs) ** 2))
+        return float(np.sqrt(max(at, 0.0)))
+
+
 def fitted(
     grid: TextureGrid,
     theta: Floats,
@@ -79,6 +104,7 @@ def fitted(
     observed: Observed | None = None,
     steps: int = 12,
     enough: float = 1.0,
+    middles: bool = False,
 ) -> Solution:
     """The field near a start (C, p); by default with the strong prior of the search."""
     if precision is None:
@@ -88,7 +114,7 @@ def fitted(
         theta,
         signs,
         observed,
-        grid.field(precision),
+        grid.field(precision, middles=middles),
         limits=grid.limits(signs.size),
         steps=steps,
         enough=enough,
@@ -120,7 +146,6 @@ def search(grid: TextureGrid, *, count: int | None = None) -> list[Solution]:
         _spread(pool)
     if _complete(pool):
         _reduce(pool)
-    _carry(pool)
     if part is grid:
         return pool.contenders()
     return [expanded(grid, part, s) for s in pool.contenders()]
@@ -281,25 +306,6 @@ def in_frequency_order(grid: TextureGrid, solution: Solution) -> Solution:
     return max([solution, *tried], key=lambda s: s.evidence)
 
 
-def _carry(pool: _Pool) -> None:
-    """The layers of single conditions that are fitted well, carried to all others.
-
-    Frequencies and gains follow their trend, widths stay. A few conditions that converged to a
-    poor maximum together, mostly in their widths, hold each other there.
-    """
-    grid, count = pool.grid, pool.best().count
-    for solution in map(pool.of, (count - 1, count)):
-        if solution is None or not solution.count:
-            continue
-        m = solution.count
-        excess = solution.fit.slopes.misfit - solution.observed.scatter
-        rows = np.argsort(np.where(grid.recorded, excess, np.inf), kind="stable")
-        for row in rows[:CARRIED_CONDITIONS]:
-            along = (grid.places - grid.places[row]) @ solution.fit.field.trend
-            along[:, 1 + m : 1 + 2 * m] = 0.0
-            pool.add([fitted(grid, solution.theta[row] + along, solution.signs)])
-
-
 def _spread(pool: _Pool) -> None:
     """Two or three layers spread over single spectra, every sign, carried to all conditions."""
     counts = range(2, MOST_SPREAD_LAYERS + 1) if pool.count is None else [pool.count]
@@ -376,11 +382,25 @@ def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Soluti
     wanted = np.log(np.array(grid.conditions))[:, [by_row, 1 - by_row]]
     theta = np.asarray(RegularGridInterpolator(tuple(axes), values)(wanted), dtype=np.float64)
     theta[:, np.r_[0, 1 + 2 * solution.count : theta.shape[1]]] += np.log(part.scale / grid.scale)
-    return fitted(grid, theta, solution.signs, steps=10)
+    return learned(grid, replace(solution, theta=theta), rounds=ROUGH_ROUNDS)
 
 
-def hidden(grid: TextureGrid, solution: Solution) -> Solution:
-    """The same field without every second condition, which it then predicts."""
-    seen = solution.observed.without(grid.every_second())
-    refit = fitted(grid, solution.theta, solution.signs, observed=seen, enough=0.5)
-    return replace(refit, observed=solution.observed)
+def learned(grid: TextureGrid, solution: Solution, *, rounds: int) -> Solution:
+    """The solution in a field whose smoothness is estimated from it; blends have no holes."""
+    theta, observed = solution.theta, grid.observed(solution.theta)
+    precision = np.asarray(np.linalg.inv(prior_covariance(solution.count)))
+    for _ in range(rounds):
+        solution = fitted(
+            grid,
+            theta,
+            solution.signs,
+            precision=precision,
+            observed=observed,
+            steps=8,
+            enough=0.5,
+            middles=True,
+        )
+        theta, precision = solution.theta, updated_precision(solution.fit)
+    return fitted(
+        grid, theta, solution.signs, precision=precision, steps=8, enough=0.3, middles=True
+    )

@@ -10,13 +10,16 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.coherent import Observed, limits_of, observe
-from modeling.estimation.likelihood import Power, signal_power, split
+from modeling.estimation.likelihood import LOWEST_HZ, Power, signal_power, split
+from modeling.fitting.blending import Middles
+from modeling.fitting.equations import Corners, cells
 from modeling.fitting.field import Field
 from modeling.models.grid import Condition
 from modeling.recordings.spectrum import Spectrum
 
 # On larger grids layers are searched on every second or third node of either axis, so many at most.
 COARSE_NODES = 4
+MIDDLE_POINTS = 48  # frequencies at which blends are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,10 +85,33 @@ class TextureGrid:
         _, frequency, bandwidth, _ = split(theta, (theta.shape[1] - 1) // 3)
         return observe(self.powers, np.exp(frequency), np.exp(bandwidth), scale=self.scale)
 
-    def field(self, precision: Floats) -> Field:
-        """A field over this grid, without a trend yet."""
+    def field(self, precision: Floats, *, middles: bool = False) -> Field:
+        """A field over this grid, without a trend yet; with `middles` blends may have no holes."""
         flat = np.zeros((2, len(precision)))
-        return Field(self.rows, self.columns, self.places, precision, flat)
+        held = self.middles if middles and self.rows > 1 else None
+        return Field(
+            self.rows, self.columns, self.places, precision, flat, self.corners, middles=held
+        )
+
+    @cached_property
+    def corners(self) -> Corners:
+        """Where the records lie: each at the node of its number."""
+        nodes = np.repeat(np.arange(len(self.powers))[:, None], 4, axis=1)
+        shares = np.zeros(nodes.shape)
+        shares[:, 0] = 1.0
+        return Corners(nodes, shares, len(self.conditions))
+
+    @cached_property
+    def middles(self) -> Middles:
+        """The middles of the cells."""
+        corners = cells(self.rows, self.columns)
+        shares = np.full(4, 0.25) if self.columns > 1 else np.array([0.5, 0.0, 0.5, 0.0])
+        highest = max(power.frequency_hz[-1] for power in self._known)
+        frequency = np.geomspace(LOWEST_HZ, highest, MIDDLE_POINTS)
+        tangent = np.tan(np.pi / self.rate_hz * frequency)[None]
+        one = np.ones(tangent.shape)
+        places = Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), self.rate_hz)
+        return Middles(corners, shares, places, len(self.conditions))
 
     def levels(self) -> Floats:
         """Log amplitude of white noise of each condition's power, (C,); the mean where unknown."""
