@@ -30,6 +30,16 @@ class Held(NamedTuple):
     score: Floats
 
 
+def distances_db(one: Floats, other: Floats, places: Observed) -> Floats:
+    """Log-spectral distances (K,) of responses in nepers (K, n), as an RMS over frequency.
+
+    At places that are evenly spaced in the logarithm of frequency.
+    """
+    frequency = np.arctan(places.tangent[0])
+    square = (one - other) ** 2 @ frequency / frequency.sum()
+    return np.asarray(NEPER_DB * np.sqrt(square))
+
+
 @dataclass(frozen=True, eq=False)
 class Middles:
     """The middles of a lattice's cells in log speed and log force.
@@ -53,10 +63,8 @@ class Middles:
     def defects_db(self, theta: Floats, signs: Floats) -> Floats:
         """Distance of each middle's response from the mean of its corners' logarithms, (M,)."""
         level = self._levels(theta, signs)
-        frequency = np.arctan(self.places.tangent[0])  # evenly spaced in its logarithm
         m = len(self.corners)
-        square = (level[:m] - self._mean(level[m:])) ** 2 @ frequency / frequency.sum()
-        return np.asarray(NEPER_DB * np.sqrt(square))
+        return distances_db(level[:m], self._mean(level[m:]), self.places)
 
     def held(self, theta: Floats, signs: Floats) -> Held:
         """The cost of holes in the middles, from the parameters (N, p) of the nodes."""

@@ -7,7 +7,7 @@ is a block tridiagonal matrix.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import combinations_with_replacement
@@ -151,8 +151,8 @@ def cells(rows: int, columns: int) -> Integers:
     return np.stack([corner.ravel() for corner in corners], axis=1)
 
 
-def corners_of(places: Floats, axes: Sequence[Floats], *, count: int) -> Corners:
-    """Places (K, 2) in a lattice with these two axes (rows, columns); beyond it those of its edge."""
+def corners_of(places: Floats, axes: tuple[Floats, Floats]) -> Corners:
+    """Places (K, 2) in a lattice with these axes (rows, columns); beyond it those of its edge."""
     rows, row_share = _cell_of(places[:, 0], axes[0])
     columns, column_share = _cell_of(places[:, 1], axes[1])
     width = len(axes[1])
@@ -168,7 +168,7 @@ def corners_of(places: Floats, axes: Sequence[Floats], *, count: int) -> Corners
         ),
         axis=1,
     )
-    return Corners(nodes, shares, count)
+    return Corners(nodes, shares, axes[0].size * width)
 
 
 def _cell_of(values: Floats, axis: Floats) -> tuple[Integers, Floats]:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
+from modeling.arrays import Floats, Integers
 from modeling.estimation.coherent import (
     FIRST_DAMPING,
     HOPELESS_DAMPING,
@@ -40,6 +40,9 @@ PRIOR_LEVEL_CHANGE = 0.38
 # Precision of a parameter that no record determines: a deviation of 30 in its logarithm.
 FAINTEST = 1e-3
 RESTART_ROUNDS = 3
+# Of Student's t distribution, by which the levels of records scatter: a single one that is far off
+# does not bend the field.
+FREEDOM = 3.0
 # Weight of a trend's square in the penalty: a power of speed or force of 1 is as usual as a change
 # of PRIOR_CHANGE between neighbours. Matters where two speeds alone determine the trend, or none.
 TREND_SHARE = PRIOR_CHANGE**2
@@ -65,6 +68,9 @@ class Field:
         Where the records lie in the lattice.
     middles : Middles, optional
         The middles of the cells, where the blended response is looked at.
+    level_sd : (K,) ndarray, optional
+        By how much (nepers) the level of each record scatters about the field; without it not at
+        all.
     """
 
     rows: int
@@ -74,6 +80,7 @@ class Field:
     trend: Floats
     records: Corners
     middles: Middles | None = None
+    level_sd: Floats | None = None
 
     def pull(self, theta: Floats) -> Floats:
         """Gradient (C, p) of the penalty ½·Σ over neighbours of Δ'·precision·Δ."""
@@ -148,15 +155,22 @@ def _degrees(rows: int, columns: int) -> Floats:
 class FieldFit(NamedTuple):
     """The field's maximum: parameters (N, p) of the nodes and what `slopes` says of the records.
 
-    `value` is the objective with the penalties, `information` that of the records and of the
+    `level` (K,) is what the records are louder than the field, in nepers; `value` is the objective
+    with the penalties, `information` that of the records and of the
     middles of the cells on the nodes, `field` has the trend of the parameters.
     """
 
     theta: Floats
+    level: Floats
     slopes: Slopes
     value: float
     information: Blocks
     field: Field
+
+    @property
+    def at_records(self) -> Floats:
+        """The parameters (K, p) of the records, each at its own level."""
+        return louder(self.field.records.blended(self.theta), self.level)
 
 
 def fit_field(
@@ -190,7 +204,8 @@ def fit_field(
     fit = _climb_field(theta, signs, observed, field, limits=limits, steps=steps, enough=enough)
     for _ in range(RESTART_ROUNDS):
         predicted = np.clip(fit.field.predicted(fit.theta), *limits)
-        there = slopes(field.records.blended(predicted), signs, observed).objective
+        there = louder(field.records.blended(predicted), fit.level)
+        there = slopes(there, signs, observed).objective
         poor = field.records.touched(there < fit.slopes.objective - enough)
         if not poor.any():
             break
@@ -204,25 +219,66 @@ def fit_field(
     return fit
 
 
+def louder(theta: Floats, level: Floats) -> Floats:
+    """Parameters (K, p) with all gains raised by a level (K,) in nepers."""
+    raised = theta.copy()
+    raised[:, _gains(theta.shape[1])] += level[:, None]
+    return raised
+
+
+def _gains(p: int) -> Integers:
+    """Places of the noise gain and of the layers' amplitudes among p parameters."""
+    return np.r_[0, 1 + 2 * ((p - 1) // 3) : p]
+
+
+class _Levels(NamedTuple):
+    """Information (K, p) that a record's level shares with its parameters, its own (K,), its score."""
+
+    shared: Floats
+    own: Floats
+    score: Floats
+
+    def step(self, theta: Floats) -> Floats:
+        """Step (K,) of the levels with a step (K, p) of the records' parameters."""
+        step = (self.score - np.einsum("kp,kp->k", self.shared, theta)) / self.own
+        return np.asarray(np.clip(step, -LONGEST_STEP, LONGEST_STEP))
+
+
 class _There(NamedTuple):
-    """What is known at one set of parameters: the records' slopes, and the cost of the middles."""
+    """What is known at one set of parameters: the records' slopes, and the cost with all else."""
 
     records: Slopes
+    levels: _Levels | None
     cost: float
     information: Blocks
     score: Floats
 
 
-def _looked_at(theta: Floats, signs: Floats | None, observed: Observed, field: Field) -> _There:
+def _looked_at(
+    theta: Floats, level: Floats, signs: Floats | None, observed: Observed, field: Field
+) -> _There:
     at = field.records.blended(theta)
-    found = slopes(at, signs, observed)
-    information = field.records.coupled(found.information)
-    score, cost = field.records.gathered(found.score), float(found.objective.sum())
+    found = slopes(at if field.level_sd is None else louder(at, level), signs, observed)
+    cost, levels = float(found.objective.sum()), None
+    of_records, pull = found.information, found.score
+    if field.level_sd is not None:
+        ratio = (level / field.level_sd) ** 2 / FREEDOM
+        cost += 0.5 * (FREEDOM + 1) * float(np.log1p(ratio).sum())
+        stiffness = (FREEDOM + 1) / (FREEDOM * (1 + ratio) * field.level_sd**2)
+        gains = _gains(at.shape[1])
+        shared = of_records[:, :, gains].sum(axis=2)
+        own = shared[:, gains].sum(axis=1) + stiffness
+        levels = _Levels(shared, own, pull[:, gains].sum(axis=1) - stiffness * level)
+        # What is left for the field once the level has taken its share.
+        of_records = of_records - shared[:, :, None] * (shared / own[:, None])[:, None, :]
+        pull = pull - shared * (levels.score / own)[:, None]
+    information = field.records.coupled(of_records)
+    score = field.records.gathered(pull)
     if field.middles is not None and signs is not None and signs.size:
         held = field.middles.held(theta, signs)
         cost, score = cost + held.cost, score + held.score
         information = information.plus(held.information)
-    return _There(found, cost, information, score)
+    return _There(found, levels, cost, information, score)
 
 
 def _climb_field(
@@ -238,20 +294,24 @@ def _climb_field(
     """Fisher scoring with Levenberg–Marquardt damping; the trend follows."""
     low, high = limits
     theta = np.clip(theta, low, high)
+    level = np.zeros(len(observed.power))
     damping = FIRST_DAMPING
     field = field.following(theta)
-    now = _looked_at(theta, signs, observed, field)
+    now = _looked_at(theta, level, signs, observed, field)
     value = now.cost + field.penalty(theta)
     for _ in range(steps):
         step = solve(field, _damped(now.information, damping), now.score - field.pull(theta))
         tried = np.clip(theta + np.clip(step, -LONGEST_STEP, LONGEST_STEP), low, high)
-        there = _looked_at(tried, signs, observed, field)
+        level_tried = level
+        if now.levels is not None:
+            level_tried = level + now.levels.step(field.records.blended(tried - theta))
+        there = _looked_at(tried, level_tried, signs, observed, field)
         value_there = there.cost + field.penalty(tried)
         if value_there < value:
             field = field.following(tried)
             value_there = there.cost + field.penalty(tried)
             gained = value - value_there
-            theta, now, value = tried, there, value_there
+            theta, level, now, value = tried, level_tried, there, value_there
             damping = max(damping / 10, LEAST_DAMPING)
             if gained < enough:
                 break
@@ -259,7 +319,7 @@ def _climb_field(
             break
         else:
             damping *= 10
-    return FieldFit(theta, now.records, value, now.information, field)
+    return FieldFit(theta, level, now.records, value, now.information, field)
 
 
 def _damped(information: Blocks, damping: float) -> Blocks:

@@ -29,7 +29,7 @@ RAISED = (1.3, 1e4)  # power ratio at which a new layer starts
 
 
 class Candidate(NamedTuple):
-    """A layer that might be missing: frequencies, widths (Hz) and power ratio in each condition."""
+    """A layer that might be missing: frequencies, widths (Hz) and power ratio in each record."""
 
     frequencies_hz: Floats
     bandwidths_hz: Floats
@@ -43,15 +43,15 @@ def candidates(grid: TextureGrid, theta: Floats, signs: Floats | None) -> list[C
     Parameters
     ----------
     grid : TextureGrid
-        C conditions.
-    theta : (C, p) ndarray
-        The layers so far, relative to the grid's scale.
+        K records.
+    theta : (K, p) ndarray
+        The layers so far at the records, relative to the grid's scale.
     signs : (m,) ndarray, optional
         Without them layers are independent.
     """
     ratio, lines = _excess(grid.powers, theta, signs, scale=grid.scale)
     cells = ratio.shape[1] - 1
-    shifts = np.rint(EXPONENTS[:, None] * grid.places[:, 0] / CELL).astype(np.intp)
+    shifts = np.rint(EXPONENTS[:, None] * grid.record_places[:, 0] / CELL).astype(np.intp)
     reach = int(np.abs(shifts).max(initial=0))
     place = np.arange(-reach, cells + reach)[None, :] + shifts[:, :, None]  # (laws, C, places)
     found = []
@@ -133,7 +133,7 @@ def _boxes(ratio: Floats, lines: Floats, width: int) -> tuple[Floats, Floats]:
 
 
 def inserted_independently(theta: Floats, candidate: Candidate, *, rate_hz: float) -> Floats:
-    """Parameters (C, p + 3) of independent layers with the candidate as the last one."""
+    """Parameters (K, p + 3) of independent layers with the candidate as the last one."""
     m = (theta.shape[1] - 1) // 3
     noise, frequency, bandwidth, gain = split(theta, m)
     u = _offsets_at(frequency, bandwidth, candidate.frequencies_hz, rate_hz=rate_hz)
@@ -166,7 +166,7 @@ def _offsets_at(frequency: Floats, bandwidth: Floats, at_hz: Floats, *, rate_hz:
 def inserted(
     theta: Floats, signs: Floats, candidate: Candidate, *, sign: float, rate_hz: float
 ) -> tuple[Floats, Floats]:
-    """Parameters (C, p + 3) and signs (m + 1,) with the candidate as the last layer.
+    """Parameters (K, p + 3) and signs (m + 1,) with the candidate as the last layer.
 
     Its amplitude is such that the response at its frequency reaches the raised power.
     """

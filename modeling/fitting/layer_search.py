@@ -55,7 +55,7 @@ NOT_WORSE = 3.0  # in log evidence per record, for a solution to be looked at in
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Layers of a whole texture: parameters (C, p) relative to the grid's scale, and signs (m,).
+    """Layers of a whole texture: parameters (N, p) of the nodes relative to the grid's scale, and signs (m,).
 
     `value` is the penalised misfit, less what scatter alone gives in these bins, so that solutions
     in different bins can be compared; `observed` are the bins.
@@ -79,20 +79,30 @@ class Solution:
 
 
     @cached_property
-    def distance_db(self) -> float:
-        """Expected distance from the true spectra, at the records and between them.
+    def at_db(self) -> float:
+        """Expected distance from the true spectra at the records.
 
-        At them, what the misfit has above scatter, and as much for each parameter that the records
-        determine as it costs in other records than these (Akaike 1974); between them the response
-        should be near that of its nodes.
+        What the misfit has above scatter, and as much for each parameter that the records
+        determine as it costs in other records than these (Akaike 1974).
         """
         excess = float((self.fit.slopes.misfit - self.observed.scatter).sum())
-        spent = effective_parameters(self.fit)
-        at = 2 * NEPER_POWER_DB**2 * (excess + spent) / float(self.observed.weight.sum())
+        lost = max(excess + effective_parameters(self.fit), 0.0)
+        return float(NEPER_POWER_DB * np.sqrt(2 * lost / self.observed.weight.sum()))
+
+    @cached_property
+    def distance_db(self) -> float:
+        """Expected distance at the records and between them, where blends should be near nodes."""
+        return float(np.sqrt(self.at_db**2 + np.mean(self._defects_db**2)))
+
+    @cached_property
+    def blend_defect_db(self) -> float:
+        """Largest distance of a blend half-way between nodes from the mean of their logarithms."""
+        return float(self._defects_db.max())
+
+    @cached_property
+    def _defects_db(self) -> Floats:
         middles = self.fit.field.middles
-        if middles is not None:
-            at += float(np.mean(middles.defects_db(self.theta, self.signs) ** 2))
-        return float(np.sqrt(max(at, 0.0)))
+        return np.zeros(1) if middles is None else middles.defects_db(self.theta, self.signs)
 
 
 def fitted(
@@ -106,7 +116,7 @@ def fitted(
     enough: float = 1.0,
     middles: bool = False,
 ) -> Solution:
-    """The field near a start (C, p); by default with the strong prior of the search."""
+    """The field near a start (N, p); by default with the strong prior of the search."""
     if precision is None:
         precision = search_precision(signs.size)
     observed = grid.observed(theta) if observed is None else observed
@@ -158,7 +168,7 @@ class _Pool:
         self.grid, self.count = grid, count
         self.records = int(grid.recorded.sum())
         self.most = MOST_LAYERS if count is None else max(count, 1)
-        noise = fitted(grid, grid.levels()[:, None], np.zeros(0))
+        noise = fitted(grid, grid.at_nodes(grid.levels())[:, None], np.zeros(0))
         self._solutions: dict[int, list[Solution]] = {0: [noise]}
 
     def add(self, solutions: Sequence[Solution]) -> None:
@@ -206,10 +216,12 @@ def _grow(pool: _Pool) -> None:
     grid = pool.grid
     theta, now, idle = pool.best().theta, pool.best().value, 0
     for m in range(1, pool.most + 1):
-        found = candidates(grid, theta, None)
+        at_records = grid.corners.blended(theta)
+        found = candidates(grid, at_records, None)
         if not found:
             return
-        start = inserted_independently(theta, found[0], rate_hz=grid.rate_hz)
+        start = inserted_independently(at_records, found[0], rate_hz=grid.rate_hz)
+        start = grid.at_nodes(start)
         observed = grid.observed(start)
         field, limits = grid.field(search_precision(m)), grid.limits(m)
         fit = fit_field(start, None, observed, field, limits=limits, steps=12, enough=1.0)
@@ -261,11 +273,13 @@ def _complete(pool: _Pool) -> bool:
         if best.count >= pool.most:
             return completed
         grid = pool.grid
-        starts = [
-            inserted(best.theta, best.signs, found, sign=sign, rate_hz=grid.rate_hz)
-            for found in candidates(grid, best.theta, best.signs)
+        at_records = grid.corners.blended(best.theta)
+        found = [
+            inserted(at_records, best.signs, candidate, sign=sign, rate_hz=grid.rate_hz)
+            for candidate in candidates(grid, at_records, best.signs)
             for sign in (1.0, -1.0)
         ]
+        starts = [(grid.at_nodes(theta), signs) for theta, signs in found]
         if not starts:
             return completed
         pool.add([fitted(grid, *start) for start in _likeliest(grid, starts, TRIED_GROWTH)])
@@ -274,15 +288,15 @@ def _complete(pool: _Pool) -> bool:
         completed = True
 
 
-def completed(grid: TextureGrid, solution: Solution, *, count: int | None = None) -> Solution:
+def completed(grid: TextureGrid, solution: Solution) -> Solution:
     """The solution, with layers added where some condition clearly lacks them.
 
     The coarse grid may not show a layer that is heard at one speed alone.
     """
     excess = solution.fit.slopes.misfit - solution.observed.scatter
-    if count is not None or not (excess[grid.recorded] > CLEAR_EVIDENCE).any():
+    if not (excess[grid.recorded] > CLEAR_EVIDENCE).any():
         return solution
-    pool = _Pool(grid, count)
+    pool = _Pool(grid, None)
     pool.add([solution])
     _complete(pool)
     return pool.best()
@@ -315,7 +329,7 @@ def _spread(pool: _Pool) -> None:
 
 
 def _spread_layers(grid: TextureGrid, count: int) -> list[Solution]:
-    levels, bins = grid.levels(), grid.observed(np.zeros((len(grid.powers), 1)))
+    levels, bins = grid.levels(), grid.observed(np.zeros((len(grid.conditions), 1)))
     patterns = np.array(list(product((1.0, -1.0), repeat=count)))
     carried = []
     for row in grid.spread(STARTING_CONDITIONS):
@@ -331,7 +345,7 @@ def _spread_layers(grid: TextureGrid, count: int) -> list[Solution]:
             everywhere = np.tile(best.theta, (len(levels), 1))
             gains = np.r_[0, 1 + 2 * count : 1 + 3 * count]
             everywhere[:, gains] += (levels - levels[row])[:, None]
-            carried.append((everywhere, best.signs))
+            carried.append((grid.at_nodes(everywhere), best.signs))
     rough = [fitted(grid, *c, observed=bins, steps=8, enough=5.0) for c in carried]
     rough.sort(key=lambda s: s.value)
     return [fitted(grid, s.theta, s.signs) for s in rough[:TRIED_STARTS]]
@@ -354,7 +368,7 @@ def _likeliest(
 ) -> list[tuple[Floats, Floats]]:
     """The best of some starts with this number of layers, by their fit in a few conditions."""
     some = grid.spread(DECIDING_CONDITIONS)
-    theta = np.concatenate([theta[some] for theta, _ in starts])
+    theta = np.concatenate([grid.corners.blended(theta)[some] for theta, _ in starts])
     signs = np.concatenate([np.tile(signs, (some.size, 1)) for _, signs in starts])
     m = signs.shape[1]
     _, frequency, bandwidth, _ = split(theta, m)

@@ -11,7 +11,7 @@ import numpy as np
 from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.layers import EstimatorName, Layers
 from modeling.estimation.paper import find_peak_frequencies, fit_layers
-from modeling.models.grid import Condition, fill_grid
+from modeling.models.grid import Condition, fill_grid, grid_axes
 from modeling.recordings.spectrum import Spectrum
 
 
@@ -83,7 +83,10 @@ def _grids(tracked: Mapping[Condition, _Tracked], texture: str) -> dict[str, Any
 
     noise = {c: np.array([t.layers.noise_gain]) for c, t in tracked.items()}
     noise_gains, interpolated = fill_grid(noise, texture)
+    speeds, forces = grid_axes(tracked)
     return {
+        "speeds_mm_s": np.array(speeds),
+        "forces_n": np.array(forces),
         "noise_gains": noise_gains[:, :, 0],
         **{
             name: grid(name) for name in ("frequencies_hz", "bandwidths_hz", "gains", "level_sd_db")

@@ -90,7 +90,6 @@ def fit_spectra(
             f"{len(repeats)} conditions; check the sensor, or leave its floor out."
         )
     check_spanned(spectra, first.texture)
-    speeds, forces = grid_axes(spectra)
     if chosen == "joint":
         arrays = _joint_arrays(spectra, layers)
     else:
@@ -98,8 +97,6 @@ def fit_spectra(
     return TextureModel(
         texture=first.texture,
         rate_hz=spectrum_of_first.rate_hz,
-        speeds_mm_s=np.array(speeds),
-        forces_n=np.array(forces),
         estimator=chosen,
         unit=first.unit,
         simulated=any(r.simulated for r, _ in measured),
@@ -120,7 +117,7 @@ def _check_layers(layers: object, estimator: EstimatorName) -> None:
 def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> dict[str, Any]:
     """The model's arrays by `joint`; holes are what their neighbours predict."""
     found = fit_grid_jointly(spectra, count=count)
-    speeds, forces = grid_axes(spectra)
+    speeds, forces = grid_axes(found.layers)
     grid = [(speed, force) for speed in speeds for force in forces]
     shape = (len(speeds), len(forces))
 
@@ -131,11 +128,14 @@ def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> d
     inherited = np.array([found.inherited[c] for c in grid]).reshape(*shape, -1)
     names = ("frequencies_hz", "bandwidths_hz", "gains", "level_sd_db", "unresolved")
     return {
+        "speeds_mm_s": np.array(speeds),
+        "forces_n": np.array(forces),
         "noise_gains": table("noise_gain")[:, :, 0],
         **{name: table(name) for name in names},
         "inherited": inherited & recorded[:, :, None],
         "interpolated": ~recorded,
         "blending": "logarithmic",
+        "fit": found.summary,
     }
 
 

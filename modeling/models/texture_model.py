@@ -16,6 +16,7 @@ from modeling.equalizer.peq import PEQ
 from modeling.errors import InputError, shown
 from modeling.files.saved_model import SavedModel
 from modeling.models.compiled_for import CompiledFor
+from modeling.models.fit_summary import FitSummary
 from modeling.models.grid import check_axes
 from modeling.models.parameter_table import (
     Parameters,
@@ -72,6 +73,9 @@ class TextureModel(SavedModel):
         The scene that the model was compiled for, with the bound that it keeps there.
     simplified_from : str
         SHA-256 of the full model, where `simplify` dropped layers of it; else empty.
+    fit : FitSummary, optional
+        What the estimator says of its fit; of a model with fewer layers or other nodes it says
+        nothing.
 
     Raises
     ------
@@ -80,7 +84,7 @@ class TextureModel(SavedModel):
     """
 
     FORMAT = "tactileq.texture-model"
-    OPTIONAL = frozenset({"blending", "compiled_for", "simplified_from"})
+    OPTIONAL = frozenset({"blending", "compiled_for", "fit", "simplified_from"})
 
     texture: str
     rate_hz: float
@@ -100,10 +104,12 @@ class TextureModel(SavedModel):
     blending: Blending = "linear"
     compiled_for: CompiledFor | None = None
     simplified_from: str = ""
+    fit: FitSummary | None = None
 
     def __post_init__(self) -> None:
         self._check_kinds()
         object.__setattr__(self, "compiled_for", CompiledFor.of(self.compiled_for))
+        object.__setattr__(self, "fit", FitSummary.of(self.fit))
         self._freeze(("gains",))
         shape = np.shape(self.gains)
         for name in _BOOLEAN_ARRAYS:
@@ -239,7 +245,8 @@ class TextureModel(SavedModel):
 
     def with_layers(self, keep: list[int]) -> TextureModel:
         """The model with only the layers of these indices (0-based), in that order."""
-        return replace(self, **{name: getattr(self, name)[:, :, keep] for name in _LAYER_ARRAYS})
+        arrays = {name: getattr(self, name)[:, :, keep] for name in _LAYER_ARRAYS}
+        return replace(self, **arrays, fit=self.fit if keep == [*range(self.n_layers)] else None)
 
 
 _LAYER_ARRAYS = (

@@ -63,6 +63,7 @@ def _on_axes(model: TextureModel, speeds_mm_s: Floats, forces_n: Floats) -> Text
         level_sd_db=cells.blend(model.level_sd_db).reshape(*shape, -1),
         interpolated=(filled | ~known).reshape(shape),
         blending="linear",
+        fit=None,
         **marks,
     )
 
