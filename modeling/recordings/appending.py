@@ -22,6 +22,7 @@ from modeling.recordings.recording_set import (
     INDEX_NAME,
     WAV_COLUMNS,
     RecordingSet,
+    check_rounding,
     index_cells,
     listed,
     write_samples,
@@ -184,7 +185,8 @@ def _told(target: Path) -> Iterator[None]:
 
 
 def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
-    """Refuse a second recording of a condition, by the index; no samples are read."""
+    """Refuse a second recording of a condition, or of one that differs by rounding only, by the
+    index; no samples are read."""
     taken = {
         (
             row["texture"],
@@ -201,6 +203,9 @@ def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet)
                 "them in the set already; leave it out, or number real repetitions in the column "
                 "'repeat'."
             )
+    check_rounding(
+        [*(place[:3] for place in taken), *((r.texture, *r.condition) for r in recordings)]
+    )
 
 
 def _remove_unfinished(folder: Path) -> None:

@@ -73,18 +73,9 @@ class Recording:
             object.__setattr__(self, name, float(getattr(self, name)))
         try:
             check_rate(self.rate_hz)
+            check_condition(self.speed_mm_s, self.force_n)
         except InputError as error:
             raise InputError(f"{where}: {error}") from None
-        for name, unit, highest in (
-            ("speed_mm_s", "mm/s", HIGHEST_SPEED_MM_S),
-            ("force_n", "N", HIGHEST_FORCE_N),
-        ):
-            value = getattr(self, name)
-            if not 0 <= value <= highest:
-                raise InputError(
-                    f"{where}: expected {name} of at least 0 {unit} and at most {highest:g}, got "
-                    f"{value:g}; correct it."
-                )
         if self.unit not in UNITS:
             raise InputError(
                 f"{where}: expected a unit among {', '.join(UNITS)}, got {shown(self.unit)}; "
@@ -133,6 +124,19 @@ class Recording:
         """One phrase that names the record, for messages."""
         repeat = f", repeat {self.repeat}" if self.repeat != 1 else ""
         return f"{self.texture} at {self.speed_mm_s:g} mm/s, {self.force_n:g} N{repeat}"
+
+
+def check_condition(speed_mm_s: float, force_n: float) -> None:
+    """Refuse a speed beyond 0 … 1e5 mm/s and a force beyond 0 … 1e4 N, NaN among them."""
+    for name, value, unit, highest in (
+        ("speed_mm_s", speed_mm_s, "mm/s", HIGHEST_SPEED_MM_S),
+        ("force_n", force_n, "N", HIGHEST_FORCE_N),
+    ):
+        if not 0 <= value <= highest:
+            raise InputError(
+                f"expected {name} of at least 0 {unit} and at most {highest:g}, got {value:g}; "
+                "correct it."
+            )
 
 
 def _checked_samples(samples: ArrayLike, where: str) -> Floats:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import get_close_matches
+from itertools import islice
+from math import isclose
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +25,7 @@ from modeling.files.tables import (
     write_table,
 )
 from modeling.files.wav import full_scale, read_wav
-from modeling.recordings.recording import Recording
+from modeling.recordings.recording import Recording, check_condition
 
 INDEX_NAME = "recordings.tsv"
 INDEX_COLUMNS = (
@@ -41,6 +43,8 @@ INDEX_COLUMNS = (
 # What the index says of WAV files beside that; empty for CSV files.
 WAV_COLUMNS = ("g_per_fullscale", "channel")
 KNOWN_COLUMNS = INDEX_COLUMNS + WAV_COLUMNS
+# Speeds, or forces, whose relative difference is smaller are the same but for rounding.
+ROUNDING = 1e-6
 
 
 class RecordingSet:
@@ -54,7 +58,8 @@ class RecordingSet:
     Raises
     ------
     InputError
-        If there is none, or if two stand for the same condition.
+        If there is none, if two stand for the same condition, or if conditions of a texture differ
+        by rounding only.
     """
 
     def __init__(self, recordings: Iterable[Recording]) -> None:
@@ -70,6 +75,7 @@ class RecordingSet:
                     "remove one, or number real repetitions in the column 'repeat'."
                 )
             seen.add(key)
+        check_rounding((r.texture, *r.condition) for r in self.recordings)
 
     def __len__(self) -> int:
         return len(self.recordings)
@@ -146,6 +152,25 @@ class RecordingSet:
                 "texture or record this one."
             )
         return RecordingSet(_load_row(Path(folder), row) for row in rows)
+
+
+def check_rounding(places: Iterable[tuple[str, float, float]]) -> None:
+    """Refuse conditions of a texture that differ, but in speed and force by less than a millionth.
+
+    They would count as two conditions of one grid. `places`: texture, speed (mm/s), force (N).
+    """
+    ordered = sorted(set(places))
+    for later, (texture, speed, force) in enumerate(ordered, start=1):
+        for name, other_speed, other_force in islice(ordered, later, None):
+            if name != texture or not isclose(speed, other_speed, rel_tol=ROUNDING):
+                break
+            if isclose(force, other_force, rel_tol=ROUNDING):
+                raise InputError(
+                    f"{shown(texture)}: expected conditions that are equal or differ by more than "
+                    f"rounding, got {speed!r} mm/s, {force!r} N and {other_speed!r} mm/s, "
+                    f"{other_force!r} N; write the same for both, and number real repetitions in "
+                    "the column 'repeat'."
+                )
 
 
 def load_usable(
@@ -255,6 +280,7 @@ def _sidecar_row(path: Path) -> dict[str, str]:
 
 def _load_row(folder: Path, row: dict[str, str]) -> Recording:
     path = listed_file(folder, row["file"], index_name=INDEX_NAME)
+    condition = _declared_condition(folder, row)
     unit = row.get("unit") or "arbitrary"
     if path.suffix.lower() == ".wav":
         channel = row.get("channel")
@@ -272,8 +298,7 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
         recording = Recording(
             samples,
             rate_hz,
-            number(row.get("speed_mm_s", ""), f"speed_mm_s of {path.name}"),
-            number(row.get("force_n", ""), f"force_n of {path.name}"),
+            *condition,
             row["texture"],
             unit=unit,
             simulated=_flag(row.get("simulated") or "false", f"simulated of {path.name}"),
@@ -291,6 +316,20 @@ def _load_row(folder: Path, row: dict[str, str]) -> Recording:
             "is truncated or was changed, copy or record it again."
         )
     return recording
+
+
+def _declared_condition(folder: Path, row: Mapping[str, str]) -> tuple[float, float]:
+    """Speed and force of a row; errors name the table, or the sidecar, the row and the column."""
+    name = row["file"]
+    index = folder / INDEX_NAME
+    where = f"row {name} of {index}" if index.is_file() else f"{Path(name).with_suffix('.json')}"
+    try:
+        speed = number(row.get("speed_mm_s", ""), f"speed_mm_s of {name}")
+        force = number(row.get("force_n", ""), f"force_n of {name}")
+        check_condition(speed, force)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return speed, force
 
 
 def _flag(text: str, name: str) -> bool:

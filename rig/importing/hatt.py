@@ -38,6 +38,11 @@ UNITS = {"AccelUnits": "m/s^2", "SpeedUnits": "mm/s", "ForceUnits": "N"}
 # A pole 2 Hz wide has forgotten where it began to 1e-5 by then.
 _RUN_IN_S = 2.0
 _INSIDE = -1e-9
+# Twice the area of a triangle, relative to the fastest speed and the strongest force, that is a
+# line: one of several, and the largest of a file, whose six decimals give lines an area.
+_FLAT = 1e-12
+_ONLY_LINES = 1e-6
+_TINY = 1e-300
 # Toolkit models describe their surfaces whatever the length of the record.
 DURATION_S = 10.0
 
@@ -120,7 +125,9 @@ class HattTexture:
         renderer does: between two conditions the power of the driving noise is blended, not its
         amplitude. Its filters at rest and at no force have variance 0, so levels fade there.
         """
-        weights = self.weights(speed_mm_s, force_n)
+        return self._blended(self.weights(speed_mm_s, force_n))
+
+    def _blended(self, weights: Floats) -> ARMAFilter:
         denominator = prediction_coefficients(weights @ self.ar_frequencies)
         numerator = np.ones(1)
         if self.ma_frequencies.shape[1]:
@@ -162,33 +169,88 @@ class HattTexture:
         InputError
             For values out of range, and where no condition lies within the hull and vibrates.
         """
-        rate = self.rate_hz if rate_hz is None else rate_hz
-        if not LOWEST_RATE_HZ <= rate <= self.rate_hz:
-            raise InputError(
-                f"{self.material}: expected a rate from {LOWEST_RATE_HZ:.0f} to the file's "
-                f"{self.rate_hz:g} Hz, got {rate:g}; leave it out to keep the file's."
-            )
-        check_duration(duration_s, self.rate_hz)
-        if round(duration_s * rate) < MIN_SAMPLES:
-            raise InputError(
-                f"{self.material}: expected at least {MIN_SAMPLES} samples, got {duration_s:g} s "
-                f"at {rate:g} Hz; give a longer duration, or leave the rate out."
-            )
+        rate = self._checked_rate(rate_hz, duration_s=duration_s)
         grid = [(float(speed), float(force)) for speed in speeds_mm_s for force in forces_n]
         for condition in grid:
-            self._check_condition(*condition)
+            self.check_condition(*condition)
         inside = self.conditions_inside(grid)
         if not inside:
             raise InputError(
                 f"{self.material}: expected a condition within the file's models and with "
-                f"vibration, got none of {len(grid)}; choose another grid."
+                f"vibration, got none of {len(grid)}; choose another grid, or take the file's own "
+                "conditions."
             )
-        own = [seed, number_of(self.material)]
         return RecordingSet(
-            self._recording(*condition, rate, duration_s=duration_s, rng=generator(own, number))
+            self._recording(
+                condition,
+                self.filter(*condition),
+                rate,
+                duration_s=duration_s,
+                rng=self._generator(seed, number),
+            )
             for number, condition in enumerate(grid)
             if condition in inside
         )
+
+    def own_recordings(
+        self, *, duration_s: float = DURATION_S, rate_hz: float | None = None, seed: int = 0
+    ) -> RecordingSet:
+        """Simulated recordings at the file's own conditions, each through its own filter.
+
+        Parameters
+        ----------
+        duration_s, rate_hz, seed
+            As in `recordings`.
+
+        Returns
+        -------
+        RecordingSet
+            One recording per filter with vibration, at exactly its speed and force (see
+            `vibrating`), in the order of the file.
+
+        Raises
+        ------
+        InputError
+            For values out of range, and where no filter vibrates.
+        """
+        rate = self._checked_rate(rate_hz, duration_s=duration_s)
+        rows = self.vibrating()
+        for row in rows:
+            self.check_condition(*self._condition(row))
+        alone = np.eye(len(self.conditions))
+        return RecordingSet(
+            self._recording(
+                self._condition(row),
+                self._blended(alone[row]),
+                rate,
+                duration_s=duration_s,
+                rng=self._generator(seed, row),
+            )
+            for row in rows
+        )
+
+    def vibrating(self) -> list[int]:
+        """The rows of `conditions` whose filters vibrate: at a speed, a force and a level above 0.
+
+        Of filters at one condition (to the six decimals of the files) the first one counts.
+
+        Raises
+        ------
+        InputError
+            Where there is none.
+        """
+        level = self.variances * np.abs(self.gains)
+        loud = np.flatnonzero((self.conditions > 0).all(axis=1) & (level > 0))
+        if not loud.size:
+            raise InputError(
+                f"{self.material}: expected a model with vibration, at a speed, a force and a "
+                f"variance above 0, got none among {counted(len(self.conditions), 'model')}; "
+                "leave the file out."
+            )
+        first: dict[tuple[float, float], int] = {}
+        for row in loud.tolist():
+            first.setdefault(_key(*self._condition(row)), row)
+        return list(first.values())
 
     def conditions_inside(
         self, conditions: Sequence[tuple[float, float]]
@@ -201,7 +263,31 @@ class HattTexture:
             and self.filter(speed, force).numerator.any()
         ]
 
-    def _check_condition(self, speed_mm_s: float, force_n: float) -> None:
+    def _condition(self, row: int) -> tuple[float, float]:
+        speed, force = self.conditions[row].tolist()
+        return speed, force
+
+    def _generator(self, seed: int, number: int) -> np.random.Generator:
+        return generator([seed, number_of(self.material)], number)
+
+    def _checked_rate(self, rate_hz: float | None, *, duration_s: float) -> float:
+        """The rate of recordings, once it and their duration are usable."""
+        rate = self.rate_hz if rate_hz is None else rate_hz
+        if not LOWEST_RATE_HZ <= rate <= self.rate_hz:
+            raise InputError(
+                f"{self.material}: expected a rate from {LOWEST_RATE_HZ:.0f} to the file's "
+                f"{self.rate_hz:g} Hz, got {rate:g}; leave it out to keep the file's."
+            )
+        check_duration(duration_s, self.rate_hz)
+        if round(duration_s * rate) < MIN_SAMPLES:
+            raise InputError(
+                f"{self.material}: expected at least {MIN_SAMPLES} samples, got {duration_s:g} s "
+                f"at {rate:g} Hz; give a longer duration, or leave the rate out."
+            )
+        return rate
+
+    def check_condition(self, speed_mm_s: float, force_n: float) -> None:
+        """Refuse a speed and a force for which no recording can be made: 0, NaN, beyond hands."""
         if not (0 < speed_mm_s <= HIGHEST_SPEED_MM_S and 0 < force_n <= HIGHEST_FORCE_N):
             raise InputError(
                 f"{self.material}: expected speeds and forces above 0, up to "
@@ -211,20 +297,19 @@ class HattTexture:
 
     def _recording(
         self,
-        speed_mm_s: float,
-        force_n: float,
+        condition: tuple[float, float],
+        fitted: ARMAFilter,
         rate_hz: float,
         *,
         duration_s: float,
         rng: np.random.Generator,
     ) -> Recording:
-        fitted = self.filter(speed_mm_s, force_n)
         run_in = round(_RUN_IN_S * self.rate_hz)
         noise = rng.standard_normal(run_in + round(duration_s * self.rate_hz))
         samples = lfilter(fitted.numerator, fitted.denominator, noise)[run_in:]
         if rate_hz != self.rate_hz:
             samples = resample(samples, round(samples.size * rate_hz / self.rate_hz))
-        return Recording(samples, rate_hz, speed_mm_s, force_n, self.material, simulated=True)
+        return Recording(samples, rate_hz, *condition, self.material, simulated=True)
 
 
 def load_hatt(path: str | Path) -> HattTexture:
@@ -425,8 +510,9 @@ def _triangles(file: _Reader, root: ElementTree.Element, conditions: Floats) -> 
     if not rows:
         file.refuse("at least one triangle tri", "none", "download it again")
     triangles = np.array(rows, dtype=np.intp) - 1
-    first, second, third = (conditions[triangles[:, corner]] for corner in range(3))
-    if not _cross(second - first, third - first).any():
+    # As in `weights`, relative to the fastest speed and the strongest force.
+    corners = (conditions / np.maximum(conditions.max(axis=0), _TINY))[triangles]
+    if float(np.abs(_areas(corners)).max()) < _ONLY_LINES:
         file.refuse("a triangle with an area", "only lines", "download it again")
     return triangles
 
@@ -436,14 +522,19 @@ def _cross(a: Floats, b: Floats) -> Floats:
     return area
 
 
+def _areas(corners: Floats) -> Floats:
+    """Twice the signed areas (t,) of triangles (t, 3, 2)."""
+    return _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def _barycentric(corners: Floats, point: Floats) -> Floats:
     """Barycentric coordinates (t, 3) of a point (2,) in each triangle (t, 3, 2); −inf in lines."""
     to_corners = corners - point
     areas = np.stack(
         [_cross(to_corners[:, (i + 1) % 3], to_corners[:, (i + 2) % 3]) for i in range(3)], axis=-1
     )
-    whole = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    flat = np.abs(whole) < 1e-12
+    whole = _areas(corners)
+    flat = np.abs(whole) < _FLAT
     shares = areas / np.where(flat, 1.0, whole)[:, None]
     return np.where(flat[:, None], -np.inf, shares)
 
@@ -452,7 +543,7 @@ def _nearest_on_sides(corners: Floats, point: Floats) -> tuple[int, int, float]:
     """Triangle, side (from corner i to i+1) and share along it of the point nearest to `point`."""
     start, stop = corners, np.roll(corners, -1, axis=1)
     side = stop - start
-    along = ((point - start) * side).sum(axis=-1) / np.maximum((side**2).sum(axis=-1), 1e-300)
+    along = ((point - start) * side).sum(axis=-1) / np.maximum((side**2).sum(axis=-1), _TINY)
     along = np.clip(along, 0.0, 1.0)
     distance = np.linalg.norm(start + along[..., None] * side - point, axis=-1)
     triangle, which = np.unravel_index(int(np.argmin(distance)), distance.shape)

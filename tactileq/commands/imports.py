@@ -11,13 +11,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from modeling.errors import counted
+from modeling.errors import counted, shown
 from tactileq.options import Out, Seed
 from tactileq.telling import clipping_warnings, progress
 
 if TYPE_CHECKING:
+    from modeling import RecordingSet
     from rig.importing.files import Imported
     from rig.importing.hatt import HattTexture
+    from rig.importing.hatt_grid import ToolkitGrid
     from rig.importing.labels import Label
 
 imports = typer.Typer(
@@ -158,6 +160,12 @@ def import_hatt(
     out: Out = Path("recordings"),
     speed: Annotated[list[float] | None, typer.Option(help="Speed, mm/s; repeatable.")] = None,
     force: Annotated[list[float] | None, typer.Option(help="Force, N; repeatable.")] = None,
+    own_conditions: Annotated[
+        bool,
+        typer.Option(
+            "--own-conditions", help="No grid: the scattered conditions of each file's models."
+        ),
+    ] = False,
     rate_hz: Annotated[
         float | None, typer.Option("--rate", help="Sampling rate in Hz; by default the file's.")
     ] = None,
@@ -167,28 +175,40 @@ def import_hatt(
 ) -> None:
     """Add simulated recordings from models of the Penn Haptic Texture Toolkit.
 
-    Without --speed and --force: 50 to 350 mm/s x 0.5 to 3.5 N, 7 x 7. Conditions outside the range
-    of a file's models are left out, so that they count as missing. The toolkit is not included.
+    By default a grid of 7 x 7 spans the range of each file's models: from the lowest speed and
+    force with vibration to the highest. Conditions outside the hull of the models are left out, so
+    that they count as missing. With --own-conditions there is one recording for each model with
+    vibration, at its own speed and force. The toolkit is not included.
 
     Example: tactileq import hatt "Models_Canvas 1.xml" Models_MDF.xml --out recordings/hatt
+
+    Example: tactileq import hatt "Models_Canvas 1.xml" --speed 100 --speed 200 --force 1 --force 2
     """
     from modeling.files.hashes import sha256_of_paths
     from rig.importing.files import Imported
     from rig.importing.hatt import load_hatt
+    from rig.importing.hatt_grid import spanning_grid
     from rig.importing.plausible import doubts_about
 
+    if own_conditions and (speed or force):
+        raise ValueError(
+            "expected the grid of --speed and --force or --own-conditions, got both; leave one out."
+        )
     files = [file for given in files for file in models_of_the_toolkit(given)]
     inputs = sha256_of_paths(files)
-    speeds = speed or [50.0 * step for step in range(1, 8)]
-    forces = force or [0.5 * step for step in range(1, 8)]
     textures = [load_hatt(file) for file in files]
+    check_one_file_each(files, [texture.material for texture in textures])
+    grids = [
+        None
+        if own_conditions
+        else spanning_grid(texture, speeds_mm_s=speed or None, forces_n=force or None)
+        for texture in textures
+    ]
     made = []
     with progress("Synthesising", len(textures)) as advance:
-        for texture in textures:
+        for texture, grid in zip(textures, grids, strict=True):
             made.append(
-                texture.recordings(
-                    speeds, forces, duration_s=duration_s, rate_hz=rate_hz, seed=seed
-                )
+                synthesised(texture, grid, duration_s=duration_s, rate_hz=rate_hz, seed=seed)
             )
             advance(texture.material)
     records = [
@@ -196,9 +216,48 @@ def import_hatt(
         for of_texture in made
         for record in of_texture
     ]
-    settings = {"speeds_mm_s": speeds, "forces_n": forces, "duration_s": duration_s, "seed": seed}
+    settings = {
+        "speeds_mm_s": speed,
+        "forces_n": force,
+        "own_conditions": own_conditions,
+        "grids": {
+            texture.material: {"speeds_mm_s": grid.speeds.values, "forces_n": grid.forces.values}
+            for texture, grid in zip(textures, grids, strict=True)
+            if grid is not None
+        },
+        "duration_s": duration_s,
+        "seed": seed,
+    }
     add_to_set(out, records, "import hatt", settings=settings, inputs=inputs, yes=yes)
-    tell_beyond_hull(textures, [(v, f) for v in speeds for f in forces])
+    tell_conditions(made, grids)
+
+
+def check_one_file_each(files: Sequence[Path], materials: Sequence[str]) -> None:
+    """Refuse two files of one texture: their conditions would be mixed in one model."""
+    first: dict[str, Path] = {}
+    for file, material in zip(files, materials, strict=True):
+        if material in first:
+            raise ValueError(
+                f"expected one file per texture, got {first[material]} and {file}, both of "
+                f"{shown(material)}; leave one out."
+            )
+        first[material] = file
+
+
+def synthesised(
+    texture: HattTexture,
+    grid: ToolkitGrid | None,
+    *,
+    duration_s: float,
+    rate_hz: float | None,
+    seed: int,
+) -> RecordingSet:
+    """Recordings of one texture over a grid or, without one, at its own conditions."""
+    if grid is None:
+        return texture.own_recordings(duration_s=duration_s, rate_hz=rate_hz, seed=seed)
+    return texture.recordings(
+        grid.speeds.values, grid.forces.values, duration_s=duration_s, rate_hz=rate_hz, seed=seed
+    )
 
 
 def models_of_the_toolkit(given: Path) -> list[Path]:
@@ -351,17 +410,24 @@ def imports_before(provenance: Path) -> list[dict[str, Any]]:
     return history
 
 
-def tell_beyond_hull(
-    textures: Sequence[HattTexture], conditions: Sequence[tuple[float, float]]
-) -> None:
-    """Report in one line how many conditions of each texture have no recording."""
-    outside = {
-        texture.material: len(conditions) - len(texture.conditions_inside(conditions))
-        for texture in textures
-    }
-    lacking = [f"{name} ({count})" for name, count in outside.items() if count]
-    if lacking:
-        print(
-            f"note: of {counted(len(conditions), 'condition')}, those outside the range of a "
-            f"texture's models, or silent there, are left out: {_first_of(lacking)}"
-        )
+def tell_conditions(made: Sequence[RecordingSet], grids: Sequence[ToolkitGrid | None]) -> None:
+    """Report which conditions were taken: a line for each of the first textures, then their sum."""
+    for records, grid in list(zip(made, grids, strict=True))[:MOST_NAMES]:
+        phrase = own_range(records) if grid is None else grid.describe()
+        print(f"{records.texture}: {phrase}")
+    kept, others = sum(map(len, made[MOST_NAMES:])), grids[MOST_NAMES:]
+    if others:
+        nodes = sum(len(grid.conditions) for grid in others if grid is not None)
+        what = f"{kept} of {counted(nodes, 'node')}" if nodes else counted(kept, "own condition")
+        print(f"{counted(len(others), 'more texture')}: {what}; provenance.json lists grids")
+    if any(grid is not None and grid.inside < len(grid.conditions) for grid in grids):
+        print("note: nodes outside the hull of a file's models, or silent there, are left out")
+
+
+def own_range(records: RecordingSet) -> str:
+    """One phrase: how many conditions, over what range."""
+    speeds, forces = zip(*(record.condition for record in records), strict=True)
+    return (
+        f"{counted(len(records), 'own condition')}, {min(speeds):.4g} to {max(speeds):.4g} mm/s "
+        f"x {min(forces):.4g} to {max(forces):.4g} N"
+    )

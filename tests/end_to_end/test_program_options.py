@@ -27,6 +27,7 @@ def test_version_is_that_of_the_project(main) -> None:
         ("tactileq im", {"import"}),
         ("tactileq import ", {"csv", "hatt", "wav"}),
         ("tactileq import wav --ch", {"--channel"}),
+        ("tactileq import hatt --own", {"--own-conditions"}),
         ("tactileq import csv --axis ", {"x", "y", "z", "dft321"}),
     ],
 )

@@ -99,6 +99,15 @@ def test_a_condition_that_the_set_holds_is_refused(tmp_path: Path) -> None:
     assert contents(tmp_path / "set") == before
 
 
+def test_a_condition_that_differs_by_rounding_is_refused(tmp_path: Path) -> None:
+    """Such a set could not be loaded any more."""
+    append(tmp_path / "set", RecordingSet([recording(50), recording(100)]), [None, None])
+    before = contents(tmp_path / "set")
+    with refused(InputError, names="'felt'", expected="rounding", got=["50.0", "50.000001"]):
+        append(tmp_path / "set", RecordingSet([recording(50.000001)]), [None])
+    assert contents(tmp_path / "set") == before
+
+
 def test_files_of_others_keep_their_names(tmp_path: Path) -> None:
     append(tmp_path / "set", RecordingSet([recording(50)]), [None])
     (tmp_path / "set/0002.csv").write_text("mine")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import soundfile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -14,8 +15,8 @@ from scipy.signal import butter, sosfilt
 
 from modeling import InputError, Recording, RecordingSet
 from modeling.errors import shown
-from modeling.recordings.recording_set import is_recording_set, textures_in
-from tests.refusals import refused
+from modeling.recordings.recording_set import is_recording_set, load_usable, textures_in
+from tests.refusals import check_refusal, refused
 
 RecordingMaker = Callable[..., Recording]
 NOISE = np.random.default_rng(1).standard_normal(100)
@@ -228,6 +229,30 @@ def test_two_files_for_a_condition_are_refused(make_recording: RecordingMaker) -
     assert len(RecordingSet([make_recording(), make_recording(texture="other")])) == 2
 
 
+@pytest.mark.parametrize(
+    ("speed_mm_s", "force_n"), [(100.00000001, 1.0), (100.0, 1 + 2e-16), (99.99999, 0.9999999)]
+)
+def test_conditions_that_differ_by_rounding_are_refused(
+    make_recording: RecordingMaker, speed_mm_s: float, force_n: float
+) -> None:
+    """They would span a grid of 2 x 2 that nobody recorded; a repeat's number is no excuse."""
+    first = make_recording()
+    other = make_recording(speed_mm_s=speed_mm_s, force_n=force_n, repeat=2)
+    got = [f"{speed_mm_s!r} mm/s", f"{force_n!r} N", "100.0 mm/s", "1.0 N"]
+    with refused(InputError, names=["'planted'", "repeat"], expected="rounding", got=got):
+        RecordingSet([make_recording(force_n=2.0), first, other])
+
+
+def test_conditions_that_differ_in_one_value_are_two(make_recording: RecordingMaker) -> None:
+    others = [
+        {"speed_mm_s": 100.001},
+        {"speed_mm_s": 100.0000001, "force_n": 2.0},
+        {"speed_mm_s": 100.0000001, "texture": "other"},
+    ]
+    for other in others:
+        assert len(RecordingSet([make_recording(), make_recording(**other)])) == 2
+
+
 def test_only_texture(make_recording: RecordingMaker) -> None:
     both = RecordingSet([make_recording(texture="b"), make_recording(texture="a")])
     assert both.textures == ("b", "a")
@@ -241,6 +266,8 @@ def recording_sets(draw: st.DrawFn) -> RecordingSet:
     names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=6).filter(
         lambda name: name.strip() and name.isprintable()
     )
+    # Conditions that differ by rounding only are refused: five digits, and all bits behind them.
+    values = st.floats(0, 1e4).map(lambda value: float(f"{value:.4e}") / 3)
     recordings = []
     for number in range(draw(st.integers(1, 3))):
         samples = draw(
@@ -251,8 +278,8 @@ def recording_sets(draw: st.DrawFn) -> RecordingSet:
             Recording(
                 np.clip(samples, -1e100, 1e100),
                 draw(st.floats(1.0, 1e6)),
-                draw(st.floats(0, 1e4)),
-                draw(st.floats(0, 1e4)),
+                draw(values),
+                draw(values),
                 draw(names),
                 unit=draw(st.sampled_from(["g", "arbitrary"])),
                 simulated=draw(st.booleans()),
@@ -370,6 +397,38 @@ def test_damaged_index_is_refused(folder: Path, old: str, new: str, sentence: st
     edit(folder / "recordings.tsv", old, new)
     with pytest.raises(InputError, match=sentence):
         RecordingSet.load(folder)
+
+
+@pytest.mark.parametrize("column", ["speed_mm_s", "force_n"])
+@pytest.mark.parametrize(
+    ("cell", "got"),
+    [
+        ("nan", "nan"),
+        ("-0.5", -0.5),
+        ("inf", "inf"),
+        ("-inf", "-inf"),
+        ("n/a", "'n/a'"),
+        ("", "nothing"),
+    ],
+)
+def test_impossible_speeds_and_forces_are_refused_by_table_row_and_column(
+    folder: Path, column: str, cell: str, got: object
+) -> None:
+    new = f"\t{cell}\t2.0" if column == "speed_mm_s" else f"\t100.0\t{cell}"
+    edit(folder / "recordings.tsv", "\t100.0\t2.0", new)
+    names = [folder / "recordings.tsv", "row 0002.csv"]
+    with refused(InputError, names=names, expected=column, got=got):
+        RecordingSet.load(folder)
+    kept, (sentence,) = load_usable(folder)
+    assert len(kept) == 1
+    check_refusal(sentence, names=names, expected=column, got=got)
+
+
+def test_impossible_speeds_of_sidecars_are_refused_by_name(tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "a.wav", NOISE / 10, 8000)
+    (tmp_path / "a.json").write_text('{"speed_mm_s": NaN, "force_n": 1.0}')
+    with refused(InputError, names="a.json", expected="speed_mm_s", got="nan"):
+        RecordingSet.load(tmp_path)
 
 
 @pytest.mark.parametrize(

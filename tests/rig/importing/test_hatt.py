@@ -256,6 +256,77 @@ def test_a_hole_changes_no_other_recording() -> None:
     assert np.array_equal(kept.samples, inside[50.0, 1.0].samples)
 
 
+# --- at the file's own conditions
+
+
+def test_each_loud_filter_has_one_recording_at_its_own_condition(
+    load: Callable[[str], HattTexture], hatt_xml: Xml
+) -> None:
+    texture = load(hatt_xml())
+    assert texture.vibrating() == [3, 4]
+    records = texture.own_recordings(duration_s=100.0, seed=1)
+    assert [r.condition for r in records] == [(300, 4), (160, 1.5)]
+    assert all(r.simulated and r.unit == "g" and r.texture == "Planted 1" for r in records)
+    frequency = np.arange(10.0, 490.0)
+    for record in records:
+        _, density = welch(record.samples, fs=1000.0, nperseg=1000)
+        expected = planted(*record.condition, frequency) ** 2 * 2 / 1000
+        assert np.mean(density[10:490] / expected) == pytest.approx(1, abs=0.02)
+
+
+def test_own_conditions_take_the_filter_itself_even_outside_all_triangles() -> None:
+    """The triangles of a file may leave a filter out; its neighbours then say nothing about it."""
+    texture = square([(100, 1), (200, 1), (100, 2), (300, 3)], [[0, 1, 2]])
+    *_, last = texture.own_recordings(duration_s=100.0, seed=4)
+    assert last.condition == (300, 3)
+    alone = square([(100, 1), (200, 1), (300, 3), (100, 2)], [[0, 1, 2]])
+    exact = alone.filter(300.0, 3.0)
+    # Line spectral frequencies are those of all filters; the variance is the fourth one's.
+    power = np.mean(exact.response(np.linspace(0, 500, 20_001)) ** 2) * 4 / 3
+    assert np.var(last.samples) == pytest.approx(power, rel=0.03)
+
+
+def test_own_conditions_are_bits_of_seed_and_place_at_any_rate() -> None:
+    first = [r.samples for r in UNIT.own_recordings(duration_s=0.5, seed=3)]
+    assert len(first) == 1
+    assert np.array_equal(
+        first[0], UNIT.own_recordings(duration_s=0.5, seed=3).recordings[0].samples
+    )
+    other = UNIT.own_recordings(duration_s=0.5, seed=4).recordings[0].samples
+    assert not np.array_equal(first[0], other)
+    [half] = UNIT.own_recordings(duration_s=0.5, rate_hz=500.0)
+    assert (half.rate_hz, half.samples.size) == (500.0, 250)
+
+
+def test_filters_without_speed_force_or_level_are_no_own_conditions() -> None:
+    texture = square([(100, 1), (0, 1), (100, 0), (200, 2), (300, 1)], [[0, 1, 2]])
+    texture.variances[3] = 0
+    assert texture.vibrating() == [0, 4]
+    texture.gains[0] = 0
+    assert texture.vibrating() == [4]
+    assert [r.condition for r in texture.own_recordings(duration_s=0.1)] == [(300, 1)]
+
+
+def test_a_condition_that_is_listed_twice_has_one_recording() -> None:
+    texture = square([(100, 1), (200, 1), (100, 2), (200.0000001, 1)], [[0, 1, 2]])
+    assert texture.vibrating() == [0, 1, 2]
+
+
+def test_silent_files_have_no_own_conditions(
+    load: Callable[[str], HattTexture], hatt_xml: Xml
+) -> None:
+    silent = load(re.sub("<var>.*?</var>", "<var>0.000000</var>", hatt_xml()))
+    with refused(InputError, names="Planted 1", expected="vibration", got=["none", "5 models"]):
+        silent.own_recordings()
+
+
+def test_unusable_options_of_own_conditions_are_refused() -> None:
+    with refused(InputError, expected=["rate", "1000 Hz"], got=2000):
+        UNIT.own_recordings(rate_hz=2000.0)
+    with refused(InputError, expected="100000 mm/s", got="200000 mm/s"):
+        square([(100, 1), (2e5, 1), (100, 2)], [[0, 1, 2]]).own_recordings()
+
+
 # --- bad files
 
 
@@ -370,10 +441,12 @@ def test_filters_of_different_orders_are_refused(
         load(mixed)
 
 
+@pytest.mark.parametrize("last", [(200, 0), (200, 0.000001)])
 def test_triangles_without_area_are_refused(
-    load: Callable[[str], HattTexture], hatt_xml: Xml
+    load: Callable[[str], HattTexture], hatt_xml: Xml, last: tuple[float, float]
 ) -> None:
-    text = hatt_xml(conditions=((0, 0), (100, 0), (200, 0), (0, 4)))
+    """A line to the six decimals of the file is a line."""
+    text = hatt_xml(conditions=((0, 0), (100, 0), last, (0, 4)))
     corner = "<value>1</value><value>2</value><value>3</value>"
     line = re.sub(r"<tri .*</tri>", f'<tri type="array">{corner}</tri>', text, flags=re.DOTALL)
     with refused(InputError, names="Models_Planted 1.xml", expected=["triangle", "area"]):
