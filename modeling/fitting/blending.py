@@ -13,10 +13,10 @@ import numpy as np
 
 from modeling.arrays import Floats, Integers
 from modeling.estimation.coherent import Observed, Response, response
+from modeling.estimation.likelihood import split
 from modeling.fitting.equations import Blocks, of_cells
 
-# In nepers (1 dB): how far a blended response may lie from the mean of its nodes for nothing.
-FORGIVEN = 0.0
+REACH = 6.0  # of a moving peak to either side, in widths
 # In log likelihood, per frequency: half of this times the square of what is beyond.
 HELD = 20.0
 NEPER_DB = 20 / np.log(10)
@@ -63,28 +63,43 @@ class Middles:
     def defects_db(self, theta: Floats, signs: Floats) -> Floats:
         """Distance of each middle's response from the mean of its corners' logarithms, (M,)."""
         level = self._levels(theta, signs)
-        m = len(self.corners)
-        return distances_db(level[:m], self._mean(level[m:]), self.places)
+        return distances_db(self._off(theta, level), np.zeros(level.shape[1]), self.places)
 
     def held(self, theta: Floats, signs: Floats) -> Held:
         """The cost of holes in the middles, from the parameters (N, p) of the nodes."""
         m = len(self.corners)
         found = self._response(theta, signs)
         level, slope = 0.5 * np.log(found.power), 0.5 * found.by_parameter
-        off = level[:m] - self._mean(level[m:])
-        beyond = np.sign(off) * np.maximum(np.abs(off) - FORGIVEN, 0.0)
-        far = np.flatnonzero(beyond.any(axis=1))
+        off = self._off(theta, level)
+        far = np.flatnonzero(off.any(axis=1))
         p = theta.shape[1]
         # By the parameters of each corner: of the blend, less of the corner itself.
         pull = slope[far][:, None] - slope[m:][self.corners[far]]
-        pull *= self.shares[None, :, None, None] * (beyond[far] != 0)[:, None, None, :]
+        pull *= self.shares[None, :, None, None] * (off[far] != 0)[:, None, None, :]
         flat = pull.reshape(len(far), 4 * p, slope.shape[2])
         blocks = (HELD * flat @ flat.transpose(0, 2, 1)).reshape(len(far), 4, p, 4, p)
         score = np.zeros(theta.shape)
-        along = -HELD * np.einsum("mapn,mn->map", pull, beyond[far])
+        along = -HELD * np.einsum("mapn,mn->map", pull, off[far])
         np.add.at(score, self.corners[far], along)
         information = of_cells(self.corners[far], blocks, self.count)
-        return Held(0.5 * HELD * float((beyond**2).sum()), information, score)
+        return Held(0.5 * HELD * float((off**2).sum()), information, score)
+
+    def _off(self, theta: Floats, level: Floats) -> Floats:
+        """Middles less the mean of their corners (M, n) in nepers; 0 where that means nothing.
+
+        Where a layer moves by more than its width, corners have its peak and the middle has it
+        elsewhere.
+        """
+        layers = (theta.shape[1] - 1) // 3
+        _, frequency, bandwidth, _ = split(theta[self.corners], layers)
+        width = np.exp(bandwidth.max(axis=1))
+        lowest, highest = np.exp(frequency.min(axis=1)), np.exp(frequency.max(axis=1))
+        reach = np.where(highest - lowest > width, REACH * width, -np.inf)
+        place = np.arctan(self.places.tangent[0]) * self.places.rate_hz / np.pi
+        below = (lowest - reach)[..., None] < place
+        passed = (below & (place < (highest + reach)[..., None])).any(axis=1)
+        m = len(self.corners)
+        return np.asarray(np.where(passed, 0.0, level[:m] - self._mean(level[m:])))
 
     def _mean(self, levels: Floats) -> Floats:
         """Means of the logarithms at the corners (M, n), from those at the nodes (N, n)."""

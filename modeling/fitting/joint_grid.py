@@ -120,7 +120,7 @@ def _summary(
     by_layers = {m: found.distance_db for m, found in others.items() if m != solution.count}
     warnings = [
         f"the recording at {speed:.4g} mm/s and {force:.3g} N is {abs(level):.0f} dB "
-        f"{'louder' if level > 0 else 'softer'} than its neighbours; its level was left out of the "
+        f"{'louder' if level > 0 else 'softer'} than the others suggest; its level was left out of the "
         "model, check its gain or record it again"
         for (speed, force), level in grid.surprising()
     ]
