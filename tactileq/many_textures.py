@@ -23,6 +23,7 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     from analysis.report.findings import Findings
     from modeling import RecordingSet
+    from modeling.models.fit_summary import FitSummary
 
 
 @dataclass(frozen=True)
@@ -201,9 +202,16 @@ def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
         *left_out_warnings(source.texture, unusable),
         *clipping_warnings(records),
         *_mended(found),
+        *_doubts(found),
     )
     outcome = Outcome(what, notes=notes, warnings=warnings)
     return _Made(outcome, files, provenance)
+
+
+def _doubts(found: Findings) -> list[str]:
+    """What the estimator warns of."""
+    fit = None if found.model is None else found.model.fit
+    return [] if fit is None else [f"warning: {found.texture}: {w}." for w in fit.warnings]
 
 
 def _mended(found: Findings) -> list[str]:
@@ -256,6 +264,8 @@ def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
         f"{int(model.unresolved.any(axis=2).sum())} and not identifiable in {unknown} of "
         f"{counted(conditions, 'condition')}: {start}.json"
     )
+    if model.fit is not None:
+        lines.append(f"{name}: {_nearness(model.fit)}")
     lines.append(f"{name}: layers over the grid in {start}_layers.tsv")
     lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
     if found.left_out is not None:
@@ -273,6 +283,20 @@ def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
         names = "; ".join(f"{speed:g} mm/s at {force:g} N" for speed, force in missing)
         lines.append(f"{name}: interpolated, because there is no recording: {names}")
     return lines
+
+
+def _nearness(fit: FitSummary) -> str:
+    """What is expected of a model's distance, and what other numbers of layers would change."""
+    others = ", ".join(
+        f"{counted(int(number), 'layer')} {distance:.2f} dB"
+        for number, distance in sorted(fit.by_layers_db.items(), key=lambda item: int(item[0]))
+    )
+    text = (
+        f"expected distance from the true spectra {fit.distance_db:.2f} dB at conditions, "
+        f"{fit.with_blends_db:.2f} dB with the blends between them (at worst "
+        f"{fit.blend_defect_db:.1f} dB from their conditions)"
+    )
+    return f"{text}; by --layers instead {others}" if others else text
 
 
 def recording_folders(folder: Path) -> list[Path]:

@@ -18,8 +18,10 @@ from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
 from analysis.textures.likeness import GFC_COLUMNS
 from analysis.textures.results import (
+    FIT_COLUMNS,
     VERDICT_COLUMNS,
     TextureResult,
+    fit_table,
     reference_condition,
     simplification_table,
 )
@@ -62,7 +64,7 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
     return Section(
         "models",
         "Models and their simplification",
-        (table, *predicted, *folds),
+        (table, *_fit_items(textures), *predicted, *folds),
         outcomes=(
             *simplification_outcomes(gfc),
             *described(left_out_outcomes(left_out)),
@@ -70,6 +72,24 @@ def model_section(textures: Sequence[TextureResult], gfc: pd.DataFrame) -> Secti
         done=_models_done(textures),
         tiles=_model_tiles(gfc),
     )
+
+
+def _fit_items(textures: Sequence[TextureResult]) -> tuple[Item, ...]:
+    fits = fit_table(textures)
+    if not len(fits):
+        return ()
+    table = Table(
+        "fits",
+        "Expected distance of the models, and their blends",
+        "Expected log-spectral distance from the true spectra, estimated from the fit itself: at "
+        "the recorded conditions, and at and between them. Blend defect: the largest distance of "
+        "a response half-way between conditions from the mean of the logarithms at its "
+        "conditions; above 4 dB a model must not be used between its conditions.",
+        fits,
+        without(FIT_COLUMNS, "simulated"),
+        any(result.simulated for result in textures),
+    )
+    return (table,)
 
 
 def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields
 
 import numpy as np
@@ -112,6 +112,44 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
         full_sha256=simplification.full_sha256,
         threshold_sha256=simplification.threshold.sha256,
     )
+
+
+FIT_COLUMNS = (
+    TEXTURE,
+    Column("layers"),
+    Column("distance_db", "expected distance at conditions", "dB"),
+    Column("with_blends_db", "and between", "dB"),
+    Column("blend_defect_db", "largest blend defect", "dB"),
+    Column("by_layers", "with other numbers of layers"),
+    Column("warnings"),
+    SIMULATED,
+)
+
+
+def fit_table(results: Sequence[TextureResult]) -> pd.DataFrame:
+    """What the estimator `joint` says of its own fits; textures of other estimators have no row.
+
+    Returns
+    -------
+    DataFrame
+        texture, layers, distance_db, with_blends_db, blend_defect_db (as in
+        `modeling.models.fit_summary.FitSummary`), by_layers and warnings (text), simulated.
+    """
+    rows = [
+        {
+            "texture": result.texture,
+            "layers": result.model.n_layers,
+            "distance_db": fit.distance_db,
+            "with_blends_db": fit.with_blends_db,
+            "blend_defect_db": fit.blend_defect_db,
+            "by_layers": ", ".join(f"{m}: {d:.2f} dB" for m, d in fit.by_layers_db.items()),
+            "warnings": "; ".join(fit.warnings),
+            "simulated": result.simulated,
+        }
+        for result in results
+        if (fit := result.model.fit) is not None
+    ]
+    return pd.DataFrame(rows, columns=[column.name for column in FIT_COLUMNS])
 
 
 def reference_condition(result: TextureResult) -> tuple[float, float]:

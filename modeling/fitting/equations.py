@@ -50,7 +50,8 @@ class Blocks(NamedTuple):
 
     def plus(self, other: Blocks) -> Blocks:
         """The sum of both."""
-        return Blocks(*(_sum(a, b) for a, b in zip(self, other, strict=True)))
+        couplings = [_sum(a, b) for a, b in zip(self[1:], other[1:], strict=True)]
+        return Blocks(self.own + other.own, *couplings)
 
 
 def _sum(a: Floats | None, b: Floats | None) -> Floats | None:

@@ -228,11 +228,11 @@ def louder(theta: Floats, level: Floats) -> Floats:
 
 def _gains(p: int) -> Integers:
     """Places of the noise gain and of the layers' amplitudes among p parameters."""
-    return np.r_[0, 1 + 2 * ((p - 1) // 3) : p]
+    return np.concatenate(([0], np.arange(1 + 2 * ((p - 1) // 3), p)))
 
 
 class _Levels(NamedTuple):
-    """Information (K, p) that a record's level shares with its parameters, its own (K,), its score."""
+    """Of records' levels: information (K, p) shared with their parameters, own (K,), score (K,)."""
 
     shared: Floats
     own: Floats
@@ -378,7 +378,7 @@ def covariances(field: Field, information: Blocks) -> Covariances:
     pivots: list[tuple[Floats, Floats]] = []
     before = np.zeros((size, size))
     for own, after in rows_of(matrix, columns=field.columns):
-        inverse = np.linalg.inv(own - before)
+        inverse = np.asarray(np.linalg.inv(own - before), dtype=np.float64)
         pivots.append((inverse, after))
         before = after.T @ inverse @ after
     each = np.empty((count, p, p))
@@ -426,7 +426,7 @@ def updated_precision(fit: FieldFit) -> Floats:
 
 
 def effective_parameters(fit: FieldFit) -> float:
-    """How many parameters the records determine: the trace of the share of information that is theirs.
+    """How many parameters the records determine: the trace of their share of the information.
 
     The neighbours determine the rest (MacKay 1992).
     """

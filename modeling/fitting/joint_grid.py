@@ -34,7 +34,6 @@ from modeling.fitting.field import (
     solve,
 )
 from modeling.fitting.layer_search import (
-    LEAST_GAIN,
     Solution,
     completed,
     fitted,
@@ -120,8 +119,8 @@ def _summary(
     by_layers = {m: found.distance_db for m, found in others.items() if m != solution.count}
     warnings = [
         f"the recording at {speed:.4g} mm/s and {force:.3g} N is {abs(level):.0f} dB "
-        f"{'louder' if level > 0 else 'softer'} than the others suggest; its level was left out of the "
-        "model, check its gain or record it again"
+        f"{'louder' if level > 0 else 'softer'} than the others suggest; its level was left out of "
+        "the model, check its gain or record it again"
         for (speed, force), level in grid.surprising()
     ]
     if refused:
@@ -145,6 +144,7 @@ def _summary(
     return FitSummary(
         solution.at_db,
         solution.blend_defect_db,
+        solution.distance_db,
         {str(m): by_layers[m] for m in sorted(by_layers)},
         tuple(warnings),
     )
@@ -188,8 +188,8 @@ def _worth(grid: TextureGrid, more: Solution, *, fewer: Solution) -> bool:
     gained = fewer.distance_db - more.distance_db
     if gained >= LEAST_WORTH_DB or gained < LEAST_GAINED_DB:
         return gained >= LEAST_WORTH_DB
-    levels = [_levels(grid, found)[grid.recorded] for found in (more, fewer)]
-    changed = distances_db(*levels, grid.sampled)
+    one, other = (_levels(grid, found)[grid.recorded] for found in (more, fewer))
+    changed = distances_db(one, other, grid.sampled)
     worth = np.hypot(more.distance_db, changed) - more.distance_db
     return bool(np.quantile(worth, 1 - SOMEWHERE) >= LEAST_WORTH_DB)
 
@@ -234,7 +234,7 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
 def _cancelling_pair(grid: TextureGrid, solution: Solution) -> tuple[int, int] | None:
     """Two layers (the louder one first) of opposite signs at one place in most conditions."""
     _, frequency, bandwidth, gain = (np.exp(part) for part in split(solution.theta, solution.count))
-    known = grid.near.any(axis=0)
+    known = grid.known
     for a, b in combinations(range(solution.count), 2):
         near = CANCELLING_SHARE * np.minimum(bandwidth[:, a], bandwidth[:, b])
         together = np.abs(frequency[:, a] - frequency[:, b]) < near
@@ -246,7 +246,7 @@ def _cancelling_pair(grid: TextureGrid, solution: Solution) -> tuple[int, int] |
 
 def _grid_fit(grid: TextureGrid, solution: Solution) -> GridFit:
     """Layers in the order of their frequencies in the top corner, with their deviations."""
-    m, recorded = solution.count, grid.near.any(axis=0)
+    m, recorded = solution.count, grid.known
     absent = _absent(grid, solution)
     theta = np.clip(_placed_by_neighbours(solution, absent), *grid.limits(m))
     noise, frequency, bandwidth, gain = split(theta, m)
@@ -291,7 +291,7 @@ def _absent(grid: TextureGrid, solution: Solution) -> Bools:
         cost = misfits(power, solution.observed) - solution.fit.slopes.misfit
         shown[:, layer] = cost >= LEAST_EVIDENCE
     near = grid.near.astype(float).T
-    return np.asarray((near @ shown == 0) & grid.near.any(axis=0)[:, None])
+    return np.asarray((near @ shown == 0) & grid.known[:, None])
 
 
 def _placed_by_neighbours(solution: Solution, absent: Bools) -> Floats:

@@ -55,7 +55,7 @@ NOT_WORSE = 3.0  # in log evidence per record, for a solution to be looked at in
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Layers of a whole texture: parameters (N, p) of the nodes relative to the grid's scale, and signs (m,).
+    """Layers of a texture: parameters (N, p) of nodes, relative to the grid's scale, signs (m,).
 
     `value` is the penalised misfit, less what scatter alone gives in these bins, so that solutions
     in different bins can be compared; `observed` are the bins.
@@ -76,7 +76,6 @@ class Solution:
     def evidence(self) -> float:
         """Log evidence, comparable between solutions in different bins."""
         return log_evidence(self.fit) + float(self.observed.scatter.sum())
-
 
     @cached_property
     def at_db(self) -> float:

@@ -131,6 +131,11 @@ class TextureGrid:
         """Which records (K) decide about which nodes (N): they are nearest to them, (K, N)."""
         return np.asarray((self.corners.weights > NEAR_SHARE) & self.recorded[:, None])
 
+    @cached_property
+    def known(self) -> Bools:
+        """Nodes (N,) that some record decides about."""
+        return np.asarray(self.near.any(axis=0))
+
     def limits(self, m: int) -> tuple[Floats, Floats]:
         """Lowest and highest parameters of m layers."""
         return limits_of(m, rate_hz=self.rate_hz, step_hz=self.step_hz)

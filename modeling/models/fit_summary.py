@@ -21,20 +21,23 @@ class FitSummary:
     blend_defect_db : float
         The largest distance of a response half-way between nodes from the mean of the logarithms
         at its nodes, ≥ 0 (docs/method/fitting.md#blends).
+    with_blends_db : float
+        Expected distance at the recordings and between them, ≥ 0.
     by_layers_db : dict of str to float
-        Expected distance, blends included, with other numbers of layers that were tried.
+        The same with other numbers of layers that were tried.
     warnings : tuple of str
         One sentence each: outliers, refused layers, scattered conditions.
     """
 
     distance_db: float
     blend_defect_db: float
+    with_blends_db: float
     by_layers_db: Mapping[str, float] = field(hash=False)
     warnings: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "warnings", tuple(self.warnings))
-        numbers = [self.distance_db, self.blend_defect_db]
+        numbers = [self.distance_db, self.blend_defect_db, self.with_blends_db]
         mapped = isinstance(self.by_layers_db, Mapping)
         numbers += self.by_layers_db.values() if mapped else []
         texts = all(isinstance(warning, str) for warning in self.warnings)

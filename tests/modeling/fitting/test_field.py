@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from modeling.arrays import Floats
 from modeling.estimation.coherent import limits_of, observe, response
 from modeling.estimation.likelihood import Power, signal_power
+from modeling.fitting.equations import Blocks, Corners
 from modeling.fitting.field import (
     FAINTEST,
     TREND_SHARE,
@@ -34,7 +35,13 @@ def random_field(rows: int, columns: int, p: int, *, seed: int = 0) -> Field:
     root = rng.standard_normal((p, p))
     places = np.array([(0.3 * i, 0.2 * j**1.2) for i in range(rows) for j in range(columns)])
     trend = rng.standard_normal((2, p))
-    return Field(rows, columns, places, root @ root.T + np.eye(p), trend)
+    return Field(rows, columns, places, root @ root.T + np.eye(p), trend, at_nodes(rows * columns))
+
+
+def at_nodes(count: int) -> Corners:
+    """Records at the nodes themselves."""
+    nodes = np.repeat(np.arange(count)[:, None], 4, axis=1)
+    return Corners(nodes, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), count)
 
 
 def neighbours(rows: int, columns: int) -> list[tuple[int, int]]:
@@ -67,7 +74,9 @@ def test_banded_equations_are_the_dense_ones(rows: int, columns: int, p: int) ->
     field, blocks = random_field(rows, columns, p), positive(rows * columns, p)
     right = np.random.default_rng(2).standard_normal((rows * columns, p))
     expected = np.linalg.solve(dense(field, blocks), right.ravel())
-    assert solve(field, blocks, right).ravel() == pytest.approx(expected, rel=1e-9, abs=1e-12)
+    assert solve(field, Blocks(blocks), right).ravel() == pytest.approx(
+        expected, rel=1e-9, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize(("rows", "columns"), SHAPES)
@@ -77,7 +86,7 @@ def test_covariances_are_those_of_the_dense_inverse(rows: int, columns: int, p: 
     count = rows * columns
     inverse = np.linalg.inv(dense(field, blocks + FAINTEST * np.eye(p)))
     inverse = inverse.reshape(count, p, count, p)
-    found = covariances(field, blocks)
+    found = covariances(field, Blocks(blocks))
     expected = np.array([inverse[c, :, c] for c in range(count)])
     assert found.conditions == pytest.approx(expected, rel=1e-8, abs=1e-12)
     pairs = neighbours(rows, columns)
@@ -162,7 +171,8 @@ def field_of(rows: int, columns: int, m: int) -> Field:
     places = np.log([(1.3**i, 1.5**j) for i in range(rows) for j in range(columns)])
     precision = np.linalg.inv(prior_covariance(m))
     p = 1 + 3 * m
-    return Field(rows, columns, places - places.mean(axis=0), precision, np.zeros((2, p)))
+    centred = places - places.mean(axis=0)
+    return Field(rows, columns, centred, precision, np.zeros((2, p)), at_nodes(len(places)))
 
 
 def observed_near(powers: list[Power], theta: Floats) -> object:
@@ -270,7 +280,8 @@ def test_evidence_of_a_linear_field_is_that_of_its_normal_distribution() -> None
     value = 0.5 * np.sum(information * (data - best) ** 2)
     slopes_there = Slopes(np.zeros(6), np.zeros(6), information[:, None, None], np.zeros((6, 1)))
     penalty = field.penalty(best[:, None])
-    fit = FieldFit(best[:, None], slopes_there, value + penalty, field)
+    records = Blocks(slopes_there.information)
+    fit = FieldFit(best[:, None], np.zeros(6), slopes_there, value + penalty, records, field)
     # The common level's own prior is all but flat; its cost is the same in every field.
     covariance = np.linalg.inv(precision) + np.diag(1 / information)
     exact = -0.5 * (data @ np.linalg.solve(covariance, data) + np.linalg.slogdet(covariance)[1])
