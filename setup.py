@@ -3,7 +3,7 @@
 import numpy
 from setuptools import Extension, setup
 
-PARTS = ("kernel", "kernel_single", "many", "rivals", "live")
+PARTS = ("kernel", "kernel_single", "many", "slopes", "rivals", "live")
 
 setup(
     cffi_modules=[f"tools/c_parts.py:{part}" for part in PARTS],

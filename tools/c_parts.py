@@ -1,7 +1,8 @@
 """The C parts of the project and their cffi bindings; run by setup.py, without the project.
 
 `modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
-`_many` renders many streams side by side, `analysis.benches._rivals` is what the bench compares,
+`_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
+spends its time on, `analysis.benches._rivals` is what the bench compares,
 `rig.live._live` is the memory that processes of a rig share and the callback that plays.
 """
 
@@ -17,6 +18,7 @@ KERNEL = ROOT / "modeling" / "rendering" / "kernel.h"
 LATTICE = ROOT / "modeling" / "rendering" / "lattice.h"
 MANY = ROOT / "modeling" / "rendering" / "many.h"
 MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
+SLOPES = ROOT / "modeling" / "estimation" / "slopes.h"
 RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
@@ -57,7 +59,7 @@ def binding(
         depends=[str(header) for header in (*headers, *included)],
         define_macros=[("TQ_REAL", real), ("TQ_FLAGS", f'"{" ".join(arguments)}"')],
         extra_compile_args=arguments,
-        optional=True,  # no compiler: the Python renderer does the same, slower
+        optional=True,  # no compiler: Python does the same, slower
     )
     return builder
 
@@ -72,6 +74,9 @@ many = binding(
     constants="TQ_BLOCK, TQ_STREAMS",
     included=(MANY_LANES,),
     arguments=VECTOR_ARGUMENTS,
+)
+slopes = binding(
+    "modeling.estimation._slopes", SLOPES, constants="TQ_SUMS", arguments=VECTOR_ARGUMENTS
 )
 
 

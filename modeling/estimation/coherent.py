@@ -16,6 +16,7 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
+from modeling.estimation.compiled import CompiledSpectra, Costs, is_compiled
 from modeling.estimation.likelihood import (
     LEAST_POWER,
     WIDEST_LOG_GAIN,
@@ -32,6 +33,7 @@ LINE_WIDTH = 0.9
 NARROWEST_LINES = 1.5
 # Half the corner of the high-pass of the preparation: of layers below it only a skirt is seen.
 LOWEST_LAYER_HZ = 5.0
+HIGHEST_LOOKED_AT = 0.49  # of the rate: where a layer's response at its own frequency is looked at
 # A layer higher than this many times the response at its own frequency is mostly cancelled by
 # others: two such layers describe what one would, and nothing predicts what is left of them
 # elsewhere. Being twice as high costs nothing, four times as high five units of log likelihood.
@@ -71,6 +73,20 @@ class Observed:
         count = np.maximum(self.count, 0.5)
         each = self.weight * (np.log(count) - digamma(count))
         return np.asarray(np.where(self.weight > 0, each, 0.0).sum(axis=1))
+
+    @cached_property
+    def compiled(self) -> CompiledSpectra:
+        """The same for the compiled engine."""
+        return CompiledSpectra(
+            self.power,
+            self.weight,
+            self.tangent,
+            self.cotangent,
+            line_hz=self.line_hz,
+            rate_hz=self.rate_hz,
+            highest_hz=HIGHEST_LOOKED_AT * self.rate_hz,
+            costs=Costs(LEAST_POWER, CANCELLING, LARGEST_SHARE),
+        )
 
     def rows(self, chosen: Sequence[int] | Integers) -> Observed:
         """Some of the spectra, any of them several times."""
@@ -168,6 +184,8 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
     g = tan(πf/fs), k = tan(πB/fs): `bands.band_response`, rearranged. Seen through a line of width
     δ, the band has the width √(B² + δ²) and the power of its peak is lower by B over it.
     """
+    if is_compiled():
+        return Response(*observed.compiled.responses(theta, signs))
     m, per_hz = (theta.shape[1] - 1) // 3, np.pi / observed.rate_hz
     noise, frequency, bandwidth, gain = split(theta, m)
     centre, width = np.exp(frequency), np.exp(bandwidth)
@@ -249,6 +267,8 @@ class Slopes(NamedTuple):
 
 def slopes(theta: Floats, signs: Floats | None, observed: Observed) -> Slopes:
     """The objective at (K, p) parameters and what a scoring step needs."""
+    if is_compiled():
+        return Slopes(*observed.compiled.slopes(theta, signs))
     m, n = (theta.shape[1] - 1) // 3, observed.tangent.shape[1]
     power, derivative = response(theta, signs, _with_centres(theta, m, observed))
     at_bins = derivative[:, :, :n]
@@ -275,7 +295,7 @@ def slopes(theta: Floats, signs: Floats | None, observed: Observed) -> Slopes:
 def _with_centres(theta: Floats, m: int, observed: Observed) -> Observed:
     """Further places without weight: each layer's own frequency."""
     at = np.exp(split(theta, m)[1])
-    at = np.tan(np.pi / observed.rate_hz * np.clip(at, 1.0, 0.49 * observed.rate_hz))
+    at = np.tan(np.pi / observed.rate_hz * np.clip(at, 1.0, HIGHEST_LOOKED_AT * observed.rate_hz))
     none = np.zeros(at.shape)
     return Observed(
         np.concatenate((observed.power, none + 1), axis=1),

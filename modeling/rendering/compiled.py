@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from modeling.arrays import Floats
+from modeling.engines import prefers_python
 from modeling.rendering.plan import LayeredModel, RenderCounters, RenderPlan
 
 try:
@@ -18,9 +18,6 @@ try:
     from modeling.rendering._call import Call
 except ImportError:  # no compiler at installation
     _kernel = _kernel_single = Call = None
-
-# Set to anything, renders in Python although the kernel is there.
-SWITCH = "TACTILEQ_NO_KERNEL"
 
 
 def is_compiled() -> bool:
@@ -33,7 +30,7 @@ def is_compiled() -> bool:
             RuntimeWarning,
             stacklevel=1,  # from one place, so that Python shows it once
         )
-    return Call is not None and not os.environ.get(SWITCH)
+    return Call is not None and not prefers_python()
 
 
 def filled_texture(ffi: Any, fields: dict[str, Any], real: type) -> tuple[Any, list[Any]]:

@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from modeling import ARModel, InputError, Limits, Renderer
+from modeling.engines import SWITCH
 from modeling.errors import shown
-from modeling.rendering.compiled import SWITCH, Call
+from modeling.rendering.compiled import Call
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 

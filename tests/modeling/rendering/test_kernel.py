@@ -15,8 +15,8 @@ from hypothesis.extra.numpy import arrays
 
 import modeling.rendering.compiled
 from modeling import Limits, Renderer, TextureModel, regressed
+from modeling.engines import SWITCH
 from modeling.equalizer.bands import band_coefficients
-from modeling.rendering.compiled import SWITCH
 from modeling.rendering.noise import stream_key, white_noise
 from stimuli.planted.textures import CATALOGUE, planted_texture
 

@@ -21,7 +21,7 @@ import pytest
 
 from analysis.benches.rivals import layered_texture
 from modeling import Renderer, TextureModel
-from modeling.rendering.compiled import SWITCH
+from modeling.engines import SWITCH
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.scenes.microcontrollers import MicroController

@@ -16,9 +16,9 @@ from hypothesis.extra.numpy import arrays
 import modeling.rendering.many
 from modeling import ARModel, InputError, Limits, Renderer, TextureModel, regressed, render_many
 from modeling.arrays import Floats
+from modeling.engines import SWITCH
 from modeling.hand import Hand
 from modeling.models.compiled_for import CompiledFor
-from modeling.rendering.compiled import SWITCH
 from modeling.rendering.many import WIDTHS, lib, rendered
 from modeling.vibrators.compensation import Compensation
 from stimuli.planted.textures import TEXTURES, planted_texture

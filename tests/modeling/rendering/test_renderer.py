@@ -22,11 +22,12 @@ from modeling import (
     Renderer,
     TextureModel,
 )
+from modeling.engines import SWITCH
 from modeling.errors import shown
 from modeling.hand import Hand
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.rendering.compiled import SWITCH, Call, is_compiled
+from modeling.rendering.compiled import Call, is_compiled
 from stimuli.planted.textures import CATALOGUE, planted_texture
 from tests.refusals import refused
 

@@ -27,8 +27,8 @@ from modeling import (
     compensation_for,
     regressed,
 )
+from modeling.engines import SWITCH
 from modeling.errors import shown
-from modeling.rendering.compiled import SWITCH
 from stimuli.exports.c_header import c_identifier, write_c_header
 from stimuli.exports.peq_json import write_peq_json
 from stimuli.exports.wav import write_wav
