@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 Item = TypeVar("Item")
@@ -17,6 +18,19 @@ def usable_cores() -> int:
 
     cores: int = cpu_count()
     return cores
+
+
+@contextmanager
+def one_linear_algebra_thread() -> Generator[None]:
+    """Linear algebra on one thread within, so that no sum depends on the number of cores.
+
+    SciPy is loaded first: what is loaded afterwards would not be limited.
+    """
+    import scipy.linalg  # noqa: F401  # late: slow to load
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        yield
 
 
 def in_order(

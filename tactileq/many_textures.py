@@ -166,17 +166,16 @@ def _write(made: _Made, start: Path, *, texture: str) -> Outcome:
 
 def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
     """Load and model one texture; what is wrong with it becomes its outcome's error."""
-    from threadpoolctl import threadpool_limits
-
     from analysis.report.findings import find_in, findings_files
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.recordings.recording_set import load_usable
+    from modeling.threads import one_linear_algebra_thread
 
     what = f"{source.texture} in {source.folder}"
     try:
         # One thread each: sums must not depend on the number of cores.
-        with threadpool_limits(limits=1):
+        with one_linear_algebra_thread():
             inputs = sha256_of_paths([source.folder])
             records, unusable = load_usable(source.folder, texture=source.texture)
             found = find_in(
@@ -242,7 +241,7 @@ def _rate_notes(records: RecordingSet) -> list[str]:
 
 def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     """What was found and where it is, with the conditions that were interpolated."""
-    from analysis.textures.between import sentence
+    from analysis.textures.between import sentence, worth_recording
     from modeling import missing_conditions
     from modeling.models.own_peaks import own_peaks
 
@@ -270,6 +269,9 @@ def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
     if found.left_out is not None:
         lines.append(f"{name}: conditions left out and predicted: {sentence(found.left_out)}")
+        if more := worth_recording(found.left_out):
+            near = "; ".join(f"{speed:.4g} mm/s at {force:.3g} N" for speed, force in more)
+            lines.append(f"{name}: further conditions are worth recording near {near}")
     for axis, unit in ((model.speeds_mm_s, "mm/s"), (model.forces_n, "N")):
         if axis.size == 1:
             other = "speeds" if unit == "mm/s" else "forces"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from analysis.columns import tsv_text
-from analysis.textures.between import distances_to_recordings, joint_fit, left_out_table
+from analysis.textures.between import distances_to_recordings, fit_like, left_out_table
 from analysis.textures.recordings import (
     RecordingLayers,
     layers_of_recordings,
@@ -105,7 +105,7 @@ def find_in(
         model = fit_spectra(measured, estimator=estimator, layers=layers)
         quality = distances_to_recordings(model.peq, measured)
         if check:
-            left_out = left_out_table(measured, joint_fit(estimator=estimator, layers=layers))
+            left_out = left_out_table(measured, fit_like(model))
     except GridError as error:
         why_not = str(error)
     each = () if model and not alone else layers_of_recordings(measured, estimator=estimator)

@@ -118,11 +118,16 @@ def _errors(model: Floats, true: Floats) -> tuple[float, float]:
 Fit = Callable[[Measured], FilterAt]
 
 
-def joint_fit(*, estimator: str = "joint", layers: int | None = None) -> Fit:
-    """What `left_out_table` refits: a texture model by this estimator."""
+def fit_like(model: TextureModel) -> Fit:
+    """What `left_out_table` refits: a model as this one.
+
+    By `joint` with its number of layers and their signs, which all recordings have decided; what
+    is fitted again are their parameters.
+    """
+    like = model if model.estimator == "joint" else None
 
     def fit(measured: Measured) -> FilterAt:
-        return fit_spectra(measured, estimator=estimator, layers=layers).peq
+        return fit_spectra(measured, estimator=model.estimator, like=like).peq
 
     return fit
 
@@ -222,6 +227,24 @@ def sentence(table: pd.DataFrame) -> str:
     )
 
 
+def worth_recording(left_out: pd.DataFrame, *, most: int = 3) -> list[Condition]:
+    """Conditions near which further recordings help most, the worst predicted first.
+
+    Those left out that are predicted more than twice as badly as the median of all.
+
+    Parameters
+    ----------
+    left_out : DataFrame
+        From `left_out_table`.
+    most : int
+    """
+    if not len(left_out):
+        return []
+    poor = left_out[left_out[DISTANCE] > 2 * left_out[DISTANCE].median()]
+    worst = poor.sort_values(DISTANCE, ascending=False).head(most)
+    return list(zip(worst["speed_mm_s"].tolist(), worst["force_n"].tolist(), strict=True))
+
+
 def truth_summary(
     filter_at: FilterAt, truth: Truth, conditions: Iterable[Condition], *, frequency_hz: Floats
 ) -> tuple[float, float, float]:
@@ -239,13 +262,10 @@ def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.D
     ----------
     measured : sequence of (Recording, Spectrum)
     model : TextureModel
-        Its estimator and, by `joint`, its number of layers are used again.
+        Its estimator and, by `joint`, the number and signs of its layers are used again.
     """
-    layers = model.n_layers if model.estimator == "joint" and model.n_layers else None
     return {
-        model.estimator: left_out_table(
-            measured, joint_fit(estimator=model.estimator, layers=layers)
-        ),
+        model.estimator: left_out_table(measured, fit_like(model)),
         f"AR({RIVAL_ORDER})": left_out_table(measured, ar_fit(RIVAL_ORDER)),
     }
 

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from analysis.textures.recovery import match_layers
 from modeling import PEQ, Recording, RecordingSet, fit_texture
 from modeling.arrays import Floats
 from modeling.models.own_peaks import own_peaks
+from modeling.threads import one_linear_algebra_thread
 from stimuli.planted.spectra import NOISE_GAIN, RATE_HZ, RandomTruth, random_truth
 
 TEXTURES = 40
@@ -232,7 +232,7 @@ def main() -> None:
     parser.add_argument("--textures", type=int, default=TEXTURES)
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".tsv"))
     asked = parser.parse_args()
-    with threadpool_limits(limits=1):
+    with one_linear_algebra_thread():
         table = study(asked.textures)
     table.to_csv(asked.out, sep="\t", index=False, float_format="%.4g")
     print(table.round(3).to_string(index=False))

@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from threadpoolctl import threadpool_limits
 
 from analysis.figures.drawing import (
     LAYER_COLOURS,
@@ -30,6 +29,7 @@ from analysis.figures.drawing import stamp_if_simulated as stamp
 from analysis.textures.between import FilterAt, halfway, truth_summary
 from modeling import RecordingSet, fit_ar, fit_texture
 from modeling.models.grid import Condition
+from modeling.threads import one_linear_algebra_thread
 from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
 
 SURFACES = 40
@@ -172,7 +172,7 @@ def main() -> None:
     stem = Path(__file__).with_suffix("")
     cases = {"": whole_grid, "_every_second": every_second_node, "_few_speeds": few_speeds}
     for suffix, make in cases.items():
-        with threadpool_limits(limits=1):
+        with one_linear_algebra_thread():
             table = run(make, SURFACES)
         table.to_csv(f"{stem}{suffix}.tsv", sep="\t", index=False, float_format="%.4g")
         print(f"{make.__name__}\n{table.round(3).to_string(index=False)}", flush=True)

@@ -44,6 +44,7 @@ from modeling.fitting.layer_search import (
 from modeling.fitting.texture_grid import TextureGrid, texture_grid
 from modeling.models.fit_summary import FitSummary
 from modeling.models.grid import Condition
+from modeling.models.texture_model import TextureModel
 from modeling.recordings.spectrum import Spectrum
 
 EM_ROUNDS = 3
@@ -63,6 +64,8 @@ LEAST_EVIDENCE = 3.0
 # Layers within this share of their widths, of opposite signs, are tried as one.
 CANCELLING_SHARE = 0.25
 LEAST_LEFT = 0.05
+REFIT_ROUNDS = 2
+LEAST_START = 1e-6
 FADED = 8.0  # of log amplitude: 70 dB
 HELD = 1e8
 TREND_ROUNDS = 8
@@ -104,7 +107,8 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     if not grid.recorded.any():
         return _silent(grid)
     contenders, refused = _held(grid, count)
-    solution = learned(grid, _with_fewest(grid, contenders), rounds=EM_ROUNDS)
+    best = _with_fewest(grid, contenders)
+    solution = learned(grid, best.theta, best.signs, rounds=EM_ROUNDS)
     if count is None:
         solution = _merged(grid, _completed(grid, solution))
     solution = in_frequency_order(grid, solution)
@@ -148,6 +152,27 @@ def _summary(
         {str(m): by_layers[m] for m in sorted(by_layers)},
         tuple(warnings),
     )
+
+
+def refit_grid_jointly(spectra: Mapping[Condition, Spectrum], model: TextureModel) -> GridFit:
+    """The layers of a model, their number and signs as in it, fitted to other records.
+
+    Parameters
+    ----------
+    spectra : mapping of (speed, force) to Spectrum
+        Of the same texture and rate, at least one that is not silent.
+    model : TextureModel
+        By `joint`.
+    """
+    grid = texture_grid(spectra)
+    at = model.parameters(*np.array(grid.conditions).T)
+    signs = np.where(np.median(model.gains, axis=(0, 1)) < 0, -1.0, 1.0)
+    gains = np.column_stack((at.noise_gain, at.gains * signs)) / grid.scale
+    gains = np.log(np.maximum(gains, LEAST_START))
+    places = np.log(np.hstack((at.frequencies_hz, at.bandwidths_hz)))
+    theta = np.hstack((gains[:, :1], places, gains[:, 1:]))
+    solution = learned(grid, theta, signs, rounds=REFIT_ROUNDS)
+    return _grid_fit(grid, solution)
 
 
 def _held(grid: TextureGrid, count: int | None) -> tuple[list[Solution], bool]:
@@ -205,7 +230,7 @@ def _completed(grid: TextureGrid, solution: Solution) -> Solution:
     more = completed(grid, solution)
     if more is solution:
         return solution
-    more = learned(grid, more, rounds=EM_ROUNDS)
+    more = learned(grid, more.theta, more.signs, rounds=EM_ROUNDS)
     holds = more.blend_defect_db <= LARGEST_DEFECT_DB
     return more if holds and _worth(grid, more, fewer=solution) else solution
 
@@ -224,7 +249,8 @@ def _merged(grid: TextureGrid, solution: Solution) -> Solution:
         least = LEAST_LEFT * np.exp(theta[:, gain + stays])
         theta[:, gain + stays] = np.log(np.maximum(amplitude, least))
         start = without_layer(theta, goes), np.delete(solution.signs, goes)
-        one = learned(grid, fitted(grid, *start), rounds=EM_ROUNDS)
+        near = fitted(grid, *start)
+        one = learned(grid, near.theta, near.signs, rounds=EM_ROUNDS)
         if one.distance_db > solution.distance_db:
             return solution
         solution = one

@@ -11,7 +11,7 @@ clear peaks are also begun from layers spread over them, with every sign.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 
@@ -395,18 +395,18 @@ def expanded(grid: TextureGrid, part: TextureGrid, solution: Solution) -> Soluti
     wanted = np.log(np.array(grid.conditions))[:, [by_row, 1 - by_row]]
     theta = np.asarray(RegularGridInterpolator(tuple(axes), values)(wanted), dtype=np.float64)
     theta[:, np.r_[0, 1 + 2 * solution.count : theta.shape[1]]] += np.log(part.scale / grid.scale)
-    return learned(grid, replace(solution, theta=theta), rounds=ROUGH_ROUNDS)
+    return learned(grid, theta, solution.signs, rounds=ROUGH_ROUNDS)
 
 
-def learned(grid: TextureGrid, solution: Solution, *, rounds: int) -> Solution:
-    """The solution in a field whose smoothness is estimated from it; blends have no holes."""
-    theta, observed = solution.theta, grid.observed(solution.theta)
-    precision = np.asarray(np.linalg.inv(prior_covariance(solution.count)))
+def learned(grid: TextureGrid, theta: Floats, signs: Floats, *, rounds: int) -> Solution:
+    """The field near a start (N, p), its smoothness estimated from it; blends are held."""
+    observed = grid.observed(theta)
+    precision = np.asarray(np.linalg.inv(prior_covariance(signs.size)))
     for _ in range(rounds):
         solution = fitted(
             grid,
             theta,
-            solution.signs,
+            signs,
             precision=precision,
             observed=observed,
             steps=8,
@@ -414,6 +414,4 @@ def learned(grid: TextureGrid, solution: Solution, *, rounds: int) -> Solution:
             middles=True,
         )
         theta, precision = solution.theta, updated_precision(solution.fit)
-    return fitted(
-        grid, theta, solution.signs, precision=precision, steps=8, enough=0.3, middles=True
-    )
+    return fitted(grid, theta, signs, precision=precision, steps=8, enough=0.3, middles=True)

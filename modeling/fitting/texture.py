@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from modeling.errors import InputError, shown
 from modeling.estimation.layers import EstimatorName, check_estimator
 from modeling.estimation.likelihood import is_silent
 from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
-from modeling.fitting.joint_grid import fit_grid_jointly
+from modeling.fitting.joint_grid import GridFit, fit_grid_jointly, refit_grid_jointly
 from modeling.fitting.layer_search import MOST_LAYERS
 from modeling.fitting.paper_naming import paper_arrays
 from modeling.models.grid import Condition, check_spanned, grid_axes
@@ -69,6 +69,7 @@ def fit_spectra(
     *,
     estimator: str = "joint",
     layers: int | None = None,
+    like: TextureModel | None = None,
 ) -> TextureModel:
     """Model one texture from spectra that `recording_spectra` has prepared; see `fit_texture`.
 
@@ -77,6 +78,11 @@ def fit_spectra(
     measured : sequence of (Recording, Spectrum)
         With contact; the same texture, unit and rate in all.
     estimator : {"joint", "paper", "paper-consistent"}
+    layers : int, optional
+        As in `fit_texture`.
+    like : TextureModel, optional
+        With `joint`: number, signs and start of the layers as in this model of more recordings of
+        the texture, in a third of the time.
     """
     chosen = check_estimator(estimator)
     _check_layers(layers, chosen)
@@ -91,7 +97,12 @@ def fit_spectra(
         )
     check_spanned(spectra, first.texture)
     if chosen == "joint":
-        arrays = _joint_arrays(spectra, layers)
+        found = (
+            fit_grid_jointly(spectra, count=layers)
+            if like is None
+            else refit_grid_jointly(spectra, like)
+        )
+        arrays = _joint_arrays(found)
     else:
         arrays = paper_arrays(spectra, chosen, texture=first.texture)
     return TextureModel(
@@ -114,9 +125,8 @@ def _check_layers(layers: object, estimator: EstimatorName) -> None:
         )
 
 
-def _joint_arrays(spectra: Mapping[Condition, Spectrum], count: int | None) -> dict[str, Any]:
+def _joint_arrays(found: GridFit) -> dict[str, Any]:
     """The model's arrays by `joint`; holes are what their neighbours predict."""
-    found = fit_grid_jointly(spectra, count=count)
     speeds, forces = grid_axes(found.layers)
     grid = [(speed, force) for speed in speeds for force in forces]
     shape = (len(speeds), len(forces))

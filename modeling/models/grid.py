@@ -15,6 +15,8 @@ from modeling.errors import GridError, InputError
 from modeling.hand import Hand
 
 Condition = tuple[float, float]
+LEAST_REACH = 0.01  # of log speed or log force, of conditions that are not all the same
+LEAST_WIDTH = 0.02  # of conditions across their longest extent: a hull with less has no area
 
 
 def check_axes(speeds_mm_s: Floats, forces_n: Floats) -> None:
@@ -102,19 +104,26 @@ def grid_axes(conditions: Iterable[Condition]) -> tuple[list[float], list[float]
 def check_spanned(conditions: Collection[Condition], texture: str) -> None:
     """Refuse conditions on a line across the grid, between which nothing can be interpolated.
 
-    One speed or one force alone is no such line: nothing is known of others then.
+    One speed or one force alone is no such line: nothing is known of others then. Nor do
+    conditions that are all but the same span anything.
 
     Raises
     ------
     GridError
     """
     speeds, forces = grid_axes(conditions)
-    points = np.array(sorted(conditions))
-    across = len(speeds) > 1 and len(forces) > 1
-    if (
-        across
-        and np.linalg.matrix_rank((points - points.mean(axis=0)) / np.ptp(points, axis=0)) < 2
-    ):
+    if len(speeds) == 1 or len(forces) == 1:
+        return
+    points = np.log(np.array(sorted(conditions)))
+    reach = np.ptp(points, axis=0)
+    if (reach < LEAST_REACH).all():
+        raise GridError(
+            f"{texture}: expected recordings at different speeds or forces, got {len(points)} "
+            f"conditions within {LEAST_REACH:.0%} of {speeds[0]:g} mm/s and {forces[0]:g} N; "
+            "record others, or declare them as repeats at one speed and force."
+        )
+    long, short = np.linalg.svd((points - points.mean(axis=0)) / reach, compute_uv=False)
+    if short < LEAST_WIDTH * long:
         raise GridError(
             f"{texture}: expected recordings that span the grid, got {len(points)} of "
             f"{len(speeds) * len(forces)} conditions on one line; record more of them."

@@ -8,9 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import pytest
-from threadpoolctl import threadpool_limits
 
 from modeling import Recording, RecordingSet
+from modeling.threads import one_linear_algebra_thread
 from stimuli.planted.textures import (
     FORCES_N,
     RECORDER_RATE_HZ,
@@ -26,7 +26,7 @@ RIVAL = "rival"
 @pytest.fixture(autouse=True)
 def one_thread() -> Iterator[None]:
     """BLAS and OpenMP on one thread, so that ratios compare algorithms."""
-    with threadpool_limits(limits=1):
+    with one_linear_algebra_thread():
         yield
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 
@@ -70,3 +74,21 @@ def test_an_exception_comes_where_its_result_would_have(threads: int) -> None:
     assert max(begun) <= 5 + 2 * threads
     with pytest.raises(StopIteration):
         next(results)
+
+
+def test_linear_algebra_that_is_loaded_late_is_on_one_thread_too() -> None:
+    """In a fresh process, where SciPy's own library is not loaded before."""
+    source = (
+        "from modeling.threads import one_linear_algebra_thread\n"
+        "with one_linear_algebra_thread():\n"
+        "    import scipy.linalg\n"
+        "    from threadpoolctl import threadpool_info\n"
+        "    print([each['num_threads'] for each in threadpool_info()])\n"
+    )
+    environment = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    found = subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, check=True, env=environment
+    )
+    threads = json.loads(found.stdout)
+    assert threads
+    assert set(threads) == {1}

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-from threadpoolctl import threadpool_limits
 
 from analysis.benches.chart.fitted import Fitted, Layered, Predictor, Shaped, update_samples
 from analysis.benches.chart.measures import (
@@ -27,6 +26,7 @@ from modeling.fitting.conditions import spectra_by_condition
 from modeling.models.grid import Condition
 from modeling.models.loading import load_model
 from modeling.recordings.spectrum import mean_spectrum
+from modeling.threads import one_linear_algebra_thread
 
 UPDATES_MS = (1.0, 4.0, 16.0)
 DOUBLE, SINGLE = "double", "single"
@@ -64,7 +64,7 @@ def judge(source: Source, *, methods: Sequence[str]) -> Judged:
     InputError
         Where the texture cannot be loaded, or lacks a model that was given for others.
     """
-    with threadpool_limits(limits=1):
+    with one_linear_algebra_thread():
         material = load_material(source)
         subject = Subject(material.measured, material.truth)
         judging = _Judging(source, material)

@@ -11,21 +11,25 @@ import pytest
 from analysis.textures.between import (
     DISTANCE,
     LEVEL,
+    FilterAt,
+    Measured,
     distances_to_recordings,
     distances_to_truth,
+    fit_like,
     halfway,
-    joint_fit,
     left_out_summary,
     left_out_table,
     median_and_worst,
     planted_between_table,
     sentence,
     truth_summary,
+    worth_recording,
 )
 from analysis.textures.results import TextureResult
 from modeling import RecordingSet, Threshold, fit_texture, simplify
 from modeling.arrays import Floats
 from modeling.fitting.conditions import recording_spectra
+from modeling.fitting.texture import fit_spectra
 from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 
@@ -89,9 +93,44 @@ def test_the_truth_is_close_to_its_recordings_and_louder_is_louder() -> None:
     assert louder[LEVEL].to_numpy() == pytest.approx(expected.to_numpy())
 
 
+def refitted(measured: Measured) -> FilterAt:
+    """A model of its own, found again from the beginning."""
+    return fit_spectra(measured).peq
+
+
+def test_layers_are_kept_and_fitted_again_to_what_is_left() -> None:
+    """A tone louder in one half of the conditions than in the other must follow the half."""
+    records = planted_records()
+    model = fit_texture(records)
+    louder = [replace(r, samples=2 * r.samples) for r in records if r.condition != (200.0, 2.0)]
+    measured = recording_spectra(RecordingSet(louder))
+    again = fit_spectra(measured, like=model)
+    assert again.n_layers == model.n_layers
+    assert (np.sign(again.gains[0, 0]) == np.sign(model.gains[0, 0])).all()
+    found = distances_to_recordings(again.peq, measured)
+    assert (found[LEVEL].abs() < 0.5).all()
+    whole = left_out_table(recording_spectra(records), refitted)
+    table = left_out_table(recording_spectra(records), fit_like(model))
+    assert table[DISTANCE].median() == pytest.approx(whole[DISTANCE].median(), rel=0.3)
+
+
+def test_conditions_that_are_predicted_badly_are_worth_recording() -> None:
+    table = pd.DataFrame(
+        {
+            "speed_mm_s": [100.0, 200.0, 300.0, 400.0, 500.0],
+            "force_n": 1.0,
+            LEVEL: 0.0,
+            DISTANCE: [1.0, 1.1, 5.0, 0.9, 2.5],
+        }
+    )
+    assert worth_recording(table) == [(300.0, 1.0), (500.0, 1.0)]
+    assert worth_recording(table, most=1) == [(300.0, 1.0)]
+    assert worth_recording(table.iloc[:0]) == []
+
+
 def test_every_condition_but_the_corners_is_left_out_once() -> None:
     measured = recording_spectra(planted_records())
-    table = left_out_table(measured, joint_fit())
+    table = left_out_table(measured, refitted)
     left_out = set(zip(table["speed_mm_s"], table["force_n"], strict=True))
     corners = {(v, f) for v in (100.0, 300.0) for f in (1.0, 3.0)}
     assert left_out == {(v, f) for v in SPEEDS for f in FORCES} - corners
@@ -104,7 +143,7 @@ def test_what_is_left_out_is_foretold_without_it() -> None:
         replace(r, samples=10 * r.samples) if r.condition == (200.0, 2.0) else r
         for r in planted_records()
     ]
-    table = left_out_table(recording_spectra(RecordingSet(records)), joint_fit())
+    table = left_out_table(recording_spectra(RecordingSet(records)), refitted)
     middle = table[(table["speed_mm_s"] == 200.0) & (table["force_n"] == 2.0)]
     assert float(middle[LEVEL].iloc[0]) == pytest.approx(-20, abs=3)
 
@@ -114,7 +153,7 @@ def test_what_is_left_out_is_foretold_without_it() -> None:
 )
 def test_small_grids(speeds: Floats, forces: Floats) -> None:
     """2 × 2 has nothing but corners; a line of three has one condition between its ends."""
-    table = left_out_table(recording_spectra(planted_records(speeds, forces)), joint_fit())
+    table = left_out_table(recording_spectra(planted_records(speeds, forces)), refitted)
     assert len(table) == (1 if speeds.size == 3 else 0)
     assert sentence(table).startswith(
         "log-spectral distance" if len(table) else "the grid is too small"
@@ -127,7 +166,7 @@ def test_silent_conditions_are_not_left_out() -> None:
     silent = [
         replace(r, samples=floor.samples) if r.condition == (200.0, 1.0) else r for r in records
     ]
-    table = left_out_table(recording_spectra(RecordingSet([*silent, floor])), joint_fit())
+    table = left_out_table(recording_spectra(RecordingSet([*silent, floor])), refitted)
     assert list(zip(table["speed_mm_s"], table["force_n"], strict=True)) == [(200.0, 2.0)]
 
 
@@ -164,7 +203,7 @@ def test_planted_textures_are_judged_half_way() -> None:
         model=fitted,
         simplification=simplify(fitted, Threshold.shipped("pen-hold")),
         other_estimates=(truth, half),
-        left_out={"joint": left_out_table(recording_spectra(records), joint_fit())},
+        left_out={"joint": left_out_table(recording_spectra(records), refitted)},
     )
     table = planted_between_table([results])
     _, itself, quieter = table.to_dict("records")
