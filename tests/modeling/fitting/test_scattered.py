@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -101,7 +102,9 @@ def test_a_lattice_keeps_its_conditions() -> None:
     grid = texture_grid(
         {r.condition: s for r, s in recording_spectra(draw_surface(9011).record(seed=3))}
     )
-    assert grid.scattered is None and grid.corners.are_nodes and grid.level_sd is None
+    assert grid.scattered is None
+    assert grid.corners.are_nodes
+    assert grid.level_sd is None
 
 
 def test_an_outlier_is_named_and_bends_nothing() -> None:
@@ -112,9 +115,12 @@ def test_an_outlier_is_named_and_bends_nothing() -> None:
         replace(r, samples=10 * r.samples) if r.condition == (200.0, 2.0) else r for r in records
     ]
     model, clean = fit_texture(RecordingSet(loud)), fit_texture(records)
-    assert model.fit is not None and clean.fit is not None
+    assert model.fit is not None
+    assert clean.fit is not None
     (warning,) = model.fit.warnings
-    assert "200 mm/s" in warning and "2 N" in warning and "louder" in warning
+    assert "200 mm/s" in warning
+    assert "2 N" in warning
+    assert "louder" in warning
     assert not clean.fit.warnings
     others = [(v, f) for v in SPEEDS_MM_S for f in FORCES_N if (v, f) != (200.0, 2.0)]
     assert distance_db(model, surface, others) < distance_db(clean, surface, others) + 0.1
@@ -127,8 +133,8 @@ def test_blends_hold_where_they_once_collapsed() -> None:
     model = fit_texture(surface.record(seed=COLLAPSING))
     middles = [
         ((a + b) / 2, (c + d) / 2)
-        for a, b in zip(SPEEDS_MM_S, SPEEDS_MM_S[1:], strict=False)
-        for c, d in zip(FORCES_N, FORCES_N[1:], strict=False)
+        for a, b in itertools.pairwise(SPEEDS_MM_S)
+        for c, d in itertools.pairwise(FORCES_N)
     ]
     assert distance_db(model, surface, middles) < 0.6
     assert max(distance_db(model, surface, [place]) for place in middles) < 1.5
