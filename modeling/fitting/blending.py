@@ -13,7 +13,8 @@ import numpy as np
 
 from modeling.arrays import Floats, Integers
 from modeling.estimation.coherent import Observed, Response, response
-from modeling.fitting.equations import Blocks, of_cells
+from modeling.estimation.compiled import held_by_cells, is_compiled
+from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 # In nepers (1 dB): how far a blended response may lie from the mean of its nodes for nothing.
 FORGIVEN = 0.0
@@ -65,6 +66,17 @@ class Middles:
         level, slope = 0.5 * np.log(found.power), 0.5 * found.by_parameter
         off = level[:m] - self._mean(level[m:])
         beyond = np.sign(off) * np.maximum(np.abs(off) - FORGIVEN, 0.0)
+        cost = 0.5 * HELD * float((beyond**2).sum())
+        if is_compiled():
+            blocks, score = held_by_cells(
+                found.by_parameter,
+                beyond,
+                corners=self.corners,
+                shares=self.shares,
+                steps=STEP_OF_CORNERS,
+                held=HELD,
+            )
+            return Held(cost, Blocks(*blocks), score)
         far = np.flatnonzero(beyond.any(axis=1))
         p = theta.shape[1]
         # By the parameters of each corner: of the blend, less of the corner itself.
@@ -76,7 +88,7 @@ class Middles:
         along = -HELD * np.einsum("mapn,mn->map", pull, beyond[far])
         np.add.at(score, self.corners[far], along)
         information = of_cells(self.corners[far], blocks, self.count)
-        return Held(0.5 * HELD * float((beyond**2).sum()), information, score)
+        return Held(cost, information, score)
 
     def _mean(self, levels: Floats) -> Floats:
         """Means of the logarithms at the corners (M, n), from those at the nodes (N, n)."""
