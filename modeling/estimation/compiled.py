@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats
+from modeling.arrays import Floats, Integers
 from modeling.engines import prefers_python
 
 try:
@@ -52,21 +52,12 @@ class CompiledSpectra:
         # C reads these arrays wherever they lie; they have to live as long.
         self._arrays = [np.ascontiguousarray(t, dtype=np.float64) for t in (*tables, line_hz)]
         self.rows, self.bins = self._arrays[0].shape
-        power, weight, tangent, cotangent, line = map(_pointer, self._arrays)
-        self._fields = {
-            "rows": self.rows,
-            "bins": self.bins,
-            "per_hz": np.pi / rate_hz,
-            "highest_hz": highest_hz,
-            "least_power": costs.least_power,
-            "cancelling": costs.cancelling,
-            "log_share": float(np.log(costs.largest_share)),
-            "power": power,
-            "weight": weight,
-            "tangent": tangent,
-            "cotangent": cotangent,
-            "line_hz": line,
-        }
+        of = self._of = ffi.new("tq_spectra *")
+        of.rows, of.bins = self.rows, self.bins
+        of.power, of.weight, of.tangent, of.cotangent, of.line_hz = map(_pointer, self._arrays)
+        of.per_hz, of.highest_hz = np.pi / rate_hz, highest_hz
+        of.least_power, of.cancelling = costs.least_power, costs.cancelling
+        of.log_share = float(np.log(costs.largest_share))
 
     def slopes(self, theta: Floats, signs: Floats | None) -> tuple[Floats, Floats, Floats, Floats]:
         """Misfit and objective (K,), information (K, p, p) and score (K, p)."""
@@ -89,11 +80,72 @@ class CompiledSpectra:
         theta = np.ascontiguousarray(theta, dtype=np.float64)
         up = ffi.NULL
         if signs is not None:
-            each = np.ascontiguousarray(np.broadcast_to(signs, (rows, layers)), dtype=np.float64)
-            up = _pointer(each)
-        of = ffi.new("tq_spectra *", {**self._fields, "layers": layers})
+            each = signs if signs.ndim == 2 else np.broadcast_to(signs, (rows, layers))
+            up = _pointer(np.ascontiguousarray(each, dtype=np.float64))
+        of = ffi.new("tq_spectra *", self._of[0])  # a copy: other threads may ask for other layers
+        of.layers = layers
         memory = np.empty(lib.tq_slopes_memory(layers, self.bins))
         function(of, _pointer(theta), up, _pointer(memory), *map(_pointer, out))
+
+
+class CompiledLines:
+    """A periodogram as the compiled part reads it.
+
+    Parameters
+    ----------
+    tables : sequence of (lines,) ndarray
+        Frequency (Hz), power and weight.
+    members : float
+        The other members of `tq_lines`.
+    """
+
+    def __init__(self, *tables: Floats, **members: float) -> None:
+        self._arrays = [np.ascontiguousarray(table, dtype=np.float64) for table in tables]
+        of = self._of = ffi.new("tq_lines *", {**members, "lines": tables[0].size})
+        of.frequency_hz, of.power, of.weight = map(_pointer, self._arrays)
+
+    def bins(self, centres_hz: Floats, widths_hz: Floats) -> Floats:
+        """Power, weight, count, tangent and cotangent of the bins near peaks, (5, n)."""
+        of = ffi.new("tq_lines *", self._of[0])
+        peaks = [np.ascontiguousarray(peak, dtype=np.float64) for peak in (centres_hz, widths_hz)]
+        of.peaks = len(peaks[0])
+        of.centres_hz, of.widths_hz = map(_pointer, peaks)
+        out = np.empty((6, self._arrays[0].size))
+        found: Floats = out[:5, : lib.tq_bins(of, _pointer(out))]
+        return found
+
+
+def held_by_cells(
+    slope: Floats, off: Floats, *, corners: Integers, shares: Floats, steps: Integers, held: float
+) -> tuple[Floats, Floats]:
+    """Information (steps, N, p, p) and score (N, p) of what is off in the middles of cells.
+
+    Parameters
+    ----------
+    slope : (M + N, p, n) ndarray
+        Relative derivatives of power: in the middles, then at the nodes.
+    off : (M, n) ndarray
+        Log amplitude of the middle less the mean of its corners; 0 where nothing is held.
+    corners : (M, 4) ndarray of int
+    shares : (4,) ndarray
+        Of each corner in the middle.
+    steps : (4, 4) ndarray of int
+        Which array of blocks couples two corners, the earlier one first.
+    held : float
+        Weight of a square.
+    """
+    count, p, places = slope.shape
+    nodes = count - len(off)
+    blocks, score = np.zeros((int(steps.max()) + 1, nodes, p, p)), np.zeros((nodes, p))
+    tables = [np.ascontiguousarray(table, dtype=np.float64) for table in (slope, off, shares)]
+    whole = [np.ascontiguousarray(table, dtype=np.intp) for table in (corners, steps)]
+    of = ffi.new("tq_cells *")
+    of.slope, of.off, of.shares = map(_pointer, tables)
+    of.corners, of.steps = (ffi.from_buffer("ptrdiff_t[]", table) for table in whole)
+    of.cells, of.nodes, of.places, of.p, of.held = len(off), nodes, places, p, held
+    memory = np.empty(lib.tq_held_memory(p, places))
+    lib.tq_held(of, *map(_pointer, (memory, blocks, score)))
+    return blocks, score
 
 
 def _pointer(array: Floats) -> Any:

@@ -8,11 +8,13 @@ in stationary time series"), here over averages of neighbouring lines.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from modeling.arrays import Floats
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
+from modeling.estimation.compiled import CompiledLines, is_compiled
 from modeling.recordings.spectrum import HIGH_PASS_HZ, SMOOTHING_HZ, Spectrum, smooth
 
 # Half an octave above its corner the preparation's high-pass takes less than 0.2 dB.
@@ -22,6 +24,8 @@ EMPTY_BELOW_DB = -50.0  # smoothed spectrum relative to its maximum: no signal t
 # Real spectra are no exact sums of bands: a bin's relative misfit that is forgiven.
 FORGIVEN_MISFIT = 0.12
 BIN_SHARE = 0.05
+# A bin near a peak is no wider than these shares of the peak's width and of its distance.
+PEAK_SHARE, DISTANCE_SHARE = 0.2, 0.15
 SHAPE_RANGE = (0.8, 8.0)  # 1 is Lorentzian, 8 all but Gaussian
 NARROWEST_LINES = 1.5
 WIDEST_SHARE = 0.3
@@ -54,6 +58,22 @@ class Power:
     rate_hz: float
     step_hz: float
     records: float
+
+    @cached_property
+    def compiled(self) -> CompiledLines:
+        """The same for the compiled engine."""
+        return CompiledLines(
+            self.frequency_hz,
+            self.power,
+            self.weight,
+            step_hz=self.step_hz,
+            per_hz=np.pi / self.rate_hz,
+            records=self.records,
+            bin_share=BIN_SHARE,
+            peak_share=PEAK_SHARE,
+            distance_share=DISTANCE_SHARE,
+            forgiven=FORGIVEN_MISFIT**2,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,10 +157,15 @@ def centres_and_widths(theta: Floats, m: int) -> tuple[Floats, Floats]:
 
 def bins_near(power: Power, centres_hz: Floats, widths_hz: Floats) -> Bins:
     """Bins of 5 % of the frequency, but narrow against each peak that is near."""
+    if is_compiled():
+        average, weight, count, tangent, cotangent = power.compiled.bins(centres_hz, widths_hz)
+        return Bins(average, weight, count, tangent, cotangent, power.rate_hz)
     frequency, step = power.frequency_hz, power.step_hz
     width = np.maximum(BIN_SHARE * frequency, 2 * step)
     for centre, peak_width in zip(centres_hz, widths_hz, strict=True):
-        np.minimum(width, 0.2 * peak_width + 0.15 * np.abs(frequency - centre), out=width)
+        np.minimum(
+            width, PEAK_SHARE * peak_width + DISTANCE_SHARE * np.abs(frequency - centre), out=width
+        )
     number = np.cumsum(step / np.maximum(width, step)).astype(np.intp)
     starts = np.concatenate(([0], np.flatnonzero(number[1:] != number[:-1]) + 1))
     lines = np.diff(np.append(starts, frequency.size))

@@ -1,5 +1,6 @@
 /* Misfit, Fisher information and score of many spectra at once: what coherent.slopes and
-   coherent.response of the same folder calculate. docs/method/estimation.md#engines
+   coherent.response of the same folder calculate; the bins of likelihood.bins_near; what
+   fitting.blending asks of the middles of cells. docs/method/estimation.md#engines
 
    Places (bins, then the layers' own frequencies) are innermost everywhere, so that loops become vectors
    without -ffast-math. Sums run in TQ_SUMS parts, whatever the width of the processor's vectors: the bits
@@ -24,7 +25,8 @@
 
 enum {
     TQ_SUMS = 4,     /* parts of every sum over places */
-    TQ_CONSTANTS = 7 /* per layer */
+    TQ_CONSTANTS = 7, /* per layer */
+    TQ_CORNERS = 4
 };
 
 typedef double tq_part __attribute__((vector_size(TQ_SUMS * sizeof(double)), aligned(8), may_alias));
@@ -349,7 +351,152 @@ TQ_INLINE void tq_all_responses(const tq_spectra *of, const double *theta, const
     }
 }
 
+/* M cells with four corners each among N nodes; `steps` (4, 4) says which array of blocks
+   couples two corners. `slope` (M + N, p, places) are relative derivatives of powers in the middles, then
+   at the nodes; `off` (M, places) is what is held, 0 where nothing is. */
+typedef struct {
+    size_t cells, nodes, places;
+    int p;
+    double held;
+    const double *slope, *off, *shares;
+    const ptrdiff_t *corners, *steps;
+} tq_cells;
+
+/* Doubles of memory that tq_held needs. */
+static size_t tq_held_memory(int p, size_t places)
+{
+    size_t all = TQ_CORNERS * (size_t)p;
+    return (all + 5) * tq_whole(places) + all * all + all;
+}
+
+/* Slopes of what is off in one cell, by the parameters of its corners; 0 where nothing is held. */
+TQ_INLINE void tq_pulls(const tq_cells *of, size_t cell, const tq_places *at, double *weight, double *error)
+{
+    size_t places = of->places, size = (size_t)of->p * places;
+    const double *restrict off = of->off + cell * places, *middle = of->slope + cell * size;
+    for (size_t n = 0; n < at->stride; n++) {
+        double here = n < places ? off[n] : 0;
+        weight[n] = here != 0 ? of->held : 0;
+        error[n] = -of->held * here;
+    }
+    for (size_t a = 0; a < TQ_CORNERS; a++) {
+        size_t node = (size_t)of->corners[TQ_CORNERS * cell + a];
+        const double *corner = of->slope + (of->cells + node) * size;
+        double half = 0.5 * of->shares[a]; /* the level is half the logarithm of the power */
+        for (size_t q = 0; q < (size_t)of->p; q++) {
+            double *restrict pull = at->slope + (a * (size_t)of->p + q) * at->stride;
+            const double *restrict here = middle + q * places, *restrict there = corner + q * places;
+            for (size_t n = 0; n < places; n++)
+                pull[n] = half * (here[n] - there[n]);
+            for (size_t n = places; n < at->stride; n++)
+                pull[n] = 0;
+        }
+    }
+}
+
+/* Adds one cell's information and score to those of its corners. */
+TQ_INLINE void tq_added(const tq_cells *of, size_t cell, const double *from, const double *along,
+                        double *blocks, double *score)
+{
+    size_t p = (size_t)of->p;
+    for (size_t a = 0; a < TQ_CORNERS; a++) {
+        size_t node = (size_t)of->corners[TQ_CORNERS * cell + a];
+        for (size_t q = 0; q < p; q++)
+            score[node * p + q] += along[a * p + q];
+        for (size_t b = a; b < TQ_CORNERS; b++) {
+            size_t step = (size_t)of->steps[TQ_CORNERS * a + b];
+            double *restrict to = blocks + (step * of->nodes + node) * p * p;
+            for (size_t q = 0; q < p; q++)
+                for (size_t r = 0; r < p; r++)
+                    to[q * p + r] += from[(a * p + q) * TQ_CORNERS * p + b * p + r];
+        }
+    }
+}
+
+TQ_INLINE void tq_all_held(const tq_cells *of, double *memory, double *blocks, double *score)
+{
+    size_t all = TQ_CORNERS * (size_t)of->p, n = tq_whole(of->places);
+    tq_places at = {.count = of->places, .stride = n, .slope = memory};
+    double *weight = memory + (all + 1) * n, *error = weight + n, *pair = error + n;
+    double *information = pair + 2 * n, *along = information + all * all;
+    for (size_t cell = 0; cell < of->cells; cell++) {
+        const double *off = of->off + cell * of->places;
+        size_t first = 0;
+        while (first < of->places && off[first] == 0)
+            first++;
+        if (first == of->places)
+            continue;
+        tq_pulls(of, cell, &at, weight, error);
+        tq_gathered(&at, (int)all, weight, error, pair, information, along);
+        tq_added(of, cell, information, along, blocks, score);
+    }
+}
+
+/* How a periodogram is binned, see likelihood.bins_near. */
+typedef struct {
+    size_t lines, peaks;
+    double step_hz, per_hz, records, bin_share, peak_share, distance_share, forgiven;
+    const double *frequency_hz, *power, *weight, *centres_hz, *widths_hz;
+} tq_lines;
+
+/* The widths of bins at each line. */
+TQ_INLINE void tq_widths(const tq_lines *of, double *restrict width)
+{
+    const double *restrict frequency = of->frequency_hz;
+    for (size_t n = 0; n < of->lines; n++)
+        width[n] = fmax(of->bin_share * frequency[n], 2 * of->step_hz);
+    for (size_t i = 0; i < of->peaks; i++) {
+        double centre = of->centres_hz[i], least = of->peak_share * of->widths_hz[i];
+        for (size_t n = 0; n < of->lines; n++) {
+            double near = least + of->distance_share * fabs(frequency[n] - centre);
+            width[n] = near < width[n] ? near : width[n];
+        }
+    }
+    for (size_t n = 0; n < of->lines; n++)
+        width[n] = of->step_hz / (width[n] < of->step_hz ? of->step_hz : width[n]);
+}
+
+/* Number of bins; `out` (6, lines) has in its first rows their power, weight, count, tangent and
+   cotangent. */
+static size_t tq_bins(const tq_lines *of, double *out)
+{
+    size_t lines = of->lines, bins = 0;
+    double *width = out + 5 * lines, number = 0;
+    tq_widths(of, width);
+    for (size_t n = 0; n < lines;) {
+        size_t start = n;
+        double heard = 0, sum = 0, bin = 0;
+        for (; n < lines; n++) {
+            double next = number + width[n];
+            if (n == start)
+                bin = floor(next);
+            else if (floor(next) != bin)
+                break;
+            number = next;
+            heard += of->weight[n];
+            sum += of->power[n] * of->weight[n];
+        }
+        if (!(heard > 0)) /* lines that the sensor's floor took whole say nothing */
+            continue;
+        double middle = of->frequency_hz[start] + (double)(n - start - 1) * of->step_hz / 2;
+        double count = heard * of->records, tangent = tan(of->per_hz * middle);
+        out[bins] = sum / heard;
+        out[lines + bins] = count / (1 + count * of->forgiven);
+        out[2 * lines + bins] = count;
+        out[3 * lines + bins] = tangent;
+        out[4 * lines + bins] = 1 / tangent;
+        bins++;
+    }
+    return bins;
+}
+
 #ifdef TQ_WIDER
+__attribute__((target("avx2"))) static inline void tq_wider_held(const tq_cells *of, double *memory,
+                                                                 double *blocks, double *score)
+{
+    tq_all_held(of, memory, blocks, score);
+}
+
 __attribute__((target("avx2"))) static inline void tq_wider_slopes(
     const tq_spectra *of, const double *theta, const double *signs, double *memory, double *misfit,
     double *objective, double *information, double *score)
@@ -390,6 +537,18 @@ static void tq_responses(const tq_spectra *of, const double *theta, const double
     }
 #endif
     tq_all_responses(of, theta, signs, memory, power, slope);
+}
+
+/* Adds information (arrays of blocks, N, p, p) and score (N, p) of all cells to what is there. */
+static void tq_held(const tq_cells *of, double *memory, double *blocks, double *score)
+{
+#ifdef TQ_WIDER
+    if (__builtin_cpu_supports("avx2")) {
+        tq_wider_held(of, memory, blocks, score);
+        return;
+    }
+#endif
+    tq_all_held(of, memory, blocks, score);
 }
 
 #endif

@@ -13,8 +13,9 @@ import numpy as np
 
 from modeling.arrays import Floats, Integers
 from modeling.estimation.coherent import Observed, Response, response
+from modeling.estimation.compiled import held_by_cells, is_compiled
 from modeling.estimation.likelihood import split
-from modeling.fitting.equations import Blocks, of_cells
+from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 REACH = 6.0  # of a moving peak to either side, in widths
 # In log likelihood, per frequency: half of this times the square of what is beyond.
@@ -71,6 +72,17 @@ class Middles:
         found = self._response(theta, signs)
         level, slope = 0.5 * np.log(found.power), 0.5 * found.by_parameter
         off = self._off(theta, level)
+        cost = 0.5 * HELD * float((off**2).sum())
+        if is_compiled():
+            blocks, score = held_by_cells(
+                found.by_parameter,
+                off,
+                corners=self.corners,
+                shares=self.shares,
+                steps=STEP_OF_CORNERS,
+                held=HELD,
+            )
+            return Held(cost, Blocks(*blocks), score)
         far = np.flatnonzero(off.any(axis=1))
         p = theta.shape[1]
         # By the parameters of each corner: of the blend, less of the corner itself.
@@ -82,7 +94,7 @@ class Middles:
         along = -HELD * np.einsum("mapn,mn->map", pull, off[far])
         np.add.at(score, self.corners[far], along)
         information = of_cells(self.corners[far], blocks, self.count)
-        return Held(0.5 * HELD * float((off**2).sum()), information, score)
+        return Held(cost, information, score)
 
     def _off(self, theta: Floats, level: Floats) -> Floats:
         """Middles less the mean of their corners (M, n) in nepers; 0 where that means nothing.

@@ -33,6 +33,10 @@ _STEP_OF_CORNERS = {
     (1, 3): DOWN,
     (0, 3): ALONG,
 }
+# The same for both corners' numbers, (4, 4); of no use where the first is the later one.
+STEP_OF_CORNERS = np.array(
+    [[_STEP_OF_CORNERS.get((a, b), OWN) for b in range(4)] for a in range(4)], dtype=np.intp
+)
 
 
 class Blocks(NamedTuple):
@@ -191,10 +195,12 @@ def solve_blocks(blocks: Blocks, right: Floats, *, columns: int) -> Floats:
     columns : int
         Nodes in a row.
     """
-    from scipy.linalg import solveh_banded
+    from scipy.linalg.lapack import dpbsv  # what solveh_banded calls after several checks
 
     band = band_of(blocks, columns=columns)
-    solution = solveh_banded(band, right.ravel(), lower=True, overwrite_ab=True, check_finite=False)
+    _, solution, info = dpbsv(band, right.ravel(), lower=1)
+    if info:
+        raise np.linalg.LinAlgError(f"leading minor {info} is not positive definite")
     return np.asarray(solution, dtype=np.float64).reshape(right.shape)
 
 

@@ -59,15 +59,25 @@ def candidates(grid: TextureGrid, theta: Floats, signs: Floats | None) -> list[C
         if width > cells // 2:
             break
         gain, raised = _boxes(ratio, lines, width)
-        padded = np.pad(gain, ((0, 0), (2 * reach, 2 * reach)))
-        at = np.arange(len(gain))[None, :, None], place + 2 * reach
-        support = padded[at].sum(axis=1)
+        support = _along(gain, shifts, reach)
         for _ in range(CANDIDATES):
             law, middle = np.unravel_index(int(np.argmax(support)), support.shape)
             found.append((float(support[law, middle]), width, place[law, :, middle], raised))
             near = slice(max(0, int(middle) - 2 * width), int(middle) + 2 * width + 1)
             support[:, near] = 0.0
     return _distinct(found, rate_hz=grid.rate_hz)
+
+
+def _along(gain: Floats, shifts: Integers, reach: int) -> Floats:
+    """Sums of each condition's gain (C, cells) at its shifts (laws, C), (laws, places)."""
+    cells = gain.shape[1]
+    padded = np.zeros((len(gain), cells + 4 * reach))
+    padded[:, 2 * reach : 2 * reach + cells] = gain
+    support = np.zeros((len(shifts), cells + 2 * reach))
+    for law, of_law in zip(support, shifts + reach, strict=True):
+        for row, start in zip(padded, of_law.tolist(), strict=True):
+            law += row[start : start + law.size]
+    return support
 
 
 def _distinct(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -15,8 +16,13 @@ from hypothesis import strategies as st
 from modeling.arrays import Floats
 from modeling.engines import SWITCH
 from modeling.estimation.coherent import Observed, climb, limits_of, response, slopes
-from modeling.estimation.compiled import is_compiled
+from modeling.estimation.compiled import held_by_cells, is_compiled
+from modeling.estimation.likelihood import Power, bins_near
+from modeling.fitting.blending import Middles
+from modeling.fitting.equations import STEP_OF_CORNERS, cells
 
+SOURCE = Path(__file__).with_name("slopes_bits.c")
+HEADER = Path(__file__).parents[3] / "modeling" / "estimation" / "slopes.h"
 RATE_HZ = 1000.0
 Result = TypeVar("Result")
 
@@ -183,12 +189,83 @@ def test_a_climb_ends_at_the_same_place() -> None:
     assert climbed() == pytest.approx(in_numpy(climbed), rel=1e-6)
 
 
+@settings(deadline=None)
+@given(st.integers(0, 2**32), st.integers(0, 5), st.integers(1, 400), st.floats(1.0, 9.0))
+def test_bins_are_those_of_numpy(seed: int, layers: int, lines: int, records: float) -> None:
+    rng = np.random.default_rng(seed)
+    step_hz = rng.choice([0.5, 1.0, 1.3])
+    frequency = 15.0 + step_hz * np.arange(lines)
+    weight = rng.random(lines) * (rng.random(lines) > 0.3)
+    weight[rng.integers(lines)] = 1.0
+    weight[lines // 2 : lines // 2 + rng.integers(lines)] *= rng.integers(2)  # a part unheard
+    weight[0] = 1.0
+    power = Power(frequency, rng.exponential(1, lines), 1.0, weight, RATE_HZ, step_hz, records)
+    peaks = rng.uniform(10, 400, layers), np.exp(rng.uniform(-1, 5, layers))
+    found, expected = bins_near(power, *peaks), in_numpy(bins_near, power, *peaks)
+    for name in ("power", "weight", "count", "tangent", "cotangent"):
+        ours, theirs = getattr(found, name), getattr(expected, name)
+        assert ours.shape == theirs.shape
+        assert ours == pytest.approx(theirs, rel=1e-12), name
+
+
+@pytest.mark.parametrize("rows", [2, 3])
+@pytest.mark.parametrize("columns", [1, 2, 4])
+@pytest.mark.parametrize("layers", [1, 2, 5])
+def test_what_holds_middles_is_that_of_numpy(rows: int, columns: int, layers: int) -> None:
+    theta, signs, _ = drawn(12, rows=rows * columns, layers=layers, bins=1)
+    tangent = np.tan(np.pi / RATE_HZ * np.geomspace(15, 480, 30))[None]
+    one = np.ones(tangent.shape)
+    places = Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), RATE_HZ)
+    shares = np.full(4, 0.25) if columns > 1 else np.array([0.5, 0.0, 0.5, 0.0])
+    middles = Middles(cells(rows, columns), shares, places, rows * columns)
+    found, expected = middles.held(theta, signs[0]), in_numpy(middles.held, theta, signs[0])
+    assert expected.cost > 0
+    assert found.cost == pytest.approx(expected.cost, rel=1e-9)
+    assert_same(found.score[None], expected.score[None])
+    for ours, theirs in zip(found.information, expected.information, strict=True):
+        assert ours is not None
+        assert theirs is not None
+        assert_same(ours[None], theirs[None])
+
+
+def test_what_is_not_off_holds_nothing() -> None:
+    """Places of a cell where nothing is off do not count, whatever their slopes."""
+    rng = np.random.default_rng(13)
+    slope, off = rng.normal(size=(5, 3, 8)), rng.normal(size=(1, 8))
+    off[:, 2:5] = 0.0
+    table = {"corners": cells(2, 2), "shares": np.full(4, 0.25), "steps": STEP_OF_CORNERS}
+    seen = np.r_[0, 1, 5:8]
+    whole = held_by_cells(slope, off, held=2.0, **table)
+    part = held_by_cells(slope[..., seen], off[:, seen], held=2.0, **table)
+    for one, other in zip(whole, part, strict=True):
+        assert np.any(other)
+        assert one == pytest.approx(other, rel=1e-12, abs=1e-15)
+    assert not any(np.any(array) for array in held_by_cells(slope, 0 * off, held=2.0, **table))
+
+
+def test_bits_are_equal_with_and_without_wide_vectors(tmp_path: Path) -> None:
+    """As on processors that have none."""
+    found = []
+    for options in ([], ["-DTQ_BASELINE"]):
+        program = tmp_path / f"slopes{len(options)}"
+        command = ["gcc", "-std=c99", "-O3", "-ffp-contract=off", "-fno-trapping-math", *options]
+        command += [f"-I{HEADER.parent}", str(SOURCE), "-o", str(program), "-lm"]
+        subprocess.run(command, check=True)
+        run = subprocess.run([program], check=True, capture_output=True, text=True)
+        found.append(run.stdout)
+    assert len(set(found[0].split())) > 1000
+    assert found[0] == found[1]
+
+
 def test_without_a_compiler_numpy_calculates_the_same() -> None:
     """A fresh process in which the extension cannot be imported."""
     program = """
 import sys
 sys.modules["modeling.estimation._slopes"] = None
-from modeling.estimation.compiled import is_compiled
+from modeling.estimation.compiled import held_by_cells, is_compiled
+from modeling.estimation.likelihood import Power, bins_near
+from modeling.fitting.blending import Middles
+from modeling.fitting.equations import STEP_OF_CORNERS, cells
 from tests.modeling.estimation.test_compiled import drawn, slopes
 print(is_compiled(), *slopes(*drawn(11, rows=3, layers=2, bins=50)).objective)
 """

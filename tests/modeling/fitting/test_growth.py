@@ -9,7 +9,7 @@ from modeling import PEQ, Recording
 from modeling.arrays import Floats
 from modeling.estimation.coherent import response
 from modeling.estimation.likelihood import split
-from modeling.fitting.growth import candidates, inserted, inserted_independently
+from modeling.fitting.growth import _along, candidates, inserted, inserted_independently
 from modeling.fitting.layer_search import fitted, in_frequency_order, search
 from modeling.fitting.texture_grid import TextureGrid, texture_grid
 from modeling.recordings.spectrum import spectrum
@@ -52,6 +52,12 @@ def grid_of(
 def flat(grid: TextureGrid) -> Floats:
     """Noise alone, as quiet as it was planted."""
     return np.full((len(grid.conditions), 1), np.log(0.02 / grid.scale))
+
+
+def test_gains_are_summed_at_the_shifts_of_each_condition() -> None:
+    gain, shifts = np.array([[1.0, 2.0, 4.0], [8.0, 16.0, 32.0]]), np.array([[0, 0], [1, -1]])
+    expected = [[0, 9, 18, 36, 0], [1, 2, 4 + 8, 16, 32]]
+    assert _along(gain, shifts, 1).tolist() == expected
 
 
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0])
