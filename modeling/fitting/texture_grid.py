@@ -32,6 +32,7 @@ AT_NODE, OUTLIER = 1e-6, 10.0
 # In nepers (14 dB); of 200 drawn surfaces no record is more than 7.2 dB off.
 OUTLIER_ABOVE = 1.6
 OUTLIER_ROUNDS = 4
+MOST_OUTLIERS = 0.1  # of all records
 FEWEST_FOR_OUTLIERS = 15
 SAMPLED = 48  # frequencies at which responses are compared
 
@@ -184,10 +185,12 @@ class TextureGrid:
             return surprise
         levels, (a, b) = self.levels()[known], self.record_places[known].T
         design = np.column_stack((np.ones(known.size), a, b, a * a, a * b, b * b))
-        rest = levels - np.median(levels)
+        near = np.ones(known.size, dtype=bool)
         for _ in range(OUTLIER_ROUNDS):
-            near = np.abs(rest) <= OUTLIER_ABOVE
             rest = levels - design @ np.linalg.lstsq(design[near], levels[near], rcond=None)[0]
+            near = np.abs(rest) <= OUTLIER_ABOVE
+            if near.mean() < 1 - MOST_OUTLIERS:  # then it is not they that are wrong
+                return surprise
         surprise[known] = rest
         return surprise
 

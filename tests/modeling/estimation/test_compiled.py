@@ -213,6 +213,7 @@ def test_bins_are_those_of_numpy(seed: int, layers: int, lines: int, records: fl
 @pytest.mark.parametrize("layers", [1, 2, 5])
 def test_what_holds_middles_is_that_of_numpy(rows: int, columns: int, layers: int) -> None:
     theta, signs, _ = drawn(12, rows=rows * columns, layers=layers, bins=1)
+    theta[:, 1 : 1 + layers] = theta[0, 1 : 1 + layers]  # what moves far is not held
     tangent = np.tan(np.pi / RATE_HZ * np.geomspace(15, 480, 30))[None]
     one = np.ones(tangent.shape)
     places = Observed(one, one, one, tangent, 1 / tangent, np.zeros(1), RATE_HZ)
