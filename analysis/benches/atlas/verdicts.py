@@ -19,7 +19,8 @@ from analysis.textures.recovery import match_layers
 from modeling import TextureModel, Threshold, fit_texture, simplify
 from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response
-from modeling.perception.simplification import HIGHEST_FLIP_PROBABILITY, layer_amplitudes_g
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY
 from modeling.seeds import generator
 from stimuli.planted.textures import record_texture
 

@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
-from modeling.perception.simplification import (
-    distances_db,
-    layer_amplitudes_g,
-    with_signs_chosen_again,
-)
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.signs_of_rest import with_signs_chosen_again
+from modeling.perception.simplification import distances_db
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]

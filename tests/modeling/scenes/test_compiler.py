@@ -18,7 +18,7 @@ from modeling.arrays import Floats
 from modeling.equalizer.bands import band_rms
 from modeling.models.own_peaks import own_peaks
 from modeling.models.parameter_table import Parameters
-from modeling.perception.simplification import with_signs_chosen_again
+from modeling.perception.signs_of_rest import with_signs_chosen_again
 from modeling.rendering.plan import plan_for
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scene
