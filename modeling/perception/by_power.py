@@ -128,7 +128,8 @@ def _why_kept(
     if above := int((distances + margin_db >= 0).sum()):
         where = f"{above} of {counted(distances.size, 'condition')}"
         if margin_db:
-            return f"{what} changes the power by no {margin_db:g} dB less than the threshold in {where}"
+            bar = f"the threshold less {margin_db:g} dB"
+            return f"{what} changes the power by more than {bar} in {where}"
         return f"{what} changes the power by more than the threshold in {where}"
     if not dropping.below:
         return no_threshold_known(distances, threshold)

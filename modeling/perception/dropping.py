@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -147,12 +147,18 @@ class Judge:
     @property
     def n_layers(self) -> int:
         """Number of layers of the full model."""
-        return self._at.gains.shape[1]
+        return int(self._at.gains.shape[1])
+
+    @property
+    def centres_hz(self) -> Floats:
+        """Frequency of each layer, (m,): the median over the places."""
+        centres: Floats = np.median(self._at.frequencies_hz, axis=0)
+        return centres
 
     @property
     def n_places(self) -> int:
         """Number of places that are judged."""
-        return self._at.gains.shape[0]
+        return int(self._at.gains.shape[0])
 
     def change(self, layers: Layers) -> PowerChange:
         """The change of power by dropping these layers, at the places."""
@@ -182,22 +188,20 @@ class SetsOfLayers:
     A set may go if the change by dropping all of it is below the threshold everywhere, and if that
     is certain of each part that goes: of each group alone, or, where that alone would be felt, of
     the fewest groups with which together it would not. Of more than six groups, only unions of
-    those are looked at that may go alone or in pairs; of more than six of these, one after the
-    other is added, of what adds least first.
+    those are looked at that may go alone or with a neighbour in frequency; of more than six of
+    these only ever larger sets, what changes least first.
 
     Parameters
     ----------
-    judge : callable
-        What dropping layers changes: `Judge`.
+    judge : Judge
     groups : sequence of sequences of int
         Layers that go together or not at all.
     """
 
-    def __init__(
-        self, judge: Callable[[Layers], Dropping], groups: Sequence[Sequence[int]]
-    ) -> None:
+    def __init__(self, judge: Judge, groups: Sequence[Sequence[int]]) -> None:
         self._judge = judge
-        self._groups = [tuple(group) for group in groups]
+        centres = judge.centres_hz
+        self._groups = sorted(map(tuple, groups), key=lambda group: float(centres[group[0]]))
         # What lies mostly where nothing is known must not hide behind something louder.
         known = [group for group in self._groups if not judge(group).unknown.any()]
         tried = [judge(layers) for layers in self._tried(known)]
@@ -219,38 +223,38 @@ class SetsOfLayers:
 
     def _tried(self, groups: list[Layers]) -> list[Layers]:
         if len(groups) <= MOST_GROUPS:
-            return _unions(groups, most=len(groups))
-        few = _unions(groups, most=2)
-        candidates = [group for group in groups if self._may_go(group, few)]
+            return _unions(groups)
+        parts = list(filter(None, (self._part_of(n, groups) for n in range(len(groups)))))
+        candidates = [g for g in groups if any(set(g) <= set(part.layers) for part in parts)]
+        few = [part.layers for part in parts]
         if len(candidates) <= MOST_GROUPS:
-            return list(dict.fromkeys(few + _unions(candidates, most=len(candidates))))
-        return list(dict.fromkeys(few + self._one_after_the_other(candidates)))
+            return list(dict.fromkeys(few + _unions(candidates)))
+        return list(dict.fromkeys(few + self._one_after_the_other(parts)))
 
-    def _may_go(self, group: Layers, few: list[Layers]) -> bool:
-        """Whether a group is surely below alone or, if it is above alone, with another one."""
-        with_it = [self._judge(layers) for layers in few if set(group) <= set(layers)]
-        below = sorted((d.layers != group, d.flip_probability) for d in with_it if d.below)
-        return bool(below) and below[0][1] < HIGHEST_FLIP_PROBABILITY
+    def _part_of(self, number: int, groups: list[Layers]) -> Dropping | None:
+        """A group alone, or with a neighbour if alone it is above; None if neither surely goes."""
+        alone = self._judge(groups[number])
+        neighbours = groups[max(number - 1, 0) : number] + groups[number + 1 : number + 2]
+        pairs = [self._judge(_union((groups[number], other))) for other in neighbours]
+        tried = [alone] if alone.below else [pair for pair in pairs if pair.below]
+        certain = [d for d in tried if d.flip_probability < HIGHEST_FLIP_PROBABILITY]
+        return min(certain, key=lambda d: d.highest_db, default=None)
 
-    def _one_after_the_other(self, groups: list[Layers]) -> list[Layers]:
-        """Ever larger sets: with one group more if any stays below, else with two."""
-        chain: list[Layers] = [()]
-        while True:
-            rest = [group for group in groups if not set(group) <= set(chain[-1])]
-            for most in (1, 2):
-                wider = [_union((chain[-1], more)) for more in _unions(rest, most=most)]
-                below = [d for d in map(self._judge, wider) if d.below]
-                if below:
-                    chain.append(min(below, key=lambda d: d.highest_db).layers)
-                    break
-            else:
-                return chain[1:]
+    def _one_after_the_other(self, parts: list[Dropping]) -> list[Layers]:
+        """Ever larger sets: what changes least first, whatever then stays below."""
+        chain: list[Layers] = []
+        so_far: set[int] = set()
+        for part in sorted(parts, key=lambda d: d.highest_db):
+            wider = tuple(sorted(so_far.union(part.layers)))
+            if self._judge(wider).below:
+                so_far.update(part.layers)
+                chain.append(wider)
+        return chain
 
 
-def _unions(groups: Sequence[Layers], *, most: int) -> list[Layers]:
-    return [
-        _union(chosen) for count in range(1, most + 1) for chosen in combinations(groups, count)
-    ]
+def _unions(groups: Sequence[Layers]) -> list[Layers]:
+    counts = range(1, len(groups) + 1)
+    return [_union(some) for count in counts for some in combinations(groups, count)]
 
 
 def _union(groups: Sequence[Layers]) -> Layers:
