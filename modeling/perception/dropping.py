@@ -97,16 +97,15 @@ class Recorded:
     beyond: bool
 
     def flip_probability(self, layers: Layers, distances_db: Floats) -> float:
-        """P(flip) of dropping some layers, from distances (n,) that include the margin.
-
-        The deviation is the mean of those of the dropped layers, weighted by their power.
-        """
+        """P(flip) of dropping some layers, from distances (n,) that include the margin."""
         if self.beyond:
             distances_db = np.where(distances_db < 0, distances_db, -np.inf)
-        deviation = self._deviations(list(layers))
+        deviation = self.deviations_db(layers)
         return float(flip_probabilities(distances_db[:, None], deviation[:, None])[0])
 
-    def _deviations(self, chosen: list[int]) -> Floats:
+    def deviations_db(self, layers: Layers) -> Floats:
+        """Of some layers together, (n,): the mean of theirs, weighted by their power."""
+        chosen = list(layers)
         amplitude = np.abs(self.at.gains[:, chosen])
         largest = float(amplitude.max(initial=0.0)) or 1.0
         # Relative to the largest one: no power overflows. Of silent layers all count alike.

@@ -17,7 +17,7 @@ from modeling.perception.thresholds import Threshold
 
 # Edges of the cells of the quadrature: over the whole range, and around each layer at
 # sinh(u) half-widths from its centre, so that its top and its skirts are both resolved.
-CELLS = 24
+CELLS = 48
 LOWEST_EDGE_HZ = 1.0
 AROUND_A_LAYER = np.sinh(np.arange(-9.0, 10.0))
 GAUSS_NODES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(5)  # of a cell of half-width 1
