@@ -122,7 +122,8 @@ from stimuli.planted.textures import planted_texture
 for name in ("canvas", "PVC"):
     model = planted_texture(name)
     model.save(f"models/{name}.json")
-    simplify(model, Threshold.shipped("codec")).model.save(f"simplified/{name}.json")
+    fewer = simplify(model, Threshold.shipped("codec"), criterion="paper-fft").model
+    fewer.save(f"simplified/{name}.json")
 """
 ANSWERS = """
 from analysis.answers.loading import load_responses

@@ -33,7 +33,7 @@ LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side o
 # Recordings are modelled and drawn behind it, so a model drawn beside one has to be, too.
 BEHIND_HIGH_PASS = f"model, with the recording's {HIGH_PASS_HZ:g} Hz high-pass"
 AMPLITUDE_LABELS = {
-    "energy": "amplitude of the sinusoid of equal power",
+    "energy": "sinusoid of the power that dropping it changes",
     "paper-fft": "single-sided FFT amplitude of the peak",
     "paper-gain": "gain G read as an amplitude",
 }
@@ -61,8 +61,8 @@ def plot_model_spectrum(
 ) -> Axes:
     """One model (full or simplified) and the recording, smoothed; its layers and their thresholds.
 
-    The threshold stands at each layer as the gain with which that layer would be just felt, so a
-    layer is above threshold where its own response peaks above it.
+    The threshold stands at each layer as the gain with which that layer, were it alone, would be
+    just felt.
     """
     ax = axes_or_new(ax)
     frequency, response = comparison.frequency_hz, getattr(comparison, model)
@@ -95,7 +95,7 @@ def plot_model_spectrum(
             color=GREEN,
             lw=2.4,
             ls=JUST_FELT_DASHES,
-            label="" if layer else "gain at which the layer would just be felt here",
+            label="" if layer else "gain at which the layer alone would just be felt",
         )
     # Far skirts of layers must not stretch the axis.
     lowest, highest = (
@@ -114,7 +114,11 @@ def plot_model_spectrum(
 def plot_layers_and_threshold(
     comparison: SpectrumComparison, *, model: str = "full", ax: Axes | None = None
 ) -> Axes:
-    """Amplitude of the model's layers by the criterion (stems at f) against the threshold."""
+    """Amplitude of each layer by the criterion (stems at f) against the threshold.
+
+    By `energy` the one of the change of power by dropping it, which the criterion compares with
+    the threshold at all frequencies of the change.
+    """
     ax = axes_or_new(ax)
     threshold = comparison.threshold
     ax.plot(

@@ -202,10 +202,11 @@ def _threshold_picture(result: TextureResult, stem: str) -> Picture:
         f"threshold_{stem}",
         f"{result.texture}: spectra and detection threshold at {speed_mm_s:g} mm/s, {force_n:g} N",
         "Top: smoothed spectrum of the recording and of each model; thin lines: each layer alone, "
-        "and green dashes: the gain at which it would just be felt. Bottom: amplitude of each "
-        "layer by the criterion, and the threshold; open crosses mark dropped layers. A layer may "
-        "lie below the threshold here and still be kept, because another condition, its "
-        "uncertainty or the sum of the dropped layers decides. Compare figure 6 of the paper.",
+        "and green dashes: the gain at which it, alone, would just be felt. Bottom: amplitude of "
+        "each layer by the criterion (by energy: the sinusoid of the power that dropping it "
+        "changes), and the threshold; open crosses mark dropped layers. A layer may lie below the "
+        "threshold here and still be kept, because another condition, its uncertainty or all "
+        "dropped layers together decide. Compare figure 6 of the paper.",
         figure_spectra_and_threshold(comparison),
         result.simulated,
     )

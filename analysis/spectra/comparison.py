@@ -23,7 +23,10 @@ from modeling import (
 from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import band_response
 from modeling.errors import shown
-from modeling.perception.simplification import layer_amplitudes_g
+from modeling.models.own_peaks import own_peaks
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.by_power import power_changes
+from modeling.perception.signs_of_rest import SignsOfRest
 from modeling.perception.verdicts import CriterionName
 from modeling.recordings.spectrum import (
     SMOOTHING_HZ,
@@ -53,15 +56,15 @@ class SpectrumComparison:
         Magnitudes in g per unit noise, all smoothed alike (Gaussian, σ = 30 Hz). `recording` is
         NaN where there is none; where there is one, both models are behind its 10 Hz high-pass.
     layer_frequency_hz, layer_amplitude_g : (m,) ndarray
-        Frequency and amplitude (g peak) of each layer of the full model here; the amplitude is
-        the one that `criterion` compares with the threshold.
+        Frequency and amplitude (g peak) of each layer of the full model here, the amplitude by
+        `criterion`. By energy it is that of the sinusoid of the power that dropping the layer here
+        changes (with its peak, or what fills its shape).
     layer_response : (m, n) ndarray
         Each layer's own response |G·H(f)| in g per unit noise, not smoothed.
     layer_threshold : (m, n) ndarray
-        The gain (g per unit noise) with which a layer of this width would stand at the threshold
-        by `criterion`, a quarter of an octave around the layer, NaN elsewhere and where no
-        threshold is known or assumed. The layer is above threshold where its response peaks
-        above this.
+        The gain (g per unit noise) with which a layer of this width, were it alone, would stand at
+        the threshold by `criterion`, a quarter of an octave around the layer, NaN elsewhere and
+        where no threshold is known or assumed.
     dropped : (m,) ndarray of bool
         Layers that the simplified model does without.
     threshold : Threshold
@@ -156,7 +159,7 @@ def compare_condition(
         full=respond(peq),
         simplified=respond(fewer),
         layer_frequency_hz=peq.frequencies_hz,
-        layer_amplitude_g=layer_amplitudes_g(peq, criterion=simplification.criterion),
+        layer_amplitude_g=_layer_amplitudes(full, peq, simplification),
         layer_response=np.abs(peq.gains)[:, None] * np.abs(_bands(peq, frequency)),
         layer_threshold=_layer_thresholds(peq, simplification, frequency_hz=frequency),
         dropped=np.array([v.verdict == "dropped" for v in simplification.layers], bool),
@@ -176,6 +179,17 @@ def _smoothed_response(peq: PEQ, frequency_hz: Floats, *, high_passed: bool) -> 
         response = response * high_pass_response(frequency_hz, rate_hz=peq.rate_hz)
     step_hz = float(frequency_hz[1] - frequency_hz[0])
     return smooth(response, SMOOTHING_HZ, step_hz=step_hz)
+
+
+def _layer_amplitudes(full: TextureModel, peq: PEQ, simplification: Simplification) -> Floats:
+    """Amplitude of each layer by the criterion, (m,), in g peak."""
+    if simplification.criterion != "energy":
+        return layer_amplitudes_g(peq, criterion=simplification.criterion)
+    amplitudes, signs = np.zeros(full.n_layers), SignsOfRest.of_model(full)
+    changes = power_changes(peq, simplification.threshold, hold_above=simplification.hold_above)
+    for group in own_peaks(full).groups:
+        amplitudes[list(group)] = changes.of(signs.without(peq.gains[None], group)).amplitude_g
+    return amplitudes
 
 
 def _layer_thresholds(peq: PEQ, simplification: Simplification, *, frequency_hz: Floats) -> Floats:

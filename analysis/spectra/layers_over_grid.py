@@ -9,7 +9,7 @@ import numpy as np
 from modeling import InputError, TextureModel
 from modeling.arrays import Bools, Floats
 from modeling.errors import shown
-from modeling.perception.simplification import layer_amplitudes_g
+from modeling.perception.amplitudes import layer_amplitudes_g
 
 
 def _grid_index(model: TextureModel, speed_mm_s: float, *, force_n: float) -> tuple[int, int]:

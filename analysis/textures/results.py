@@ -97,7 +97,7 @@ def simplification_table(simplification: Simplification) -> pd.DataFrame:
     -------
     DataFrame
         texture, layer (1-based), verdict (kept|dropped), reason, worst_speed_mm_s, worst_force_n,
-        worst_frequency_hz (the condition where the layer stands highest against the threshold),
+        worst_frequency_hz (the condition where what decides is highest against the threshold),
         distance_db (to the threshold there, + above), flip_probability (0–1), assumed and fills
         (as in `modeling.LayerVerdict`), simulated, full_sha256 and threshold_sha256.
     """

@@ -17,7 +17,8 @@ from modeling.arrays import Bools, Floats
 from modeling.equalizer.peq import PEQ
 from modeling.errors import counted
 from modeling.models.loading import Layered
-from modeling.perception.simplification import layer_amplitudes_g
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.by_power import changes_alone
 from modeling.perception.thresholds import Threshold
 from modeling.perception.verdicts import CriterionName
 
@@ -38,13 +39,14 @@ class FeltLayers(NamedTuple):
     Parameters
     ----------
     frequency_hz, amplitude_g : (m,) ndarray
-        The amplitude (peak) is the one that `simplify` compares with the threshold.
+        The amplitude (peak) is by the criterion of `simplify`; by `energy` that of the sinusoid
+        of the power that dropping the layer changes.
     sensation_db : (m,) ndarray
-        Level above the threshold; NaN where no threshold is known, −inf for a silent layer.
+        Distance to the threshold; NaN where no threshold is known, −inf for a silent layer.
     felt : (m,) ndarray of bool
         At or above the threshold.
     unknown : (m,) ndarray of bool
-        No threshold is known at this frequency.
+        No threshold is known at these frequencies.
     """
 
     frequency_hz: Floats
@@ -82,22 +84,32 @@ class Yardstick:
     def layers(self, peq: PEQ) -> FeltLayers:
         """Each layer of one condition against the threshold.
 
-        Above the end of the threshold's table a layer below its last level is not felt (where
-        `hold_above`), of a louder one nothing is known.
+        By `energy` by the change of power if it alone is dropped here, signs chosen again for this
+        condition. Above the end of the threshold's table what is below its last level is not felt
+        (where `hold_above`), of what is louder nothing is known.
         """
+        amplitude, level = self._by_power(peq) if self._by_energy else self._by_amplitude(peq)
+        unknown = np.isnan(level)
+        return FeltLayers(peq.frequencies_hz, amplitude, level, ~unknown & (level >= 0), unknown)
+
+    @property
+    def _by_energy(self) -> bool:
+        return self.criterion == "energy"
+
+    def _by_power(self, peq: PEQ) -> tuple[Floats, Floats]:
+        changes = changes_alone(peq, self.threshold, hold_above=self.hold_above)
+        amplitude = np.array([float(change.amplitude_g[0]) for change in changes])
+        level = np.array([float(change.distances_db()[0][0]) for change in changes])
+        return amplitude, level
+
+    def _by_amplitude(self, peq: PEQ) -> tuple[Floats, Floats]:
         frequency = peq.frequencies_hz
         amplitude = layer_amplitudes_g(peq, criterion=self.criterion)
         held = (self.threshold.held if self.hold_above else self.threshold.at)(frequency)
         with np.errstate(divide="ignore", invalid="ignore"):
             level = 20 * np.log10(amplitude / held)
         unknown = np.isnan(self.threshold.at(frequency)) & ~(level < 0)
-        return FeltLayers(
-            frequency,
-            amplitude,
-            np.where(unknown, np.nan, level),
-            ~unknown & (level >= 0),
-            unknown,
-        )
+        return amplitude, np.where(unknown, np.nan, level)
 
 
 def texture_now(texture: Texture, hand: HandNow, yardstick: Yardstick) -> Now:

@@ -37,6 +37,16 @@ class OwnPeaks(NamedTuple):
     is_peak: Bools
     fills: Integers
 
+    @property
+    def groups(self) -> list[tuple[int, ...]]:
+        """Layers that go together or not at all: a peak and those that fill its shape."""
+        fills = self.fills.tolist()
+        peaks = [layer for layer, peak in enumerate(fills) if peak < 0]
+        return [
+            tuple(layer for layer, filled in enumerate(fills) if peak in (layer, filled))
+            for peak in peaks
+        ]
+
 
 def own_peaks(model: TextureModel) -> OwnPeaks:
     """Which layers of a model are peaks of their own, and which peaks the others fill."""

@@ -36,17 +36,21 @@ class LayerVerdict:
     reason : str
         One phrase.
     worst_speed_mm_s, worst_force_n, worst_frequency_hz : float
-        The condition in which the layer stands highest against the threshold.
+        The condition in which what decides stands highest against the threshold; the layer's
+        frequency there.
     distance_db : float
-        Its level there, in dB relative to the threshold; NaN where no threshold is known.
+        The distance to the threshold there, in dB; NaN where no threshold is known. By `energy` of
+        the change of power by dropping the layer, with what fills its shape, and, if it goes only
+        with others, with the fewest of them; in files of earlier versions of its own power. By the
+        paper's criteria of its amplitude.
     flip_probability : float
-        P(flip): how often the layer would be on the other side of the all-conditions rule if the
-        levels scattered once more by their standard deviations, as in a block bootstrap of the
+        P(flip): how often that distance would be on the other side of the all-conditions rule if
+        the levels scattered once more by their standard deviations, as in a block bootstrap of the
         records (normal, independent between conditions); NaN where a threshold is not known. Not
         in it: whether the estimator would find the layer again, its bias, the other rules.
     assumed : int
-        In how many conditions the threshold was not known at the layer's frequency, but its last
-        level was held as a lower bound.
+        In how many conditions the threshold was not known at the layer's frequency (by `energy`:
+        at most of the change), but its last level was held as a lower bound.
     fills : int
         The layer (1-based) whose shape this one only fills, with which alone it goes; 0 for a peak
         of its own.

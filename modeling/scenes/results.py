@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from modeling.models.loading import Layered
-from modeling.perception.simplification import with_signs_chosen_again
+from modeling.perception.signs_of_rest import with_signs_chosen_again
 from modeling.rendering.plan import RenderPlan
 from modeling.scenes.compiled import Alternative, CompiledTexture, Measured, Step, Way
 from modeling.scenes.cost import stored_numbers

@@ -14,17 +14,18 @@ from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.loading import Layered
+from modeling.models.own_peaks import own_peaks
 from modeling.models.parameter_table import NEXT
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.terms import DrivenBy
 from modeling.models.texture_model import TextureModel
-from modeling.perception.simplification import with_signs_chosen_again
+from modeling.perception.signs_of_rest import SignsOfRest
 from modeling.regression.driving import regressed
 from modeling.rendering.plan import RenderPlan, plan_for
 from modeling.scenes.compiled import Way
 from modeling.scenes.cost import stored_numbers
 from modeling.scenes.error_maps import ErrorMaps
-from modeling.scenes.felt import at_places, kept_layers, layer_groups
+from modeling.scenes.felt import at_places, kept_layers
 from modeling.scenes.limit_losses import limit_loss_db
 from modeling.scenes.measures import Errors, Yardstick
 from modeling.scenes.places import places_of
@@ -107,8 +108,9 @@ class Search:
             ("yardstick", name, band_hz), partial(Yardstick.of, full, band_hz=band_hz)
         )
         self.rate_hz = scene.actuator.rate_hz or full.rate_hz
-        groups = known.get(("groups", name), partial(layer_groups, full))
-        self.kept = kept_layers(full, scene, self.places, groups=groups)
+        groups = known.get(("groups", name), lambda: own_peaks(full).groups)
+        self._signs = known.get(("signs", name), partial(SignsOfRest.of_model, full))
+        self.kept = kept_layers(full, scene, self.places, groups=groups, signs=self._signs)
         self._counted: dict[tuple[int, int], float] = {}
         self._found: dict[tuple[Any, ...], Candidate | None] = {}
         self._lost = self._lost_to_limits()
@@ -123,10 +125,8 @@ class Search:
         """The same as it is played, between the nodes of the full model's table."""
         if len(layers) == self.full.n_layers:
             return self.played
-        chosen = with_signs_chosen_again(self.full, list(layers))
         fewer = self.played.with_layers(list(layers))
-        signs = np.sign(chosen.gains.sum(axis=(0, 1)))
-        return replace(fewer, gains=np.abs(fewer.gains) * np.where(signs < 0, -1.0, 1.0))
+        return replace(fewer, gains=self._signs.gains(self.played.gains, layers))
 
     def maps(self, layers: tuple[int, ...]) -> ErrorMaps:
         key = "maps", self.full.texture, layers, self.scene.actuator.band_hz

@@ -39,7 +39,10 @@ def truths(paper: Study) -> dict[str, TextureModel]:
 @pytest.fixture(scope="module")
 def models(truths: dict[str, TextureModel]) -> ModelSets:
     threshold = Threshold.shipped("codec")
-    simplified = {name: simplify(truth, threshold).model for name, truth in truths.items()}
+    simplified = {
+        name: simplify(truth, threshold, criterion="paper-fft").model
+        for name, truth in truths.items()
+    }
     return ModelSets(sets={"full": truths, "simplified": simplified})
 
 

@@ -26,7 +26,9 @@ def recipe(timed: bool, tmp_path_factory: pytest.TempPathFactory) -> Recipe:
     for name in list(TEXTURES) if timed else list(TEXTURES)[:1]:
         model = planted_texture(name)
         model.save(folder / f"full/{name}.json")
-        simplify(model, Threshold.named("codec")).model.save(folder / f"simplified/{name}.json")
+        simplify(model, Threshold.named("codec"), criterion="paper-fft").model.save(
+            folder / f"simplified/{name}.json"
+        )
     strokes = [TrajectoryEntry.constant(speed, 1.0) for speed in (100.0, 250.0)]
     for number, duration_s in enumerate(HANDS_S):
         path = folder / f"{number}.csv"

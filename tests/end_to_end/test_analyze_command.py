@@ -64,7 +64,10 @@ def simulated(once_per_run: Any) -> Path:
 def simulated_in(folder: Path) -> Path:
     truths = {texture: planted_texture(texture) for texture in TEXTURES}
     threshold = Threshold.shipped("codec")
-    fewer = {name: simplify(truth, threshold).model for name, truth in truths.items()}
+    fewer = {
+        name: simplify(truth, threshold, criterion="paper-fft").model
+        for name, truth in truths.items()
+    }
     claim = Claim(
         name="as strong",
         task="absolute",

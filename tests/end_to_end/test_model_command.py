@@ -174,21 +174,21 @@ def test_clipping_is_told_for_each_texture(main, tmp_path: Path) -> None:
 
 
 def test_simplify_says_where_nothing_is_left_to_compare(main, tmp_path: Path) -> None:
-    full = planted_texture("polyester")
-    full.save(tmp_path / "polyester.json")
-    done = main("simplify", "polyester.json", "--out", "fewer")
+    full = planted_texture("PVC")
+    full.save(tmp_path / "PVC.json")
+    done = main("simplify", "PVC.json", "--out", "fewer")
     assert done.returncode == 0, done.stderr
     assert "identical" not in done.stdout
-    saved = Simplification.load(tmp_path / "fewer/polyester_simplification.json")
+    saved = Simplification.load(tmp_path / "fewer/PVC_simplification.json")
     assert saved == simplify(full, Threshold.shipped("codec"))
-    assert saved.model == TextureModel.load(tmp_path / "fewer/polyester.json")
-    table = pd.read_csv(tmp_path / "fewer/polyester_layers.tsv", sep="\t")
+    assert saved.model == TextureModel.load(tmp_path / "fewer/PVC.json")
+    table = pd.read_csv(tmp_path / "fewer/PVC_layers.tsv", sep="\t")
     assert set(table["full_sha256"]) == {full.sha256}
     assert set(table["threshold_sha256"]) == {saved.threshold.sha256}
     # The model that is left has no layer that could go.
-    again = main("simplify", "fewer/polyester.json", "--out", "fewest")
-    assert "polyester: the simplified model is identical to the full one" in again.stdout
-    assert Simplification.load(tmp_path / "fewest/polyester_simplification.json").identical
+    again = main("simplify", "fewer/PVC.json", "--out", "fewest")
+    assert "PVC: the simplified model is identical to the full one" in again.stdout
+    assert Simplification.load(tmp_path / "fewest/PVC_simplification.json").identical
 
 
 def test_simplify_draws_the_condition_that_was_asked_for(main, three: Path) -> None:

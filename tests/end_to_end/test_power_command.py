@@ -20,7 +20,9 @@ def place(tmp_path: Path, small_study: str, claimed_study: str) -> Path:
     for name in ("canvas", "MDF"):
         truth = planted_texture(name)
         truth.save(tmp_path / f"models/{name}.json")
-        simplify(truth, codec).model.save(tmp_path / f"simplified/{name}.json")
+        simplify(truth, codec, criterion="paper-fft").model.save(
+            tmp_path / f"simplified/{name}.json"
+        )
     (tmp_path / "study.toml").write_text(claimed_study)
     (tmp_path / "none.toml").write_text(small_study)
     return tmp_path

@@ -29,7 +29,7 @@ def place(tmp_path: Path, main: Main) -> Path:
         (tmp_path / folder).mkdir()
     for number, name in enumerate(Study.load().textures):
         full = planted_texture(name, **SMALL)
-        fewer = simplify(full, Threshold.shipped("codec")).model
+        fewer = simplify(full, Threshold.shipped("codec"), criterion="paper-fft").model
         full.save(tmp_path / f"models/{number}.json")
         (full if name == "MDF" else fewer).save(tmp_path / f"simplified/{number}.json")
     assert main("study", "init", "study.toml").returncode == 0

@@ -136,7 +136,10 @@ def truths() -> dict[str, TextureModel]:
 
 @pytest.fixture(scope="session")
 def models(truths: dict[str, TextureModel], threshold: Threshold) -> ModelSets:
-    simplified = {name: simplify(model, threshold).model for name, model in truths.items()}
+    simplified = {
+        name: simplify(model, threshold, criterion="paper-fft").model
+        for name, model in truths.items()
+    }
     return ModelSets(sets={"full": truths, "simplified": simplified})
 
 

@@ -79,7 +79,10 @@ def study() -> Study:
 def models() -> ModelSets:
     truths = {texture: planted_texture(texture) for texture in TEXTURES}
     codec = Threshold.named("codec")
-    fewer = {texture: simplify(model, codec).model for texture, model in truths.items()}
+    fewer = {
+        texture: simplify(model, codec, criterion="paper-fft").model
+        for texture, model in truths.items()
+    }
     return ModelSets(sets={"full": truths, "simplified": fewer})
 
 

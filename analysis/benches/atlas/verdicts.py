@@ -1,14 +1,16 @@
 """Verdicts of simplification in the atlas: distance to the threshold and record length.
 
 Textures whose layers are known are recorded twice and modelled; the threshold lies so far from the
-true level of one layer and far below the others. Textures have one condition: over a grid a layer
-has to be below in all of them. The rules: docs/method/perception.md#simplification.
+true change of power by dropping one layer, the others kept. Textures have one condition: over a
+grid a layer has to be below in all of them. The rules: docs/method/perception.md#simplification.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import lru_cache, partial
+from itertools import product
 
 import numpy as np
 from scipy.optimize import brentq
@@ -16,10 +18,13 @@ from scipy.special import ndtr, ndtri
 
 from analysis.benches.atlas.case import Axis, Case
 from analysis.textures.recovery import match_layers
-from modeling import TextureModel, Threshold, fit_texture, simplify
+from modeling import TextureModel, Threshold, fit_texture
 from modeling.arrays import Bools, Floats, Integers
 from modeling.equalizer.bands import band_response
-from modeling.perception.simplification import HIGHEST_FLIP_PROBABILITY, layer_amplitudes_g
+from modeling.perception.by_power import judge_of
+from modeling.perception.dropping import HIGHEST_FLIP_PROBABILITY
+from modeling.perception.simplification import distances_db
+from modeling.perception.thresholds import FREQUENCIES_HZ
 from modeling.seeds import generator
 from stimuli.planted.textures import record_texture
 
@@ -31,9 +36,6 @@ SPEED_MM_S, FORCE_N = 200.0, 2.0
 NOISE_GAIN = 0.01
 PLACES_HZ, PLACE_FACTOR = (70.0, 190.0, 400.0, 800.0), 1.15
 BANDWIDTHS_HZ, LEVELS_DB = (15.0, 50.0), (12.0, 24.0)
-# Of the threshold at all layers but one, so that neither the sum of what is dropped nor "the last
-# layer stays" decides.
-ELSEWHERE_DB = -40.0
 Rule = Callable[[TextureModel, int, Threshold], bool]
 Pair = tuple[TextureModel, tuple[TextureModel, TextureModel]]
 
@@ -82,25 +84,21 @@ def partners(model: TextureModel, truth: TextureModel) -> Integers:
 
 
 def dropped_by_all_rules(model: TextureModel, layer: int, threshold: Threshold) -> bool:
-    """What `simplify` decides."""
-    return simplify(model, threshold).layers[layer].verdict == "dropped"
+    """What `simplify` decides on the layer, were all others kept."""
+    alone = judge_of(model, threshold, margin_db=0.0, hold_above=True)((layer,))
+    return alone.below and alone.flip_probability < HIGHEST_FLIP_PROBABILITY
 
 
 def dropped_by_level(model: TextureModel, layer: int, threshold: Threshold) -> bool:
-    """The paper's rule alone: the measured level is below the threshold."""
-    amplitude = layer_amplitudes_g(model, criterion="energy")[0, 0, layer]
-    return bool(amplitude < threshold.at(model.frequencies_hz[0, 0, layer]))
+    """The paper's rule alone: what is measured is below the threshold."""
+    return judge_of(model, threshold, margin_db=0.0, hold_above=True)((layer,)).below
 
 
 def threshold_at(truth: TextureModel, layer: int, distance_db: float) -> Threshold:
-    """A threshold that the true level exceeds by a margin, flat half-way to the neighbours."""
-    frequency = truth.frequencies_hz[0, 0]
-    borders = np.concatenate(([1.0], np.sqrt(frequency[1:] * frequency[:-1]), [2450.0]))
-    amplitude = layer_amplitudes_g(truth, criterion="energy")[0, 0]
-    levels = amplitude * 10 ** (ELSEWHERE_DB / 20)
-    levels[layer] = amplitude[layer] * 10 ** (-distance_db / 20)
-    edges = np.column_stack((borders[:-1] * 1.0001, borders[1:])).ravel()
-    return Threshold("in steps", edges, np.repeat(levels, 2), "the atlas", "steps")
+    """A flat threshold that the true change by dropping a layer exceeds by a margin."""
+    unit = Threshold("flat", np.array(FREQUENCIES_HZ), np.ones(2), "the atlas", "flat")
+    level_db = float(distances_db(truth, unit)[0, 0, layer]) - distance_db
+    return replace(unit, acceleration_g=np.full(2, 10 ** (level_db / 20)))
 
 
 def dropped(pairs: tuple[Pair, ...], distance_db: float, *, rule: Rule) -> tuple[Bools, Bools]:
@@ -145,12 +143,14 @@ def _share(happened: Bools, counted: Bools) -> float:
 
 @lru_cache(maxsize=4)
 def level_deviations_db(duration_s: float) -> Floats:
-    """Cramér–Rao bounds of the levels of lone layers as they are drawn: floor and all unknown."""
+    """Cramér–Rao bounds of the changes by lone layers as they are drawn, floor and all unknown."""
     widths, levels = np.geomspace(*BANDWIDTHS_HZ, 5), np.linspace(*LEVELS_DB, 5)
-    return np.array([_deviation_db(w, level, duration_s) for w in widths for level in levels])
+    layers = product(widths, levels, (1.0, -1.0))
+    return np.array([_deviation_db(w, db, duration_s, sign=sign) for w, db, sign in layers])
 
 
-def _deviation_db(width_hz: float, level_db: float, duration_s: float) -> float:
+def _deviation_db(width_hz: float, level_db: float, duration_s: float, *, sign: float) -> float:
+    """Of √|G² + 2·G·G_w|·√B, the amplitude of the change, in dB."""
     frequency = np.arange(1, round(RATE_HZ / 2 * duration_s)) / duration_s
     truth = np.array([np.mean(PLACES_HZ), width_hz, 10 ** (level_db / 20), 1.0])
 
@@ -162,13 +162,14 @@ def _deviation_db(width_hz: float, level_db: float, duration_s: float) -> float:
             bandwidths_hz=np.array([width]),
             rate_hz=RATE_HZ,
         )[0]
-        log: Floats = np.log(np.abs(noise + gain * band) ** 2)
+        log: Floats = np.log(np.abs(noise + sign * gain * band) ** 2)
         return log
 
     step = 1e-4
     slopes = np.array([(log_power(d) - log_power(-d)) / (2 * step) for d in step * np.eye(4)])
     covariance = np.linalg.inv(slopes @ slopes.T)
-    level = np.array([0.0, 0.5, 1.0, 0.0])  # ln(G·√B)
+    ratio = sign * truth[2] / truth[3]
+    level = np.array([0.0, 0.5, (ratio + 1) / (ratio + 2), 1 / (ratio + 2)])
     return float(20 / np.log(10) * np.sqrt(level @ covariance @ level))
 
 

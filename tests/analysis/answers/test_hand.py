@@ -223,7 +223,9 @@ def test_presentations_are_those_that_the_answers_count(tmp_path):
         trays={"leather": "A", "MDF": "B"},
         tasks={"absolute": plan, "relative": plan},
     )
-    simplified = {name: simplify(t, threshold).model for name, t in truths.items()}
+    simplified = {
+        name: simplify(t, threshold, criterion="paper-fft").model for name, t in truths.items()
+    }
     simulate_study(
         study,
         real=truths,

@@ -62,7 +62,10 @@ def folder(tmp_path_factory) -> Path:
         models=ModelSets(
             sets={
                 "full": truths,
-                "simplified": {name: simplify(t, threshold).model for name, t in truths.items()},
+                "simplified": {
+                    name: simplify(t, threshold, criterion="paper-fft").model
+                    for name, t in truths.items()
+                },
             }
         ),
         rig=SimulatedRig(seed=1),

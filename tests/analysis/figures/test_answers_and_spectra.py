@@ -142,7 +142,7 @@ def test_lines_of_thresholds_are_told_apart_by_colour_and_by_dashes(results):
     axes = drawn(figure_spectra_and_threshold(comparison))
     lines = {str(line.get_label()): line for ax in axes for line in ax.lines}
     names = (
-        "gain at which the layer would just be felt here",
+        "gain at which the layer alone would just be felt",
         "detection threshold (codec)",
         "assumed lower bound of the threshold",
     )

@@ -25,6 +25,8 @@ from analysis.textures.results import TextureResult
 from modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify
 from modeling.estimation.estimators import find_layers
 from modeling.fitting.conditions import recording_spectra
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.signs_of_rest import with_signs_chosen_again
 from modeling.recordings.spectrum import high_pass_response, mean_spectrum, smooth
 from stimuli.planted.textures import record_texture
 from tests.refusals import refused
@@ -63,7 +65,9 @@ def lines_named(ax, label: str) -> list:
 
 @pytest.mark.parametrize("criterion", CRITERIA)
 def test_a_layer_stands_above_its_drawn_threshold_as_its_amplitude_does(model, criterion) -> None:
+    """Of each layer alone."""
     threshold = Threshold.shipped("codec")
+    amplitudes = layer_amplitudes_g(model.peq(150.0, 1.5), criterion=criterion)
     result = simplify(model, threshold, criterion=criterion)
     shown = compare_condition(model, result, speed_mm_s=150.0, force_n=1.5)
     for layer, (frequency, gain) in enumerate(zip(FREQUENCIES_HZ[:2], GAINS[:2], strict=True)):
@@ -71,15 +75,32 @@ def test_a_layer_stands_above_its_drawn_threshold_as_its_amplitude_does(model, c
         assert shown.frequency_hz[at] == frequency
         assert shown.layer_response[layer, at] == pytest.approx(abs(gain), rel=1e-12)
         drawn = shown.layer_response[layer, at] / shown.layer_threshold[layer, at]
-        compared = shown.layer_amplitude_g[layer] / threshold.at(frequency)
+        compared = amplitudes[layer] / threshold.at(frequency)
         assert drawn == pytest.approx(compared, rel=1e-12)
     # None is known at 900 Hz: its last level is drawn as a lower bound.
     bound = shown.layer_response[2, 900] / shown.layer_threshold[2, 900]
-    compared = shown.layer_amplitude_g[2] / threshold.at(400.0)
+    compared = amplitudes[2] / threshold.at(400.0)
     assert bound == pytest.approx(compared, rel=1e-12)
     known_only = simplify(model, threshold, criterion=criterion, hold_above=False)
     shown = compare_condition(model, known_only, speed_mm_s=150.0, force_n=1.5)
     assert np.isnan(shown.layer_threshold[2]).all()
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_amplitudes_are_those_of_the_criterion(model, criterion) -> None:
+    """By `energy` that of the change of power: by a sum over frequency."""
+    result = simplify(model, Threshold.shipped("codec"), criterion=criterion)
+    shown = compare_condition(model, result, speed_mm_s=150.0, force_n=1.5)
+    peq = model.peq(150.0, 1.5)
+    if criterion != "energy":
+        assert (shown.layer_amplitude_g == layer_amplitudes_g(peq, criterion=criterion)).all()
+        return
+    frequency = np.arange(0.05, 2500.0, 0.1)
+    for layer in range(3):
+        others = [other for other in range(3) if other != layer]
+        fewer = with_signs_chosen_again(model, others).peq(150.0, 1.5)
+        change = np.abs(peq.response(frequency) ** 2 - fewer.response(frequency) ** 2)
+        assert shown.layer_amplitude_g[layer] ** 2 == pytest.approx(2 * change.mean(), rel=2e-3)
 
 
 def test_thresholds_are_drawn_a_quarter_octave_around_their_layers(model) -> None:

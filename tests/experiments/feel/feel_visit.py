@@ -100,7 +100,9 @@ def visit_in(size):
 window.LiveText = panels.LiveText = NotedText
 threshold = Threshold.shipped("codec")
 canvas, leather = planted_texture("canvas"), planted_texture("leather")
-textures = [Texture(full=canvas, simplified=simplify(canvas, threshold).model)]
+textures = [
+    Texture(full=canvas, simplified=simplify(canvas, threshold, criterion="paper-fft").model)
+]
 textures.append(Texture(full=leather))
 yardstick = Yardstick(threshold=threshold)
 while order := sys.stdin.readline():

@@ -47,7 +47,7 @@ class NotingRig:
 @pytest.fixture
 def visit() -> Visit:
     canvas = planted_texture("canvas")
-    fewer = simplify(canvas, Threshold.shipped("codec")).model
+    fewer = simplify(canvas, Threshold.shipped("codec"), criterion="paper-fft").model
     textures = (
         Texture(full=canvas, simplified=fewer),
         Texture(full=planted_texture("PVC")),
@@ -74,10 +74,10 @@ def test_keys_switch_textures(visit: Visit) -> None:
 
 def test_a_key_switches_between_full_and_simplified(visit: Visit) -> None:
     visit.play()
-    assert asked(visit, "f", "f") == [("canvas", 2), ("canvas", 4)]
-    assert asked(visit, "f", "2") == [("canvas", 2), ("PVC", 4)]
+    assert asked(visit, "f", "f") == [("canvas", 1), ("canvas", 4)]
+    assert asked(visit, "f", "2") == [("canvas", 1), ("PVC", 4)]
     # What has no simplified model stays as it is, and the wish for one holds for the next texture.
-    assert asked(visit, "1") == [("canvas", 2)]
+    assert asked(visit, "1") == [("canvas", 1)]
     visit.switch_model(simplified=True)
     assert asked(visit) == []
 

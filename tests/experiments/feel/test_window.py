@@ -97,7 +97,7 @@ def test_keys_and_buttons_change_what_plays_and_what_is_drawn(
         assert "simulated texture, simulated hand, force assumed" in visitor.words
         assert "limits touched: peak" in visitor.words
 
-        assert visitor.press("f") == ["canvas", 2]
+        assert visitor.press("f") == ["canvas", 1]
         fewer = visitor.look(tmp_path / "fewer.png")
         assert "canvas, simplified model" in visitor.words
         # The curve that plays is thicker, its layers stand on stems.
@@ -109,7 +109,7 @@ def test_keys_and_buttons_change_what_plays_and_what_is_drawn(
         assert "no simplified model" in visitor.words
         assert pixels(leather, BLUE) < 0.2 * pixels(fewer, BLUE)
 
-        assert visitor.click("texture 1") == ["canvas", 2]
+        assert visitor.click("texture 1") == ["canvas", 1]
         assert visitor.click("full") == ["canvas", 4]
         assert visitor.click("stop") == ["silence"]
         visitor.look(tmp_path / "stopped.png")

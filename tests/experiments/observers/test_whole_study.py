@@ -35,7 +35,10 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
 def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: Any) -> None:
     study = Study.load()
     truths = {texture: planted_texture(texture) for texture in study.textures}
-    reduced = {name: simplify(model, threshold).model for name, model in truths.items()}
+    reduced = {
+        name: simplify(model, threshold, criterion="paper-fft").model
+        for name, model in truths.items()
+    }
     steps: list[tuple[int, int, str]] = []
     results = simulate(
         study,

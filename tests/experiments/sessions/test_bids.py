@@ -118,7 +118,10 @@ def test_the_validator_finds_no_error(study_on_disk, write_session, tmp_path, ki
 
 
 def test_the_validator_finds_no_error_in_a_simulated_study(tmp_path, truths, threshold):
-    simplified = {name: simplify(truth, threshold).model for name, truth in truths.items()}
+    simplified = {
+        name: simplify(truth, threshold, criterion="paper-fft").model
+        for name, truth in truths.items()
+    }
     plan = {"participants": 1, "schedule": "interleaved", "training_trials": 1}
     simulate_study(
         Study(

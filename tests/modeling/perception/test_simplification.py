@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 from scipy.special import ndtr
 
 from modeling import CRITERIA, InputError, Simplification, TextureModel, Threshold, simplify
-from modeling.perception.simplification import (
-    distances_db,
-    layer_amplitudes_g,
-    with_signs_chosen_again,
-)
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.signs_of_rest import with_signs_chosen_again
+from modeling.perception.simplification import distances_db
 from tests.refusals import refused
 
 ModelMaker = Callable[..., TextureModel]
@@ -364,12 +362,15 @@ def test_the_criterion_decides(make_model: ModelMaker, criterion: str) -> None:
     """A 50 Hz layer 6 dB above under `energy` is 14 dB below under `paper-fft`."""
     k = np.tan(np.pi * 50 / 5000)
     gain = 0.2 / np.sqrt(2 * k / (1 + k))
-    model = make_model(0.0, [(100.0, 50.0, 100.0), (200.0, 50.0, gain)])
-    expected = {"energy": (6.02, "kept"), "paper-fft": (-13.85, "dropped")}
-    expected["paper-gain"] = (18.17, "kept")
-    layer = run(model, criterion=criterion).layers[1]
+    # The other one is silent, so that by `energy` this one counts as if it were alone.
+    model = make_model(0.0, [(100.0, 50.0, 0.0), (200.0, 50.0, gain)])
+    threshold = replace(FLAT, frequency_hz=np.array([1e-6, 1e6]))
+    layer = simplify(model, threshold, criterion=criterion).layers[1]  # type: ignore[arg-type]
+    expected = {"energy": (6.02, "above"), "paper-fft": (-13.85, "below")}
+    expected["paper-gain"] = (18.17, "above")
     assert layer.distance_db == pytest.approx(expected[criterion][0], abs=0.05)
-    assert layer.verdict == expected[criterion][1]
+    last = "kept as the last layer" in layer.reason
+    assert last == (expected[criterion][1] == "below")
 
 
 # --- stability
@@ -395,12 +396,11 @@ def test_flips_of_5_percent_are_the_limit(
     make_model: ModelMaker, level_db: float, verdict: str
 ) -> None:
     """Four conditions at z: 1 − Φ(z)⁴ = 5 % at z = 2.234."""
-    unit_energy_gain = 0.1 / layer_amplitudes_g(
-        make_model(0.0, [(200.0, 50.0, 1.0)]), criterion="energy"
-    )
-    gain = float(unit_energy_gain[0, 0, 0]) * 10 ** (level_db / 20)
-    model = make_model(0.0, [(100.0, 50.0, 10.0), (200.0, 50.0, gain)], level_sd_db=1.0)
-    layer = run(model, criterion="energy").layers[1]
+    model = make_model(0.01, [(100.0, 50.0, 10.0), (200.0, 50.0, 1.0)], level_sd_db=1.0)
+    everywhere = replace(FLAT, frequency_hz=np.array([1e-6, 1e6]))
+    distance = float(distances_db(model, everywhere)[0, 0, 1])
+    level_g = FLAT.acceleration_g * 10 ** ((distance - level_db) / 20)
+    layer = simplify(model, replace(everywhere, acceleration_g=level_g)).layers[1]
     assert layer.distance_db == pytest.approx(level_db)
     assert layer.verdict == verdict
     assert (layer.flip_probability < 0.05) == (verdict == "dropped")
@@ -514,6 +514,47 @@ def test_simplify_chooses_signs_again(make_model: ModelMaker) -> None:
     simplified = simplify(make_model(0.02, ALTERNATING), high, criterion="paper-gain").model
     assert simplified.n_layers == 2
     assert (simplified.gains[:, :, 0] * simplified.gains[:, :, 1] < 0).all()
+
+
+def test_reasons_of_the_change_of_power(make_model: ModelMaker) -> None:
+    """Of narrow layers far apart, at +3, −3 and −20 dB."""
+    threshold = Threshold("flat", np.array([1e-6, 1000.0]), np.array([0.1, 0.1]), "", "")
+    k = np.tan(np.pi * 0.3 / 5000)
+    unit = 0.1 / np.sqrt(2 * k / (1 + k))
+    levels = (3.0, -3.5, -20.5)
+    layers = [(200.0 * (n + 1), 0.3, unit * 10 ** (db / 20)) for n, db in enumerate(levels)]
+    model = make_model(0.0, layers)
+
+    def reasons(model: TextureModel, **options: float) -> list[str]:
+        return [layer.reason for layer in simplify(model, threshold, **options).layers]  # type: ignore[arg-type]
+
+    below = "dropping it changes the power by {} dB less than the threshold in every condition"
+    above = "dropping it changes the power by more than the threshold {}in 4 of 4 conditions"
+    assert reasons(model)[0] == above.format("")
+    assert reasons(model)[1].startswith("dropping it changes the power by 3.")
+    assert reasons(model)[2] == below.format("20.0")
+    assert reasons(model, margin_db=6.0)[:2] == [above.format("less 6 dB ")] * 2
+    unsure = replace(model, level_sd_db=np.full(model.gains.shape, 5.0))
+    assert reasons(unsure)[1] == (
+        "dropping it changes the power by less than the threshold, but the records are too short "
+        "to be certain"
+    )
+    silent = replace(model, gains=model.gains * [0.5, 0.0, 0.2])
+    assert reasons(silent) == [
+        "dropping it changes the power by less than the threshold, kept as the last layer",
+        "dropping it changes nothing in any condition",
+        reasons(silent)[2],
+    ]
+    twice = make_model(0.0, [layers[0], layers[1], (600.0, 0.3, layers[1][2])])
+    assert (
+        "dropping it changes the power by less than the threshold, but not together with the "
+        "other dropped" in reasons(replace(twice, gains=twice.gains * [1.0, 1.2, 1.1]))
+    )
+    beyond = make_model(0.0, [layers[0], (1500.0, 0.3, unit * 10)])
+    assert (
+        reasons(beyond)[1]
+        == "no threshold known in 4 of 4 conditions (flat covers 1e-06 to 1000 Hz)"
+    )
 
 
 def test_reasons_name_the_margin(make_model: ModelMaker) -> None:

@@ -39,7 +39,7 @@ def varied_model(
     width = rng.uniform(15, 60, m) * v**0.1 * np.ones_like(f)
     level = rng.uniform(0.03, 0.1, m) * v ** rng.uniform(0.2, 0.8, m) * f**0.3
     weakest = rng.permutation(m) < weak
-    below = 0.1 * Threshold.shipped("codec").held(frequency) / np.sqrt(2)
+    below = 1e-3 * Threshold.shipped("codec").held(frequency) / np.sqrt(2)
     gains = np.where(weakest, below, level) / band_rms(1.0, width, rate_hz=rate_hz)
     return TextureModel(
         **{

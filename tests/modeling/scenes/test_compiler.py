@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from modeling import InputError, RegressedModel, TextureModel, regressed
 from modeling.arrays import Floats
-from modeling.equalizer.bands import band_rms
+from modeling.equalizer.bands import band_response
 from modeling.models.own_peaks import own_peaks
 from modeling.models.parameter_table import Parameters
-from modeling.perception.simplification import with_signs_chosen_again
+from modeling.perception.signs_of_rest import with_signs_chosen_again
 from modeling.rendering.plan import plan_for
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scene
@@ -46,17 +46,36 @@ def subsets(size: int) -> Iterator[tuple[int, ...]]:
 
 
 def may_stay_alone(full: TextureModel, scene: Scene, places: Any) -> Iterator[tuple[int, ...]]:
-    """Choices of layers that lack nothing but what is below the threshold, alone and in sum."""
+    """Choices of layers without which the power changes by less than the threshold."""
     rows, columns = np.nonzero(places.counts)
     at = full.parameters(places.speeds_mm_s[rows], places.forces_n[columns])
-    peak = np.sqrt(2) * band_rms(at.gains, at.bandwidths_hz, rate_hz=full.rate_hz)
-    ratio = peak / scene.threshold.held(at.frequencies_hz)
+    frequency = np.arange(0.5, full.rate_hz / 2)  # every hertz
+    low, high = scene.actuator.band_hz or (0.0, np.inf)
+    threshold = np.where(
+        (frequency >= low) & (frequency <= high), scene.threshold.held(frequency), np.nan
+    )
     fills = own_peaks(full).fills
     for kept in subsets(full.n_layers):
-        dropped = [layer for layer in range(full.n_layers) if layer not in kept]
+        signs = np.zeros(full.n_layers)
+        chosen = with_signs_chosen_again(full, list(kept))
+        signs[list(kept)] = np.sign(chosen.gains.sum(axis=(0, 1)))
         torn = any(p >= 0 and (i in kept) != (p in kept) for i, p in enumerate(fills))
-        if not torn and (np.sum(ratio[:, dropped] ** 2, axis=1) < 1).all():
+        rest = at._replace(gains=np.abs(at.gains) * signs)
+        change = np.abs(powers(at, frequency, full.rate_hz) - powers(rest, frequency, full.rate_hz))
+        felt = 2 * np.nansum(change / threshold**2, axis=1) / (full.rate_hz / 2)
+        if not torn and (felt < 1).all():
             yield kept
+
+
+def powers(at: Parameters, frequency_hz: Floats, rate_hz: float) -> Floats:
+    """|G_w + Σ G_i H_i|² at n places, (n, f)."""
+    found = []
+    for noise, centres, widths, gains in zip(*at, strict=True):
+        bands = band_response(
+            frequency_hz, centres_hz=centres, bandwidths_hz=widths, rate_hz=rate_hz
+        )
+        found.append(np.abs(noise + gains @ bands) ** 2)
+    return np.array(found)
 
 
 def felt_of(full: TextureModel, kept: tuple[int, ...]) -> TextureModel:

@@ -93,7 +93,11 @@ def surfaces(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("surfaces")
     for texture in ("canvas", "MDF"):
         full = planted_texture(texture)
-        few = simplify(full, Threshold.shipped("codec")).model if texture == "canvas" else full
+        few = (
+            simplify(full, Threshold.shipped("codec"), criterion="paper-fft").model
+            if texture == "canvas"
+            else full
+        )
         for name, model in (("full", full), ("simplified", few)):
             (folder / name).mkdir(exist_ok=True)
             model.save(folder / name / f"{texture}.json")

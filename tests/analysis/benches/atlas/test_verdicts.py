@@ -11,7 +11,8 @@ from analysis.benches.atlas import verdicts
 from analysis.benches.atlas.case import Case
 from analysis.benches.atlas.verdicts import ALL_RULES, BY_LEVEL, CASES, RULES, planted
 from modeling import TextureModel
-from modeling.perception.simplification import distances_db
+from modeling.perception.amplitudes import layer_amplitudes_g
+from modeling.perception.signs_of_rest import with_signs_chosen_again
 from modeling.seeds import generator
 
 LAYERS = len(verdicts.PLACES_HZ)
@@ -30,6 +31,7 @@ def read_as(truth: TextureModel, *, error_db: float, sd_db: float) -> TextureMod
     factor = 10 ** (error_db / 20)
     return replace(
         truth,
+        noise_gains=truth.noise_gains * factor,
         gains=truth.gains * factor,
         level_sd_db=np.full(truth.gains.shape, sd_db),
         estimator="joint",
@@ -45,14 +47,19 @@ def pairs_of(errors_db: tuple[float, float], *, sd_db: float) -> tuple[verdicts.
     return tuple(zip(truths, zip(first, second, strict=True), strict=True))
 
 
-def test_the_threshold_lies_under_one_layer_and_far_below_the_others() -> None:
+def test_the_threshold_is_so_far_from_the_change_by_one_layer() -> None:
+    """By a sum over frequency."""
     truth = planted(generator(3))
+    frequency = np.arange(0.05, 2500.0, 0.1)
     for layer in range(LAYERS):
         threshold = verdicts.threshold_at(truth, layer, -2.5)
-        distances = distances_db(truth, threshold)[0, 0]
-        expected = np.full(LAYERS, -verdicts.ELSEWHERE_DB)
-        expected[layer] = -2.5
-        assert distances == pytest.approx(expected)
+        others = [other for other in range(LAYERS) if other != layer]
+        powers = [
+            model.peq(200.0, 2.0).response(frequency) ** 2
+            for model in (truth, with_signs_chosen_again(truth, others))
+        ]
+        change = 2 * np.mean(np.abs(powers[0] - powers[1]))
+        assert 10 * np.log10(change / threshold.at(300.0) ** 2) == pytest.approx(-2.5, abs=0.01)
 
 
 @pytest.mark.parametrize("method", RULES)
@@ -88,7 +95,7 @@ def test_shares_count_layers_and_second_recordings(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_layer_that_is_not_found_is_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    ((truth, (first, second)), *_) = pairs_of((-2.0, -2.0), sd_db=0.1)
+    ((truth, (first, second)), *_) = pairs_of((-20.0, -20.0), sd_db=0.1)
     fewer = second.with_layers([0, 1])
     pairs = ((truth, (first, fewer)),)
     gone, found = verdicts.dropped(pairs, 1.0, rule=verdicts.dropped_by_level)
@@ -106,8 +113,10 @@ def test_a_layer_that_is_not_found_is_not_counted(monkeypatch: pytest.MonkeyPatc
 def test_the_bound_of_a_level_is_the_lone_layers_where_it_is_loud() -> None:
     for width, duration in ((20.0, 1.0), (50.0, 2.0)):
         lone = 10 / np.log(10) / np.sqrt(np.pi * width * duration)
-        assert verdicts._deviation_db(width, 60.0, duration) == pytest.approx(lone, rel=0.1)
-    quiet, loud = (verdicts._deviation_db(30.0, level, 1.0) for level in (6.0, 20.0))
+        assert verdicts._deviation_db(width, 60.0, duration, sign=1.0) == pytest.approx(
+            lone, rel=0.1
+        )
+    quiet, loud = (verdicts._deviation_db(30.0, level, 1.0, sign=1.0) for level in (6.0, 20.0))
     assert quiet > 1.3 * loud  # the floor takes its part
     assert np.median(verdicts.level_deviations_db(0.25) / verdicts.level_deviations_db(1.0)) == (
         pytest.approx(2.0, rel=0.03)
@@ -129,10 +138,8 @@ def test_levels_of_found_layers_scatter_as_the_bound_says() -> None:
         for truth, models in verdicts.recorded_twice(verdicts.TEXTURES[False], 1.0)
         for model in models
         for true, found in zip(
-            verdicts.layer_amplitudes_g(truth, criterion="energy")[0, 0],
-            verdicts.layer_amplitudes_g(model, criterion="energy")[0, 0][
-                verdicts.partners(model, truth)
-            ],
+            layer_amplitudes_g(truth, criterion="energy")[0, 0],
+            layer_amplitudes_g(model, criterion="energy")[0, 0][verdicts.partners(model, truth)],
             strict=True,
         )
     ]
