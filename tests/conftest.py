@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import gc
 import os
 import pickle
 import resource
@@ -29,6 +30,10 @@ from tests.real_time import BareProcess, needs_time, repeat_where_the_machine_st
 # A slow machine is no counterexample: hypothesis must not fail a test for its wall time.
 settings.register_profile("house", deadline=None)
 settings.load_profile("house")
+
+# The libraries, loaded once, are a million objects. By default they are looked through for garbage
+# again and again, which takes more than a twentieth of the time of all tests.
+gc.set_threshold(20_000, 10, 10)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

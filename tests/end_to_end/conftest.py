@@ -5,9 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer
 
 from tactileq import app
 
@@ -66,6 +69,12 @@ def run(tmp_path: Path) -> Run:
     return call
 
 
+@cache
+def commands() -> Any:
+    """All commands with their options, which Typer otherwise reads from the functions each time."""
+    return typer.main.get_command(app.app)
+
+
 @pytest.fixture
 def main(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -78,6 +87,7 @@ def main(
         # Worker processes would outlive the test, in the folder where they began.
         words += ["--jobs", "1"] if words[0] == "model" else []
         monkeypatch.setattr("sys.argv", ["tactileq", *words])
+        monkeypatch.setattr(app, "app", commands())
         with pytest.raises(SystemExit) as end:
             app.main()
         told = capsys.readouterr()

@@ -64,9 +64,18 @@ def responses_of(
     )
 
 
+FEW = ("canvas", "leather", "PVC")  # of seven, tables of confusions take long
+
+
 def of_six(answers: pd.DataFrame) -> pd.DataFrame:
-    """The answers of six of the sixteen: enough for what hangs on no number of people."""
-    return answers[answers["participant_id"] <= "sub-06"]
+    """The answers of six of the sixteen about three of the seven textures: enough for what hangs on
+    no number of people or textures. Who chose another texture is said to have chosen the next."""
+    few = answers[(answers["participant_id"] <= "sub-06") & answers["texture"].isin(FEW)]
+    if "answer" not in few:
+        return few
+    following = dict(zip(FEW, FEW[1:] + FEW[:1], strict=True))
+    answered = few["answer"].where(few["answer"].isin(FEW), few["texture"].map(following))
+    return few.assign(answer=answered, layout="|".join(FEW))
 
 
 @pytest.fixture(scope="module")
@@ -357,7 +366,7 @@ def test_a_person_at_the_simulated_rig_is_a_person(tmp_path, ratings, choices):
     shown = Page(write_report(tmp_path / "report.html", responses=people).read_text("utf-8"))
     told = "people took part, but with a simulated rig, so nobody felt a real surface"
     assert BANNER.format(told) in shown.text
-    assert "Absolute evaluation: 6 participants with the simulated rig, 84 trials" in shown.text
+    assert "Absolute evaluation: 6 participants with the simulated rig, 36 trials" in shown.text
     assert "6participants with the simulated rig, forced choice" in shown.text
     assert "The participants are people, but the rig was simulated" in shown.text
     assert "(SIMULATED)" in shown.text
@@ -456,7 +465,8 @@ def test_nothing_to_report_is_refused(tmp_path, ratings, choices):
 
 
 def test_every_pair_of_three_sets_has_its_times(tmp_path, choices):
-    few = choices[choices["participant_id"] <= "sub-04"]
+    few = of_six(choices)
+    few = few[few["participant_id"] <= "sub-04"]
     third = few[few["model"] == "full"].assign(model="AR")
     three = pd.concat([few, third]).sort_values("participant_id", kind="stable", ignore_index=True)
     relative = PlannedTask(

@@ -27,6 +27,7 @@ from analysis.statistics.claims import (
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
 from analysis.statistics.power import verdicts
 from analysis.statistics.verdicts import (
+    ClaimFound,
     all_claims,
     chance_of,
     check_complete,
@@ -47,6 +48,10 @@ def rng() -> np.random.Generator:
 
 @pytest.fixture
 def answers(ratings, choices, plan, anchors) -> Responses:
+    return all_answers(ratings, choices, plan, anchors)
+
+
+def all_answers(ratings, choices, plan, anchors) -> Responses:
     return Responses(
         {"absolute": ratings, "relative": choices},
         simulated_participants=False,
@@ -353,9 +358,15 @@ def by_model(answers: Responses, **changes: object) -> Responses:
     return replace(answers, plan=plan)
 
 
-def test_the_plan_names_the_rule_that_decides(answers):
+@pytest.fixture(scope="module")
+def judged_once(ratings, choices, plan, anchors) -> list[ClaimFound]:
+    """What the model says of the answers, sampled once."""
+    return claims_found(by_model(all_answers(ratings, choices, plan, anchors)), rng=rng())
+
+
+def test_the_plan_names_the_rule_that_decides(answers, judged_once):
     tested = claims_found(answers, rng=rng())[0]
-    judged = claims_found(by_model(answers), rng=rng())[0]
+    judged = judged_once[0]
     assert tested.people is None
     assert set(tested.tests["rule"]) == {"tests"}
     assert judged.people is not None
@@ -376,7 +387,8 @@ def test_the_plan_names_the_rule_that_decides(answers):
     assert textures.loc["PVC", "model_high"] < 0
     assert "exploratory" not in set(judged.tests["planned"])
     # Measures that nobody planned a claim about are tested as before.
-    assert all(one.people is None for one in claims_found(by_model(answers), rng=rng())[1:])
+    assert len(judged_once) == 3
+    assert all(one.people is None for one in judged_once[1:])
 
 
 def test_the_model_calls_nothing_equal_without_proof_of_sensitivity(answers):
@@ -385,8 +397,8 @@ def test_the_model_calls_nothing_equal_without_proof_of_sensitivity(answers):
     assert blind.tests["doubt"].iloc[0] == NOT_TESTED
 
 
-def test_the_same_seed_gives_the_same_verdicts_of_the_model(answers):
-    first, again = (claims_found(by_model(answers), rng=rng())[0] for _ in range(2))
+def test_the_same_seed_gives_the_same_verdicts_of_the_model(answers, judged_once):
+    first, again = judged_once[0], claims_found(by_model(answers), rng=rng())[0]
     pd.testing.assert_frame_equal(first.tests, again.tests)
     pd.testing.assert_frame_equal(first.people.people, again.people.people)
 
