@@ -80,6 +80,7 @@ def main(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Run:
     """`run` without a process of its own: loading the libraries takes longer than the work."""
+    monkeypatch.setattr(app, "app", commands())
 
     def call(*arguments: object) -> subprocess.CompletedProcess[str]:
         monkeypatch.chdir(tmp_path)
@@ -87,7 +88,6 @@ def main(
         # Worker processes would outlive the test, in the folder where they began.
         words += ["--jobs", "1"] if words[0] == "model" else []
         monkeypatch.setattr("sys.argv", ["tactileq", *words])
-        monkeypatch.setattr(app, "app", commands())
         with pytest.raises(SystemExit) as end:
             app.main()
         told = capsys.readouterr()

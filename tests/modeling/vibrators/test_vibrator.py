@@ -341,7 +341,8 @@ def spoiled(records: np.ndarray, value: float) -> np.ndarray:
     return records
 
 
-def cases(white: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, object, object]]:
+@pytest.fixture(scope="module")
+def no_tests(white: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, object, object]]:
     """Records that are no test of a resonance, and what is to be said of them."""
     sensed = moved(one_resonance(), white)
     other = noise(20.0, seed=9)
@@ -371,8 +372,8 @@ def cases(white: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, object, objec
 
 
 @pytest.mark.parametrize("number", range(18))
-def test_what_is_no_test_is_refused_in_one_sentence(white, number) -> None:
-    drive, acceleration, expected, got = cases(white)[number]
+def test_what_is_no_test_is_refused_in_one_sentence(no_tests, number) -> None:
+    drive, acceleration, expected, got = no_tests[number]
     with refused(InputError, expected=expected, got=got) as refusal:
         identify_vibrator(drive, acceleration, rate_hz=RATE_HZ)
     assert "\n" not in str(refusal.value)
