@@ -126,7 +126,14 @@ class SavedModel(_Base):
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
         return value.tolist()
-    return asdict(value) if is_dataclass(value) and not isinstance(value, type) else value
+    if is_dataclass(value) and not isinstance(value, type):
+        return asdict(value, dict_factory=_listed)
+    return value
+
+
+def _listed(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Values by name as JSON reads them back: tuples are lists."""
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in pairs}
 
 
 def _fields(values: Any, file_format: str, *, version: int, source: Path) -> dict[str, Any]:

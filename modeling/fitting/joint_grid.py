@@ -107,11 +107,10 @@ def fit_grid_jointly(spectra: Mapping[Condition, Spectrum], *, count: int | None
     if not grid.recorded.any():
         return _silent(grid)
     contenders, refused = _held(grid, count)
-    best = _with_fewest(grid, contenders)
+    best = in_frequency_order(grid, _with_fewest(grid, contenders))
     solution = learned(grid, best.theta, best.signs, rounds=EM_ROUNDS)
     if count is None:
         solution = _merged(grid, _completed(grid, solution))
-    solution = in_frequency_order(grid, solution)
     summary = _summary(grid, solution, contenders, refused=refused)
     return replace(_grid_fit(grid, solution), summary=summary)
 

@@ -315,7 +315,7 @@ def in_frequency_order(grid: TextureGrid, solution: Solution) -> Solution:
     theta[:, 1:] = np.take_along_axis(theta[:, 1:], columns, axis=1)
     patterns = neighbouring_patterns(np.median(np.exp(theta[:, 1 : 1 + solution.count]), axis=0))
     likeliest = _likeliest(grid, [(theta, signs) for signs in patterns], TRIED_SIGNS)
-    tried = [fitted(grid, *start, observed=solution.observed) for start in likeliest]
+    tried = [fitted(grid, *start, observed=solution.observed, middles=True) for start in likeliest]
     return max([solution, *tried], key=lambda s: s.evidence)
 
 

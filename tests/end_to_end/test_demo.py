@@ -81,11 +81,11 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     assert numbers["grid"] > 10 * numbers["conditions"] > 10 * numbers["centroid"]
     assert (demo / "figures/centroid.png").read_bytes().startswith(b"\x89PNG")
 
-    # What the report says is what was planted, or nothing; MDF's difference it finds.
+    # What the report says is what was planted, or nothing; the difference of PVC it finds.
     said = pd.read_csv(demo / "tables/planted_effects.tsv", sep="\t")
     assert set(said.agreement) <= {"agrees", "undecided"}
     magnitude = said[said.claim == "magnitude feels the same"].set_index("texture")
-    assert magnitude.loc["MDF", ["planted", "verdict"]].tolist() == [-15.0, "different"]
+    assert magnitude.loc["PVC", ["planted", "verdict"]].tolist() == [-15.0, "different"]
     assert (said.agreement == "agrees").sum() >= 4
     tests = pd.read_csv(demo / "tables/claim_tests.tsv", sep="\t", na_values="n/a")
     # Anchors and the reference are told apart: nothing withholds equality.

@@ -17,6 +17,10 @@ from modeling.files.provenance import provenance_of, seal_folder
 from stimuli.planted.textures import planted_texture, record_texture
 
 
+# A threshold below which the fine layers of the planted textures lie.
+INSENSITIVE = "# source: test\n# caveat: none\nfrequency_hz\tacceleration_g\n10\t0.2\n600\t0.2\n"
+
+
 def grid(name: str) -> RecordingSet:
     """A planted texture on 2 × 2 conditions."""
     axes = {"speeds_mm_s": np.array([100.0, 300.0]), "forces_n": np.array([1.0, 3.0])}
@@ -80,10 +84,12 @@ def study(main, tmp_path: Path, small_study: str, made_once: Path) -> Path:
     if made_once.exists():
         return shutil.copytree(made_once, tmp_path, dirs_exist_ok=True)
     (tmp_path / "study.toml").write_text(small_study)
+    (tmp_path / "insensitive.tsv").write_text(INSENSITIVE)
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / "recordings" / name)
         assert main("model", f"recordings/{name}", "--out", "models").returncode == 0
-        made = main("simplify", f"models/{name}.json", "--out", "simplified", "--margin-db", 3)
+        fewer = ("--threshold", "insensitive.tsv", "--out", "simplified")
+        made = main("simplify", f"models/{name}.json", *fewer)
         assert made.returncode == 0
     simulated = main("simulate", "--study", "study.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr

@@ -48,6 +48,11 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_scene_becomes_a_folder_of_least_models(main, place: Path) -> None:
+    (place / "insensitive.tsv").write_text(
+        "# source: test\n# caveat: none\nfrequency_hz\tacceleration_g\n10\t0.1\n600\t0.1\n"
+    )
+    with_threshold = SCENE.replace("textures", 'threshold = "insensitive.tsv", textures')
+    (place / "light.toml").write_text(with_threshold)
     made = main("scene", "light.toml", "--out", "small")
     assert made.returncode == 0, made.stderr
     files = contents(place / "small")

@@ -44,19 +44,19 @@ def test_the_scenes_that_ship_are_those_that_the_report_shows() -> None:
 @pytest.fixture(scope="module")
 def judged() -> tuple[CompiledExample, dict[str, Surface]]:
     """One planted texture in a part of its grid, beside an AR model of a short record."""
-    planted = planted_texture("canvas")
+    planted = planted_texture("aluminum")
     hand = HandRange(speed_mm_s=(100.0, 200.0), force_n=(1.0, 2.0))
-    compiled = compile_scene(Scene(name="part", hand=hand), {"canvas": planted})
+    compiled = compile_scene(Scene(name="part", hand=hand), {"aluminum": planted})
     windows = windows_kept(compiled.textures[0], compiled.scene, count=3)
     rival = fit_ar(record_texture(planted, duration_s=0.5, seed=1), order=20)
-    surface = Surface(PlantedSurface("canvas"), rival)
-    return CompiledExample(compiled, (windows,)), {"canvas": surface}
+    surface = Surface(PlantedSurface("aluminum"), rival)
+    return CompiledExample(compiled, (windows,)), {"aluminum": surface}
 
 
 def test_the_comparison_counts_what_each_method_needs(judged) -> None:
     table = comparison_table([judged]).set_index("method")
     [texture] = judged[0].compiled.textures
-    assert table.loc[FULL, "numbers"] == 49 * 13
+    assert table.loc[FULL, "numbers"] == 49 * 10
     assert table.loc[LEAST, "numbers"] < table.loc[FULL, "numbers"]
     assert table.loc[LEAST, "fewer_operations"] == pytest.approx(
         texture.before.operations / texture.after.operations

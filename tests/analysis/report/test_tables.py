@@ -86,6 +86,7 @@ from analysis.textures.regressions import (
     SUPPORT_COLUMNS,
     driving_table,
 )
+from analysis.textures.results import FIT_COLUMNS as MODEL_FIT_COLUMNS
 from analysis.textures.results import VERDICT_COLUMNS as LAYER_VERDICT_COLUMNS
 from modeling import Scene, compile_scene, fit_ar
 from modeling.scenes.scene import HandRange
@@ -124,6 +125,7 @@ DECLARED = {
     "speed_cells": CELL_COLUMNS,
     "speed_quantiles": CONDITIONAL_COLUMNS,
     "gfc": GFC_COLUMNS,
+    "fits": MODEL_FIT_COLUMNS,
     "left_out": LEFT_OUT_COLUMNS,
     "verdicts": LAYER_VERDICT_COLUMNS,
     "regressions": REGRESSION_COLUMNS,
