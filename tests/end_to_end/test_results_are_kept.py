@@ -83,7 +83,9 @@ def study(main, tmp_path: Path, small_study: str, made_once: Path) -> Path:
     for name in ("canvas", "MDF"):
         grid(name).save(tmp_path / "recordings" / name)
         assert main("model", f"recordings/{name}", "--out", "models").returncode == 0
-        made = main("simplify", f"models/{name}.json", "--out", "simplified", "--margin-db", 3)
+        made = main(
+            "simplify", f"models/{name}.json", "--out", "simplified", "--criterion", "paper-fft"
+        )
         assert made.returncode == 0
     simulated = main("simulate", "--study", "study.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr

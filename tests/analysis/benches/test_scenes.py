@@ -44,13 +44,13 @@ def test_the_scenes_that_ship_are_those_that_the_report_shows() -> None:
 @pytest.fixture(scope="module")
 def judged() -> tuple[CompiledExample, dict[str, Surface]]:
     """One planted texture in a part of its grid, beside an AR model of a short record."""
-    planted = planted_texture("canvas")
+    planted = planted_texture("PVC")  # one of whose layers is not felt
     hand = HandRange(speed_mm_s=(100.0, 200.0), force_n=(1.0, 2.0))
-    compiled = compile_scene(Scene(name="part", hand=hand), {"canvas": planted})
+    compiled = compile_scene(Scene(name="part", hand=hand), {"PVC": planted})
     windows = windows_kept(compiled.textures[0], compiled.scene, count=3)
     rival = fit_ar(record_texture(planted, duration_s=0.5, seed=1), order=20)
-    surface = Surface(PlantedSurface("canvas"), rival)
-    return CompiledExample(compiled, (windows,)), {"canvas": surface}
+    surface = Surface(PlantedSurface("PVC"), rival)
+    return CompiledExample(compiled, (windows,)), {"PVC": surface}
 
 
 def test_the_comparison_counts_what_each_method_needs(judged) -> None:
