@@ -33,7 +33,7 @@ LEAST_LABEL_RATIO = 1.65  # of two frequencies whose labels stand side by side o
 # Recordings are modelled and drawn behind it, so a model drawn beside one has to be, too.
 BEHIND_HIGH_PASS = f"model, with the recording's {HIGH_PASS_HZ:g} Hz high-pass"
 AMPLITUDE_LABELS = {
-    "energy": "sinusoid of the power that dropping it changes",
+    "energy": "sinusoid of the change of power",
     "paper-fft": "single-sided FFT amplitude of the peak",
     "paper-gain": "gain G read as an amplitude",
 }

@@ -56,18 +56,18 @@ def test_a_scene_becomes_a_folder_of_least_models(main, place: Path) -> None:
     made = main("scene", "light.toml", "--out", "small")
     assert made.returncode == 0, made.stderr
     files = contents(place / "small")
-    assert set(files) == {*TABLES, "MDF.json", "light-touch.h"}
+    assert set(files) == {*TABLES, "PVC.json", "light-touch.h"}
     assert files["tradeoff.png"].startswith(b"\x89PNG")
-    scene, full = Scene.load(place / "light.toml"), TextureModel.load(place / "models/MDF.json")
-    least = load_compiled(place / "small", {"MDF": full})["MDF"]
+    scene, full = Scene.load(place / "light.toml"), TextureModel.load(place / "models/PVC.json")
+    least = load_compiled(place / "small", {"PVC": full})["PVC"]
     assert least.compiled_for is not None
     assert least.compiled_for.scene_sha256 == scene.sha256
     table = pd.read_csv(place / "small/before_after.tsv", sep="\t").set_index("texture")
-    assert table.loc["MDF", "layers_after"] == least.n_layers < full.n_layers
-    assert table.loc["MDF", "operations_after"] < table.loc["MDF", "operations_before"]
+    assert table.loc["PVC", "layers_after"] == least.n_layers < full.n_layers
+    assert table.loc["PVC", "operations_after"] < table.loc["PVC", "operations_before"]
     assert "full model" in set(pd.read_csv(place / "small/steps.tsv", sep="\t").step)
     told = made.stdout
-    assert f"MDF (simulated): {full.n_layers} → {counted(least.n_layers, 'layer')}" in told
+    assert f"PVC (simulated): {full.n_layers} → {counted(least.n_layers, 'layer')}" in told
     assert "the bound is kept in 60 of 60 windows of 1 s" in told
     assert told.endswith("operations per sample: small/before_after.tsv\n")
     # A later run replaces it, with the same bytes: no time of this machine is in them.

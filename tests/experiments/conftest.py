@@ -137,7 +137,7 @@ def truths() -> dict[str, TextureModel]:
 @pytest.fixture(scope="session")
 def models(truths: dict[str, TextureModel], threshold: Threshold) -> ModelSets:
     simplified = {
-        name: simplify(model, threshold, criterion="paper-fft").model
+        name: simplify(model, threshold, criterion="paper-fft", margin_db=15.0).model
         for name, model in truths.items()
     }
     return ModelSets(sets={"full": truths, "simplified": simplified})
