@@ -90,8 +90,7 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     tests = pd.read_csv(demo / "tables/claim_tests.tsv", sep="\t", na_values="n/a")
     # Anchors and the reference are told apart: nothing withholds equality.
     assert tests.doubt.isna().all()
-    # Five textures keep all their layers; of the other two one is equal.
-    assert {"different", "equal on average", "control"} <= set(tests.verdict)
+    assert "equivalent" in set(tests.verdict)
 
 
 def answers_of(data: Path, task: str) -> pd.DataFrame:

@@ -48,11 +48,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_scene_becomes_a_folder_of_least_models(main, place: Path) -> None:
-    (place / "insensitive.tsv").write_text(
-        "# source: test\n# caveat: none\nfrequency_hz\tacceleration_g\n10\t0.1\n600\t0.1\n"
-    )
-    with_threshold = SCENE.replace("textures", 'threshold = "insensitive.tsv", textures')
-    (place / "light.toml").write_text(with_threshold)
+    (place / "light.toml").write_text(SCENE.replace("MDF", "PVC"))  # of which a layer goes
     made = main("scene", "light.toml", "--out", "small")
     assert made.returncode == 0, made.stderr
     files = contents(place / "small")
