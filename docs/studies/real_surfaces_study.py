@@ -45,6 +45,7 @@ MODELS = (
     "paper-consistent",
 )
 # Few speeds: three are recorded at two forces, two others are predicted.
+SPEED_RANGE, FORCE_RANGE = (50.0, 350.0), (0.5, 3.5)
 FEW_SPEEDS, FEW_FORCES, HIDDEN_SPEEDS = (50.0, 150.0, 350.0), (1.0, 2.5), (90.0, 230.0)
 Conditions = Sequence[Condition]
 
@@ -106,6 +107,57 @@ def few_speeds(seed: int) -> list[dict[str, Any]]:
     return compared(surface, records, {"at": nodes, "between": hidden})
 
 
+def scattered(seed: int) -> list[dict[str, Any]]:
+    """20 to 35 random conditions, a tenth of them hidden: `joint`, and AR(20) at the others.
+
+    The rival blends the log spectra of AR(20) by the inverse distance in log speed and log force,
+    or by its square.
+    """
+    rng, surface = np.random.default_rng([seed, 7]), draw_surface(seed)
+    count = int(rng.integers(20, 36))
+    axes = [np.exp(rng.uniform(*np.log(ends), count)) for ends in (SPEED_RANGE, FORCE_RANGE)]
+    places = [(float(v), float(f)) for v, f in zip(*axes, strict=True)]
+    records = [
+        next(iter(surface.record([v], [f], seed=int(rng.integers(1 << 30))))) for v, f in places
+    ]
+    hidden = max(2, round(0.1 * count))
+    start = perf_counter()
+    model = fit_texture(RecordingSet(records[hidden:]))
+    time = 1e3 * (perf_counter() - start) / (count - hidden)
+    start = perf_counter()
+    levels = [
+        np.log(fit_ar(RecordingSet([r]), order=20).filter(*r.condition).response(FREQUENCY_HZ))
+        for r in records[hidden:]
+    ]
+    rival_time = 1e3 * (perf_counter() - start) / (count - hidden)
+    logs, blends = np.log(np.array(places)), {"AR(20), inverse distance": 1, "its square": 2}
+    rows = []
+    for name, power in {"joint": 0, **blends}.items():
+        off = []
+        for n in range(hidden):
+            if name == "joint":
+                found = np.log(model.peq(*places[n]).response(FREQUENCY_HZ))
+            else:
+                away = np.linalg.norm(logs[hidden:] - logs[n], axis=1)
+                found = np.average(levels, axis=0, weights=away**-power)
+            v, f = places[n]
+            true = surface.magnitude(FREQUENCY_HZ, speed_mm_s=v, force_n=f)
+            off.append(20 / np.log(10) * (found - np.log(true)))
+        level = np.abs(np.mean(off, axis=1))
+        rows.append(
+            {
+                "surface": surface.name,
+                "model": name,
+                "numbers": 1 + 3 * model.n_layers if name == "joint" else 21,
+                "milliseconds_a_record": time if name == "joint" else rival_time,
+                "between": float(np.sqrt(np.mean(np.square(off)))),
+                "between_level": float(np.median(level)),
+                "between_worst_level": float(level.max()),
+            }
+        )
+    return rows
+
+
 def summary(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:
     """Per model: median and 95th percentile over surfaces, and the worst level of all."""
     table = pd.DataFrame(rows)
@@ -163,7 +215,7 @@ def _panel(ax: Axes, table: pd.DataFrame, *, place: str) -> None:
 
 
 def run(make: Callable[[int], list[dict[str, Any]]], surfaces: int) -> pd.DataFrame:
-    """The summary of one of the three cases over this many surfaces."""
+    """The summary of one of the cases over this many surfaces."""
     return summary([row for n in range(surfaces) for row in make(FIRST + n)])
 
 
@@ -171,6 +223,7 @@ def main() -> None:
     """Run the study and write its tables and picture."""
     stem = Path(__file__).with_suffix("")
     cases = {"": whole_grid, "_every_second": every_second_node, "_few_speeds": few_speeds}
+    cases["_scattered"] = scattered
     for suffix, make in cases.items():
         with one_linear_algebra_thread():
             table = run(make, SURFACES)
