@@ -77,6 +77,7 @@ def test_a_session_that_is_ended_by_a_signal_goes_on_and_ends_with_its_terminal(
 
     press_until(lambda: asked(1), display)
     first.send_signal(signal.SIGTERM)
+    first.wait(timeout=SECONDS)  # its terminal stays open until then
     _, told = first.communicate(timeout=SECONDS)
     assert first.returncode == 128 + signal.SIGTERM
     assert "interrupted by SIGTERM" in told
