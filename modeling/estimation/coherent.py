@@ -159,10 +159,14 @@ class Climbed(NamedTuple):
 
 
 class Response(NamedTuple):
-    """Expected power (K, n), and its relative derivatives by the parameters (K, p, n)."""
+    """Expected power (K, n), and its relative derivatives.
+
+    By the parameters (K, p, n), and by the tangents of the places (K, n).
+    """
 
     power: Floats
     by_parameter: Floats
+    by_tangent: Floats
 
 
 def response(theta: Floats, signs: Floats | None, observed: Observed) -> Response:
@@ -211,7 +215,8 @@ def response(theta: Floats, signs: Floats | None, observed: Observed) -> Respons
         width_share * (by_u * by_width) + 0.5 * (1 - width_share) * by_gain
     )
     derivative[:, 1 + 2 * m :] = by_gain
-    return Response(power, derivative)
+    beside = -(g * g * scale)[..., None] * cotangent**2 - scale[..., None]
+    return Response(power, derivative, np.asarray((by_u * beside).sum(axis=1)))
 
 
 def _coherent(floor: Floats, signed: Floats, u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
@@ -270,7 +275,7 @@ def slopes(theta: Floats, signs: Floats | None, observed: Observed) -> Slopes:
     if is_compiled():
         return Slopes(*observed.compiled.slopes(theta, signs))
     m, n = (theta.shape[1] - 1) // 3, observed.tangent.shape[1]
-    power, derivative = response(theta, signs, _with_centres(theta, m, observed))
+    power, derivative, _ = response(theta, signs, _with_centres(theta, m, observed))
     at_bins = derivative[:, :, :n]
     misfit = misfits(power[:, :n], observed)
     weighted = at_bins * observed.weight[:, None, :]
@@ -390,7 +395,7 @@ def without_layer(theta: Floats, layer: int) -> Floats:
 
 def record_information(theta: Floats, signs: Floats, observed: Observed) -> Floats:
     """Fisher information (K, p, p) of the records, by their full number of lines."""
-    _, derivative = response(theta, signs, observed)
+    derivative = response(theta, signs, observed).by_parameter
     information: Floats = (derivative * observed.count[:, None, :]) @ derivative.transpose(0, 2, 1)
     return information
 

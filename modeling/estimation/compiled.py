@@ -67,12 +67,13 @@ class CompiledSpectra:
         self._call(lib.tq_slopes, theta, signs, misfit, objective, information, score)
         return misfit, objective, information, score
 
-    def responses(self, theta: Floats, signs: Floats | None) -> tuple[Floats, Floats]:
-        """Expected power (K, n) and its relative derivatives (K, p, n)."""
+    def responses(self, theta: Floats, signs: Floats | None) -> tuple[Floats, Floats, Floats]:
+        """Expected power (K, n), its relative derivatives (K, p, n), and by the tangents (K, n)."""
         rows, p = theta.shape
-        power, derivative = np.empty((rows, self.bins)), np.empty((rows, p, self.bins))
-        self._call(lib.tq_responses, theta, signs, power, derivative)
-        return power, derivative
+        power, beside = np.empty((2, rows, self.bins))
+        derivative = np.empty((rows, p, self.bins))
+        self._call(lib.tq_responses, theta, signs, power, derivative, beside)
+        return power, derivative, beside
 
     def _call(self, function: Any, theta: Floats, signs: Floats | None, *out: Floats) -> None:
         rows, p = theta.shape
@@ -116,7 +117,14 @@ class CompiledLines:
 
 
 def held_by_cells(
-    slope: Floats, off: Floats, *, corners: Integers, shares: Floats, steps: Integers, held: float
+    slope: Floats,
+    off: Floats,
+    lowest: Integers,
+    *,
+    corners: Integers,
+    shares: Floats,
+    steps: Integers,
+    held: float,
 ) -> tuple[Floats, Floats]:
     """Information (steps, N, p, p) and score (N, p) of what is off in the middles of cells.
 
@@ -125,7 +133,9 @@ def held_by_cells(
     slope : (M + N, p, n) ndarray
         Relative derivatives of power: in the middles, then at the nodes.
     off : (M, n) ndarray
-        Log amplitude of the middle less the mean of its corners; 0 where nothing is held.
+        Log amplitude of the middle less what it is held to; 0 where nothing is held.
+    lowest : (M, n) ndarray of int
+        The corner it is held to; where it is negative, the mean of all.
     corners : (M, 4) ndarray of int
     shares : (4,) ndarray
         Of each corner in the middle.
@@ -138,10 +148,10 @@ def held_by_cells(
     nodes = count - len(off)
     blocks, score = np.zeros((int(steps.max()) + 1, nodes, p, p)), np.zeros((nodes, p))
     tables = [np.ascontiguousarray(table, dtype=np.float64) for table in (slope, off, shares)]
-    whole = [np.ascontiguousarray(table, dtype=np.intp) for table in (corners, steps)]
+    whole = [np.ascontiguousarray(table, dtype=np.intp) for table in (corners, steps, lowest)]
     of = ffi.new("tq_cells *")
     of.slope, of.off, of.shares = map(_pointer, tables)
-    of.corners, of.steps = (ffi.from_buffer("ptrdiff_t[]", table) for table in whole)
+    of.corners, of.steps, of.lowest = (ffi.from_buffer("ptrdiff_t[]", table) for table in whole)
     of.cells, of.nodes, of.places, of.p, of.held = len(off), nodes, places, p, held
     memory = np.empty(lib.tq_held_memory(p, places))
     lib.tq_held(of, *map(_pointer, (memory, blocks, score)))

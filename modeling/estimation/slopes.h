@@ -120,13 +120,24 @@ TQ_INLINE void tq_chained(double by_u, double by_gain, double u, double cotangen
     *gain = by_gain;
 }
 
-/* Power of one noise through all bands, and its relative derivatives. */
-TQ_INLINE void tq_coherent(const tq_places *at, int m, double floor, const double *signs, double least)
+/* Adds what one layer contributes to the derivative by the tangent of each place. */
+TQ_INLINE double tq_beside(double by_u, double cotangent, const double *c)
+{
+    return -by_u * (c[0] * cotangent * cotangent + c[1]);
+}
+
+/* Power of one noise through all bands, and its relative derivatives; with `moved` those by the tangents
+   of the places, too, in the row after the last parameter's. */
+TQ_INLINE void tq_coherent(const tq_places *at, int m, double floor, const double *signs, double least,
+                           int moved)
 {
     size_t stride = at->stride;
     double *restrict in_phase = at->along, *restrict quadrature = at->across;
     double *restrict power = at->power, *restrict noise = at->slope;
+    double *restrict beside = at->slope + (1 + 3 * m) * stride;
     const double *restrict cotangent = at->cotangent;
+    if (moved)
+        memset(beside, 0, stride * sizeof(double));
     for (size_t n = 0; n < stride; n++) {
         in_phase[n] = floor;
         quadrature[n] = 0;
@@ -153,23 +164,28 @@ TQ_INLINE void tq_coherent(const tq_places *at, int m, double floor, const doubl
         double *restrict frequency = at->slope + (1 + i) * stride;
         double *restrict width = at->slope + (1 + m + i) * stride;
         double *restrict gain = at->slope + (1 + 2 * m + i) * stride;
-        double c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], twice = 2 * c[6];
-        const double own[TQ_CONSTANTS] = {0, 0, c2, c3, c4, c5, 0};
+        double c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], twice = 2 * c[6];
+        const double own[TQ_CONSTANTS] = {c0, c1, c2, c3, c4, c5, 0};
         for (size_t n = 0; n < stride; n++) {
             double u = frequency[n], real = gain[n], along = in_phase[n], across = quadrature[n];
             double by_gain = twice * (real * along + (u * real) * across);
             double by_u = twice * (real * real) * ((1 - u * u) * across - 2 * u * along);
+            if (moved)
+                beside[n] += tq_beside(by_u, cotangent[n], own);
             tq_chained(by_u, by_gain, u, cotangent[n], own, frequency + n, width + n, gain + n);
         }
     }
 }
 
 /* The same for layers each with a noise of its own: powers add. */
-TQ_INLINE void tq_independent(const tq_places *at, int m, double floor, double least)
+TQ_INLINE void tq_independent(const tq_places *at, int m, double floor, double least, int moved)
 {
     size_t stride = at->stride;
     double *restrict power = at->power, *restrict noise = at->slope;
+    double *restrict beside = at->slope + (1 + 3 * m) * stride;
     const double *restrict cotangent = at->cotangent;
+    if (moved)
+        memset(beside, 0, stride * sizeof(double));
     for (size_t n = 0; n < stride; n++)
         power[n] = 0;
     for (int i = 0; i < m; i++) {
@@ -189,10 +205,12 @@ TQ_INLINE void tq_independent(const tq_places *at, int m, double floor, double l
         double *restrict frequency = at->slope + (1 + i) * stride;
         double *restrict width = at->slope + (1 + m + i) * stride;
         double *restrict gain = at->slope + (1 + 2 * m + i) * stride;
-        double c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], twice = 2 * (c[6] * c[6]);
-        const double own[TQ_CONSTANTS] = {0, 0, c2, c3, c4, c5, 0};
+        double c0 = c[0], c1 = c[1], c2 = c[2], c3 = c[3], c4 = c[4], c5 = c[5], twice = 2 * (c[6] * c[6]);
+        const double own[TQ_CONSTANTS] = {c0, c1, c2, c3, c4, c5, 0};
         for (size_t n = 0; n < stride; n++) {
             double u = frequency[n], real = gain[n], share = twice * real / power[n];
+            if (moved)
+                beside[n] += tq_beside(-share * u * real, cotangent[n], own);
             tq_chained(-share * u * real, share, u, cotangent[n], own, frequency + n, width + n, gain + n);
         }
     }
@@ -200,7 +218,7 @@ TQ_INLINE void tq_independent(const tq_places *at, int m, double floor, double l
 
 /* What is expected at all places of one row. */
 TQ_INLINE void tq_expected(const tq_places *at, int m, const double *theta, const double *signs,
-                           double line_hz, double per_hz, double least)
+                           double line_hz, double per_hz, double least, int moved)
 {
     double floor = exp(theta[0]);
     for (size_t n = at->count; n < at->stride; n++) /* any that are finite; they have no weight */
@@ -208,9 +226,9 @@ TQ_INLINE void tq_expected(const tq_places *at, int m, const double *theta, cons
     for (int i = 0; i < m; i++)
         tq_layer(theta + 1 + i, m, line_hz, per_hz, at->constants + TQ_CONSTANTS * i);
     if (signs)
-        tq_coherent(at, m, floor, signs, least);
+        tq_coherent(at, m, floor, signs, least, moved);
     else
-        tq_independent(at, m, floor, least);
+        tq_independent(at, m, floor, least, moved);
 }
 
 /* The sum of a part's lanes. */
@@ -324,7 +342,7 @@ TQ_INLINE void tq_all_slopes(const tq_spectra *of, const double *theta, const do
             at.tangent[n] = tan(of->per_hz * centre);
             at.cotangent[n] = 1 / at.tangent[n];
         }
-        tq_expected(&at, m, own, up, of->line_hz[row], of->per_hz, of->least_power);
+        tq_expected(&at, m, own, up, of->line_hz[row], of->per_hz, of->least_power, 0);
         misfit[row] = objective[row] = tq_misfit(&at, bins, of->power + from, weight, error, pair);
         if (up)
             objective[row] += tq_cancelling(of, &at, bins, own, weight, error);
@@ -334,7 +352,7 @@ TQ_INLINE void tq_all_slopes(const tq_spectra *of, const double *theta, const do
 }
 
 TQ_INLINE void tq_all_responses(const tq_spectra *of, const double *theta, const double *signs,
-                                double *memory, double *power, double *slope)
+                                double *memory, double *power, double *slope, double *beside)
 {
     int m = of->layers;
     size_t p = 1 + 3 * (size_t)m, bins = of->bins;
@@ -344,22 +362,24 @@ TQ_INLINE void tq_all_responses(const tq_spectra *of, const double *theta, const
         memcpy(at.tangent, of->tangent + row * bins, bins * sizeof(double));
         memcpy(at.cotangent, of->cotangent + row * bins, bins * sizeof(double));
         tq_expected(&at, m, theta + row * p, signs ? signs + row * (size_t)m : NULL, of->line_hz[row],
-                    of->per_hz, of->least_power);
+                    of->per_hz, of->least_power, 1);
         memcpy(power + row * bins, at.power, bins * sizeof(double));
         for (size_t q = 0; q < p; q++)
             memcpy(slope + (row * p + q) * bins, at.slope + q * at.stride, bins * sizeof(double));
+        memcpy(beside + row * bins, at.slope + p * at.stride, bins * sizeof(double));
     }
 }
 
 /* M cells with four corners each among N nodes; `steps` (4, 4) says which array of blocks
    couples two corners. `slope` (M + N, p, places) are relative derivatives of powers in the middles, then
-   at the nodes; `off` (M, places) is what is held, 0 where nothing is. */
+   at the nodes; `off` (M, places) is what is held, 0 where nothing is: against the corner `lowest` (M,
+   places), or where that is negative against the mean of all. */
 typedef struct {
     size_t cells, nodes, places;
     int p;
     double held;
     const double *slope, *off, *shares;
-    const ptrdiff_t *corners, *steps;
+    const ptrdiff_t *corners, *steps, *lowest;
 } tq_cells;
 
 /* Doubles of memory that tq_held needs. */
@@ -382,12 +402,15 @@ TQ_INLINE void tq_pulls(const tq_cells *of, size_t cell, const tq_places *at, do
     for (size_t a = 0; a < TQ_CORNERS; a++) {
         size_t node = (size_t)of->corners[TQ_CORNERS * cell + a];
         const double *corner = of->slope + (of->cells + node) * size;
-        double half = 0.5 * of->shares[a]; /* the level is half the logarithm of the power */
+        double share = of->shares[a];
+        const ptrdiff_t *restrict lowest = of->lowest + cell * places;
         for (size_t q = 0; q < (size_t)of->p; q++) {
             double *restrict pull = at->slope + (a * (size_t)of->p + q) * at->stride;
             const double *restrict here = middle + q * places, *restrict there = corner + q * places;
-            for (size_t n = 0; n < places; n++)
-                pull[n] = half * (here[n] - there[n]);
+            for (size_t n = 0; n < places; n++) { /* the level is half the logarithm of the power */
+                double less = lowest[n] < 0 ? share : lowest[n] == (ptrdiff_t)a ? 1 : 0;
+                pull[n] = 0.5 * (share * here[n] - less * there[n]);
+            }
             for (size_t n = places; n < at->stride; n++)
                 pull[n] = 0;
         }
@@ -506,9 +529,9 @@ __attribute__((target("avx2"))) static inline void tq_wider_slopes(
 
 __attribute__((target("avx2"))) static inline void tq_wider_responses(
     const tq_spectra *of, const double *theta, const double *signs, double *memory, double *power,
-    double *slope)
+    double *slope, double *beside)
 {
-    tq_all_responses(of, theta, signs, memory, power, slope);
+    tq_all_responses(of, theta, signs, memory, power, slope, beside);
 }
 #endif
 
@@ -526,17 +549,18 @@ static void tq_slopes(const tq_spectra *of, const double *theta, const double *s
     tq_all_slopes(of, theta, signs, memory, misfit, objective, information, score);
 }
 
-/* Expected power (K, bins) and its relative derivatives (K, p, bins). */
+/* Expected power (K, bins) and its relative derivatives, by parameters (K, p, bins) and by the tangents of
+   the places (K, bins). */
 static void tq_responses(const tq_spectra *of, const double *theta, const double *signs, double *memory,
-                         double *power, double *slope)
+                         double *power, double *slope, double *beside)
 {
 #ifdef TQ_WIDER
     if (__builtin_cpu_supports("avx2")) {
-        tq_wider_responses(of, theta, signs, memory, power, slope);
+        tq_wider_responses(of, theta, signs, memory, power, slope, beside);
         return;
     }
 #endif
-    tq_all_responses(of, theta, signs, memory, power, slope);
+    tq_all_responses(of, theta, signs, memory, power, slope, beside);
 }
 
 /* Adds information (arrays of blocks, N, p, p) and score (N, p) of all cells to what is there. */

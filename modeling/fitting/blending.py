@@ -11,15 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from modeling.arrays import Floats, Integers
+from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.coherent import Observed, Response, response
 from modeling.estimation.compiled import held_by_cells, is_compiled
 from modeling.estimation.likelihood import split
 from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 REACH = 6.0  # of a moving peak to either side, in widths
+# In nepers (1.7 dB): peaks that meet at one corner and not in the middle are so far from the mean.
+MEETING = 0.2
 # In log likelihood, per frequency: half of this times the square of what is beyond.
 HELD = 20.0
+# Places that move with a layer: from its frequency, in widths.
+AROUND = np.array([-1.5, -0.75, 0.0, 0.75, 1.5])
 NEPER_DB = 20 / np.log(10)
 
 
@@ -29,6 +33,21 @@ class Held(NamedTuple):
     cost: float
     information: Blocks
     score: Floats
+
+
+class _Seen(NamedTuple):
+    """The middles: `off` (M, …) in nepers, 0 where nothing is held, at fixed and at moving places.
+
+    `lowest` (M, …) is the corner that a place is held to, −1 for the mean of all; `passed` (M, n)
+    are fixed places that a moving layer passes, `moving` (M, …) the others that count;
+    `by_parameter` (M + N, p, …) are relative derivatives of power, in the middles and at the nodes.
+    """
+
+    off: Floats
+    lowest: Integers
+    passed: Bools
+    moving: Bools
+    by_parameter: Floats
 
 
 def distances_db(one: Floats, other: Floats, places: Observed) -> Floats:
@@ -62,32 +81,46 @@ class Middles:
     count: int
 
     def defects_db(self, theta: Floats, signs: Floats) -> Floats:
-        """Distance of each middle's response from the mean of its corners' logarithms, (M,)."""
-        level = self._levels(theta, signs)
-        return distances_db(self._off(theta, level), np.zeros(level.shape[1]), self.places)
+        """Distance of each middle's response from what it is held to, (M,).
+
+        Where peaks pass, by the places along them.
+        """
+        middles = self._seen(theta, signs)
+        n = middles.passed.shape[1]
+        frequency = np.arctan(self.places.tangent[0])
+        share = frequency / frequency.sum()
+        along = (middles.off[:, n:] ** 2).sum(axis=1)
+        along /= np.maximum(middles.moving.sum(axis=1), 1)
+        fixed = np.where(middles.passed, 0.0, middles.off[:, :n]) ** 2
+        square = fixed @ share + along * (middles.passed @ share)
+        return np.asarray(NEPER_DB * np.sqrt(square))
 
     def held(self, theta: Floats, signs: Floats) -> Held:
-        """The cost of holes in the middles, from the parameters (N, p) of the nodes."""
-        m = len(self.corners)
-        found = self._response(theta, signs)
-        level, slope = 0.5 * np.log(found.power), 0.5 * found.by_parameter
-        off = self._off(theta, level)
+        """The cost of what is off in the middles, from the parameters (N, p) of the nodes."""
+        seen = self._seen(theta, signs)
+        m, off = len(self.corners), seen.off
         cost = 0.5 * HELD * float((off**2).sum())
         if is_compiled():
             blocks, score = held_by_cells(
-                found.by_parameter,
+                seen.by_parameter,
                 off,
+                seen.lowest,
                 corners=self.corners,
                 shares=self.shares,
                 steps=STEP_OF_CORNERS,
                 held=HELD,
             )
             return Held(cost, Blocks(*blocks), score)
+        slope = 0.5 * seen.by_parameter
         far = np.flatnonzero(off.any(axis=1))
         p = theta.shape[1]
-        # By the parameters of each corner: of the blend, less of the corner itself.
-        pull = slope[far][:, None] - slope[m:][self.corners[far]]
-        pull *= self.shares[None, :, None, None] * (off[far] != 0)[:, None, None, :]
+        # By the parameters of each corner: of the blend, less of the corners that it is held to.
+        lowest = seen.lowest[far][:, None]
+        one = lowest == np.arange(4)[:, None]
+        less = np.where(lowest < 0, self.shares[:, None], one)[:, :, None]
+        pull = self.shares[:, None, None] * slope[far][:, None]
+        pull -= less * slope[m:][self.corners[far]]
+        pull *= (off[far] != 0)[:, None, None, :]
         flat = pull.reshape(len(far), 4 * p, slope.shape[2])
         blocks = (HELD * flat @ flat.transpose(0, 2, 1)).reshape(len(far), 4, p, 4, p)
         score = np.zeros(theta.shape)
@@ -96,32 +129,63 @@ class Middles:
         information = of_cells(self.corners[far], blocks, self.count)
         return Held(cost, information, score)
 
-    def _off(self, theta: Floats, level: Floats) -> Floats:
-        """Middles less the mean of their corners (M, n) in nepers; 0 where that means nothing.
+    def _seen(self, theta: Floats, signs: Floats) -> _Seen:
+        """What the middles are held to, and how far off they are.
 
-        Where a layer moves by more than its width, corners have its peak and the middle has it
-        elsewhere.
+        At a fixed place to the mean of the corners' logarithms. Where a layer moves by more than
+        its width that means nothing: there a middle may be no lower than the lowest corner, and at
+        places that move with the layer it is held near the mean.
         """
+        middle = np.einsum("a,map->mp", self.shares, theta[self.corners])
+        both, m = np.concatenate((middle, theta)), len(self.corners)
+        found = self._responses(both, signs)
+        level = 0.5 * np.log(found.power)
+        corners = level[m:][self.corners]
+        off = level[:m] - np.einsum("a,man->mn", self.shares, corners)
+        passed, moving = self._moving(theta)
+        n = passed.shape[1]
+        lowest = np.full(off.shape, -1)
+        fixed = np.where((self.shares > 0)[:, None], corners[:, :, :n], np.inf)
+        lowest[:, :n] = np.where(passed, fixed.argmin(axis=1), -1)
+        hole = np.minimum(level[:m, :n] - fixed.min(axis=1), 0.0)
+        off[:, :n] = np.where(passed, hole, off[:, :n])
+        beyond = np.maximum(np.abs(off[:, n:]) - MEETING, 0.0)
+        off[:, n:] = moving * np.sign(off[:, n:]) * beyond
+        return _Seen(off, lowest, passed, moving, found.by_parameter)
+
+    def _moving(self, theta: Floats) -> tuple[Bools, Bools]:
+        """Fixed places that a moving layer passes, (M, n), and places of moving layers, (M, …)."""
         layers = (theta.shape[1] - 1) // 3
         _, frequency, bandwidth, _ = split(theta[self.corners], layers)
         width = np.exp(bandwidth.max(axis=1))
         lowest, highest = np.exp(frequency.min(axis=1)), np.exp(frequency.max(axis=1))
-        reach = np.where(highest - lowest > width, REACH * width, -np.inf)
+        moves = highest - lowest > width
+        reach = np.where(moves, REACH * width, -np.inf)
         place = np.arctan(self.places.tangent[0]) * self.places.rate_hz / np.pi
         below = (lowest - reach)[..., None] < place
         passed = (below & (place < (highest + reach)[..., None])).any(axis=1)
-        m = len(self.corners)
-        return np.asarray(np.where(passed, 0.0, level[:m] - self._mean(level[m:])))
+        return passed, np.repeat(moves, AROUND.size, axis=1)
 
-    def _mean(self, levels: Floats) -> Floats:
-        """Means of the logarithms at the corners (M, n), from those at the nodes (N, n)."""
-        return np.asarray(np.einsum("a,man->mn", self.shares, levels[self.corners]))
-
-    def _levels(self, theta: Floats, signs: Floats) -> Floats:
-        return np.asarray(0.5 * np.log(self._response(theta, signs).power))
-
-    def _response(self, theta: Floats, signs: Floats) -> Response:
-        """In the middles, then at the nodes, (M + N, n)."""
-        middle = np.einsum("a,map->mp", self.shares, theta[self.corners])
-        both = np.concatenate((middle, theta))
-        return response(both, signs, self.places.rows(np.zeros(len(both), dtype=np.intp)))
+    def _responses(self, theta: Floats, signs: Floats) -> Response:
+        """At the fixed places, then at those of each layer, which move with it, (K, n + …)."""
+        rows, layers = len(theta), signs.size
+        per_hz, fixed = np.pi / self.places.rate_hz, self.places.tangent
+        _, frequency, bandwidth, _ = split(theta, layers)
+        centre = np.exp(frequency)[..., None]
+        away = np.exp(bandwidth)[..., None] * AROUND
+        ends = np.arctan(fixed[0, [0, -1]]) / per_hz
+        own = np.tan(per_hz * np.clip(centre + away, *ends)).reshape(rows, -1)
+        tangent = np.concatenate((np.broadcast_to(fixed, (rows, fixed.size)), own), axis=1)
+        one = np.ones(tangent.shape)
+        places = Observed(one, one, one, tangent, 1 / tangent, np.zeros(rows), self.places.rate_hz)
+        found = response(theta, signs, places)
+        inside = (centre + away > ends[0]) & (centre + away < ends[1])
+        by_hz = (found.by_tangent[:, fixed.size :] * per_hz * (1 + own**2)).reshape(away.shape)
+        for layer in range(layers):
+            of_layer = slice(
+                fixed.size + layer * AROUND.size, fixed.size + (layer + 1) * AROUND.size
+            )
+            slope = by_hz[:, layer] * inside[:, layer]
+            found.by_parameter[:, 1 + layer, of_layer] += slope * centre[:, layer]
+            found.by_parameter[:, 1 + layers + layer, of_layer] += slope * away[:, layer]
+        return found

@@ -84,9 +84,20 @@ class Solution:
         What the misfit has above scatter, and as much for each parameter that the records
         determine as it costs in other records than these (Akaike 1974).
         """
-        excess = float((self.fit.slopes.misfit - self.observed.scatter).sum())
-        lost = max(excess + effective_parameters(self.fit), 0.0)
-        return float(NEPER_POWER_DB * np.sqrt(2 * lost / self.observed.weight.sum()))
+        return self._distance_db(self._excess + effective_parameters(self.fit))
+
+    @cached_property
+    def unexplained_db(self) -> float:
+        """What the misfit has above scatter, as a distance."""
+        return self._distance_db(self._excess)
+
+    @property
+    def _excess(self) -> float:
+        return float((self.fit.slopes.misfit - self.observed.scatter).sum())
+
+    def _distance_db(self, lost: float) -> float:
+        """The distance that costs so much log likelihood."""
+        return float(NEPER_POWER_DB * np.sqrt(2 * max(lost, 0.0) / self.observed.weight.sum()))
 
     @cached_property
     def distance_db(self) -> float:

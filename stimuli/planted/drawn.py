@@ -117,6 +117,57 @@ class DrawnSurface:
         return RecordingSet(records)
 
 
+@dataclass(frozen=True, eq=False)
+class AlteredSurface(DrawnSurface):
+    """A drawn surface whose curves are shifted in frequency, with resonances and lines added.
+
+    So that its spectra are not combinations of the curves that surfaces are drawn from.
+
+    Parameters
+    ----------
+    shift : float
+        Its spectrum at f is that of the drawn surface at f / shift.
+    peaks : (n, 4) ndarray
+        Of each peak whose power is added: frequency (Hz) at 150 mm/s, half-power width (Hz),
+        height over the spectrum there (dB), and the exponent of its frequency over speed: 0 for a
+        resonance, 1 for a line of a spatial wavelength.
+    """
+
+    shift: float
+    peaks: Floats
+
+    def magnitude(self, frequency_hz: ArrayLike, *, speed_mm_s: float, force_n: float) -> Floats:
+        """As of a drawn surface."""
+        frequency = np.asarray(frequency_hz, dtype=np.float64)
+        centre, width, height_db, exponent = self.peaks.T
+        centre = centre * (speed_mm_s / REFERENCE_SPEED_MM_S) ** exponent
+        at = {"speed_mm_s": speed_mm_s, "force_n": force_n}
+        height = super().magnitude(centre / self.shift, **at) ** 2 * 10 ** (height_db / 10)
+        shape = 1 / (1 + ((frequency[..., None] - centre) / (width / 2)) ** 2)
+        below = super().magnitude(frequency / self.shift, **at) ** 2
+        return np.asarray(np.sqrt(below + shape @ height), dtype=np.float64)
+
+
+def alter_surface(seed: int) -> AlteredSurface:
+    """The drawn surface of this seed, shifted by up to 30 %, with one to three peaks of each kind.
+
+    Resonances lie at 60 to 400 Hz with a Q of 3 to 15, lines at 30 to 150 Hz (at 150 mm/s) and are
+    3 to 8 Hz wide; both are 5 to 15 dB above the spectrum.
+    """
+    drawn, rng = draw_surface(seed), generator([0x60, seed])
+    resonances, lines = rng.integers(1, 4, 2)
+    centre = np.exp(rng.uniform(np.log(60.0), np.log(400.0), resonances))
+    low = np.exp(rng.uniform(np.log(30.0), np.log(150.0), lines))
+    width = np.concatenate((centre / rng.uniform(3.0, 15.0, resonances), rng.uniform(3, 8, lines)))
+    height = rng.uniform(5.0, 15.0, resonances + lines)
+    exponent = np.repeat([0.0, 1.0], [resonances, lines])
+    peaks = np.column_stack((np.concatenate((centre, low)), width, height, exponent))
+    shift = float(rng.uniform(0.7, 1.3))
+    return AlteredSurface(
+        f"altered {seed}", drawn.coefficients, drawn.residuals, shift=shift, peaks=peaks
+    )
+
+
 def draw_surface(seed: int) -> DrawnSurface:
     """The random surface of this seed, a whole number of at least 0."""
     statistics, rng = _statistics(), generator([0x5F, seed])

@@ -26,6 +26,7 @@ static void print(const double *values, size_t count)
 int main(void)
 {
     static double table[5][ROWS * BINS], theta[ROWS * P], signs[ROWS * LAYERS], memory[100000];
+    static ptrdiff_t lowest[CELLS * BINS];
     static double found[ROWS * (2 + P + P * P)], slope[(CELLS + NODES) * P * BINS], off[CELLS * BINS];
     static double blocks[5 * NODES * P * P], score[NODES * P];
     const double shares[4] = {0.25, 0.25, 0.25, 0.25};
@@ -54,7 +55,9 @@ int main(void)
         slope[i] = uniform() - 0.5;
     for (size_t i = 0; i < CELLS * BINS; i++)
         off[i] = uniform() < 0.2 ? 0 : uniform() - 0.5;
-    tq_cells cells = {CELLS, NODES, BINS, P, 20, slope, off, shares, corners, steps};
+    for (size_t i = 0; i < CELLS * BINS; i++)
+        lowest[i] = (ptrdiff_t)(uniform() * 5) - 1;
+    tq_cells cells = {CELLS, NODES, BINS, P, 20, slope, off, shares, corners, steps, lowest};
     tq_held(&cells, memory, blocks, score);
     print(blocks, 5 * NODES * P * P);
     print(score, NODES * P);

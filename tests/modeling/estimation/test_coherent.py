@@ -99,7 +99,7 @@ def test_derivatives(
     theta, m = drawn
     signs = np.array(up[:m]) if coherent else None
     here = at(np.geomspace(15, 2400, 60), line_hz=line_hz)
-    power, derivative = (values[0] for values in response(theta[None], signs, here))
+    power, derivative, by_tangent = (v[0] for v in response(theta[None], signs, here))
     step = 1e-6
     moves = step * np.eye(theta.size)
     up_and_down = [
@@ -111,6 +111,14 @@ def test_derivatives(
     clear = power > 1e-4 * power.max()
     steepest = np.abs(derivative).max(axis=1, keepdims=True)
     assert (np.abs(derivative - quotient) <= 1e-3 * (1 + steepest))[:, clear].all()
+    nearby = [
+        replace(here, tangent=here.tangent * move, cotangent=here.cotangent / move)
+        for move in (1 + step, 1 - step)
+    ]
+    up_and_down = [np.log(response(theta[None], signs, there).power[0]) for there in nearby]
+    along = (up_and_down[0] - up_and_down[1]) / (2 * step)
+    found = by_tangent * here.tangent[0]
+    assert (np.abs(found - along) <= 1e-3 * (1 + np.abs(found).max()))[clear].all()
 
 
 @settings(deadline=None)

@@ -119,6 +119,7 @@ def test_responses_are_those_of_numpy(
     found, expected = response(*arguments), in_numpy(response, *arguments)
     assert found.power == pytest.approx(expected.power, rel=1e-9)
     assert_same(found.by_parameter, expected.by_parameter)
+    assert_same(found.by_tangent, expected.by_tangent)
 
 
 @pytest.mark.parametrize("up", [1.0, -1.0])
@@ -233,15 +234,18 @@ def test_what_is_not_off_holds_nothing() -> None:
     """Places of a cell where nothing is off do not count, whatever their slopes."""
     rng = np.random.default_rng(13)
     slope, off = rng.normal(size=(5, 3, 8)), rng.normal(size=(1, 8))
+    lowest = rng.integers(-1, 4, (1, 8))
     off[:, 2:5] = 0.0
     table = {"corners": cells(2, 2), "shares": np.full(4, 0.25), "steps": STEP_OF_CORNERS}
     seen = np.r_[0, 1, 5:8]
-    whole = held_by_cells(slope, off, held=2.0, **table)
-    part = held_by_cells(slope[..., seen], off[:, seen], held=2.0, **table)
+    whole = held_by_cells(slope, off, lowest, held=2.0, **table)
+    part = held_by_cells(slope[..., seen], off[:, seen], lowest[:, seen], held=2.0, **table)
     for one, other in zip(whole, part, strict=True):
         assert np.any(other)
         assert one == pytest.approx(other, rel=1e-12, abs=1e-15)
-    assert not any(np.any(array) for array in held_by_cells(slope, 0 * off, held=2.0, **table))
+    assert not any(
+        np.any(array) for array in held_by_cells(slope, 0 * off, lowest, held=2.0, **table)
+    )
 
 
 def test_bits_are_equal_with_and_without_wide_vectors(tmp_path: Path) -> None:

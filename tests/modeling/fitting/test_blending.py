@@ -49,14 +49,15 @@ def test_a_sum_that_turns_its_sign_between_the_nodes_is_seen() -> None:
     assert middles.defects_db(theta, signs)[0] > 20.0
 
 
+@pytest.mark.parametrize("moving", [0.02, 0.6], ids=["at rest", "moving"])
 @pytest.mark.parametrize("columns", [1, 3])
-def test_slopes_are_those_of_the_cost(columns: int) -> None:
+def test_slopes_are_those_of_the_cost(columns: int, moving: float) -> None:
     middles, signs = middles_of(3, columns), np.array([1.0, -1.0])
     rng = np.random.default_rng(columns)
     theta = np.log([0.1, 60.0, 200.0, 40.0, 60.0, 1.0, 0.7]) + 0.4 * rng.standard_normal(
         (3 * columns, 7)
     )
-    theta[:, 1:3] = np.log([60.0, 200.0]) + 0.02 * rng.standard_normal((3 * columns, 2))
+    theta[:, 1:3] = np.log([60.0, 200.0]) + moving * rng.standard_normal((3 * columns, 2))
     held = middles.held(theta, signs)
     assert held.cost > 0
     step = 1e-5 * rng.standard_normal(theta.shape)
