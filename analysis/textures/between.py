@@ -179,14 +179,21 @@ def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
 
 
 def chessboard(conditions: Set[Condition], *, colour: int) -> set[Condition]:
-    """The conditions on squares of one colour (0, 1) of the grid, without its corners."""
+    """The conditions of one colour (0, 1), without the corners of the grid.
+
+    In the order of speed and force, each has another colour than the nearest (in ln v, ln F) of
+    those before it: on a lattice the squares of a chessboard, and elsewhere, too, what is left out
+    has a neighbour that is not.
+    """
+    ordered = sorted(conditions)
+    points = np.log(np.array(ordered))
+    colours = [0]
+    for place in range(1, len(ordered)):
+        nearest = np.argmin(np.linalg.norm(points[:place] - points[place], axis=1))
+        colours.append(1 - colours[nearest])
     speeds, forces = grid_axes(conditions)
     ends = {(v, f) for v in (speeds[0], speeds[-1]) for f in (forces[0], forces[-1])}
-    return {
-        (speed, force)
-        for speed, force in conditions - ends
-        if (speeds.index(speed) + forces.index(force)) % 2 == colour
-    }
+    return {one for one, own in zip(ordered, colours, strict=True) if own == colour} - ends
 
 
 MEDIAN_AND_WORST_COLUMNS = (

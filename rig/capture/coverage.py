@@ -12,7 +12,7 @@ from rig.capture.grid import StrokeGrid
 
 
 class Coverage:
-    """Seconds per cell of a grid.
+    """Seconds per wanted cell of a grid.
 
     Parameters
     ----------
@@ -28,26 +28,27 @@ class Coverage:
     ) -> None:
         self.grid = grid
         self.wanted_s = wanted_s
-        every = [seconds.get(condition, 0.0) for condition in grid.conditions]
-        self.seconds: Floats = np.array(every).reshape(grid.shape)
+        # (S, F) ndarray, 0 for cells that are not wanted.
+        self.seconds: Floats = np.zeros(grid.shape)
+        self.seconds[grid.wanted] = [seconds.get(one, 0.0) for one in grid.conditions]
 
     @property
     def full(self) -> Bools:
-        """(S, F) ndarray: which cells have all that is wanted."""
-        whole: Bools = self.seconds >= self.wanted_s
+        """(S, F) ndarray: which wanted cells have all their seconds."""
+        whole: Bools = self.grid.wanted & (self.seconds >= self.wanted_s)
         return whole
 
     @property
     def complete(self) -> bool:
         """Whether nothing is missing."""
-        return bool(self.full.all())
+        return not self.missing
 
     @property
     def missing(self) -> dict[Condition, float]:
-        """Seconds that each cell lacks which is not full."""
-        lacking = (self.wanted_s - self.seconds).ravel().tolist()
-        every = zip(self.grid.conditions, lacking, self.full.ravel().tolist(), strict=True)
-        return {condition: seconds for condition, seconds, full in every if not full}
+        """Seconds that each wanted cell lacks which is not full."""
+        there = self.seconds[self.grid.wanted].tolist()
+        every = zip(self.grid.conditions, there, strict=True)
+        return {one: self.wanted_s - seconds for one, seconds in every if seconds < self.wanted_s}
 
     def next_condition(
         self, speed_mm_s: float, force_n: float, *, current: Condition | None = None

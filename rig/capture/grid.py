@@ -5,14 +5,16 @@ docs/method/strokes.md#cells
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Floats, Integers
+from modeling.arrays import Bools, Floats, Integers
 from modeling.checks import (
     HIGHEST_FORCE_N,
     HIGHEST_SPEED_MM_S,
@@ -33,6 +35,7 @@ MOST_STEPS = 50
 NOWHERE = -1
 _AXES = ("speeds_mm_s", "forces_n")
 _TOLERANCES = ("speed_tolerance", "force_tolerance")
+_CONDITIONS = "conditions"
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +49,9 @@ class StrokeGrid:
     speed_tolerance, force_tolerance : float
         Shares (above 0, up to 0.5) of a condition's speed and force. A cell never reaches further
         than half-way to its neighbour.
+    conditions : sequence of (speed, force)
+        The cells to record, each of a speed and a force of the grid; none given means all. Kept
+        force by force within a speed.
 
     Raises
     ------
@@ -56,6 +62,7 @@ class StrokeGrid:
     forces_n: Floats
     speed_tolerance: float = SPEED_TOLERANCE
     force_tolerance: float = FORCE_TOLERANCE
+    conditions: Sequence[Condition] = ()
 
     def __post_init__(self) -> None:
         for name, highest in zip(_AXES, (HIGHEST_SPEED_MM_S, HIGHEST_FORCE_N), strict=True):
@@ -70,6 +77,17 @@ class StrokeGrid:
         check_axes(self.speeds_mm_s, self.forces_n)
         for name in _TOLERANCES:
             check_number(name, getattr(self, name), low=0.01, high=LARGEST_TOLERANCE)
+        object.__setattr__(self, "conditions", self._checked_conditions())
+
+    def _checked_conditions(self) -> list[Condition]:
+        every = list(product(self.speeds_mm_s.tolist(), self.forces_n.tolist()))
+        given = set(self.conditions)
+        if len(given) < len(self.conditions) or not given <= set(every):
+            raise InputError(
+                "expected conditions, each once, of a speed and a force of the grid, got "
+                f"{shown(list(self.conditions))}; correct the grid."
+            )
+        return [pair for pair in every if pair in given or not given]
 
     @classmethod
     def default(cls) -> StrokeGrid:
@@ -85,7 +103,7 @@ class StrokeGrid:
         InputError
         """
         values = read_toml(Path(path), "a grid (TOML)")
-        check_keys(values, (*_AXES, *_TOLERANCES, "exploration"), where=str(path))
+        check_keys(values, (*_AXES, *_TOLERANCES, _CONDITIONS, "exploration"), where=str(path))
         for name in _AXES:
             axis = values.get(name)
             if not isinstance(axis, list) or not all(is_number(value) for value in axis):
@@ -94,6 +112,8 @@ class StrokeGrid:
                     "file with tactileq rig range, or correct it."
                 )
         given: dict[str, Any] = {name: values[name] for name in _TOLERANCES if name in values}
+        if _CONDITIONS in values:
+            given[_CONDITIONS] = _pairs(values[_CONDITIONS], path)
         speeds, forces = (np.array(values[name], dtype=np.float64) for name in _AXES)
         try:
             return cls(speeds, forces, **given)
@@ -106,12 +126,14 @@ class StrokeGrid:
         return self.speeds_mm_s.size, self.forces_n.size
 
     @property
-    def conditions(self) -> list[Condition]:
-        """(speed, force) of all cells, force by force within a speed."""
-        return [(v, f) for v in self.speeds_mm_s.tolist() for f in self.forces_n.tolist()]
+    def wanted(self) -> Bools:
+        """(S, F) ndarray: which cells are to be recorded."""
+        every = product(self.speeds_mm_s.tolist(), self.forces_n.tolist())
+        wanted = set(self.conditions)
+        return np.array([pair in wanted for pair in every]).reshape(self.shape)
 
     def cells(self, speed_mm_s: ArrayLike, force_n: ArrayLike) -> Integers:
-        """Which cell each of (n,) hands is in: its place in `conditions`, or `NOWHERE`.
+        """Which wanted cell each of (n,) hands is in: its place in `conditions`, or `NOWHERE`.
 
         Parameters
         ----------
@@ -126,7 +148,9 @@ class StrokeGrid:
             self.forces_n, np.asarray(force_n, dtype=np.float64), tolerance=self.force_tolerance
         )
         inside = (row != NOWHERE) & (column != NOWHERE)
-        return np.where(inside, row * self.forces_n.size + column, NOWHERE)
+        places = np.full(self.shape, NOWHERE)
+        places[self.wanted] = np.arange(len(self.conditions))
+        return np.where(inside, places[row, column], NOWHERE)
 
     def bounds(self) -> tuple[Floats, Floats]:
         """Lowest and highest value of each step of the speeds (2, S) and of the forces (2, F)."""
@@ -138,7 +162,22 @@ class StrokeGrid:
     def to_dict(self) -> dict[str, Any]:
         """What a file of the grid holds."""
         axes = {name: getattr(self, name).tolist() for name in _AXES}
-        return axes | {name: getattr(self, name) for name in _TOLERANCES}
+        values = axes | {name: getattr(self, name) for name in _TOLERANCES}
+        if not self.wanted.all():
+            values[_CONDITIONS] = [list(pair) for pair in self.conditions]
+        return values
+
+
+def _pairs(given: Any, path: str | Path) -> list[Condition]:
+    """The conditions that a file lists."""
+    whole = isinstance(given, list) and all(isinstance(pair, list) for pair in given)
+    if not (whole and given and all(len(p) == 2 and all(map(is_number, p)) for p in given)):
+        raise InputError(
+            f"expected a list of pairs {_CONDITIONS} such as [[60, 1.0]] in {path}, got "
+            f"{shown(given)}; give a speed and a force of the grid in each, or leave it out to "
+            "record all."
+        )
+    return [(float(speed), float(force)) for speed, force in given]
 
 
 def _bounds(axis: Floats, tolerance: float) -> Floats:

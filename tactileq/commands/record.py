@@ -33,6 +33,10 @@ def record(
         Path | None,
         typer.Option("--grid", help="Grid (TOML) from tactileq rig range; by default 7 x 7."),
     ] = None,
+    more: Annotated[
+        bool,
+        typer.Option("--more", help="Only conditions that the model of these recordings asks for."),
+    ] = False,
     repeat: Annotated[int, typer.Option(min=1, help="Number of the repeat of each condition.")] = 1,
     device: Annotated[
         str | None, typer.Option(help="Input device: its name or a part of it.")
@@ -52,7 +56,8 @@ def record(
     """Record a surface by hand (--audio), or a planted texture in silico, 7 speeds x 7 forces.
 
     With --audio you stroke the surface freely; strokes are cut into the conditions of the grid, and
-    a map shows which are missing. Ctrl-C ends it; run the command again to continue.
+    a map shows which are missing. Ctrl-C ends it; run the command again to continue. --more models
+    what is recorded already, and asks for conditions near those that the others predict worst.
 
     Example: tactileq record recordings/oak --audio --texture oak --rig rig.toml --grid grid.toml
 
@@ -68,10 +73,10 @@ def record(
     by_hand = HandOptions(hand, hand_device, counts_per_mm, force)
     heard = InputOptions(device, channel, rate_hz if audio else None, g_per_fullscale, simulated)
     if audio:
-        options = HandRecording(texture, duration_s, repeat, grid, rig, by_hand, heard)
+        options = HandRecording(texture, duration_s, repeat, grid, rig, by_hand, heard, more)
         record_by_hand(folder, options)
         return
-    if rig or grid or repeat > 1 or (by_hand, heard) != (HandOptions(), InputOptions()):
+    if rig or grid or more or repeat > 1 or (by_hand, heard) != (HandOptions(), InputOptions()):
         raise ValueError(
             "expected --audio with options of the hand, the input, the grid or the repeat, got "
             "those options without it; add --audio, or leave them out to record in silico."

@@ -13,11 +13,13 @@ from typing import TYPE_CHECKING, Any
 from modeling.errors import counted
 from tactileq.commands.imports import imports_before
 from tactileq.commands.record_map import recording_map
+from tactileq.commands.record_more import NOTHING_MORE, further_conditions
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from rig.capture.cutting import Readings
+    from rig.capture.grid import StrokeGrid
     from rig.capture.input import InputSettings
     from rig.capture.pieces import Plan
     from rig.capture.recorder import StrokeRecorder
@@ -54,7 +56,7 @@ class InputOptions:
 
 @dataclass(frozen=True)
 class HandRecording:
-    """What is to be recorded, and with what."""
+    """What is to be recorded, and with what; `more`: what the model of the recordings asks for."""
 
     texture: str
     duration_s: float
@@ -63,6 +65,7 @@ class HandRecording:
     rig: Path | None
     hand: HandOptions
     input: InputOptions
+    more: bool = False
 
 
 def hand_from(rig: RigFile | None, options: HandOptions) -> HandSettings:
@@ -139,19 +142,50 @@ def rig_from(path: Path | None) -> RigFile | None:
 
 def record_by_hand(folder: Path, options: HandRecording) -> None:
     """Record strokes until the grid is full, or until the program is asked to end."""
-    from rig.capture.grid import StrokeGrid
-    from rig.capture.input import AudioInput
-    from rig.capture.pieces import PieceStore, Plan
-    from rig.capture.recorder import StrokeRecorder, check_assumed_force
-    from rig.desk.lock import rig_locked
+    import numpy as np
 
+    from modeling.models.grid import grid_axes
+    from rig.capture.grid import StrokeGrid
+    from rig.capture.recorder import check_assumed_force
+
+    if options.more and options.grid is not None:
+        raise ValueError(
+            f"expected --more or --grid, got both ({options.grid}); leave out --grid, since --more "
+            "takes its conditions from the recordings, or leave out --more."
+        )
     rig = rig_from(options.rig)
     hand, heard = hand_from(rig, options.hand), input_from(rig, options.input)
-    grid = StrokeGrid.default() if options.grid is None else StrokeGrid.load(options.grid)
+    if options.more:
+        wanted = further_conditions(folder, options.texture)
+        if not wanted:
+            print(NOTHING_MORE)
+            return
+        speeds, forces = map(np.array, grid_axes(wanted))
+        grid = StrokeGrid(speeds, forces, conditions=wanted)
+    else:
+        grid = StrokeGrid.default() if options.grid is None else StrokeGrid.load(options.grid)
     if hand.assumed_force_n is not None and (hand.without_pressure or hand.kind in WITHOUT_FORCE):
         check_assumed_force(grid, hand.assumed_force_n)
     if rig is not None and options.input.g_per_fullscale is None:
         tell_assumed(rig)
+    record_on(grid, folder, options, rig=rig, hand=hand, heard=heard)
+
+
+def record_on(
+    grid: StrokeGrid,
+    folder: Path,
+    options: HandRecording,
+    *,
+    rig: RigFile | None,
+    hand: HandSettings,
+    heard: InputSettings,
+) -> None:
+    """Open the devices, and record until the grid is full."""
+    from rig.capture.input import AudioInput
+    from rig.capture.pieces import PieceStore, Plan
+    from rig.capture.recorder import StrokeRecorder
+    from rig.desk.lock import rig_locked
+
     alone = nullcontext() if rig is None else rig_locked(rig.rig.name)
     with alone, opened_hand(hand) as (live, reader), AudioInput(heard) as source:
         plan = Plan(
@@ -270,7 +304,7 @@ def shown_map(recorder: StrokeRecorder, console: Console) -> Iterator[Callable[[
         nonlocal logged
         if recorder.store.conditions_recorded > logged:
             logged = recorder.store.conditions_recorded
-            of = counted(recorder.coverage.full.size, "condition")
+            of = counted(len(recorder.coverage.grid.conditions), "condition")
             print(f"{logged} of {of} recorded", flush=True)
 
     yield show
@@ -283,7 +317,7 @@ def tell(recorder: StrokeRecorder, *, before: int) -> None:
     store, coverage = recorder.store, recorder.coverage
     new = store.conditions_recorded - before
     print(
-        f"{store.conditions_recorded} of {counted(coverage.full.size, 'condition')} of "
+        f"{store.conditions_recorded} of {counted(len(coverage.grid.conditions), 'condition')} of "
         f"{store.plan.texture} recorded in {store.folder}, {new} of them in this run"
         + (" (simulated)" if store.simulated else "")
     )

@@ -28,7 +28,7 @@ def recording_map(recorder: StrokeRecorder) -> Group:
     target, words = recorder.target(coverage)
     lines = [hand_line(recorder.hand, target, words), level_line(recorder.level)]
     warnings = [Text(f"warning: {warning}", style=PART) for warning in recorder.warnings()]
-    done, of = int(coverage.full.sum()), coverage.full.size
+    done, of = int(coverage.full.sum()), len(coverage.grid.conditions)
     head = Text(
         f"{done} of {of} conditions recorded; seconds so far, of {coverage.wanted_s:g} s each:"
     )
@@ -38,11 +38,14 @@ def recording_map(recorder: StrokeRecorder) -> Group:
 
 
 def grid_table(coverage: Coverage, target: Condition | None, *, here: Condition | None) -> Table:
-    """Seconds of every cell: `ok` full, `>` next, `*` under the hand, `-` nothing yet."""
+    """Seconds of every cell: `ok` full, `>` next, `*` under the hand, `-` nothing yet.
+
+    Cells that are not wanted are blank.
+    """
     from rich.table import Table
     from rich.text import Text
 
-    table = Table()
+    table, wanted = Table(), coverage.grid.wanted
     table.add_column("N \\ mm/s", justify="right")
     for speed in coverage.grid.speeds_mm_s:
         table.add_column(f"{speed:g}", justify="right", min_width=6)
@@ -50,6 +53,9 @@ def grid_table(coverage: Coverage, target: Condition | None, *, here: Condition 
         force = float(coverage.grid.forces_n[column])
         cells = []
         for row, speed in enumerate(coverage.grid.speeds_mm_s.tolist()):
+            if not wanted[row, column]:
+                cells.append(Text())
+                continue
             text, style = _cell(
                 float(coverage.seconds[row, column]),
                 full=bool(coverage.full[row, column]),

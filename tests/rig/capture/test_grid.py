@@ -10,7 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from modeling import InputError
+from rig.capture.exploration import grid_text
 from rig.capture.grid import NOWHERE, StrokeGrid
+from tests.refusals import refused
 
 # Steps of a grid are apart by more than rounding.
 AXES = st.lists(st.integers(1, 10_000), min_size=1, max_size=8, unique=True).map(
@@ -80,6 +82,45 @@ def test_a_file_gives_the_grid_and_its_tolerances(tmp_path: Path) -> None:
     grid = StrokeGrid.load(file)
     assert grid.conditions == [(60.0, 1.0), (120.5, 1.0)]
     assert (grid.speed_tolerance, grid.force_tolerance) == (0.1, 0.3)
+
+
+def test_only_wanted_conditions_have_a_cell_and_a_file_keeps_them(tmp_path: Path) -> None:
+    file = tmp_path / "grid.toml"
+    file.write_text(
+        "speeds_mm_s = [60, 120]\nforces_n = [1, 2, 3]\n"
+        "conditions = [[120, 1], [60, 2], [120, 3]]\n"
+    )
+    grid = StrokeGrid.load(file)
+    assert grid.conditions == [(60.0, 2.0), (120.0, 1.0), (120.0, 3.0)]
+    assert grid.wanted.tolist() == [[False, True, False], [True, False, True]]
+    assert grid.cells([60, 60, 120, 121, 120, 90], [1, 2, 1, 2, 3, 2]).tolist() == [
+        *(NOWHERE, 0, 1, NOWHERE, 2, NOWHERE)
+    ]
+    file.write_text(grid_text(grid))
+    assert StrokeGrid.load(file).to_dict() == grid.to_dict()
+    assert grid.to_dict()["conditions"] == [[60.0, 2.0], [120.0, 1.0], [120.0, 3.0]]
+    assert "conditions" not in StrokeGrid.default().to_dict()
+
+
+@pytest.mark.parametrize(
+    ("conditions", "expected", "got"),
+    [
+        ("[[60, 2]]", ["each once", "of the grid"], "(60.0, 2.0)"),
+        ("[[60, 1], [60, 1]]", ["each once", "of the grid"], "(60.0, 1.0)"),
+        ("[]", ["pairs", "conditions"], "[]"),
+        ("[60, 1]", ["pairs", "conditions"], "[60, 1]"),
+        ("[[60, 1, 1]]", ["pairs", "conditions"], "[[60, 1, 1]]"),
+        ('[["fast", 1]]', ["pairs", "conditions"], "fast"),
+        ("3", ["pairs", "conditions"], 3),
+    ],
+)
+def test_conditions_that_are_not_of_the_grid_are_refused(
+    tmp_path: Path, conditions: str, expected: list[str], got: object
+) -> None:
+    file = tmp_path / "grid.toml"
+    file.write_text(f"speeds_mm_s = [60, 120]\nforces_n = [1]\nconditions = {conditions}\n")
+    with refused(InputError, names=file, expected=expected, got=got):
+        StrokeGrid.load(file)
 
 
 @pytest.mark.parametrize(

@@ -216,3 +216,55 @@ def test_what_to_stroke_next_stays_until_it_is_full() -> None:
 )
 def test_advice(hand, words) -> None:
     assert advice(GRID, (160.0, 1.2), speed_mm_s=hand[0], force_n=hand[1]) == words
+
+
+def test_only_wanted_conditions_are_asked_for_and_kept(
+    tmp_path: Path, readings_of, stroking
+) -> None:
+    wanted = [(80.0, 1.2), (160.0, 0.6)]
+    grid = StrokeGrid([80.0, 160.0], [0.6, 1.2], conditions=wanted)
+    rows = readings_of(*stroking(30.0, grid.speeds_mm_s, grid.forces_n, seed=3))
+    recorder = recorder_of(Script(noise(30.0), rows), tmp_path / "oak", grid=grid)
+    asked = set()
+    for _ in range(600):
+        recorder.step()
+        asked.add(recorder.target(recorder.coverage)[0])
+        if recorder.coverage.complete:
+            break
+    assert None in asked
+    assert asked <= {*wanted, None}
+    assert recorder.coverage.full.tolist() == [[False, True], [True, False]]
+    assert recorder.coverage.seconds.tolist() == [[0.0, 0.5], [0.5, 0.0]]
+    assert recorder.store.conditions_recorded == 2
+    assert {r.condition for r in RecordingSet.load(tmp_path / "oak")} == set(wanted)
+    kept = (tmp_path / "oak/pieces/pieces.tsv").read_text().splitlines()[1:]
+    assert {tuple(map(float, line.split("\t")[2:4])) for line in kept} == set(wanted)
+
+
+def test_pieces_of_a_condition_that_is_not_wanted_any_more_stay(
+    tmp_path: Path, readings_of
+) -> None:
+    rows = readings_of(np.full(150, 80.0), np.full(150, 0.6))
+    first = recorder_of(Script(noise(0.3), rows), tmp_path / "oak")
+    play(first)
+    assert first.coverage.missing[80.0, 0.6] < 0.3
+    other = StrokeGrid([80.0, 160.0], [0.6, 1.2], conditions=[(160.0, 1.2)])
+    second = recorder_of(Script(noise(0.3), rows), tmp_path / "oak", grid=other)
+    play(second)
+    assert second.coverage.seconds.sum() == 0
+    third = recorder_of(Script(noise(0), rows), tmp_path / "oak")
+    assert np.array_equal(third.coverage.seconds, first.coverage.seconds)
+
+
+def test_the_next_condition_is_a_wanted_one_wherever_the_hand_is() -> None:
+    wanted = [(80.0, 1.2), (160.0, 0.6)]
+    grid = StrokeGrid([80.0, 160.0], [0.6, 1.2], conditions=wanted)
+    # What is not wanted does not count, recorded or not.
+    empty = Coverage(grid, 1.0, seconds={(80.0, 0.6): 0.5, (160.0, 1.2): 1.0})
+    assert empty.missing == dict.fromkeys(wanted, 1.0)
+    assert empty.next_condition(80, 0.7) == (80.0, 1.2)
+    assert empty.next_condition(160, 1.1) == (160.0, 0.6)
+    assert not empty.complete
+    full = Coverage(grid, 1.0, seconds=dict.fromkeys(wanted, 1.0))
+    assert full.complete
+    assert full.next_condition(80, 0.6) is None
