@@ -241,7 +241,7 @@ def _rate_notes(records: RecordingSet) -> list[str]:
 
 def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     """What was found and where it is, with the conditions that were interpolated."""
-    from analysis.textures.between import sentence, worth_recording
+    from analysis.textures.between import FIELD_OF_SPECTRA, sentence, worth_recording
     from modeling import missing_conditions
     from modeling.models.own_peaks import own_peaks
 
@@ -269,6 +269,8 @@ def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
     lines.append(f"{name}: fit to its recordings: {sentence(found.quality)}")
     if found.left_out is not None:
         lines.append(f"{name}: conditions left out and predicted: {sentence(found.left_out)}")
+        if (without := found.left_out_without_layers) is not None and len(without):
+            lines.append(f"{name}: the same by {FIELD_OF_SPECTRA}, no layers: {sentence(without)}")
         if more := worth_recording(found.left_out):
             near = "; ".join(f"{speed:.4g} mm/s at {force:.3g} N" for speed, force in more)
             lines.append(f"{name}: further conditions are worth recording near {near}")

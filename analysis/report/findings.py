@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from analysis.columns import tsv_text
-from analysis.textures.between import distances_to_recordings, fit_like, left_out_table
+from analysis.textures.between import (
+    distances_to_recordings,
+    field_fit,
+    fit_like,
+    left_out_table,
+)
 from analysis.textures.recordings import (
     RecordingLayers,
     layers_of_recordings,
@@ -57,6 +62,8 @@ class Findings:
         without a model.
     left_out : DataFrame, optional
         The same for conditions that were left out and predicted, where requested.
+    left_out_without_layers : DataFrame, optional
+        The same by a field of spectra: what the recordings support without layers.
     """
 
     texture: str
@@ -67,6 +74,7 @@ class Findings:
     why_not: str
     quality: pd.DataFrame
     left_out: pd.DataFrame | None
+    left_out_without_layers: pd.DataFrame | None
 
 
 def find_in(
@@ -100,16 +108,19 @@ def find_in(
     """
     only_unit(records)
     measured = recording_spectra(records, keep_hum=keep_hum)
-    model, why_not, quality, left_out = None, "", pd.DataFrame(), None
+    model, why_not, quality, left_out, without = None, "", pd.DataFrame(), None, None
     try:
         model = fit_spectra(measured, estimator=estimator, layers=layers)
         quality = distances_to_recordings(model.peq, measured)
         if check:
             left_out = left_out_table(measured, fit_like(model))
+            without = left_out_table(measured, field_fit)
     except GridError as error:
         why_not = str(error)
     each = () if model and not alone else layers_of_recordings(measured, estimator=estimator)
-    return Findings(records.texture, estimator, measured, each, model, why_not, quality, left_out)
+    return Findings(
+        records.texture, estimator, measured, each, model, why_not, quality, left_out, without
+    )
 
 
 def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:

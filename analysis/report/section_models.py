@@ -99,7 +99,8 @@ def _left_out_items(summary: pd.DataFrame, *, simulated: bool) -> tuple[Item, ..
         "left_out",
         "Prediction of left-out conditions (cross-validation)",
         "A hand is rarely exactly at a recorded condition. Every second condition was left out and "
-        "predicted from its neighbours, by the model and by an autoregressive model. Level error "
+        "predicted from its neighbours, by the model, by an autoregressive model and by a smooth "
+        "field of spectra, which shows what the recordings support without layers. Level error "
         "(absolute median) and log-spectral distance (both smoothed with σ = 30 Hz) are relative "
         "to the left-out recording, whose own scatter they include.",
         summary,

@@ -21,6 +21,7 @@ from modeling.arrays import Floats
 from modeling.estimation.likelihood import is_silent
 from modeling.fitting.autoregressive import fit_ar_spectra
 from modeling.fitting.conditions import spectra_by_condition
+from modeling.fitting.spectral_field import fit_field_to_spectra
 from modeling.fitting.texture import fit_spectra
 from modeling.models.grid import Condition, grid_axes
 from modeling.recordings.spectrum import SMOOTHING_HZ, mean_spectrum, smooth
@@ -31,6 +32,7 @@ Measured = Sequence[tuple[Recording, Spectrum]]
 # Of one condition: the filter that a model has there.
 FilterAt = Callable[[float, float], SpectralFilter]
 RIVAL_ORDER = 20
+FIELD_OF_SPECTRA = "a field of spectra"
 LEVEL, DISTANCE = "level_error_db", "log_spectral_distance_db"
 
 
@@ -61,7 +63,7 @@ def distances_to_truth(
     Parameters
     ----------
     filter_at : callable
-        `model.peq` of a texture model, `model.filter` of an AR model.
+        `model.peq` of a texture model, `model.filter` of an AR model or a field of spectra.
     truth : Truth
     conditions : iterable of (speed, force)
     frequency_hz : (n,) ndarray
@@ -139,6 +141,11 @@ def ar_fit(order: int) -> Fit:
         return fit_ar_spectra(measured, order=order).filter
 
     return fit
+
+
+def field_fit(measured: Measured) -> FilterAt:
+    """The same by a smooth field of spectra, which knows nothing of layers."""
+    return fit_field_to_spectra(measured).filter
 
 
 def left_out_table(measured: Measured, fit: Fit) -> pd.DataFrame:
@@ -263,7 +270,7 @@ def truth_summary(
 
 
 def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.DataFrame]:
-    """Left-out conditions of one texture, predicted as its model was made, and by the rival.
+    """Left-out conditions of one texture, predicted as its model was made, and by the rivals.
 
     Parameters
     ----------
@@ -274,6 +281,7 @@ def left_out_by_model(measured: Measured, model: TextureModel) -> dict[str, pd.D
     return {
         model.estimator: left_out_table(measured, fit_like(model)),
         f"AR({RIVAL_ORDER})": left_out_table(measured, ar_fit(RIVAL_ORDER)),
+        FIELD_OF_SPECTRA: left_out_table(measured, field_fit),
     }
 
 

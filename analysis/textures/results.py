@@ -31,8 +31,8 @@ class TextureResult:
     other_estimates : tuple of TextureModel
         Models of other estimators, to be compared with the truth beside `model`.
     left_out : mapping of str to DataFrame
-        By model (joint, AR(20)): conditions predicted by one that was fitted without them
-        (`analysis.textures.between.left_out_table`); empty where that was not tried.
+        By model (joint, AR(20), a field of spectra): conditions predicted by one that was fitted
+        without them (`analysis.textures.between.left_out_table`); empty where that was not tried.
     """
 
     recordings: RecordingSet

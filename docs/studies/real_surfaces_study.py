@@ -10,6 +10,7 @@ this file and prints the tables.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -27,7 +28,9 @@ from analysis.figures.drawing import (
 )
 from analysis.figures.drawing import stamp_if_simulated as stamp
 from analysis.textures.between import FilterAt, halfway, truth_summary
-from modeling import RecordingSet, fit_ar, fit_texture
+from modeling import Recording, RecordingSet, fit_ar, fit_texture
+from modeling.arrays import Floats
+from modeling.fitting.spectral_field import fit_spectral_field
 from modeling.models.grid import Condition
 from modeling.threads import one_linear_algebra_thread
 from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
@@ -41,6 +44,7 @@ MODELS = (
     "joint, 3 layers",
     "AR(6)",
     "AR(20)",
+    "field of spectra",
     "paper",
     "paper-consistent",
 )
@@ -51,10 +55,13 @@ Conditions = Sequence[Condition]
 
 
 def fitted(records: RecordingSet, name: str) -> tuple[FilterAt, int]:
-    """One of `MODELS` of these records, and its numbers per condition."""
+    """One of `MODELS` of these records, and its numbers per condition: of a field, its bands."""
     if name.startswith("AR"):
         order = int(name[3:-1])
         return fit_ar(records, order=order).filter, order + 1
+    if name == "field of spectra":
+        field = fit_spectral_field(records)
+        return field.filter, field.n_parameters
     estimator, _, layers = name.partition(", ")
     model = fit_texture(
         records, estimator=estimator, layers=int(layers.split()[0]) if layers else None
@@ -108,10 +115,10 @@ def few_speeds(seed: int) -> list[dict[str, Any]]:
 
 
 def scattered(seed: int) -> list[dict[str, Any]]:
-    """20 to 35 random conditions, a tenth of them hidden: `joint`, and AR(20) at the others.
+    """20 to 35 random conditions, a tenth of them hidden: `joint`, the field, AR(20) at the others.
 
-    The rival blends the log spectra of AR(20) by the inverse distance in log speed and log force,
-    or by its square.
+    The last rival blends the log spectra of AR(20) by the inverse distance in log speed and log
+    force, or by its square.
     """
     rng, surface = np.random.default_rng([seed, 7]), draw_surface(seed)
     count = int(rng.integers(20, 36))
@@ -121,41 +128,55 @@ def scattered(seed: int) -> list[dict[str, Any]]:
         next(iter(surface.record([v], [f], seed=int(rng.integers(1 << 30))))) for v, f in places
     ]
     hidden = max(2, round(0.1 * count))
-    start = perf_counter()
-    model = fit_texture(RecordingSet(records[hidden:]))
-    time = 1e3 * (perf_counter() - start) / (count - hidden)
-    start = perf_counter()
-    levels = [
-        np.log(fit_ar(RecordingSet([r]), order=20).filter(*r.condition).response(FREQUENCY_HZ))
-        for r in records[hidden:]
-    ]
-    rival_time = 1e3 * (perf_counter() - start) / (count - hidden)
-    logs, blends = np.log(np.array(places)), {"AR(20), inverse distance": 1, "its square": 2}
     rows = []
-    for name, power in {"joint": 0, **blends}.items():
+    for name, (log_response, numbers, time) in _predictors(records[hidden:]).items():
         off = []
-        for n in range(hidden):
-            if name == "joint":
-                found = np.log(model.peq(*places[n]).response(FREQUENCY_HZ))
-            else:
-                away = np.linalg.norm(logs[hidden:] - logs[n], axis=1)
-                found = np.average(levels, axis=0, weights=away**-power)
-            v, f = places[n]
+        for v, f in places[:hidden]:
             true = surface.magnitude(FREQUENCY_HZ, speed_mm_s=v, force_n=f)
-            off.append(20 / np.log(10) * (found - np.log(true)))
+            off.append(20 / np.log(10) * (log_response(v, f) - np.log(true)))
         level = np.abs(np.mean(off, axis=1))
         rows.append(
             {
                 "surface": surface.name,
                 "model": name,
-                "numbers": 1 + 3 * model.n_layers if name == "joint" else 21,
-                "milliseconds_a_record": time if name == "joint" else rival_time,
+                "numbers": numbers,
+                "milliseconds_a_record": time,
                 "between": float(np.sqrt(np.mean(np.square(off)))),
                 "between_level": float(np.median(level)),
                 "between_worst_level": float(level.max()),
             }
         )
     return rows
+
+
+def _predictors(
+    records: Sequence[Recording],
+) -> dict[str, tuple[Callable[[float, float], Floats], int, float]]:
+    """What predicts `scattered`: log response anywhere, numbers per condition, fitting time."""
+    found: dict[str, tuple[Callable[[float, float], Floats], int, float]] = {}
+    for name in ("joint", "field of spectra"):
+        start = perf_counter()
+        filter_at, numbers = fitted(RecordingSet(records), name)
+        time = 1e3 * (perf_counter() - start) / len(records)
+        found[name] = (partial(_log_response, filter_at), numbers, time)
+    start = perf_counter()
+    levels = [
+        _log_response(fit_ar(RecordingSet([r]), order=20).filter, *r.condition) for r in records
+    ]
+    time = 1e3 * (perf_counter() - start) / len(records)
+    logs = np.log([r.condition for r in records])
+
+    def blended(v: float, f: float, *, power: int) -> Floats:
+        away = np.linalg.norm(logs - np.log([v, f]), axis=1)
+        return np.asarray(np.average(levels, axis=0, weights=away**-power))
+
+    for name, power in {"AR(20), inverse distance": 1, "its square": 2}.items():
+        found[name] = (partial(blended, power=power), 21, time)
+    return found
+
+
+def _log_response(filter_at: FilterAt, speed_mm_s: float, force_n: float) -> Floats:
+    return np.asarray(np.log(filter_at(speed_mm_s, force_n).response(FREQUENCY_HZ)))
 
 
 def summary(rows: Sequence[dict[str, Any]]) -> pd.DataFrame:

@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from modeling.arrays import Floats
+from modeling.arrays import Bools, Floats
 from modeling.equalizer.bands import HIGHEST_FREQUENCY_SHARE, LOWEST_BANDWIDTH_HZ
 from modeling.estimation.compiled import CompiledLines, is_compiled
-from modeling.recordings.spectrum import HIGH_PASS_HZ, SMOOTHING_HZ, Spectrum, smooth
+from modeling.recordings.spectrum import HIGH_PASS_HZ, Spectrum
 
 # Half an octave above its corner the preparation's high-pass takes less than 0.2 dB.
 LOWEST_HZ = 1.5 * HIGH_PASS_HZ
@@ -101,22 +101,25 @@ class Bins:
     rate_hz: float
 
 
-def signal_power(spectrum: Spectrum) -> Power | None:
+def signal_power(spectrum: Spectrum, *, empty_below_db: float = EMPTY_BELOW_DB) -> Power | None:
     """The band of a spectrum that holds signal; None for silence.
 
     From 15 Hz to 0.98 of the Nyquist frequency, or to where the smoothed spectrum last stands
     within 50 dB of its maximum: above a recorder's own low-pass there is nothing to model, and an
     empty region would rule the likelihood.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+    empty_below_db : float
+        Instead of −50 dB; −inf for the whole band.
     """
-    magnitude = spectrum.without_leakage
-    smoothed = smooth(magnitude, SMOOTHING_HZ, step_hz=spectrum.rate_hz / spectrum.n_samples)
-    within = (spectrum.frequency_hz >= LOWEST_HZ) & (
-        spectrum.frequency_hz <= HIGHEST_SHARE * spectrum.rate_hz / 2
-    )
-    loudest = float(smoothed[within].max(initial=0.0))
-    if not (loudest > 0 and (magnitude[within] > 0).any()):
+    within = _fitted_band(spectrum)
+    if is_silent(spectrum):
         return None
-    last = np.flatnonzero(within & (smoothed >= loudest * 10 ** (EMPTY_BELOW_DB / 20)))[-1]
+    magnitude, smoothed = spectrum.without_leakage, spectrum.smoothed_without_leakage
+    loudest = float(smoothed[within].max())
+    last = np.flatnonzero(within & (smoothed >= loudest * 10 ** (empty_below_db / 20)))[-1]
     within[last + 1 :] = False
     # Of a Rayleigh-distributed magnitude of mean r the mean square is (4/π)r²; of the mean of K
     # such magnitudes it is r² + (4/π − 1)r²/K.
@@ -136,7 +139,14 @@ def signal_power(spectrum: Spectrum) -> Power | None:
 
 def is_silent(spectrum: Spectrum) -> bool:
     """Whether a spectrum holds nothing that a layer or a noise gain could be fitted to."""
-    return signal_power(spectrum) is None
+    loudest = spectrum.without_leakage[_fitted_band(spectrum)].max(initial=0.0)
+    return bool(loudest < np.finfo(np.float64).tiny)
+
+
+def _fitted_band(spectrum: Spectrum) -> Bools:
+    """Lines (n,) from 15 Hz to 0.98 of the Nyquist frequency."""
+    frequency = spectrum.frequency_hz
+    return (frequency >= LOWEST_HZ) & (frequency <= HIGHEST_SHARE * spectrum.rate_hz / 2)
 
 
 def split(theta: Floats, m: int) -> tuple[Floats, Floats, Floats, Floats]:

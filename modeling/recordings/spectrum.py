@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Literal
 
 import numpy as np
@@ -61,6 +61,11 @@ class Spectrum:
     def without_leakage(self) -> Floats:
         """The tapered magnitude, (n,), where there is one, else the magnitude itself."""
         return self.magnitude if self.tapered_magnitude is None else self.tapered_magnitude
+
+    @cached_property
+    def smoothed_without_leakage(self) -> Floats:
+        """`without_leakage`, (n,), smoothed as by `smoothed`; every fit and check asks for it."""
+        return smooth(self.without_leakage, SMOOTHING_HZ, step_hz=self.rate_hz / self.n_samples)
 
     @property
     def duration_s(self) -> float:

@@ -231,7 +231,7 @@ def test_layers_check_and_alone(main, tmp_path: Path) -> None:
     done = main("model", "set", "--layers", 2, "--check", "--alone", "--out", "models")
     assert done.returncode == 0, done.stderr
     assert TextureModel.load(tmp_path / "models/canvas.json").n_layers == 2
-    assert "log-spectral distance" in done.stdout
+    assert "canvas: the same by a field of spectra, no layers: log-spectral" in done.stdout
     predicted = pd.read_csv(tmp_path / "models/canvas_check.tsv", sep="\t")
     # Six conditions, four of them corners.
     assert list(zip(predicted.speed_mm_s, predicted.force_n, strict=True)) == [(200, 1), (200, 3)]

@@ -17,6 +17,7 @@ from analysis.textures.between import (
     distances_to_truth,
     fit_like,
     halfway,
+    left_out_by_model,
     left_out_summary,
     left_out_table,
     median_and_worst,
@@ -34,6 +35,7 @@ from stimuli.planted.drawn import draw_surface
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)
+FIVE_SPEEDS = np.array([60.0, 100.0, 160.0, 230.0, 300.0])
 SPEEDS, FORCES = np.array([100.0, 200.0, 300.0]), np.array([1.0, 2.0, 3.0])
 
 
@@ -168,6 +170,17 @@ def test_silent_conditions_are_not_left_out() -> None:
     ]
     table = left_out_table(recording_spectra(RecordingSet([*silent, floor])), refitted)
     assert list(zip(table["speed_mm_s"], table["force_n"], strict=True)) == [(200.0, 2.0)]
+
+
+def test_rivals_predict_the_same_conditions() -> None:
+    """Layers that are planted are predicted best by layers, and by a field better than by AR."""
+    records = planted_records(FIVE_SPEEDS, FORCES)
+    tables = left_out_by_model(recording_spectra(records), fit_texture(records))
+    assert list(tables) == ["joint", "AR(20)", "a field of spectra"]
+    joint, ar, field = (table[DISTANCE].median() for table in tables.values())
+    assert joint < field < ar
+    places = [table[["speed_mm_s", "force_n"]].to_numpy().tolist() for table in tables.values()]
+    assert places[0] == places[1] == places[2]
 
 
 def test_median_and_worst_are_named() -> None:
