@@ -138,41 +138,47 @@ class Middles:
         """
         middle = np.einsum("a,map->mp", self.shares, theta[self.corners])
         both, m = np.concatenate((middle, theta)), len(self.corners)
-        found = self._responses(both, signs)
+        moves, passed = self._moving(theta)
+        found = self._responses(both, signs, np.flatnonzero(moves.any(axis=0)))
         level = 0.5 * np.log(found.power)
         corners = level[m:][self.corners]
         off = level[:m] - np.einsum("a,man->mn", self.shares, corners)
-        passed, moving = self._moving(theta)
-        n = passed.shape[1]
         lowest = np.full(off.shape, -1)
-        fixed = np.where((self.shares > 0)[:, None], corners[:, :, :n], np.inf)
-        lowest[:, :n] = np.where(passed, fixed.argmin(axis=1), -1)
-        hole = np.minimum(level[:m, :n] - fixed.min(axis=1), 0.0)
-        off[:, :n] = np.where(passed, hole, off[:, :n])
-        beyond = np.maximum(np.abs(off[:, n:]) - MEETING, 0.0)
-        off[:, n:] = moving * np.sign(off[:, n:]) * beyond
+        moving = np.repeat(moves[:, moves.any(axis=0)], AROUND.size, axis=1)
+        if moving.size:
+            n = passed.shape[1]
+            fixed = np.where((self.shares > 0)[:, None], corners[:, :, :n], np.inf)
+            lowest[:, :n] = np.where(passed, fixed.argmin(axis=1), -1)
+            hole = np.minimum(level[:m, :n] - fixed.min(axis=1), 0.0)
+            off[:, :n] = np.where(passed, hole, off[:, :n])
+            beyond = np.maximum(np.abs(off[:, n:]) - MEETING, 0.0)
+            off[:, n:] = moving * np.sign(off[:, n:]) * beyond
         return _Seen(off, lowest, passed, moving, found.by_parameter)
 
     def _moving(self, theta: Floats) -> tuple[Bools, Bools]:
-        """Fixed places that a moving layer passes, (M, n), and places of moving layers, (M, …)."""
+        """Which layers move by more than their width, (M, m), and the places they pass, (M, n)."""
         layers = (theta.shape[1] - 1) // 3
         _, frequency, bandwidth, _ = split(theta[self.corners], layers)
         width = np.exp(bandwidth.max(axis=1))
         lowest, highest = np.exp(frequency.min(axis=1)), np.exp(frequency.max(axis=1))
         moves = highest - lowest > width
-        reach = np.where(moves, REACH * width, -np.inf)
         place = np.arctan(self.places.tangent[0]) * self.places.rate_hz / np.pi
-        below = (lowest - reach)[..., None] < place
-        passed = (below & (place < (highest + reach)[..., None])).any(axis=1)
-        return passed, np.repeat(moves, AROUND.size, axis=1)
+        passed = np.zeros((len(self.corners), place.size), dtype=bool)
+        for layer in np.flatnonzero(moves.any(axis=0)):
+            reach = np.where(moves[:, layer], REACH * width[:, layer], -np.inf)[:, None]
+            below = lowest[:, [layer]] - reach < place
+            passed |= below & (place < highest[:, [layer]] + reach)
+        return moves, passed
 
-    def _responses(self, theta: Floats, signs: Floats) -> Response:
-        """At the fixed places, then at those of each layer, which move with it, (K, n + …)."""
-        rows, layers = len(theta), signs.size
-        per_hz, fixed = np.pi / self.places.rate_hz, self.places.tangent
-        _, frequency, bandwidth, _ = split(theta, layers)
-        centre = np.exp(frequency)[..., None]
-        away = np.exp(bandwidth)[..., None] * AROUND
+    def _responses(self, theta: Floats, signs: Floats, moving: Integers) -> Response:
+        """At the fixed places, then at those that move with some of the layers, (K, n + …)."""
+        rows, fixed = len(theta), self.places.tangent
+        if not moving.size:
+            return response(theta, signs, self.places.rows(np.zeros(rows, dtype=np.intp)))
+        per_hz = np.pi / self.places.rate_hz
+        _, frequency, bandwidth, _ = split(theta, signs.size)
+        centre = np.exp(frequency[:, moving])[..., None]
+        away = np.exp(bandwidth[:, moving])[..., None] * AROUND
         ends = np.arctan(fixed[0, [0, -1]]) / per_hz
         own = np.tan(per_hz * np.clip(centre + away, *ends)).reshape(rows, -1)
         tangent = np.concatenate((np.broadcast_to(fixed, (rows, fixed.size)), own), axis=1)
@@ -180,12 +186,11 @@ class Middles:
         places = Observed(one, one, one, tangent, 1 / tangent, np.zeros(rows), self.places.rate_hz)
         found = response(theta, signs, places)
         inside = (centre + away > ends[0]) & (centre + away < ends[1])
-        by_hz = (found.by_tangent[:, fixed.size :] * per_hz * (1 + own**2)).reshape(away.shape)
-        for layer in range(layers):
-            of_layer = slice(
-                fixed.size + layer * AROUND.size, fixed.size + (layer + 1) * AROUND.size
-            )
-            slope = by_hz[:, layer] * inside[:, layer]
-            found.by_parameter[:, 1 + layer, of_layer] += slope * centre[:, layer]
-            found.by_parameter[:, 1 + layers + layer, of_layer] += slope * away[:, layer]
+        by_hz = found.by_tangent[:, fixed.size :] * per_hz * (1 + own**2)
+        by_hz = by_hz.reshape(away.shape) * inside
+        for number, layer in enumerate(moving):
+            first = fixed.size + number * AROUND.size
+            of_layer = found.by_parameter[:, :, first : first + AROUND.size]
+            of_layer[:, 1 + layer] += by_hz[:, number] * centre[:, number]
+            of_layer[:, 1 + signs.size + layer] += by_hz[:, number] * away[:, number]
         return found

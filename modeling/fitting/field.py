@@ -12,6 +12,7 @@ a record are part of the field, too.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -96,18 +97,11 @@ class Field:
 
     def laplacian(self, theta: Floats) -> Floats:
         """Each condition's parameters less its neighbours', summed over the neighbours, (C, p)."""
-        grid = theta.reshape(self.rows, self.columns, -1)
-        out = np.zeros(grid.shape)
-        down, across = np.diff(grid, axis=0), np.diff(grid, axis=1)
-        out[:-1] -= down
-        out[1:] += down
-        out[:, :-1] -= across
-        out[:, 1:] += across
-        return out.reshape(theta.shape)
+        return np.asarray(_laplacian(self.rows, self.columns) @ theta)
 
     def neighbours(self) -> Floats:
         """Number of neighbours of each condition, (C,)."""
-        return _degrees(self.rows, self.columns).ravel()
+        return np.asarray(_laplacian(self.rows, self.columns).diagonal())
 
     def penalty(self, theta: Floats) -> float:
         """½·Σ over neighbours of Δ'·precision·Δ, and a little for the trend itself."""
@@ -143,13 +137,16 @@ def prior_covariance(m: int) -> Floats:
     return covariance
 
 
-def _degrees(rows: int, columns: int) -> Floats:
-    degrees = np.zeros((rows, columns))
-    degrees[1:] += 1
-    degrees[:-1] += 1
-    degrees[:, 1:] += 1
-    degrees[:, :-1] += 1
-    return degrees
+@lru_cache(maxsize=64)
+def _laplacian(rows: int, columns: int) -> Floats:
+    """Numbers of neighbours on the diagonal, −1 for each pair of neighbours, (C, C)."""
+    node = np.arange(rows * columns).reshape(rows, columns)
+    laplacian = np.zeros((node.size, node.size))
+    for a, b in ((node[1:], node[:-1]), (node[:, 1:], node[:, :-1])):
+        laplacian[a, b] = laplacian[b, a] = -1.0
+    np.fill_diagonal(laplacian, -laplacian.sum(axis=1))
+    laplacian.setflags(write=False)
+    return laplacian
 
 
 class FieldFit(NamedTuple):
