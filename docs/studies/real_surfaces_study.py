@@ -33,7 +33,7 @@ from modeling.arrays import Floats
 from modeling.fitting.spectral_field import fit_spectral_field
 from modeling.models.grid import Condition
 from modeling.threads import one_linear_algebra_thread
-from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, draw_surface
+from stimuli.planted.drawn import FORCES_N, SPEEDS_MM_S, DrawnSurface, alter_surface, draw_surface
 
 SURFACES = 40
 FIRST = 1000  # surfaces that no constant of the estimator was chosen by
@@ -90,7 +90,16 @@ def compared(
 
 def whole_grid(seed: int) -> list[dict[str, Any]]:
     """7 × 7 conditions: at them and half-way between them."""
-    surface = draw_surface(seed)
+    return on_whole_grid(draw_surface(seed), seed)
+
+
+def altered(seed: int) -> list[dict[str, Any]]:
+    """The same of surfaces that are shifted in frequency and have resonances and lines besides."""
+    return on_whole_grid(alter_surface(seed), seed)
+
+
+def on_whole_grid(surface: DrawnSurface, seed: int) -> list[dict[str, Any]]:
+    """Every model of one surface, recorded at 7 × 7 conditions."""
     nodes = [(v, f) for v in SPEEDS_MM_S for f in FORCES_N]
     places = {"at": nodes, "between": halfway(list(SPEEDS_MM_S), list(FORCES_N))}
     return compared(surface, surface.record(seed=seed), places)
@@ -244,7 +253,7 @@ def main() -> None:
     """Run the study and write its tables and picture."""
     stem = Path(__file__).with_suffix("")
     cases = {"": whole_grid, "_every_second": every_second_node, "_few_speeds": few_speeds}
-    cases["_scattered"] = scattered
+    cases |= {"_scattered": scattered, "_altered": altered}
     for suffix, make in cases.items():
         with one_linear_algebra_thread():
             table = run(make, SURFACES)

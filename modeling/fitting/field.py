@@ -303,10 +303,10 @@ def _climb_field(
         if now.levels is not None:
             level_tried = level + now.levels.step(field.records.blended(tried - theta))
         there = _looked_at(tried, level_tried, signs, observed, field)
-        value_there = there.cost + field.penalty(tried)
+        following = field.following(tried)
+        value_there = there.cost + following.penalty(tried)
         if value_there < value:
-            field = field.following(tried)
-            value_there = there.cost + field.penalty(tried)
+            field = following
             gained = value - value_there
             theta, level, now, value = tried, level_tried, there, value_there
             damping = max(damping / 10, LEAST_DAMPING)

@@ -9,6 +9,7 @@ from modeling.arrays import Floats
 from modeling.estimation.coherent import Observed
 from modeling.fitting.blending import Middles
 from modeling.fitting.equations import cells
+from modeling.fitting.joint_grid import LARGEST_DEFECT_DB
 
 RATE_HZ = 1000.0
 
@@ -70,3 +71,26 @@ def test_a_narrow_peak_that_moves_is_no_defect() -> None:
     middles = middles_of(2, 2)
     theta = np.log(np.array([(0.02, f, 10.0, 0.3) for f in (100.0, 100.0, 300.0, 300.0)]))
     assert middles.defects_db(theta, np.ones(1))[0] < 1.0
+
+
+def test_a_hole_where_a_peak_passes_is_seen() -> None:
+    """What lies under a moving peak turns its sign, and is missing beside the peak half-way."""
+    middles, signs = middles_of(2, 2), np.array([1.0, -1.0, 1.0])
+    rows = []
+    for corner in range(4):
+        gains = (2.0, 1.0) if corner < 2 else (1.0, 2.0)
+        moving = 60.0 if corner < 2 else 90.0
+        rows.append(np.log([1e-3, 100.0, 100.0, moving, 80.0, 80.0, 4.0, *gains, 5.0]))
+    theta = np.array(rows)
+    assert middles.defects_db(theta, signs)[0] > 5.0
+    theta[:, 7:9] = np.log([2.0, 1.0])
+    assert middles.defects_db(theta, signs)[0] < 1.0
+
+
+def test_peaks_that_meet_at_two_nodes_are_far_from_refused() -> None:
+    """A narrow peak passes a resting one, which doubles it at some nodes and not half-way."""
+    middles = middles_of(2, 2)
+    theta = np.log(
+        np.array([(0.02, 200.0, f, 20.0, 10.0, 0.3, 0.3) for f in (200.0, 200.0, 300.0, 300.0)])
+    )
+    assert middles.defects_db(theta, np.ones(2))[0] < LARGEST_DEFECT_DB / 2

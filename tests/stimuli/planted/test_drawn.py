@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import stimuli.planted
-from modeling import InputError, fit_texture
+from analysis.textures.between import halfway, truth_summary
+from modeling import InputError, fit_ar, fit_texture
 from modeling.recordings.spectrum import spectrum
-from stimuli.planted.drawn import FORCES_N, RATE_HZ, SPEEDS_MM_S, draw_surface
+from stimuli.planted.drawn import FORCES_N, RATE_HZ, SPEEDS_MM_S, alter_surface, draw_surface
 from tests.refusals import refused
 
 FREQUENCY_HZ = np.arange(15.0, 481.0)
@@ -107,6 +109,40 @@ def test_conditions_outside_are_refused(condition: tuple[float, float]) -> None:
         got=[f"{condition[0]:g} mm/s", f"{condition[1]:g} N"],
     ):
         draw_surface(0).magnitude(FREQUENCY_HZ, speed_mm_s=condition[0], force_n=condition[1])
+
+
+def test_altered_surfaces_are_shifted_and_have_peaks_besides() -> None:
+    """Without their peaks they are drawn ones at f / shift; each peak adds its height there."""
+    surface, drawn = alter_surface(5), draw_surface(5)
+    condition = {"speed_mm_s": 75.0, "force_n": 2.0}
+    bare = replace(surface, peaks=np.zeros((0, 4)))
+    expected = drawn.magnitude(FREQUENCY_HZ / surface.shift, **condition)
+    assert bare.magnitude(FREQUENCY_HZ, **condition) == pytest.approx(expected, rel=1e-12)
+    assert sorted(set(surface.peaks[:, 3])) == [0.0, 1.0]
+    for peak in surface.peaks:
+        one = replace(surface, peaks=peak[None])
+        at = peak[0] * 0.5 ** peak[3]  # half of the reference speed
+        half = np.array([at, at + peak[1] / 2])
+        added = one.magnitude(half, **condition) ** 2 - bare.magnitude(half, **condition) ** 2
+        assert added[0] == pytest.approx(2 * added[1])
+        level = 10 * np.log10(added[0] / bare.magnitude(at, **condition) ** 2)
+        assert level == pytest.approx(peak[2])
+
+
+def test_joint_is_nearer_to_altered_surfaces_than_ar_of_order_6() -> None:
+    """Three surfaces; a hundred others are in docs/studies/real_surfaces.md."""
+    middles = halfway(list(SPEEDS_MM_S), list(FORCES_N))
+    for seed in (9040, 9041, 9042):
+        surface = alter_surface(seed)
+        records = surface.record(seed=seed)
+        model = fit_texture(records)
+        distances = [
+            truth_summary(filter_at, surface, middles, frequency_hz=FREQUENCY_HZ)[0]
+            for filter_at in (model.peq, fit_ar(records, order=6).filter)
+        ]
+        assert distances[0] < 0.8 * distances[1]
+        assert model.fit is not None
+        assert model.fit.blend_defect_db <= 4.0
 
 
 def test_joint_is_as_close_between_conditions_as_at_them() -> None:
