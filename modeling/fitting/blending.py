@@ -18,8 +18,8 @@ from modeling.estimation.likelihood import split
 from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 REACH = 6.0  # of a moving peak to either side, in widths
-# In nepers (1.7 dB): peaks that meet at one corner and not in the middle are so far from the mean.
-MEETING = 0.2
+# In nepers: a peak that meets another one at two of four corners is twice as high there.
+MEETING = np.log(2) / 2
 # In log likelihood, per frequency: half of this times the square of what is beyond.
 HELD = 20.0
 # Places that move with a layer: from its frequency, in widths.

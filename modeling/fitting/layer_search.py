@@ -84,7 +84,12 @@ class Solution:
         What the misfit has above scatter, and as much for each parameter that the records
         determine as it costs in other records than these (Akaike 1974).
         """
-        return self._distance_db(self._excess + effective_parameters(self.fit))
+        return self._distance_db(self.lost)
+
+    @cached_property
+    def lost(self) -> float:
+        """The same in log likelihood."""
+        return self._excess + effective_parameters(self.fit)
 
     @cached_property
     def unexplained_db(self) -> float:
@@ -102,7 +107,12 @@ class Solution:
     @cached_property
     def distance_db(self) -> float:
         """Expected distance at the records and between them, where blends should be near nodes."""
-        return float(np.sqrt(self.at_db**2 + np.mean(self._defects_db**2)))
+        return float(np.hypot(self.at_db, self.between_db))
+
+    @cached_property
+    def between_db(self) -> float:
+        """What blends between the records add to the distance: the RMS of their defects."""
+        return float(np.sqrt(np.mean(self._defects_db**2)))
 
     @cached_property
     def blend_defect_db(self) -> float:
