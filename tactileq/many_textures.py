@@ -273,7 +273,10 @@ def _findings(found: Findings, start: Path, *, plot: bool) -> list[str]:
             lines.append(f"{name}: the same by {FIELD_OF_SPECTRA}, no layers: {sentence(without)}")
         if more := worth_recording(found.left_out):
             near = "; ".join(f"{speed:.4g} mm/s at {force:.3g} N" for speed, force in more)
-            lines.append(f"{name}: further conditions are worth recording near {near}")
+            lines.append(
+                f"{name}: predicted more than twice as badly as the median: {near}; "
+                "tactileq record --audio --more asks for conditions near them"
+            )
     for axis, unit in ((model.speeds_mm_s, "mm/s"), (model.forces_n, "N")):
         if axis.size == 1:
             other = "speeds" if unit == "mm/s" else "forces"
