@@ -229,6 +229,8 @@ def _panel(ax: Axes, table: pd.DataFrame, *, place: str) -> None:
             yerr=[[0.0], [row[f"{place}_95th_db"] - median]],
             fmt=LAYER_MARKERS[int(number) % len(LAYER_MARKERS)],
             color=colour,
+            # Colours and markers are used up once.
+            markerfacecolor=colour if int(number) < len(LAYER_COLOURS) else "white",
             capsize=3,
             markersize=8,
             label=f"{row['model']} ({row['numbers']:.0f} numbers)",
