@@ -242,7 +242,7 @@ def sentence(table: pd.DataFrame) -> str:
 
 
 def worth_recording(left_out: pd.DataFrame, *, most: int = 3) -> list[Condition]:
-    """Conditions near which further recordings help most, the worst predicted first.
+    """Conditions near which the model is poorest, the worst predicted first.
 
     Those left out that are predicted more than twice as badly as the median of all.
 

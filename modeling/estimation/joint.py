@@ -25,7 +25,7 @@ from modeling.estimation.coherent import (
     without_layer,
 )
 from modeling.estimation.layers import Layers, no_layers
-from modeling.estimation.likelihood import Power, bins_near, signal_power, split
+from modeling.estimation.likelihood import NEPER_DB, Power, bins_near, signal_power, split
 from modeling.estimation.peaks import Peaks, find_peaks_jointly, penalty, power_sum_misfit
 from modeling.recordings.spectrum import Spectrum
 
@@ -34,7 +34,6 @@ COHERENT_BY = 5.0
 FARTHEST_MOVE = 0.25  # of log frequency: what coherence does to a peak, and no change of places
 WIDTH_FACTOR = 5.0
 TRIED_SIGNS = 3
-NEPER_DB = 20 / np.log(10)
 
 
 def fit_jointly(spectrum: Spectrum) -> Layers:

@@ -30,6 +30,7 @@ SHAPE_RANGE = (0.8, 8.0)  # 1 is Lorentzian, 8 all but Gaussian
 NARROWEST_LINES = 1.5
 WIDEST_SHARE = 0.3
 LEAST_POWER = 1e-200
+NEPER_DB, NEPER_POWER_DB = 20 / np.log(10), 10 / np.log(10)  # of amplitudes and of powers
 WIDEST_LOG_GAIN = 50.0  # only so that nothing overflows
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.coherent import Observed, Response, response
 from modeling.estimation.compiled import held_by_cells, is_compiled
-from modeling.estimation.likelihood import split
+from modeling.estimation.likelihood import NEPER_DB, split
 from modeling.fitting.equations import STEP_OF_CORNERS, Blocks, of_cells
 
 REACH = 6.0  # of a moving peak to either side, in widths
@@ -24,11 +24,10 @@ MEETING = np.log(2) / 2
 HELD = 20.0
 # Places that move with a layer: from its frequency, in widths.
 AROUND = np.array([-1.5, -0.75, 0.0, 0.75, 1.5])
-NEPER_DB = 20 / np.log(10)
 
 
 class Held(NamedTuple):
-    """What holes cost, and its derivatives by the parameters of the nodes (N, p)."""
+    """What blends that are off cost, and its derivatives by the parameters of the nodes (N, p)."""
 
     cost: float
     information: Blocks
@@ -139,13 +138,14 @@ class Middles:
         middle = np.einsum("a,map->mp", self.shares, theta[self.corners])
         both, m = np.concatenate((middle, theta)), len(self.corners)
         moves, passed = self._moving(theta)
-        found = self._responses(both, signs, np.flatnonzero(moves.any(axis=0)))
+        layers = np.flatnonzero(moves.any(axis=0))
+        found = self._responses(both, signs, layers)
         level = 0.5 * np.log(found.power)
         corners = level[m:][self.corners]
         off = level[:m] - np.einsum("a,man->mn", self.shares, corners)
         lowest = np.full(off.shape, -1)
-        moving = np.repeat(moves[:, moves.any(axis=0)], AROUND.size, axis=1)
-        if moving.size:
+        moving = np.repeat(moves[:, layers], AROUND.size, axis=1)
+        if layers.size:
             n = passed.shape[1]
             fixed = np.where((self.shares > 0)[:, None], corners[:, :, :n], np.inf)
             lowest[:, :n] = np.where(passed, fixed.argmin(axis=1), -1)

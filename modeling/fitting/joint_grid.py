@@ -1,9 +1,9 @@
 """The `joint` estimator over a whole grid: the layers of a texture as one smooth field.
 
-Of the solutions that the search has found the likeliest is taken: by its evidence, so that a layer
-must say more than the freedom to say it costs, and by how well it predicts conditions that are
-hidden from it. Then the field learns its own smoothness from the texture
-docs/method/fitting.md#smooth-field, docs/method/fitting.md#model-choice.
+Of the solutions that the search has found the nearest is taken, by the distance that is expected
+from the true spectra at and between the conditions, with as few layers as are worth it. The field
+learns its own smoothness from the texture.
+docs/method/fitting.md#smooth-field, docs/method/fitting.md#model-choice
 """
 
 from __future__ import annotations
@@ -23,9 +23,8 @@ from modeling.estimation.coherent import (
     response,
     without_layer,
 )
-from modeling.estimation.joint import NEPER_DB
 from modeling.estimation.layers import Layers
-from modeling.estimation.likelihood import split
+from modeling.estimation.likelihood import NEPER_DB, split
 from modeling.fitting.blending import distances_db
 from modeling.fitting.equations import Blocks
 from modeling.fitting.field import (
@@ -143,7 +142,7 @@ def _summary(
             f"lies over {LARGEST_DEFECT_DB:g} dB from what its conditions suggest; fewer layers "
             "were taken"
         )
-    if solution.blend_defect_db > LARGEST_DEFECT_DB:
+    if not _holds(solution):
         warnings.append(
             f"between conditions the response lies {solution.blend_defect_db:.1f} dB from what its "
             f"conditions suggest (at most {LARGEST_DEFECT_DB:g} dB is usual); do not use the model "
@@ -191,11 +190,16 @@ def _held(grid: TextureGrid, count: int | None) -> tuple[list[Solution], bool]:
     Where none of them does fewer layers are searched; white noise alone always holds.
     """
     contenders = search(grid, count=count)
-    held = [found for found in contenders if found.blend_defect_db <= LARGEST_DEFECT_DB]
+    held = [found for found in contenders if _holds(found)]
     fewest = min(found.count for found in contenders)
     if held or not fewest:
         return held or contenders, False
     return _held(grid, fewest - 1)[0], True
+
+
+def _holds(solution: Solution) -> bool:
+    """Whether no blend has collapsed."""
+    return solution.blend_defect_db <= LARGEST_DEFECT_DB
 
 
 def _with_further(grid: TextureGrid, contenders: list[Solution]) -> list[Solution]:
@@ -208,7 +212,7 @@ def _with_further(grid: TextureGrid, contenders: list[Solution]) -> list[Solutio
         return contenders
     counts = [nearest.count + more for more in (1, 2) if nearest.count + more <= MOST_LAYERS]
     further = [found for count in counts for found in search(grid, count=count)]
-    return contenders + [f for f in further if f.blend_defect_db <= LARGEST_DEFECT_DB]
+    return contenders + [found for found in further if _holds(found)]
 
 
 def _straightened(grid: TextureGrid, solution: Solution) -> Solution:
@@ -269,8 +273,7 @@ def _completed(grid: TextureGrid, solution: Solution) -> Solution:
     if more is solution:
         return solution
     more = learned(grid, more.theta, more.signs, rounds=EM_ROUNDS)
-    holds = more.blend_defect_db <= LARGEST_DEFECT_DB
-    return more if holds and _worth(grid, more, fewer=solution) else solution
+    return more if _holds(more) and _worth(grid, more, fewer=solution) else solution
 
 
 def _merged(grid: TextureGrid, solution: Solution) -> Solution:

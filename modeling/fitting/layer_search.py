@@ -21,7 +21,7 @@ from modeling.arrays import Floats
 from modeling.equalizer.signs import neighbouring_patterns
 from modeling.estimation.coherent import Climbed, Observed, climb, observe, without_layer
 from modeling.estimation.given_count import starts_of
-from modeling.estimation.likelihood import split
+from modeling.estimation.likelihood import NEPER_POWER_DB, split
 from modeling.fitting.field import (
     FieldFit,
     effective_parameters,
@@ -45,7 +45,6 @@ LEAST_GAIN = 4.0
 DECIDING_CONDITIONS = 6
 STARTING_CONDITIONS = 2
 MOST_SPREAD_LAYERS = 3
-NEPER_POWER_DB = 10 / np.log(10)
 ALL_PATTERNS = 4  # up to so many layers every combination of signs is tried
 TRIED_SIGNS, TRIED_GROWTH, TRIED_REMOVALS, TRIED_STARTS = 2, 2, 2, 3
 CONTENDERS = 2  # per number of layers

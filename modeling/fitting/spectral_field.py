@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
-from modeling.estimation.likelihood import Power, signal_power
+from modeling.estimation.likelihood import NEPER_POWER_DB, Power, signal_power
 from modeling.fitting.conditions import only_unit, recording_spectra, spectra_by_condition
 from modeling.models.grid import Condition
 from modeling.recordings.recording import Recording
@@ -33,7 +33,6 @@ LENGTHS = (0.5, 1.0, 2.0, 4.0)  # of ln v and ln F, among which the likelihood c
 PRIOR_SD, PRIOR_LENGTH, PRIOR_CONDITIONS = 0.3, 1.0, 20.0
 ROUNDS, STEPS, SCORING_STEPS = 3, 4, 3
 LARGEST_EXCESS = 3.0  # of a line's power over what is expected, relative: no further in one step
-DB = 10 / np.log(10)
 
 
 class Eigen(NamedTuple):
@@ -130,7 +129,7 @@ class SpectralField:
         (s, u), (c, v) = self.space, self.covariance
         explained = (to_records @ u) ** 2 @ (c * c / (np.outer(s, c) + 1))
         variance = self.noise * (v * v @ np.maximum(own * c - explained, 0.0))
-        return np.asarray(DB * np.sqrt(variance))
+        return np.asarray(NEPER_POWER_DB * np.sqrt(variance))
 
 
 def fit_spectral_field(recordings: RecordingSet | Iterable[Recording]) -> SpectralField:

@@ -10,8 +10,8 @@ import numpy as np
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.estimation.coherent import Observed, limits_of, observe
-from modeling.estimation.likelihood import LOWEST_HZ, Power, signal_power, split
-from modeling.fitting.blending import NEPER_DB, Middles
+from modeling.estimation.likelihood import LOWEST_HZ, NEPER_DB, Power, signal_power, split
+from modeling.fitting.blending import Middles
 from modeling.fitting.equations import Corners, cells, corners_of
 from modeling.fitting.field import Field
 from modeling.models.grid import Condition

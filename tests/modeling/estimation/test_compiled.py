@@ -25,6 +25,15 @@ SOURCE = Path(__file__).with_name("slopes_bits.c")
 HEADER = Path(__file__).parents[3] / "modeling" / "estimation" / "slopes.h"
 RATE_HZ = 1000.0
 Result = TypeVar("Result")
+# Seed, rows, layers, bins, whether layers are extreme, and whether they are independent.
+CASES = given(
+    st.integers(0, 2**32),
+    st.integers(1, 6),
+    st.integers(0, 12),
+    st.integers(1, 90),
+    st.booleans(),
+    st.booleans(),
+)
 
 
 @pytest.fixture(autouse=True)
@@ -81,14 +90,7 @@ def assert_same(found: Floats, expected: Floats, *, beside: Floats | float = 0.0
 
 
 @settings(deadline=None, max_examples=200)
-@given(
-    st.integers(0, 2**32),
-    st.integers(1, 6),
-    st.integers(0, 12),
-    st.integers(1, 90),
-    st.booleans(),
-    st.booleans(),
-)
+@CASES
 def test_slopes_are_those_of_numpy(
     seed: int, rows: int, layers: int, bins: int, extreme: bool, independent: bool
 ) -> None:
@@ -103,14 +105,7 @@ def test_slopes_are_those_of_numpy(
 
 
 @settings(deadline=None, max_examples=100)
-@given(
-    st.integers(0, 2**32),
-    st.integers(1, 6),
-    st.integers(0, 12),
-    st.integers(1, 90),
-    st.booleans(),
-    st.booleans(),
-)
+@CASES
 def test_responses_are_those_of_numpy(
     seed: int, rows: int, layers: int, bins: int, extreme: bool, independent: bool
 ) -> None:
