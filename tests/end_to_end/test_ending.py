@@ -52,6 +52,28 @@ def test_what_nohup_ignores_stays_ignored() -> None:
         signal.signal(signal.SIGHUP, before)
 
 
+def test_a_signal_in_a_destructor_is_not_lost() -> None:
+    """Python ignores exceptions there (seen in a callback of a WeakSet while a window flipped)."""
+
+    class Destroyed:
+        def __del__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)
+            reached.append("after the signal")
+
+    def work() -> None:
+        with ended_by_signals():
+            Destroyed()
+            wait_for(lambda: False)
+
+    reached = list[str]()
+    hook = sys.unraisablehook
+    with pytest.raises(Interrupted) as ended:
+        work()
+    assert ended.value.signal_name == "SIGTERM"
+    assert reached == []
+    assert sys.unraisablehook is hook
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
 def test_workers_end_with_their_parent(tmp_path: Path, number: signal.Signals) -> None:
     script = Path(__file__).with_name("long_work.py")
