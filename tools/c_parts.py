@@ -20,6 +20,7 @@ MANY = ROOT / "modeling" / "rendering" / "many.h"
 MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
 SLOPES = ROOT / "modeling" / "estimation" / "slopes.h"
 RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
+SOUNDS = ROOT / "analysis" / "benches" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
@@ -66,7 +67,7 @@ def binding(
 
 kernel = binding("modeling.rendering._kernel", KERNEL)
 kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
-rivals = binding("analysis.benches._rivals", KERNEL, RIVALS, included=(LATTICE,))
+rivals = binding("analysis.benches._rivals", KERNEL, RIVALS, SOUNDS)
 many = binding(
     "modeling.rendering._many",
     KERNEL,

@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 from scipy.stats import linregress
 
+from analysis.benches.coefficients import tabled_predictor
 from analysis.benches.rivals import (
     AR,
     COMPILED,
@@ -34,7 +35,6 @@ from analysis.benches.rivals import (
     layered_texture,
     operations,
     predictor_of,
-    tabled_predictor,
 )
 from modeling import Renderer
 from modeling.arrays import Floats

@@ -9,25 +9,26 @@
 #ifndef TQ_RIVALS_H
 #define TQ_RIVALS_H
 
-#include "lattice.h" /* its tq_cosine */
+#include "kernel.h"
 
 #ifndef TQ_FLAGS
 #define TQ_FLAGS "flags unknown"
 #endif
 
-#define TQ_MOST_ORDER 40 /* of the autoregressive rival, whose order is even and at least 4 */
+#define TQ_MOST_ORDER 40 /* poles or zeros of the filter by its coefficients */
 
 /* The rivals. */
-enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_PREDICTOR };
+enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_COEFFICIENTS };
 
 /* Lanes that run side by side. */
 enum { TQ_GROUPS = TQ_SIDE_BY_SIDE / TQ_LANES };
 
-/* The state of any rival; all zeros, but for kind and key, is silence at position 0. */
+/* The state of any rival; all zeros, but for kind, key and numbers of poles (4 at least) and zeros of the
+   filter by its coefficients, is silence at position 0. */
 typedef struct {
-    int kind, order, since_update; /* the order of the autoregressive rival; 0 for the others */
+    int kind, poles, zeros, since_update;
     uint64_t key, position;
-    tq_real floor;       /* the noise gain now; the gain of the autoregressive rival */
+    tq_real floor;       /* the noise gain now; the gain of the filter by its coefficients */
     tq_real before[2];   /* the last two samples of noise */
     tq_real rows[6][40]; /* filter states and coefficients, one value per layer or lag */
 } tq_rival;
@@ -213,43 +214,24 @@ TQ_INLINE void tq_tpt_layers(tq_rival *s, int first, int width, const tq_real *w
     }
 }
 
-/* --- Autoregressive, by line spectral frequencies ---------------------------------------------- */
+/* --- A filter by its coefficients --------------------------------------------------------------- */
 
-/* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + order columns, the gain and the
-   line spectral frequencies (radians per sample), then anything. */
-enum { TQ_PAST, TQ_WEIGHTS };
+/* `layers` only tells how wide the table is: 1 + 3 layers >= 1 + poles + zeros columns, the gain and
+   the coefficients, then anything. y = x + sum b x' - sum a y', with x the noise times the gain. */
+enum { TQ_PAST, TQ_WEIGHTS, TQ_PAST_INPUT, TQ_INPUT_WEIGHTS };
 
-/* A(z) from half of the coefficients of its symmetric and its antisymmetric part, each the product
-   of factors 1 - 2 cos(w) / z + 1 / z^2; the two products run side by side. */
-TQ_INLINE void tq_predictor_order_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand, int order)
+TQ_INLINE void tq_coefficients_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand)
 {
-    tq_real middle[TQ_MOST_ORDER], half[TQ_MOST_ORDER / 2 + 1][2], *a = s->rows[TQ_WEIGHTS];
-    int i, j, k;
+    int i;
     s->floor = tq_blend(hand, 0) * hand->ramp;
-    for (i = 0; i < order; i++)
-        middle[i] = -2 * tq_cosine(tq_blend_at(hand, 1 + i));
-    for (k = 0; k < 2; k++)
-        half[0][k] = 1, half[1][k] = middle[k];
-    for (i = 2; i <= order / 2; i++) {
-        const tq_real *b = middle + 2 * (i - 1);
-        for (k = 0; k < 2; k++)
-            half[i][k] = b[k] * half[i - 1][k] + 2 * half[i - 2][k];
-        for (j = i - 1; j > 1; j--)
-            for (k = 0; k < 2; k++)
-                half[j][k] += b[k] * half[j - 1][k] + half[j - 2][k];
-        for (k = 0; k < 2; k++)
-            half[1][k] += b[k];
-    }
-    for (i = 1; i <= order / 2; i++) {
-        tq_real symmetric = half[i][0] + half[i - 1][0], anti = half[i][1] - half[i - 1][1];
-        a[i - 1] = (tq_real)0.5 * (symmetric + anti);
-        a[order - i] = (tq_real)0.5 * (symmetric - anti);
-    }
+    for (i = 0; i < s->poles; i++)
+        s->rows[TQ_WEIGHTS][i] = tq_blend_at(hand, 1 + (size_t)i);
+    for (i = 0; i < s->zeros; i++)
+        s->rows[TQ_INPUT_WEIGHTS][i] = tq_blend_at(hand, 1 + (size_t)(s->poles + i));
 }
 
 /* Four samples at once as far as the past goes, then one after the other. */
-TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real *out, int count,
-                                         int order)
+TQ_INLINE void tq_all_pole(tq_rival *s, const tq_real *x, tq_real *out, int count, int order)
 {
     tq_real past[TQ_MOST_ORDER + TQ_CHUNK], a[TQ_MOST_ORDER + 1], *y = past + order;
     int n = 0, i, lag;
@@ -258,7 +240,7 @@ TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real 
     for (; n + 4 <= count; n += 4) {
         tq_real sum[4];
         for (i = 0; i < 4; i++)
-            sum[i] = s->floor * w[n + i];
+            sum[i] = x[n + i];
         for (lag = order; lag > 3; lag--)
             for (i = 0; i < 4; i++)
                 sum[i] -= a[lag] * y[n + i - lag];
@@ -266,7 +248,7 @@ TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real 
             y[n + i] = sum[i] - a[3] * y[n + i - 3] - a[2] * y[n + i - 2] - a[1] * y[n + i - 1];
     }
     for (; n < count; n++) {
-        tq_real sum = s->floor * w[n];
+        tq_real sum = x[n];
         for (lag = order; lag > 0; lag--)
             sum -= a[lag] * y[n - lag];
         y[n] = sum;
@@ -275,24 +257,38 @@ TQ_INLINE void tq_predictor_order_filter(tq_rival *s, const tq_real *w, tq_real 
     memcpy(s->rows[TQ_PAST], y + count - order, (size_t)order * sizeof(tq_real));
 }
 
-/* A constant order lets the compiler unroll. */
-#define TQ_BY_ORDER(work, s, ...)                          \
-    switch ((s)->order) {                                  \
-    case 6: work((s), __VA_ARGS__, 6); break;              \
-    case 12: work((s), __VA_ARGS__, 12); break;            \
-    case 20: work((s), __VA_ARGS__, 20); break;            \
-    case 40: work((s), __VA_ARGS__, 40); break;            \
-    default: work((s), __VA_ARGS__, (s)->order); break;    \
-    }
-
-TQ_INLINE void tq_predictor_update(tq_rival *TQ_RESTRICT s, const tq_hand *hand)
+/* The zeros; samples are independent. */
+TQ_INLINE void tq_all_zero(tq_rival *s, tq_real *x, int count)
 {
-    TQ_BY_ORDER(tq_predictor_order_update, s, hand)
+    tq_real past[TQ_MOST_ORDER + TQ_CHUNK], *in = past + s->zeros;
+    int n, lag;
+    memcpy(past, s->rows[TQ_PAST_INPUT], (size_t)s->zeros * sizeof(tq_real));
+    memcpy(in, x, (size_t)count * sizeof(tq_real));
+    for (lag = 1; lag <= s->zeros; lag++) {
+        tq_real b = s->rows[TQ_INPUT_WEIGHTS][lag - 1];
+        for (n = 0; n < count; n++)
+            x[n] += b * in[n - lag];
+    }
+    memcpy(s->rows[TQ_PAST_INPUT], in + count - s->zeros, (size_t)s->zeros * sizeof(tq_real));
 }
 
-TQ_INLINE void tq_predictor_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
+/* A constant order lets the compiler unroll. */
+TQ_INLINE void tq_coefficients_filter(tq_rival *s, const tq_real *w, tq_real *out, int count)
 {
-    TQ_BY_ORDER(tq_predictor_order_filter, s, w, out, count)
+    tq_real x[TQ_CHUNK];
+    int n;
+    for (n = 0; n < count; n++)
+        x[n] = s->floor * w[n];
+    if (s->zeros)
+        tq_all_zero(s, x, count);
+    switch (s->poles) {
+    case 6: tq_all_pole(s, x, out, count, 6); break;
+    case 8: tq_all_pole(s, x, out, count, 8); break;
+    case 12: tq_all_pole(s, x, out, count, 12); break;
+    case 20: tq_all_pole(s, x, out, count, 20); break;
+    case 40: tq_all_pole(s, x, out, count, 40); break;
+    default: tq_all_pole(s, x, out, count, s->poles); break;
+    }
 }
 
 /* --- The call ---------------------------------------------------------------------------------- */
@@ -303,7 +299,7 @@ TQ_INLINE void tq_rival_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, con
     case TQ_DIRECT:
     case TQ_TRANSPOSED: tq_direct_update(t, s, hand); break;
     case TQ_TPT: tq_tpt_update(t, s, hand); break;
-    default: tq_predictor_update(s, hand); break;
+    default: tq_coefficients_update(s, hand); break;
     }
 }
 
@@ -314,7 +310,7 @@ TQ_INLINE void tq_rival_filter(const tq_texture *t, tq_rival *s, const tq_real *
     case TQ_DIRECT: tq_all_layers(t, s, w, out, count, tq_direct_layers); break;
     case TQ_TRANSPOSED: tq_all_layers(t, s, w, out, count, tq_transposed_layers); break;
     case TQ_TPT: tq_all_layers(t, s, w, out, count, tq_tpt_layers); break;
-    default: tq_predictor_filter(s, w, out, count); break;
+    default: tq_coefficients_filter(s, w, out, count); break;
     }
 }
 

@@ -11,13 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
+from analysis.benches.coefficients import CoefficientTable
+from analysis.benches.stored_sounds import Grains, Loops
 from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.arrays import Floats
 from modeling.errors import counted
 from modeling.fitting.autoregressive import fit_filter
 from modeling.models.line_spectral import line_spectral_frequencies
-from modeling.models.parameter_table import ParameterTable
-from modeling.rendering.compiled import CompiledEngine
+from modeling.rendering.compiled import CompiledEngine, filled_texture
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import LayeredModel, RenderPlan
 from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
@@ -28,8 +29,8 @@ KERNEL, DIRECT, TRANSPOSED = "kernel", "direct form I", "direct form II"
 TPT, AR = "TPT", f"AR({ORDER})"
 FORMS = (DIRECT, TRANSPOSED)
 COMPILED = (KERNEL, DIRECT, TRANSPOSED, TPT, AR)
-_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2}
-_PREDICTOR = 3
+COEFFICIENTS = "coefficients"
+_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3, COEFFICIENTS: 3}
 _SPECTRUM_SAMPLES = 5000
 
 
@@ -99,27 +100,6 @@ def predictor_of(texture: TextureModel) -> ARModel:
     )
 
 
-class Tabled(NamedTuple):
-    """What a stream in C reads of a model: its rate and its table."""
-
-    rate_hz: float
-    table: ParameterTable
-
-
-def tabled_predictor(model: ARModel) -> Tabled:
-    """Gain and line spectral frequencies as `rivals.h` reads them: padded to 1 + 3m columns."""
-    layers = -(-model.order // 3)
-    padding = np.zeros((*model.gains.shape, 3 * layers - model.order))
-    columns = (model.gains[..., None], model.line_spectral_frequencies, padding)
-    table = ParameterTable(
-        speeds_mm_s=model.speeds_mm_s,
-        forces_n=model.forces_n,
-        values=np.concatenate(columns, axis=-1),
-        signs=np.zeros(layers),
-    )
-    return Tabled(model.rate_hz, table)
-
-
 class Operations(NamedTuple):
     """What a form needs for each sample, beside the noise: its products and its sums."""
 
@@ -136,21 +116,16 @@ def operations(name: str, layers: int) -> Operations:
     return Operations(products * layers + of_branch[0], sums * layers + of_branch[1])
 
 
-def order_of(name: str) -> int:
-    """The order of an autoregressive rival, `AR(20)`; 0 of the others."""
-    return int(name[3:-1]) if name.startswith("AR(") else 0
-
-
 class CompiledStream:
     """The kernel or one of its rivals in C, called without anything of Python around it.
 
     Parameters
     ----------
     name : str
-        One of `COMPILED`, or "AR(p)" with another even order p, 4 … 40.
+        One of `COMPILED`, or `COEFFICIENTS`.
     model : LayeredModel
-        At most 40 layers, rendered at its own rate (the kernel: at any); a `tabled_predictor` for
-        the autoregressive rival.
+        At most 40 layers, rendered at its own rate (the kernel: at any); a `CoefficientTable` for
+        `AR` and `COEFFICIENTS`.
     update_samples : int
     seed : int
         Of the noise.
@@ -178,8 +153,9 @@ class CompiledStream:
             self._state = self._of_engine("tq_state *", self._engine._state)
             self._call = lib.tq_kernel_calls
         else:
-            kind, order = _KINDS.get(name, _PREDICTOR), order_of(name)
-            state = {"kind": kind, "order": order, "key": int(key)}
+            state = {"kind": _KINDS[name], "key": int(key)}
+            if isinstance(model, CoefficientTable):
+                state |= {"poles": model.poles, "zeros": model.zeros}
             self._state = self._ffi.new("tq_rival *", state)
             self._call = lib.tq_rival_calls
 
@@ -212,6 +188,46 @@ class CompiledStream:
             calls(output.size, max(block, 1))
 
         return run
+
+
+class SoundStream:
+    """Stored sounds played by C (`sounds.h`), called without anything of Python around it.
+
+    Parameters
+    ----------
+    sounds : Loops or Grains
+        Grains have a hand of their own interval, half a block.
+    update_samples : int
+    seed : int
+        Of the places from which grains are taken; loops always start at their beginning.
+    """
+
+    def __init__(self, sounds: Loops | Grains, *, update_samples: int, seed: int) -> None:
+        self._ffi, lib = compiled_parts("analysis.benches._rivals")
+        plan = RenderPlan(rate_hz=sounds.rate_hz, update_samples=update_samples)
+        self._texture, self._arrays = filled_texture(self._ffi, plan.texture(sounds), np.float64)
+        samples = np.ascontiguousarray(sounds.samples)
+        state = {"sounds": self._ffi.from_buffer("int16_t[]", samples), "length": sounds.length}
+        if isinstance(sounds, Grains):
+            window = sounds.window
+            state |= {"window": self._ffi.from_buffer("double[]", window), "grain": sounds.block}
+            self._arrays += [window]
+            self._state = self._ffi.new("tq_grains *", state | {"drawn": int(stream_key(seed))})
+            self._call = lib.tq_grains_render
+        else:
+            self._state, self._call = self._ffi.new("tq_loops *", state), lib.tq_loops_render
+        self._arrays += [samples, *state.values()]
+
+    def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
+        """The next samples for (n,) speeds and forces, both float64."""
+        output = np.empty(speed_mm_s.size)
+        self.calls(speed_mm_s, force_n, output)()
+        return output
+
+    def calls(self, speed_mm_s: Floats, force_n: Floats, output: Floats) -> Callable[[], None]:
+        """What renders into `output`, (n,), in one call."""
+        arrays = [self._ffi.from_buffer("double[]", x) for x in (speed_mm_s, force_n, output)]
+        return lambda: self._call(self._texture, self._state, *arrays, output.size)
 
 
 class SosfiltStream:

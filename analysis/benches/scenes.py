@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from analysis.benches.chart.fitted import predictor_cost
+from analysis.benches.chart.rival_costs import coefficients_cost
+from analysis.benches.coefficients import CoefficientTable, tabled_predictor
 from analysis.columns import SIMULATED, Column, names
 from analysis.textures.between import RIVAL_ORDER, Truth
 from modeling import ARModel, CompiledScene, Scene, TextureModel, fit_texture
@@ -24,7 +25,7 @@ from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.compiler import compile_scenes
 from modeling.scenes.cost import stored_numbers
 from modeling.scenes.measures import Errors, Yardstick, errors_between
-from modeling.scenes.places import enclosing, places_of
+from modeling.scenes.places import Places, enclosing, places_of
 from modeling.scenes.strokes import Windows, windows_kept
 from stimuli.planted.drawn import draw_surface
 
@@ -171,25 +172,24 @@ def _rival_costs(
     for texture in compiled.textures:
         rival = surfaces[texture.texture].rival
         places = places_of(texture.full, compiled.scene.hand)
-        inside = [
-            int(enclosing(axis, asked).sum())
-            for axis, asked in (
-                (rival.speeds_mm_s, places.speed_range),
-                (rival.forces_n, places.force_range),
-            )
-        ]
-        conditions = int(np.prod(inside))
-        numbers += conditions * rival.n_parameters
+        numbers += _nodes_within(places, rival) * rival.n_parameters
         costs.append(
-            predictor_cost(
+            coefficients_cost(
                 rival.order,
-                conditions=conditions,
+                0,
+                nodes=_nodes_within(places, tabled_predictor(rival)),
                 update_samples=texture.plan.update_samples,
                 single=False,
             )
         )
     size = sum(cost.table_bytes for cost in costs) + max(cost.state_bytes for cost in costs)
     return numbers, size, max(cost.operations for cost in costs)
+
+
+def _nodes_within(places: Places, model: ARModel | CoefficientTable) -> int:
+    """How many nodes of a grid a hand needs."""
+    axes = (model.speeds_mm_s, places.speed_range), (model.forces_n, places.force_range)
+    return int(np.prod([enclosing(*axis).sum() for axis in axes]))
 
 
 def _judged(texture: CompiledTexture, scene: Scene, surface: Surface) -> dict[str, Errors]:

@@ -13,8 +13,17 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from analysis.benches.chart.chart import Chart
 from analysis.benches.chart.judging import AT, BETWEEN, LOADED, STROKING
-from analysis.benches.chart.methods import OURS, TRUTH, WHITE
-from analysis.benches.chart.summary import competing, default_rows, front_of
+from analysis.benches.chart.methods import (
+    AUTOREGRESSIVE,
+    GRAINS,
+    LOOPS,
+    OURS,
+    POLE_ZERO,
+    SHAPED,
+    TRUTH,
+    WHITE,
+)
+from analysis.benches.chart.summary import default_rows, front_of
 from analysis.benches.chart.surfaces import Kind, counted_kind
 from analysis.figures.drawing import (
     BLACK,
@@ -38,8 +47,11 @@ STYLES: dict[str, tuple[str, str, bool]] = {
     "simplified": (SKY_BLUE, "D", False),
     "regressed": (GREEN, "P", False),
     "paper": (VERMILLION, "X", False),
-    "autoregressive": (ORANGE, "s", True),
-    "FFT-shaped noise": (PURPLE, "^", True),
+    AUTOREGRESSIVE: (ORANGE, "s", True),
+    POLE_ZERO: (ORANGE, "d", False),
+    LOOPS: (PURPLE, "p", False),
+    GRAINS: (PURPLE, "<", False),
+    SHAPED: (PURPLE, "^", False),
     "white noise": (GREY, "v", False),
     "truth": (BLACK, "_", False),
     LOADED: (BLACK, "h", False),
@@ -54,6 +66,15 @@ SHORT = {
     "regressed, centroid": "centroid",
     "FFT, 1/16 s": "1/16 s",
     "FFT, 1/4 s": "1/4 s",
+    "grains, 1/16 s": "1/16 s",
+    "grains, 1/4 s": "1/4 s",
+    "IIR, 2 sections": "2 sections",
+    "IIR, 4 sections": "4 sections",
+    "joint, direct form": "direct form",
+    "loops of joint": "joint",
+    "loops of joint, at conditions": "at conditions",
+    "loops of field": "field",
+    "loops of spectra": "spectra",
     "white noise": "floor",
 }
 
@@ -69,9 +90,9 @@ class Panel(NamedTuple):
 
 OPERATIONS = "operations per sample at 5 kHz"
 PANELS = (
-    Panel("operations", OPERATIONS, AT, "at the recorded conditions"),
-    Panel("operations", OPERATIONS, BETWEEN, "between them"),
-    Panel("operations", OPERATIONS, STROKING, "during strokes, any update interval"),
+    Panel("operations", OPERATIONS, AT, "at rest at the recorded conditions"),
+    Panel("operations", OPERATIONS, BETWEEN, "at rest between them"),
+    Panel("operations", OPERATIONS, STROKING, "during strokes"),
     Panel("numbers", "numbers stored", BETWEEN, "between the conditions"),
 )
 
@@ -91,10 +112,8 @@ def figure_chart(chart: Chart, kind: Kind) -> Figure:
     count = int(summary["surfaces"].max())
     figure.supxlabel(
         f"{counted_kind(count, kind)}; markers: medians with default rendering (updates each ms, "
-        "FFT by blocks), bars: quartiles over surfaces;\ndots: other updates and blendings; black "
-        "line: the front, which no variant beats in both; numbers: layers, orders;\noperations of "
-        "autoregressive filters include computing coefficients at every update; ours are read from "
-        "a table",
+        "grains and FFT by blocks), bars: quartiles over surfaces;\ndots: other updates and "
+        "blendings; black line: the front, which no variant beats in both; numbers: layers, orders",
         fontsize=8.5,
         color=GREY,
     )
@@ -115,9 +134,10 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
     ax = axes_or_new(ax)
     error = f"{panel.place}_distance_db"
     usual = default_rows(summary)
-    every = competing(summary, panel.place)
-    ax.plot(every[panel.cost], every[error], ".", color=GREY, alpha=0.35, markersize=4, zorder=1)
-    _plot_front(every, panel, ax=ax)
+    ax.plot(
+        summary[panel.cost], summary[error], ".", color=GREY, alpha=0.35, markersize=4, zorder=1
+    )
+    _plot_front(summary, panel, ax=ax)
     for family, rows in usual.groupby("family", sort=False):
         _plot_family(rows, str(family), panel, ax=ax)
     _name_points(usual, panel.cost, error, ax=ax)
@@ -188,8 +208,13 @@ def _plot_front(every: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
     error = f"{panel.place}_distance_db"
     front = front_of(every[every[error].gt(0)], cost=panel.cost, error=error)
     ax.step(front[panel.cost], front[error], where="post", color=BLACK, linewidth=1.1, zorder=2)
-    if panel.place != STROKING:
-        return
+    _name_front(front, panel, ax=ax)
+    if panel.place == STROKING:
+        _draw_late_truth(every, error, ax=ax)
+
+
+def _draw_late_truth(every: pd.DataFrame, error: str, *, ax: Axes) -> None:
+    """What late updates alone cost."""
     for _, row in every[every["method"] == TRUTH].drop_duplicates(error).iterrows():
         if row["update_ms"] > 1:
             ax.axhline(row[error], color=BLACK, linewidth=0.7, linestyle=":", zorder=1)
@@ -203,8 +228,14 @@ def _plot_front(every: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
                 va="bottom",
                 fontsize=6.5,
             )
-    for _, row in front.iterrows():
-        if row["update_ms"] > 1 and row["method"] != WHITE:
+
+
+def _name_front(front: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
+    """Names of variants on the front that are not default rendering."""
+    error = f"{panel.place}_distance_db"
+    usual = default_rows(front).index
+    for index, row in front.iterrows():
+        if index not in usual and row["method"] != WHITE:
             ax.annotate(
                 f"{_short(row['method'])}: {row['update_ms']:g} ms",
                 (row[panel.cost], row[error]),

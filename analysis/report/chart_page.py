@@ -67,6 +67,9 @@ _SYMBOLS = {
     "X": "x",
     "s": "square",
     "^": "triangle-up",
+    "<": "triangle-left",
+    "d": "diamond-tall",
+    "p": "pentagon",
     "v": "triangle-down",
     "_": "line-ew",
     "h": "hexagon",
@@ -75,25 +78,33 @@ FIRST_MEASURE = "stroking_distance_db"
 
 SHOWN_COMPARISONS = without(
     COMPARISON_COLUMNS,
-    *("operations_low", "operations_high", "numbers_low", "numbers_high", "verdict", "sentence"),
+    *(
+        "operations_low",
+        "operations_high",
+        "numbers_low",
+        "numbers_high",
+        "bytes_low",
+        "bytes_high",
+    ),
+    *("fit_low", "fit_high", "at_low", "at_high", "verdict", "sentence"),
 )
 METHODS_NOTE = (
     "Medians over the surfaces for the default rendering: each method with its own blending "
-    "between conditions, parameter updates every millisecond (FFT-shaped noise: every block) and "
+    "between conditions, parameter updates every millisecond (grains and FFT-shaped noise: every "
+    "block) and "
     "double precision. Operations are counted at 5 kHz and include updates; at most: a sample with "
     "an update. Layers: n/a for methods without layers. Distances are log-spectral distances from "
     "the known truth or, for recordings, from their smoothed spectra; during strokes: while the "
     "hand moves to and fro. Time: rendering alone, all methods in turn in one process; FFT-shaped "
-    "noise in NumPy. Operations and times of autoregressive filters include the computation of "
-    "their coefficients at every update, whereas ours read them from a table: the two cannot be "
-    "compared."
+    "noise in NumPy."
 )
 COMPARISON_NOTE = (
     "Ratios of the rival to joint: geometric means over surfaces, with 95% intervals from "
-    "Student's t of the logarithms. One method dominates another if it needs no more operations "
-    "and is closer to the truth, with the upper limits of both intervals at most 1. Operations of "
-    "autoregressive filters are not compared: they include the computation of coefficients at "
-    "every update, whereas ours are read from a table."
+    "Student's t of the logarithms. A variant is a method with an update interval and a blending. "
+    "One variant dominates another if it needs no more operations and is closer to the truth, with "
+    "the upper limits of both intervals at most 1; one method dominates another if each variant of "
+    "that one is dominated by one of its own (ours: all methods with layers). This is judged at "
+    "rest between the conditions and during strokes."
 )
 
 
@@ -131,9 +142,7 @@ def chart_pictures(chart: Chart) -> tuple[Picture, ...]:
             f"chart_{kind}",
             f"Speed against accuracy: {KINDS[kind]}",
             "Farther left is cheaper, lower is closer to the truth. The black line connects the "
-            "variants that no other variant beats in both. Autoregressive filters appear too far "
-            "to the right: their coefficients are computed at every update, whereas ours are read "
-            "from a table. How to read the chart: docs/chart.md.",
+            "variants that no other variant beats in both. How to read the chart: docs/chart.md.",
             figure_chart(chart, kind),
             bool(chart.summary["simulated"].any()),
         )

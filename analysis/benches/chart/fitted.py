@@ -10,22 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.benches.accuracy import rendered_parameters
-from analysis.benches.chart.shaped_noise import ShapedFilter, ShapedNoise
+from analysis.benches.chart.rival_costs import COST_RATE_HZ
 from analysis.textures.between import Truth
-from modeling import ARModel, RegressedModel, Renderer, TextureModel
+from modeling import RegressedModel, Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.models.parameter_table import Parameters
 from modeling.models.texture_model import BLENDINGS, first_peq
-from modeling.rendering.cost import Cost, Operations
+from modeling.rendering.cost import Cost
 from modeling.rendering.plan import RenderPlan
 from modeling.rendering.reference.hand import Extrapolator
 from modeling.scenes.cost import stored_numbers
 from modeling.similarity import SpectralFilter
 from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
-
-# All costs are those of rendering at this rate, whatever the rate of the recordings.
-COST_RATE_HZ = 5000.0
 
 
 class Fitted(Protocol):
@@ -115,80 +112,6 @@ class Layered:
 
 
 @dataclass(frozen=True, eq=False)
-class Predictor:
-    """An autoregressive model over a grid; line spectral frequencies are blended."""
-
-    model: ARModel
-    layers: int = -1
-
-    @property
-    def numbers(self) -> int:
-        return self.model.gains.size * self.model.n_parameters
-
-    def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
-        return self.model.filter(speed_mm_s, force_n)
-
-    def moving(
-        self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
-    ) -> list[SpectralFilter]:
-        course = extrapolated(hand, update_samples, rate_hz=rate_hz)
-        return [self.filter(*at(course, place // update_samples)) for place in places]
-
-    def cost(self, update_ms: float, *, single: bool) -> Cost:
-        return predictor_cost(
-            self.model.order,
-            conditions=self.model.gains.size,
-            update_samples=update_samples(update_ms, COST_RATE_HZ),
-            single=single,
-        )
-
-
-@dataclass(frozen=True, eq=False)
-class Shaped:
-    """Noise shaped by FFT; a block's length is its update interval."""
-
-    model: ShapedNoise
-    block_s: float
-    layers: int = -1
-
-    @property
-    def interval_ms(self) -> float:
-        """From one block to the next at 5 kHz."""
-        return 1e3 * block_samples(self.block_s, COST_RATE_HZ) / 2 / COST_RATE_HZ
-
-    @property
-    def numbers(self) -> int:
-        return self.model.magnitudes.size
-
-    def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
-        return self.model.filter(speed_mm_s, force_n)
-
-    def moving(
-        self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
-    ) -> list[SpectralFilter]:
-        """Two blocks sound at a time; each is for where the hand should be in its middle."""
-        half = self.model.block // 2
-        return [self._overlapping(hand, place, half=half) for place in places]
-
-    def _overlapping(self, hand: Hand, place: int, *, half: int) -> ShapedFilter:
-        newer, into = divmod(place, half)
-        share = np.sin(np.pi / 2 * (into + 0.5) / half) ** 2
-        filters = [self._block(hand, block * half, half) for block in (newer - 1, newer)]
-        power = [(1 - share) * filters[0].magnitude ** 2, share * filters[1].magnitude ** 2]
-        return replace(filters[0], magnitude=np.sqrt(power[0] + power[1]))
-
-    def _block(self, hand: Hand, start: int, half: int) -> ShapedFilter:
-        last, now = (max(sample, 0) for sample in (start - half, start))
-        speed, force = (2 * reading[now] - reading[last] for reading in hand)
-        return self.model.filter(float(speed), float(force))
-
-    def cost(self, update_ms: float, *, single: bool) -> Cost:
-        return shaped_noise_cost(
-            block_samples(self.block_s, COST_RATE_HZ), numbers=self.numbers, single=single
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class Itself:
     """The truth as the best possible method; its only error is late parameters."""
 
@@ -227,83 +150,20 @@ class _TrueFilter:
 
 def extrapolated(hand: Hand, update_samples: int, *, rate_hz: float) -> Hand:
     """The hand in the middle of each update, as the renderer extrapolates it from readings."""
+    return _extrapolated(hand, update_samples, rate_hz=rate_hz)[0]
+
+
+def extrapolated_to_ends(hand: Hand, update_samples: int, *, rate_hz: float) -> Hand:
+    """The same at the last sample of each update."""
+    return _extrapolated(hand, update_samples, rate_hz=rate_hz)[1]
+
+
+def _extrapolated(hand: Hand, update_samples: int, *, rate_hz: float) -> tuple[Hand, Hand]:
     plan = RenderPlan(rate_hz=rate_hz, update_samples=update_samples)
     readings = Hand(*(reading[::update_samples] for reading in hand))
-    amid, _ = Extrapolator(plan, (SPEEDS_MM_S, FORCES_N))(readings)
-    return amid
+    return Extrapolator(plan, (SPEEDS_MM_S, FORCES_N))(readings)
 
 
 def at(hand: Hand, index: int) -> tuple[float, float]:
     """Speed without direction and force at one place."""
     return abs(float(hand.speed_mm_s[index])), float(hand.force_n[index])
-
-
-def block_samples(block_s: float, rate_hz: float) -> int:
-    """Length of an FFT block: the power of two next to so many seconds."""
-    return int(2 ** np.rint(np.log2(block_s * rate_hz)))
-
-
-# --- Operations, counted (tests/analysis/benches/test_counted_rivals.py counts them)
-
-_CHUNK = 64  # samples that a stream keeps of its noise, as the kernel does
-_EXTRAPOLATING = Operations(14, 6, 4, 0)
-_READING = Operations(12, 5, 2, 0)  # the place in the grid, and one value of it
-_BLENDED = Operations(6, 6, 0, 0)  # another value
-_NOISE = Operations(1, 2, 0, 0)  # a number of noise
-
-
-def predictor_cost(order: int, *, conditions: int, update_samples: int, single: bool) -> Cost:
-    """An autoregressive filter of even order p ≥ 4 in direct form (`rivals.h`).
-
-    An update turns p line spectral frequencies into coefficients; as often as not every sample, the
-    hand is extrapolated as by the kernel.
-    """
-    p, real_bytes = order, 4 if single else 8
-    update = Operations((p * p + 34 * p) // 2 + 12, (p * p + 78 * p) // 4 + 5, 2, 0)
-    return Cost(
-        per_sample=_sum((1, Operations(p, p + 1, 0, 0)), (1, _NOISE)),
-        per_update=_sum((1, update), (int(update_samples > 1), _EXTRAPOLATING)),
-        update_samples=update_samples,
-        table_bytes=conditions * (p + 1) * real_bytes,
-        state_bytes=(2 * p + 1 + _CHUNK) * real_bytes,
-        bytes_per_sample=(2 * p + 3) * real_bytes,
-        bytes_per_update=4 * (p + 1) * real_bytes,
-    )
-
-
-def shaped_noise_cost(block: int, *, numbers: int, single: bool) -> Cost:
-    """Noise shaped by a real inverse FFT of n = 2^k samples every n/2 of them.
-
-    The FFT by split radix: n/2·(3·log2 n − 5) + 4 sums and n/2·(log2 n − 3) + 2 products (Sorensen,
-    Jones, Heideman and Burrus 1987, "Real-valued fast Fourier transform algorithms"). Everything is
-    due when a block begins.
-    """
-    n, real_bytes = block, 4 if single else 8
-    power = round(np.log2(n))
-    transform = Operations(n // 2 * (3 * power - 5) + 4, n // 2 * (power - 3) + 2, 0, 0)
-    shaping = Operations(n // 2, 2 * n, 0, 0)  # magnitudes, window, overlap
-    return Cost(
-        per_sample=Operations(0, 0, 0, 0),
-        per_update=_sum(
-            (1, _READING),
-            (n // 2, _BLENDED),
-            (n, _NOISE),
-            (1, transform),
-            (1, shaping),
-            (1, _EXTRAPOLATING),
-        ),
-        update_samples=n // 2,
-        table_bytes=numbers * real_bytes,
-        state_bytes=2 * n * real_bytes,
-        bytes_per_sample=0,
-        bytes_per_update=(4 * (n // 2 + 1) + 4 * n) * real_bytes,
-    )
-
-
-def _sum(*parts: tuple[int, Operations]) -> Operations:
-    return Operations(
-        *(
-            sum(times * getattr(of, name) for times, of in parts)
-            for name in ("additions", "multiplications", "divisions", "square_roots")
-        )
-    )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.benches.chart.fitted import Fitted, Layered, Predictor, Shaped, update_samples
+from analysis.benches.chart.fitted import Fitted, Layered, update_samples
 from analysis.benches.chart.measures import (
     Accuracy,
     RecordYardstick,
@@ -19,6 +19,7 @@ from analysis.benches.chart.measures import (
     over_conditions,
 )
 from analysis.benches.chart.methods import TRUTH, Fit, Subject, fit_method
+from analysis.benches.chart.rival_fits import ByBlock, Filtered
 from analysis.benches.chart.surfaces import Material, Source, judged_stroke, load_material
 from analysis.textures.between import Measured
 from modeling import ARModel, InputError
@@ -93,7 +94,7 @@ def _loaded(source: Source) -> list[Fit]:
     fits = []
     for name, path in source.models:
         model = load_model(path)
-        fitted = Predictor(model) if isinstance(model, ARModel) else Layered(model)
+        fitted = Filtered.of(model) if isinstance(model, ARModel) else Layered(model)
         fits.append(Fit(name, LOADED, fitted, float("nan")))
     return fits
 
@@ -145,9 +146,9 @@ class _Judging:
         return found
 
     def _moving(self, fitted: Fitted) -> list[dict[str, Any]]:
-        """Update intervals and precisions; FFT blocks have an interval of their own."""
+        """Update intervals and precisions; blocks have an interval of their own."""
         intervals: Sequence[float] = UPDATES_MS
-        if isinstance(fitted, Shaped):
+        if isinstance(fitted, ByBlock):
             intervals = [fitted.interval_ms]
         rows = []
         for interval_ms in intervals:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from scipy.special import stdtrit
 
-from analysis.benches.chart.judging import BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
+from analysis.benches.chart.judging import AT, BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from analysis.benches.chart.measures import SUMMARIES
-from analysis.benches.chart.methods import METHODS, OUR_FAMILIES, OURS, RIVALS
+from analysis.benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
 from analysis.columns import Column, Columns, names
 from modeling.arrays import Bools, Floats
 from modeling.models.texture_model import BLENDINGS
@@ -21,8 +21,6 @@ VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_m
 COSTS = ("operations", "most_operations", "numbers", "bytes", "fit_ms", "layers")
 MEASURES = tuple(f"{place}_{name}" for place in PLACES for name in SUMMARIES)
 CONFIDENCE = 0.95
-# Their operations include computing coefficients at every update; ours are read from a table.
-COUNTED_OTHERWISE = "autoregressive"
 FEWEST_SURFACES = 3
 
 
@@ -150,70 +148,99 @@ class Dominating:
         )
 
 
+# What our default is compared with a rival's in, each by its column of the rows.
+_COMPARED = {
+    "operations": "operations",
+    "numbers": "numbers",
+    "bytes": "bytes",
+    "fit": "fit_ms",
+    AT: f"{AT}_distance_db",
+    BETWEEN: f"{BETWEEN}_distance_db",
+    STROKING: f"{STROKING}_distance_db",
+}
+_AHEAD = {
+    "operations": "operations",
+    "numbers": "numbers stored",
+    "bytes": "bytes",
+    "fit": "fitting time",
+    AT: "distance at the conditions",
+    BETWEEN: "distance between them",
+    STROKING: "distance during strokes",
+}
+# Where dominance is judged: at rest no update is late; during strokes all are.
+_HANDS = {BETWEEN: "For a hand at rest between the conditions", STROKING: "During strokes"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Our default against one rival, on one kind of surface.
+    """Our default against one rival's, on one kind of surface.
 
     Parameters
     ----------
-    operations, numbers : Ratio
-        The rival's over ours; operations NaN where they are not counted alike.
-    between, stroking : Ratio
-        The rival's distance from the truth over ours.
+    ratios : mapping of str to Ratio
+        The rival's over ours, by the names of `_COMPARED`: costs, and distances from the truth.
+    worst_db : (rival's, ours)
+        Distance between the conditions on the worst surface.
     surfaces : int
-    dominated_by : Dominating or None
-        The closest to the truth of our variants that dominate the rival.
-    dominates_by : Dominating or None
-        The closest to the truth of the rival's variants that dominate our default.
+    dominated_by, dominates_by : mapping of place to Dominating
+        Between the conditions and during strokes, where one method dominates the other: each of
+        its variants is dominated by a variant of the other. Of those that dominate the default
+        the one that is closest to the truth.
     """
 
     kind: str
     rival: str
-    operations: Ratio
-    numbers: Ratio
-    between: Ratio
-    stroking: Ratio
+    ratios: Mapping[str, Ratio]
+    worst_db: tuple[float, float]
     surfaces: int
-    dominated_by: Dominating | None
-    dominates_by: Dominating | None
+    dominated_by: Mapping[str, Dominating]
+    dominates_by: Mapping[str, Dominating]
 
     @property
-    def is_counted_alike(self) -> bool:
-        """Whether the rival's operations are counted as ours are."""
-        return _is_counted_alike(self.rival)
+    def ahead(self) -> str:
+        """In what the rival's default is ahead of ours, by the intervals."""
+        found = [
+            f"{_AHEAD[name]} ({ratio.mean:.2g} times)"
+            for name, ratio in self.ratios.items()
+            if ratio.high < 1
+        ]
+        theirs, ours = self.worst_db
+        if theirs < ours:
+            found.append(f"the worst surface between ({theirs:.2g} compared with {ours:.2g} dB)")
+        return ", ".join(found) or "nothing"
 
     @property
     def verdict(self) -> str:
         """Which dominates: no more operations and a smaller distance, by both intervals."""
-        if not self.is_counted_alike:
-            return (
-                "dominance is not assessed, because its coefficients are computed at every update "
-                "and ours are read from a table"
-            )
-        if self.dominates_by is not None:
-            return f"{self.rival} dominates joint: {self.dominates_by.text()}"
-        if self.dominated_by is not None:
-            return f"it is dominated by {self.dominated_by.text()}"
         if self.surfaces < FEWEST_SURFACES:
             return f"too few surfaces to assess dominance, {FEWEST_SURFACES} are needed"
-        return "neither dominates the other"
+        found = []
+        for place, hand in _HANDS.items():
+            if place in self.dominates_by:
+                told = f"it dominates joint ({self.dominates_by[place].text()})"
+            elif place in self.dominated_by:
+                told = f"it is dominated ({self.dominated_by[place].text()})"
+            elif np.isfinite(self.ratios[place].mean):
+                told = "neither dominates the other"
+            else:
+                continue
+            found.append(f"{hand} {told}")
+        return "; ".join(found)
 
     @property
     def sentence(self) -> str:
         """The comparison in words."""
         farther = (
-            f"between the conditions the log-spectral distance of {self.rival} from the truth is "
-            f"{self.between.text()} times that of joint"
+            f"Between the conditions the log-spectral distance of {self.rival} from the truth is "
+            f"{self.ratios[BETWEEN].text()} times that of joint"
         )
-        if np.isfinite(self.stroking.mean):
-            farther += f", during strokes {self.stroking.text()} times"
-        counted = f"{self.operations.text()} times the operations and " * self.is_counted_alike
-        costs = f"{counted}{self.numbers.text()} times the numbers"
-        return f"{farther[:1].upper()}{farther[1:]}. {self.rival} needs {costs}; {self.verdict}."
-
-
-def _is_counted_alike(rival: str) -> bool:
-    return METHODS[rival].family != COUNTED_OTHERWISE
+        if np.isfinite(self.ratios[STROKING].mean):
+            farther += f", during strokes {self.ratios[STROKING].text()} times"
+        costs = (
+            f"{self.ratios['operations'].text()} times the operations and "
+            f"{self.ratios['numbers'].text()} times the numbers"
+        )
+        return f"{farther}; it needs {costs}. It is ahead in {self.ahead}. {self.verdict}."
 
 
 def comparisons(rows: pd.DataFrame) -> list[Comparison]:
@@ -227,48 +254,56 @@ def comparisons(rows: pd.DataFrame) -> list[Comparison]:
         mine = default[default["method"] == OURS].set_index("surface")
         for rival in RIVALS:
             other = default[default["method"] == rival].set_index("surface")
-            if not len(mine.index.intersection(other.index)):
-                continue
-            found.append(_comparison(of_kind, mine, other, kind=str(kind), rival=rival))
+            if len(mine.index.intersection(other.index)):
+                found.append(_comparison(of_kind, mine, other, kind=str(kind), rival=rival))
     return found
 
 
 def _comparison(
     of_kind: pd.DataFrame, mine: pd.DataFrame, other: pd.DataFrame, *, kind: str, rival: str
 ) -> Comparison:
-    """Of one rival; costs that are not counted alike are not compared."""
+    """Of one rival."""
     pair = _paired(other, mine)
-    operations = Ratio(np.nan, np.nan, np.nan)
-    dominated_by = dominates_by = None
-    if _is_counted_alike(rival):
-        operations = _ratio("operations", *pair)
-        dominated_by = _dominating(of_kind[of_kind["family"].isin(OUR_FAMILIES)], other)
-        dominates_by = _dominating(of_kind[of_kind["method"] == rival], mine)
+    theirs = of_kind[of_kind["method"] == rival]
+    dominated = _dominated(theirs, by=of_kind[of_kind["family"].isin(OUR_FAMILIES)])
+    dominates = _dominated(of_kind[of_kind["method"] == OURS], by=theirs)
+    between = f"{BETWEEN}_distance_db"
     return Comparison(
         kind=kind,
         rival=rival,
-        operations=operations,
-        numbers=_ratio("numbers", *pair),
-        between=_ratio(f"{BETWEEN}_distance_db", *pair),
-        stroking=_ratio(f"{STROKING}_distance_db", *pair),
+        ratios={name: _ratio(column, *pair) for name, column in _COMPARED.items()},
+        worst_db=(float(pair[0][between].max()), float(pair[1][between].max())),
         surfaces=len(pair[0]),
-        dominated_by=dominated_by,
-        dominates_by=dominates_by,
+        dominated_by=dict(dominated),
+        dominates_by=dict(dominates),
     )
 
 
-def _dominating(variants: pd.DataFrame, target: pd.DataFrame) -> Dominating | None:
-    """The closest to the truth of the variants that dominate a target indexed by surface.
+def _dominated(method: pd.DataFrame, *, by: pd.DataFrame) -> Iterator[tuple[str, Dominating]]:
+    """Places where every variant of a method is dominated, with what dominates its default."""
+    default = default_rows(method).set_index("surface")
+    for place in _HANDS:
+        every = [
+            _dominating(by, variant.set_index("surface"), place) for variant in _variants(method)
+        ]
+        if all(every):
+            found = _dominating(by, default, place)
+            assert found is not None, "the default is one of the variants"
+            yield place, found
 
-    Judged during strokes where that is known, since the update interval matters there; otherwise
-    between the conditions.
-    """
-    moving = target[f"{STROKING}_distance_db"].notna().all()
-    column = f"{STROKING if moving else BETWEEN}_distance_db"
+
+def _variants(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    for _, variant in rows.groupby(["method", "blending", "update_ms"], sort=False):
+        yield variant
+
+
+def _dominating(variants: pd.DataFrame, target: pd.DataFrame, place: str) -> Dominating | None:
+    """The closest to the truth of the variants that dominate a target indexed by surface."""
     found = []
-    for _, rows in variants.groupby(["method", "blending", "update_ms"], sort=False):
+    for rows in _variants(variants):
         pair = _paired(rows.set_index("surface"), target)
-        operations, distance = _ratio("operations", *pair), _ratio(column, *pair)
+        operations = _ratio("operations", *pair)
+        distance = _ratio(f"{place}_distance_db", *pair)
         if operations.high <= 1 and distance.high < 1:
             first = rows.iloc[0]
             variant = Variant(first["method"], first["blending"], float(first["update_ms"]))
@@ -291,20 +326,11 @@ def _ratio(column: str, numerator: pd.DataFrame, denominator: pd.DataFrame) -> R
 def default_rows(rows: pd.DataFrame) -> pd.DataFrame:
     """The rows of each method as the program renders it: its own blending, 1 ms, double.
 
-    FFT-shaped noise at its own interval.
+    Blocks and grains at their own interval.
     """
     own_interval = ~rows["update_ms"].isin(UPDATES_MS)
     usual = (rows["update_ms"] == UPDATES_MS[0]) | own_interval
     return rows[rows["default_blending"] & usual & (rows["precision"] == DOUBLE)]
-
-
-def competing(of_kind: pd.DataFrame, place: str) -> pd.DataFrame:
-    """The variants that compete at a place, of rows of one kind.
-
-    At and between the conditions the hand rests, and each method has its usual interval; during
-    strokes all intervals compete.
-    """
-    return of_kind if place == STROKING else default_rows(of_kind)
 
 
 def front_of(variants: pd.DataFrame, *, cost: str, error: str) -> pd.DataFrame:
@@ -326,7 +352,7 @@ def front_table(summary: pd.DataFrame) -> pd.DataFrame:
     for _, of_kind in summary[summary["precision"] == DOUBLE].groupby("kind", sort=False):
         for place in PLACES:
             error = f"{place}_distance_db"
-            front = front_of(competing(of_kind, place), cost="operations", error=error)
+            front = front_of(of_kind, cost="operations", error=error)
             rows.append(front.assign(place=place, distance_db=front[error]))
     shown = ["kind", "place", "method", "blending", "update_ms", "precision", "operations"]
     return pd.concat(rows, ignore_index=True)[[*shown, "distance_db", "simulated"]]
@@ -342,8 +368,12 @@ COMPARISON_COLUMNS: Columns = (
     Column("surfaces", "number of surfaces"),
     *_ratio_columns("operations", "operations, ratio to joint"),
     *_ratio_columns("numbers", "numbers stored, ratio to joint"),
+    *_ratio_columns("bytes", "bytes, ratio to joint"),
+    *_ratio_columns("fit", "fitting time, ratio to joint"),
+    *_ratio_columns(AT, "distance at conditions, ratio to joint"),
     *_ratio_columns(BETWEEN, "distance between, ratio to joint"),
     *_ratio_columns(STROKING, "distance during strokes, ratio to joint"),
+    Column("ahead", "ahead of joint in"),
     Column("verdict"),
     Column("sentence"),
 )
@@ -353,7 +383,7 @@ def comparison_table(found: Sequence[Comparison]) -> pd.DataFrame:
     """The comparisons as a table: ratios with their intervals, verdict and sentence."""
     rows = []
     for one in found:
-        ratios = (one.operations, one.numbers, one.between, one.stroking)
-        values = [value for ratio in ratios for value in ratio]
-        rows.append((one.kind, one.rival, one.surfaces, *values, one.verdict, one.sentence))
+        values = [value for name in _COMPARED for value in one.ratios[name]]
+        told = (one.ahead, one.verdict, one.sentence)
+        rows.append((one.kind, one.rival, one.surfaces, *values, *told))
     return pd.DataFrame(rows, columns=names(COMPARISON_COLUMNS))

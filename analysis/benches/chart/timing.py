@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from typing import Any
@@ -10,16 +11,11 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.benches.chart.fitted import (
-    COST_RATE_HZ,
-    Fitted,
-    Layered,
-    Predictor,
-    Shaped,
-    update_samples,
-)
-from analysis.benches.rivals import CompiledStream, tabled_predictor
-from modeling import ARModel, Renderer
+from analysis.benches.chart.fitted import Fitted, Layered, update_samples
+from analysis.benches.chart.rival_costs import COST_RATE_HZ
+from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
+from analysis.benches.rivals import COEFFICIENTS, CompiledStream, SoundStream
+from modeling import Renderer
 from modeling.hand import Hand
 
 TURNS = 20
@@ -68,33 +64,30 @@ def time_table(streams: Mapping[Key, tuple[Run, int]], *, turns: int = TURNS) ->
 def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> tuple[Run, int] | None:
     """What renders at 5 kHz along a moving hand, and how many samples; None of what is not timed.
 
-    Layers by the program's renderer, in double or single precision; autoregressive filters by C
-    written with equal care, FFT-shaped noise by NumPy.
+    Layers by the program's renderer, in double or single precision; other filters and stored sounds
+    by C written with equal care, FFT-shaped noise by NumPy.
     """
-    hand = _hand()
+    hand, period = _hand(), update_samples(update_ms, COST_RATE_HZ)
+    if isinstance(fitted, Shaped):
+        return _shaped_stream(fitted), _BLOCKS * fitted.model.block // 2
     if isinstance(fitted, Layered):
-        period = update_samples(update_ms, COST_RATE_HZ)
         renderer = Renderer(fitted.at_cost_rate, update_samples=period, single=single)
         if single:
             return partial(renderer.render, *hand, out=np.empty(SAMPLES, dtype=np.float32)), SAMPLES
         return partial(renderer.render, *hand, out=np.empty(SAMPLES)), SAMPLES
-    if isinstance(fitted, Predictor):
-        return _predictor_stream(fitted.model, hand, update_ms), SAMPLES
-    if isinstance(fitted, Shaped):
-        return _shaped_stream(fitted), _BLOCKS * fitted.model.block // 2
+    out = np.empty(SAMPLES)
+    if isinstance(fitted, Filtered):
+        table = replace(fitted.model, rate_hz=COST_RATE_HZ)
+        stream = CompiledStream(COEFFICIENTS, table, update_samples=period, seed=0)
+        return stream.calls(*hand, out, block=SAMPLES), SAMPLES
+    if isinstance(fitted, Looped | Grained):
+        sounds = SoundStream(fitted.model, update_samples=period, seed=0)
+        return sounds.calls(*hand, out), SAMPLES
     return None
 
 
 def _hand() -> Hand:
     return Hand(np.linspace(*SPEEDS_MM_S, SAMPLES), np.linspace(*FORCES_N, SAMPLES))
-
-
-def _predictor_stream(model: ARModel, hand: Hand, update_ms: float) -> Run:
-    table = tabled_predictor(model)
-    period = update_samples(update_ms, COST_RATE_HZ)
-    tabled = table._replace(rate_hz=COST_RATE_HZ)
-    stream = CompiledStream(f"AR({model.order})", tabled, update_samples=period, seed=0)
-    return stream.calls(*hand, np.empty(SAMPLES), block=SAMPLES)
 
 
 def _shaped_stream(fitted: Shaped) -> Run:

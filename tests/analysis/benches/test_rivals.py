@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
+from analysis.benches.coefficients import tabled_predictor
 from analysis.benches.rivals import (
     AR,
     COMPILED,
@@ -24,11 +25,9 @@ from analysis.benches.rivals import (
     compiled_parts,
     layered_texture,
     predictor_of,
-    tabled_predictor,
 )
 from modeling import InputError, Renderer, TextureModel
 from modeling.arrays import Floats
-from modeling.models.line_spectral import prediction_coefficients
 from modeling.rendering.noise import stream_key, white_noise
 from tests.refusals import refused
 
@@ -157,32 +156,34 @@ def test_layered_rivals_follow_a_moving_hand_as_in_the_textbook(
 def test_the_predictor_is_the_all_pole_filter(
     predictor, update: int, speed: float, force: float
 ) -> None:
-    found = CompiledStream(AR, tabled_predictor(predictor), update_samples=update, seed=3).render(
-        *held(speed, force)
-    )
-    chosen = predictor.filter(speed, force)
+    table = tabled_predictor(predictor)
+    found = CompiledStream(AR, table, update_samples=update, seed=3).render(*held(speed, force))
+    chosen = table.filter(speed, force)
     noise = white_noise(KEY, 0, SAMPLES)
-    expected = lfilter([chosen.gain], [1.0, *chosen.coefficients], noise)
+    expected = lfilter([chosen.gain], [1.0, *chosen.poles], noise)
     assert np.abs(found - expected).max() <= 1e-9 * expected.std()
-    lattice = Renderer(predictor, seed=3).render(*held(speed, force))
-    assert np.abs(found - lattice).max() <= 1e-9 * expected.std()
+
+
+def test_the_predictor_is_the_lattice_where_it_was_fitted(predictor) -> None:
+    hand = held(float(predictor.speeds_mm_s[3]), float(predictor.forces_n[2]))
+    stream = CompiledStream(AR, tabled_predictor(predictor), update_samples=5, seed=3)
+    lattice = Renderer(predictor, seed=3).render(*hand)
+    assert np.abs(stream.render(*hand) - lattice).max() <= 1e-9 * lattice.std()
 
 
 @pytest.mark.parametrize("update", [1, 5, 32])
 def test_the_predictor_follows_a_moving_hand(predictor, update: int) -> None:
     speed, force = moving()
+    table = tabled_predictor(predictor)
     noise, past = white_noise(KEY, 0, SAMPLES), np.zeros(ORDER)
     expected = []
     for start in range(0, SAMPLES, update):
-        at = predictor.parameters(speed[start : start + 1], force[start : start + 1])
-        coefficients = prediction_coefficients(at.line_spectral_frequencies[0])
+        at = table.filter(speed[start], force[start])
         for w in noise[start : start + update]:
-            y = at.gain[0] * w - coefficients @ past
+            y = at.gain * w - at.poles @ past
             past = np.concatenate([[y], past[:-1]])
             expected.append(y)
-    found = CompiledStream(AR, tabled_predictor(predictor), update_samples=update, seed=3).render(
-        speed, force
-    )
+    found = CompiledStream(AR, table, update_samples=update, seed=3).render(speed, force)
     assert np.abs(found - np.array(expected)).max() <= 1e-9 * np.std(expected)
 
 

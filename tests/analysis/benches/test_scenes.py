@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.benches.chart.fitted import predictor_cost
+from analysis.benches.chart.rival_costs import coefficients_cost
 from analysis.benches.scenes import (
     DRAWN_EXAMPLE,
     FULL,
@@ -63,8 +63,8 @@ def test_the_comparison_counts_what_each_method_needs(judged) -> None:
     )
     # Three speeds and three forces lie within the scene.
     assert table.loc[RIVAL, "numbers"] == 9 * 21
-    cost = predictor_cost(
-        20, conditions=9, update_samples=texture.plan.update_samples, single=False
+    cost = coefficients_cost(  # with a node more between each two of them
+        20, 0, nodes=25, update_samples=texture.plan.update_samples, single=False
     )
     assert table.loc[RIVAL, "operations"] == cost.operations
     assert table.loc[RIVAL, "bytes"] == cost.table_bytes + cost.state_bytes

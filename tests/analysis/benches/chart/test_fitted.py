@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,18 +13,22 @@ import pytest
 import analysis.benches
 import modeling.rendering
 from analysis.benches.accuracy import stroke
-from analysis.benches.chart.fitted import (
+from analysis.benches.chart.fitted import Layered
+from analysis.benches.chart.rival_costs import (
     COST_RATE_HZ,
-    Layered,
-    Predictor,
-    Shaped,
     block_samples,
-    predictor_cost,
+    coefficients_cost,
+    grains_cost,
+    loops_cost,
     shaped_noise_cost,
 )
+from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from analysis.benches.chart.shaped_noise import ShapedNoise
-from analysis.benches.rivals import CompiledStream, predictor_of, tabled_predictor
+from analysis.benches.rivals import COEFFICIENTS, CompiledStream, SoundStream, predictor_of
+from analysis.benches.stored_sounds import Grains, make_loops
 from modeling import regressed, render_many
+from modeling.hand import Hand
+from modeling.rendering.cost import Cost
 from modeling.rendering.plan import RenderPlan
 from stimuli.planted.textures import planted_texture
 
@@ -40,20 +45,44 @@ WHAT = ("additions", "multiplications", "divisions", "square_roots")
 def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     if shutil.which("g++") is None:
         pytest.skip("g++ is not installed (see tools/system-packages)")
-    program = tmp_path_factory.mktemp("programs") / "counted_predictor"
+    program = tmp_path_factory.mktemp("programs") / "counted_rivals"
     included = [f"-I{folder}" for folder in FOLDERS]
-    source = HERE.parent / "counted_predictor.cpp"
+    source = HERE.parent / "counted_rivals.cpp"
     subprocess.run(["g++", "-std=c++17", *included, source, "-o", program], check=True)
     return program
 
 
-@pytest.mark.parametrize("order", [4, 6, 12, 20, 30, 40])
-def test_an_autoregressive_filter_costs_what_its_program_counts(program: Path, order: int) -> None:
-    run = subprocess.run([program, str(order)], check=True, capture_output=True, text=True)
+def check_counts(program: Path, name: str, cost: Cost, *orders: int) -> None:
+    arguments = [program, *map(str, orders or (4, 0))]
+    run = subprocess.run(arguments, check=True, capture_output=True, text=True)
     counted = {name: int(value) for name, value in map(str.split, run.stdout.splitlines())}
-    cost = predictor_cost(order, conditions=49, update_samples=1, single=False)
     for part, told in (("sample", cost.per_sample), ("update", cost.per_update)):
-        assert [getattr(told, w) for w in WHAT] == [counted[f"{part}_{w}"] for w in WHAT]
+        assert [getattr(told, w) for w in WHAT] == [counted[f"{name}_{part}_{w}"] for w in WHAT]
+
+
+@pytest.mark.parametrize("orders", [(4, 0), (6, 0), (12, 0), (20, 0), (40, 0), (4, 4), (8, 8)])
+def test_a_filter_by_coefficients_costs_what_its_program_counts(
+    program: Path, orders: tuple[int, int]
+) -> None:
+    cost = coefficients_cost(*orders, nodes=49, update_samples=1, single=False)
+    check_counts(program, "coefficients", cost, *orders)
+
+
+def test_loops_cost_what_their_program_counts(program: Path) -> None:
+    cost = loops_cost(nodes=6, numbers=300, update_samples=1, single=False)
+    check_counts(program, "loops", cost)
+
+
+def test_grains_cost_what_their_program_counts(program: Path) -> None:
+    cost = grains_cost(8, nodes=6, numbers=300, single=False)
+    # The program is given the hand where it should be in the middle of a grain.
+    extrapolating = loops_cost(nodes=6, numbers=0, update_samples=2, single=False).per_update
+    without = loops_cost(nodes=6, numbers=0, update_samples=1, single=False).per_update
+    parts = (getattr(extrapolating, w) - getattr(without, w) for w in WHAT)
+    update = type(cost.per_update)(
+        *(getattr(cost.per_update, w) - part for w, part in zip(WHAT, parts, strict=True))
+    )
+    check_counts(program, "grains", replace(cost, per_update=update))
 
 
 # Sorensen, Jones, Heideman and Burrus 1987, table of the real-valued split-radix FFT: n, products,
@@ -116,20 +145,74 @@ def test_filters_of_layers_in_motion_are_what_is_rendered() -> None:
     assert found / levels(filters, model.rate_hz) == pytest.approx(1, abs=0.075)
 
 
-def test_filters_of_a_predictor_in_motion_are_what_is_rendered() -> None:
-    model = predictor_of(planted_texture("canvas"))
+def found_levels(rendered: list[np.ndarray], places: list[int]) -> np.ndarray:
+    return np.sqrt(np.mean(np.stack(rendered)[:, places] ** 2, axis=0))
+
+
+def test_filters_of_coefficients_in_motion_are_what_is_rendered() -> None:
+    fitted = Filtered.of(predictor_of(planted_texture("canvas")))
+    model = fitted.model
     hand = stroke(model.rate_hz, duration_s=0.5)
-    table = tabled_predictor(model)
-    speed, force = np.abs(hand.speed_mm_s), hand.force_n
-    rendered = np.stack(
-        [
-            CompiledStream("AR(20)", table, update_samples=1, seed=seed).render(speed, force)
-            for seed in range(1500)
-        ]
-    )
-    filters = Predictor(model).moving(hand, 1, places=PLACES, rate_hz=model.rate_hz)
-    found = np.sqrt(np.mean(rendered[:, PLACES] ** 2, axis=0))
+    rendered = [
+        CompiledStream(COEFFICIENTS, model, update_samples=1, seed=seed).render(
+            np.abs(hand.speed_mm_s), hand.force_n
+        )
+        for seed in range(1500)
+    ]
+    filters = fitted.moving(hand, 1, places=PLACES, rate_hz=model.rate_hz)
+    found = found_levels(rendered, PLACES)
     assert found / levels(filters, model.rate_hz) == pytest.approx(1, abs=0.075)
+
+
+GRID = np.array([50.0, 150.0, 350.0]), np.array([0.5, 1.5, 3.5])
+
+
+def test_loops_in_motion_are_what_is_played() -> None:
+    """Updates every 5 samples, whose hand is the one at their ends, as it is extrapolated."""
+    texture = planted_texture("canvas")
+    hand = stroke(texture.rate_hz, duration_s=0.5)
+    ends = Hand(*(np.roll(reading, -4) for reading in hand))
+    rendered = []
+    for seed in range(400):
+        loops = make_loops(
+            GRID,
+            lambda v, f, frequency: texture.peq(v, f).response(frequency),
+            rate_hz=texture.rate_hz,
+            seconds=0.1,
+            rng=np.random.default_rng(seed),
+        )
+        rendered.append(SoundStream(loops, update_samples=5, seed=0).render(*ends))
+    filters = Looped(loops).moving(hand, 5, places=PLACES, rate_hz=texture.rate_hz)
+    found = found_levels(rendered, PLACES)
+    # Each value is a sum of 250 lines of random phase: √800 draws scatter by 3.5 %.
+    assert found / levels(filters, texture.rate_hz) == pytest.approx(1, abs=0.15)
+
+
+def test_grains_in_motion_are_what_is_played() -> None:
+    rate_hz, block = 1000.0, 64
+    rng = np.random.default_rng(1)
+    shares = np.array([1.0, 3.0, 4.0])[:, None] * np.array([1.0, 2.0, 2.5])
+    sounds = rng.integers(-9000, 9000, (3, 3, 1500)).astype(np.int16)
+    grains = Grains(
+        speeds_mm_s=GRID[0],
+        forces_n=GRID[1],
+        samples=sounds,
+        scales=1e-4 * shares,
+        rate_hz=rate_hz,
+        block=block,
+    )
+    hand = stroke(rate_hz, duration_s=0.75)
+    places = list(range(300, 700, 37))
+    half = block // 2
+    # Read when a grain begins: where the hand should be in its middle, linearly extrapolated.
+    before = Hand(*(np.concatenate((x[:half], x[:-half])) for x in hand))
+    amid = Hand(*(2 * now - last for now, last in zip(hand, before, strict=True)))
+    rendered = [
+        SoundStream(grains, update_samples=1, seed=seed).render(*amid) for seed in range(1500)
+    ]
+    filters = Grained(grains, 0.064).moving(hand, half, places=places, rate_hz=rate_hz)
+    found = found_levels(rendered, places)
+    assert found / levels(filters, rate_hz) == pytest.approx(1, abs=0.075)
 
 
 def test_filters_of_fft_shaped_noise_in_motion_are_what_is_rendered() -> None:

@@ -41,7 +41,8 @@ def test_every_method_has_all_its_variants(rows: pd.DataFrame) -> None:
     every = len(UPDATES_MS) * len(PRECISIONS)
     assert counts["joint, 2 layers"] == counts["white noise"] == 2 * every  # linear, logarithmic
     assert counts["AR(6)"] == counts["truth"] == len(UPDATES_MS)
-    assert counts["FFT, 1/16 s"] == 1
+    assert counts["IIR, 2 sections"] == counts["loops of field"] == len(UPDATES_MS)
+    assert counts["grains, 1/16 s"] == counts["FFT, 1/16 s"] == 1
     assert rows["simulated"].all()
 
 

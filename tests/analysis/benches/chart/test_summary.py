@@ -86,30 +86,52 @@ OURS_NEARER = rows_of(
 )
 
 
+BOTH = ["between", "stroking"]
+
+
 def test_a_rival_that_costs_more_and_is_farther_is_dominated() -> None:
     by_rival = {one.rival: one for one in comparisons(OURS_NEARER)}
     assert list(by_rival) == ["paper", "paper-consistent", "white noise"]
     dear = by_rival["paper"]
-    assert dear.operations.mean == pytest.approx(2)
-    assert dear.between.mean == pytest.approx((1.1 * 1.2 * 0.9 / (0.5 * 0.6 * 0.4 * 0.5)) ** 0.25)
-    assert dear.between.low > 1
-    assert dear.dominated_by is not None
-    assert dear.dominated_by.variant.text() == "joint (linear, every 1 ms)"
-    assert "it is dominated by joint (linear, every 1 ms), 0.5 (0.5–0.5) times" in dear.sentence
+    assert dear.ratios["operations"].mean == pytest.approx(2)
+    ratio = (1.1 * 1.2 * 0.9 / (0.5 * 0.6 * 0.4 * 0.5)) ** 0.25
+    assert dear.ratios["between"].mean == pytest.approx(ratio)
+    assert dear.ratios["between"].low > 1
+    assert list(dear.dominated_by) == BOTH
+    assert dear.dominated_by["stroking"].variant.text() == "joint (linear, every 1 ms)"
+    assert dear.dominated_by["stroking"].text() in dear.sentence
+    assert dear.ahead == "nothing"
 
 
 def test_a_cheaper_rival_is_dominated_by_a_variant_that_is_cheaper_still() -> None:
     cheap = next(one for one in comparisons(OURS_NEARER) if one.rival == "paper-consistent")
-    assert cheap.operations.mean == pytest.approx(0.7)
-    assert cheap.dominated_by is not None
-    assert cheap.dominated_by.variant.update_ms == 4
+    assert cheap.ratios["operations"].mean == pytest.approx(0.7)
+    assert cheap.dominated_by["stroking"].variant.update_ms == 4
+    assert cheap.ahead == "operations (0.7 times)"
+
+
+def test_a_rival_is_not_dominated_while_one_of_its_variants_is_not() -> None:
+    """It is updated less often, too, and is then cheaper than anything of ours."""
+    slower = rows_of({("paper-consistent", 16.0): (30.0, [3.0, 3.2, 2.8, 3.0])})
+    found = comparisons(pd.concat([OURS_NEARER, slower], ignore_index=True))
+    cheap = next(one for one in found if one.rival == "paper-consistent")
+    assert cheap.dominated_by == {}
+    assert cheap.dominates_by == {}
+
+
+def test_at_rest_a_slow_update_dominates_what_it_does_not_during_strokes() -> None:
+    slow = rows_of({("joint", 16.0): (10.0, [0.5, 0.6, 0.4, 0.5])})
+    slow["stroking_distance_db"] = 30.0
+    found = comparisons(pd.concat([OURS_NEARER, slow], ignore_index=True))
+    floor = next(one for one in found if one.rival == "white noise")
+    assert list(floor.dominated_by) == ["between"]
+    assert floor.dominated_by["between"].variant.update_ms == 16
 
 
 def test_the_cheapest_is_dominated_by_none() -> None:
     floor = next(one for one in comparisons(OURS_NEARER) if one.rival == "white noise")
-    assert floor.dominated_by is None
-    assert floor.dominates_by is None
-    assert floor.sentence.endswith("neither dominates the other.")
+    assert (floor.dominated_by, floor.dominates_by) == ({}, {})
+    assert floor.verdict.count("neither dominates the other") == 2
 
 
 def test_it_is_said_where_a_rival_dominates_ours() -> None:
@@ -120,11 +142,24 @@ def test_it_is_said_where_a_rival_dominates_ours() -> None:
         }
     )
     [one] = comparisons(rows)
-    assert one.between.high < 1
-    assert one.sentence.endswith(
-        "paper dominates joint: paper (linear, every 1 ms), 1 (1–1) times the operations and "
-        f"{one.dominates_by.distance.text()} times the distance."
+    assert one.ratios["between"].high < 1
+    assert list(one.dominates_by) == BOTH
+    assert one.dominates_by["between"].variant.method == "paper"
+    assert one.dominates_by["between"].text() in one.sentence
+    assert f"{one.ratios['between'].mean:.2g} times" in one.ahead
+    assert "0.6 compared with 1.1 dB" in one.ahead
+
+
+def test_a_rival_that_cannot_keep_up_with_our_slower_updates_does_not_dominate() -> None:
+    rows = rows_of(
+        {
+            ("joint", 1.0): (100.0, [1.0, 1.1, 0.9]),
+            ("joint", 4.0): (50.0, [1.0, 1.1, 0.9]),
+            ("paper", 1.0): (100.0, [0.5, 0.6, 0.4]),
+        }
     )
+    [one] = comparisons(rows)
+    assert one.dominates_by == {}
 
 
 def test_nobody_dominates_where_accuracy_is_not_told_apart() -> None:
@@ -132,8 +167,8 @@ def test_nobody_dominates_where_accuracy_is_not_told_apart() -> None:
         {("joint", 1.0): (100.0, [1.0, 2.0, 0.5]), ("paper", 1.0): (200.0, [1.1, 1.8, 0.6])}
     )
     [one] = comparisons(rows)
-    assert one.between.low < 1 < one.between.high
-    assert one.verdict == "neither dominates the other"
+    assert one.ratios["between"].low < 1 < one.ratios["between"].high
+    assert (one.dominated_by, one.dominates_by) == ({}, {})
     [few] = comparisons(rows[rows["surface"] != "2"])
     assert few.verdict.startswith("too few surfaces")
 
@@ -155,8 +190,8 @@ def test_summary_and_front_tables() -> None:
     assert ours["simulated"]
     fronts = front_table(summary)
     by_place = fronts.groupby("place")["method"].agg(list)
-    # At rest the usual intervals compete, while stroking all of them.
-    assert by_place["between"] == ["white noise", "paper-consistent", "joint"]
+    # All update intervals compete, at rest as well.
+    assert by_place["between"] == ["white noise", "joint", "joint"]
     assert by_place["stroking"] == ["white noise", "joint", "joint"]
 
 
@@ -166,18 +201,3 @@ def test_the_table_of_comparisons_has_the_ratios_and_the_sentence() -> None:
     assert table["sentence"].tolist() == [one.sentence for one in found]
     assert (table["between_low"] < table["between"]).all()
     assert (table["between"] < table["between_high"]).all()
-
-
-def test_operations_that_are_not_counted_alike_are_not_compared() -> None:
-    """Of autoregressive filters: they would be dominated, and would dominate, if they were."""
-    ours = {("joint", 1.0): (100.0, [0.5, 0.6, 0.4]), ("joint", 4.0): (60.0, [0.7, 0.8, 0.6])}
-    rivals = {("AR(20)", 1.0): (200.0, [1.1, 1.2, 0.9]), ("AR(6)", 1.0): (20.0, [0.1, 0.2, 0.1])}
-    found = comparisons(rows_of({**ours, **rivals}))
-    assert [one.rival for one in found] == ["AR(6)", "AR(20)"]
-    for one in found:
-        assert (one.dominated_by, one.dominates_by) == (None, None)
-        assert "operations" not in one.sentence
-        assert "dominated by" not in one.sentence
-    table = comparison_table(found)
-    assert table[["operations", "operations_low", "operations_high"]].isna().all(axis=None)
-    assert table[["numbers", "between", "stroking"]].notna().all(axis=None)

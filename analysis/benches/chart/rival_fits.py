@@ -1,0 +1,190 @@
+"""Rivals of the chart, fitted: filters by coefficients, stored sounds, and noise shaped by FFT."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from analysis.benches.chart.fitted import at, extrapolated, extrapolated_to_ends, update_samples
+from analysis.benches.chart.rival_costs import (
+    COST_RATE_HZ,
+    block_samples,
+    coefficients_cost,
+    grains_cost,
+    loops_cost,
+    shaped_noise_cost,
+)
+from analysis.benches.chart.shaped_noise import ShapedFilter, ShapedNoise
+from analysis.benches.coefficients import CoefficientTable, tabled_predictor
+from analysis.benches.stored_sounds import Grains, Loops, SampledResponse, Sounds
+from modeling import ARModel
+from modeling.arrays import Floats
+from modeling.hand import Hand
+from modeling.rendering.cost import Cost
+from modeling.similarity import SpectralFilter
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """White noise filtered by coefficients that are read from a table.
+
+    Parameters
+    ----------
+    model : CoefficientTable
+    conditions : int
+        Whose filters are stored; the table between them is made of these beforehand.
+    """
+
+    model: CoefficientTable
+    conditions: int
+    layers: int = -1
+
+    @classmethod
+    def of(cls, model: ARModel) -> Filtered:
+        """An autoregressive model."""
+        return cls(tabled_predictor(model), model.gains.size)
+
+    @property
+    def numbers(self) -> int:
+        return self.conditions * int(self.model.values.shape[-1])
+
+    def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
+        return self.model.filter(speed_mm_s, force_n)
+
+    def moving(
+        self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
+    ) -> list[SpectralFilter]:
+        course = extrapolated(hand, update_samples, rate_hz=rate_hz)
+        return [self.filter(*at(course, place // update_samples)) for place in places]
+
+    def cost(self, update_ms: float, *, single: bool) -> Cost:
+        return coefficients_cost(
+            self.model.poles,
+            self.model.zeros,
+            nodes=self.model.values[..., 0].size,
+            update_samples=update_samples(update_ms, COST_RATE_HZ),
+            single=single,
+        )
+
+
+def stored_samples(sounds: Sounds) -> int:
+    """Of all sounds at 5 kHz, whatever their own rate."""
+    return sounds.nodes * round(sounds.length * COST_RATE_HZ / sounds.rate_hz)
+
+
+@dataclass(frozen=True, eq=False)
+class Looped:
+    """Looped wavetables, whose weights ramp from update to update."""
+
+    model: Loops
+    layers: int = -1
+
+    @property
+    def numbers(self) -> int:
+        return stored_samples(self.model)
+
+    def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
+        return self.model.filter(speed_mm_s, force_n)
+
+    def moving(
+        self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
+    ) -> list[SpectralFilter]:
+        ends = extrapolated_to_ends(hand, update_samples, rate_hz=rate_hz)
+        filters = []
+        for place in places:
+            update, into = divmod(place, update_samples)
+            share = (into + 1) / update_samples
+            before, now = (np.array(at(ends, max(k, 0))) for k in (update - 1, update))
+            filters.append(self.filter(*(before * (1 - share) + now * share).tolist()))
+        return filters
+
+    def cost(self, update_ms: float, *, single: bool) -> Cost:
+        return loops_cost(
+            nodes=self.model.nodes,
+            numbers=self.numbers,
+            update_samples=update_samples(update_ms, COST_RATE_HZ),
+            single=single,
+        )
+
+
+class BlockModel(Protocol):
+    """What renders blocks of some length, each for one condition."""
+
+    @property
+    def block(self) -> int: ...
+
+    def filter(self, speed_mm_s: float, force_n: float) -> ShapedFilter | SampledResponse: ...
+
+
+@dataclass(frozen=True, eq=False)
+class ByBlock:
+    """Blocks that overlap by half, each for where the hand should be in its middle."""
+
+    model: BlockModel
+    block_s: float
+    layers: int = -1
+
+    @property
+    def interval_ms(self) -> float:
+        """From one block to the next at 5 kHz."""
+        return 1e3 * block_samples(self.block_s, COST_RATE_HZ) / 2 / COST_RATE_HZ
+
+    def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
+        return self.model.filter(speed_mm_s, force_n)
+
+    def moving(
+        self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
+    ) -> list[SpectralFilter]:
+        half = self.model.block // 2
+        return [self._overlapping(hand, place, half=half) for place in places]
+
+    def _overlapping(self, hand: Hand, place: int, *, half: int) -> SpectralFilter:
+        newer, into = divmod(place, half)
+        share = np.sin(np.pi / 2 * (into + 0.5) / half) ** 2
+        filters = [self._block(hand, block * half, half) for block in (newer - 1, newer)]
+        power = [(1 - share) * filters[0].magnitude ** 2, share * filters[1].magnitude ** 2]
+        magnitude: Floats = np.sqrt(power[0] + power[1])
+        return replace(filters[0], magnitude=magnitude)
+
+    def _block(self, hand: Hand, start: int, half: int) -> ShapedFilter | SampledResponse:
+        last, now = (max(sample, 0) for sample in (start - half, start))
+        speed, force = (2 * reading[now] - reading[last] for reading in hand)
+        return self.model.filter(float(speed), float(force))
+
+
+@dataclass(frozen=True, eq=False)
+class Shaped(ByBlock):
+    """Noise shaped by FFT; a block's length is its update interval."""
+
+    model: ShapedNoise
+
+    @property
+    def numbers(self) -> int:
+        return self.model.magnitudes.size
+
+    def cost(self, update_ms: float, *, single: bool) -> Cost:
+        return shaped_noise_cost(
+            block_samples(self.block_s, COST_RATE_HZ), numbers=self.numbers, single=single
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Grained(ByBlock):
+    """Grains of recordings."""
+
+    model: Grains
+
+    @property
+    def numbers(self) -> int:
+        return stored_samples(self.model)
+
+    def cost(self, update_ms: float, *, single: bool) -> Cost:
+        return grains_cost(
+            block_samples(self.block_s, COST_RATE_HZ),
+            nodes=self.model.nodes,
+            numbers=self.numbers,
+            single=single,
+        )
