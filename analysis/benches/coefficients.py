@@ -1,5 +1,6 @@
-"""Rivals that filter white noise by coefficients read from a table: all-pole and pole–zero filters.
+"""Rivals that filter white noise by coefficients read from a table.
 
+All-pole and pole–zero filters are one recursion; layers are bands side by side.
 Coefficients blended from one condition to the next may be unstable, line spectral frequencies
 never are: so these are blended once, to the nodes of a finer table, whose coefficients are then
 read linearly, as the kernel reads its parameters.
@@ -8,14 +9,15 @@ read linearly, as the kernel reads its parameters.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling import PEQ, ARModel, InputError, Spectrum, TextureModel
+from analysis.benches.levels import System
+from modeling import ARModel, InputError, Spectrum, TextureModel
 from modeling.arrays import Floats
 from modeling.fitting.autoregressive import fit_filter
 from modeling.models.grid import Cells, within_grid
@@ -61,6 +63,75 @@ class PoleZeroFilter:
         numerator, denominator = (np.append(1.0, part) for part in (self.zeros, self.poles))
         _, response = freqz(numerator, denominator, worN=np.asarray(frequency_hz), fs=self.rate_hz)
         return np.asarray(self.gain * np.abs(response))
+
+    @property
+    def system(self) -> System:
+        """What a direct form I keeps: the last p outputs, then the last q inputs."""
+        p, q = self.poles.size, self.zeros.size
+        row = np.concatenate((-self.poles, self.zeros))
+        a, b = np.eye(p + q, k=-1), np.zeros(p + q)
+        a[0], b[0] = row, self.gain
+        if q:
+            a[p], b[p] = 0.0, self.gain
+        return System(a, b, row, self.gain)
+
+    def times(self, factor: float) -> PoleZeroFilter:
+        """Louder by a factor."""
+        return replace(self, gain=self.gain * factor)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BandFilter:
+    """Bands side by side: y = g·w + Σ y_i with y_i = b·(w − w″) − a₁·y_i′ − a₂·y_i″.
+
+    Parameters
+    ----------
+    noise_gain : float
+        g.
+    first, second, gains : (m,) ndarray
+        a₁, a₂ and b of the bands.
+    rate_hz : float
+    """
+
+    noise_gain: float
+    first: Floats
+    second: Floats
+    gains: Floats
+    rate_hz: float
+
+    def response(self, frequency_hz: ArrayLike) -> Floats:
+        """Magnitude at (n,) frequencies in Hz."""
+        delay = np.exp(-2j * np.pi * np.asarray(frequency_hz) / self.rate_hz)[:, None]
+        bands = self.gains * (1 - delay**2) / (1 + self.first * delay + self.second * delay**2)
+        return np.asarray(np.abs(self.noise_gain + bands.sum(axis=1)))
+
+    @property
+    def system(self) -> System:
+        """What a direct form I keeps: the last two outputs of each band, and two inputs."""
+        m = self.gains.size
+        a, b = np.zeros((2 * m + 2, 2 * m + 2)), np.zeros(2 * m + 2)
+        each = np.arange(m)
+        a[2 * each, 2 * each], a[2 * each, 2 * each + 1] = -self.first, -self.second
+        a[2 * each, -1], b[2 * each] = -self.gains, self.gains
+        a[2 * each + 1, 2 * each] = 1.0
+        a[-1, -2] = b[-2] = 1.0
+        bands = a[2 * each].sum(axis=0)
+        return System(a, b, bands, self.noise_gain + float(self.gains.sum()))
+
+    def times(self, factor: float) -> BandFilter:
+        """Louder by a factor."""
+        return replace(self, noise_gain=self.noise_gain * factor, gains=self.gains * factor)
+
+
+def _values_at(
+    table: CoefficientTable | BandTable, speed_mm_s: float, force_n: float
+) -> tuple[Floats, float]:
+    """A table's values (k,) for a hand, and the level that is left below its grid."""
+    hand, ramp = within_grid(
+        table.speeds_mm_s, table.forces_n, speed_mm_s=speed_mm_s, force_n=force_n
+    )
+    [at] = Cells(table.speeds_mm_s, table.forces_n, hand=hand).blend(table.values)
+    return at, float(ramp[0])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -121,16 +192,79 @@ class CoefficientTable:
 
     def filter(self, speed_mm_s: float, force_n: float) -> PoleZeroFilter:
         """What is in use at one speed (mm/s) and force (N); edges as of a `TextureModel`."""
-        hand, ramp = within_grid(
-            self.speeds_mm_s, self.forces_n, speed_mm_s=speed_mm_s, force_n=force_n
-        )
-        [at] = Cells(self.speeds_mm_s, self.forces_n, hand=hand).blend(self.values)
+        at, level = _values_at(self, speed_mm_s, force_n)
         return PoleZeroFilter(
             poles=at[1 : 1 + self.poles],
             zeros=at[1 + self.poles :],
-            gain=float(at[0] * ramp[0]),
+            gain=float(at[0]) * level,
             rate_hz=self.rate_hz,
         )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BandTable:
+    """Bands in direct form over a grid of S speeds × F forces, read linearly between its nodes.
+
+    The coefficients of stable bands are convex: any blend of them is stable.
+
+    Parameters
+    ----------
+    speeds_mm_s, forces_n : (S,), (F,) ndarray
+        Rising, above 0, two or more each.
+    values : (S, F, 1 + 3m) ndarray
+        Noise gain, then a₁ of all bands, a₂ of all, and b of all (`BandFilter`).
+    rate_hz : float
+    """
+
+    speeds_mm_s: Floats
+    forces_n: Floats
+    values: Floats
+    rate_hz: float
+
+    @property
+    def layers(self) -> int:
+        """Number of bands, m."""
+        return (int(self.values.shape[-1]) - 1) // 3
+
+    @property
+    def table(self) -> ParameterTable:
+        """As `rivals.h` reads it."""
+        return ParameterTable(
+            speeds_mm_s=self.speeds_mm_s,
+            forces_n=self.forces_n,
+            values=self.values,
+            signs=np.zeros(self.layers),
+        )
+
+    def filter(self, speed_mm_s: float, force_n: float) -> BandFilter:
+        """What is in use at one speed (mm/s) and force (N); edges as of a `TextureModel`."""
+        at, level = _values_at(self, speed_mm_s, force_n)
+        first, second, gains = at[1:].reshape(3, -1)
+        return BandFilter(
+            noise_gain=float(at[0]) * level,
+            first=first,
+            second=second,
+            gains=gains * level,
+            rate_hz=self.rate_hz,
+        )
+
+
+def tabled_bands(model: TextureModel) -> BandTable:
+    """A layered model's coefficients at the nodes of its table, and half-way between them."""
+    speeds, forces = (
+        _finer(axis, PARTS[0]) for axis in (model.table.speeds_mm_s, model.table.forces_n)
+    )
+    hand = [axis.ravel() for axis in np.meshgrid(speeds, forces, indexing="ij")]
+    noise_gain, frequency, bandwidth, gain = model.parameters(*hand)
+    k = np.tan(np.pi * bandwidth / model.rate_hz)
+    parts = (
+        noise_gain[:, None],
+        -2 * np.cos(2 * np.pi * frequency / model.rate_hz) / (1 + k),
+        (1 - k) / (1 + k),
+        gain * k / (1 + k),
+    )
+    values = np.concatenate(parts, axis=1).reshape(speeds.size, forces.size, -1)
+    return BandTable(speeds_mm_s=speeds, forces_n=forces, values=values, rate_hz=model.rate_hz)
 
 
 def _between(nodes: Floats, share: Floats) -> list[Floats]:
@@ -179,56 +313,6 @@ def tabled(
         return np.concatenate((finer[..., :1], *coefficients), axis=-1)
 
     return _stable_between((speeds, forces), nodes, poles=poles, rate_hz=rate_hz)
-
-
-def tabled_layers(model: TextureModel) -> CoefficientTable:
-    """A layered model, one layer at least, as one filter in direct form, on a finer grid.
-
-    The denominator is the product of those of the layers. Zeros outside the unit circle are
-    reflected into it: the magnitude stays as it is, and the gain is never 0 beside other
-    coefficients.
-
-    Raises
-    ------
-    InputError
-        As `tabled`.
-    """
-    speeds, forces = (
-        wide_enough(axis, axis[:, None], along=0)[0] for axis in (model.speeds_mm_s, model.forces_n)
-    )
-
-    def nodes(parts: int) -> Floats:
-        return np.array(
-            [
-                [_direct_form(model.peq(v, f)) for f in _finer(forces, parts)]
-                for v in _finer(speeds, parts)
-            ]
-        )
-
-    return _stable_between((speeds, forces), nodes, poles=2 * model.n_layers, rate_hz=model.rate_hz)
-
-
-def _direct_form(peq: PEQ) -> Floats:
-    """Gain, denominator and numerator (1 + 4m,) of m layers and the noise branch."""
-    angle = 2 * np.pi * peq.frequencies_hz / peq.rate_hz
-    k = np.tan(np.pi * peq.bandwidths_hz / peq.rate_hz)
-    ones = np.ones_like(k)
-    sections = np.stack((ones, -2 * np.cos(angle) / (1 + k), (1 - k) / (1 + k)), axis=1)
-    bands = (peq.gains * k / (1 + k))[:, None] * np.array([1.0, 0.0, -1.0])
-    denominator = reduce(np.convolve, sections)
-    numerator = peq.noise_gain * denominator
-    for i, band in enumerate(bands):
-        numerator = numerator + reduce(np.convolve, np.delete(sections, i, axis=0), band)
-    roots = np.roots(numerator)
-    size = np.maximum(np.abs(roots), 1.0)
-    inside = np.zeros_like(numerator)
-    reflected = np.real(np.poly(roots / size**2))
-    inside[: reflected.size] = reflected
-    around = np.exp(1j * np.linspace(0.0, np.pi, 64))
-    magnitude = np.abs(np.polyval(numerator, around))
-    loudest = np.argmax(magnitude)
-    gain = magnitude[loudest] / np.abs(np.polyval(inside, around[loudest]))
-    return np.concatenate(([gain], denominator[1:], inside[1:]))
 
 
 def _stable_between(

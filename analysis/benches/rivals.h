@@ -18,7 +18,7 @@
 #define TQ_MOST_ORDER 40 /* poles or zeros of the filter by its coefficients */
 
 /* The rivals. */
-enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_COEFFICIENTS };
+enum { TQ_DIRECT, TQ_TRANSPOSED, TQ_TPT, TQ_COEFFICIENTS, TQ_BANDS };
 
 /* Lanes that run side by side. */
 enum { TQ_GROUPS = TQ_SIDE_BY_SIDE / TQ_LANES };
@@ -122,6 +122,18 @@ TQ_INLINE void tq_direct_layers(tq_rival *s, int first, int width, const tq_real
     }
     for (i = 0; i < width; i++)
         s->rows[TQ_Y1][first + i] = y1[i], s->rows[TQ_Y2][first + i] = y2[i];
+}
+
+/* The same coefficients, read from the table: noise gain, all a1, all a2, all b. */
+TQ_INLINE void tq_bands_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, const tq_hand *hand)
+{
+    size_t m = (size_t)t->layers, i;
+    s->floor = tq_blend(hand, 0) * hand->ramp;
+    for (i = 0; i < m; i++) {
+        s->rows[TQ_A1][i] = tq_blend_at(hand, 1 + i);
+        s->rows[TQ_A2][i] = tq_blend_at(hand, 1 + m + i);
+        s->rows[TQ_B][i] = tq_blend_at(hand, 1 + 2 * m + i) * hand->ramp;
+    }
 }
 
 /* The transposed form II, as scipy.signal.sosfilt has it. */
@@ -299,6 +311,7 @@ TQ_INLINE void tq_rival_update(const tq_texture *t, tq_rival *TQ_RESTRICT s, con
     case TQ_DIRECT:
     case TQ_TRANSPOSED: tq_direct_update(t, s, hand); break;
     case TQ_TPT: tq_tpt_update(t, s, hand); break;
+    case TQ_BANDS: tq_bands_update(t, s, hand); break;
     default: tq_coefficients_update(s, hand); break;
     }
 }
@@ -307,7 +320,8 @@ TQ_INLINE void tq_rival_filter(const tq_texture *t, tq_rival *s, const tq_real *
                                    int count)
 {
     switch (s->kind) {
-    case TQ_DIRECT: tq_all_layers(t, s, w, out, count, tq_direct_layers); break;
+    case TQ_DIRECT:
+    case TQ_BANDS: tq_all_layers(t, s, w, out, count, tq_direct_layers); break;
     case TQ_TRANSPOSED: tq_all_layers(t, s, w, out, count, tq_transposed_layers); break;
     case TQ_TPT: tq_all_layers(t, s, w, out, count, tq_tpt_layers); break;
     default: tq_coefficients_filter(s, w, out, count); break;

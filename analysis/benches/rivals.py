@@ -29,8 +29,8 @@ KERNEL, DIRECT, TRANSPOSED = "kernel", "direct form I", "direct form II"
 TPT, AR = "TPT", f"AR({ORDER})"
 FORMS = (DIRECT, TRANSPOSED)
 COMPILED = (KERNEL, DIRECT, TRANSPOSED, TPT, AR)
-COEFFICIENTS = "coefficients"
-_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3, COEFFICIENTS: 3}
+COEFFICIENTS, BANDS = "coefficients", "bands by their coefficients"
+_KINDS = {DIRECT: 0, TRANSPOSED: 1, TPT: 2, AR: 3, COEFFICIENTS: 3, BANDS: 4}
 _SPECTRUM_SAMPLES = 5000
 
 
@@ -122,10 +122,10 @@ class CompiledStream:
     Parameters
     ----------
     name : str
-        One of `COMPILED`, or `COEFFICIENTS`.
+        One of `COMPILED`, or `COEFFICIENTS` or `BANDS`.
     model : LayeredModel
         At most 40 layers, rendered at its own rate (the kernel: at any); a `CoefficientTable` for
-        `AR` and `COEFFICIENTS`.
+        `AR` and `COEFFICIENTS`, a `BandTable` for `BANDS`.
     update_samples : int
     seed : int
         Of the noise.

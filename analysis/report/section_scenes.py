@@ -93,8 +93,8 @@ def _comparison(comparison: pd.DataFrame, simulated: bool) -> Table:
         "their GFC but cannot be felt. The bound itself is kept relative to the part of the full "
         "model that can be felt; the last column counts the seconds of random strokes in which it "
         f"was kept. {RIVAL} has its recorded conditions within the scene, double precision and the "
-        "update interval of the least model; its operations cannot be compared with ours, because "
-        "they include the computation of coefficients at every update.",
+        "update interval of the least model, and reads its coefficients from a table with a node "
+        "more between each two of them.",
         comparison,
         COMPARISON_COLUMNS[:-1],
         simulated,

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from analysis.benches.accuracy import rendered_parameters
 from analysis.benches.chart.rival_costs import COST_RATE_HZ
+from analysis.benches.levels import level_at_rest, levels_in_motion, systems_of_layers
 from analysis.textures.between import Truth
 from modeling import RegressedModel, Renderer, TextureModel
 from modeling.arrays import Floats
@@ -42,7 +43,11 @@ class Fitted(Protocol):
     def moving(
         self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
     ) -> list[SpectralFilter]:
-        """The filters in force at some of the samples of a moving hand."""
+        """The filters in force at some rising samples of a moving hand.
+
+        Each with the level that is really rendered there, which the states have left by earlier
+        coefficients; its spectrum is that of the coefficients of the moment.
+        """
 
     def cost(self, update_ms: float, *, single: bool) -> Cost | None:
         """Of rendering at 5 kHz; None of what cannot be rendered."""
@@ -82,10 +87,17 @@ class Layered:
         self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
     ) -> list[SpectralFilter]:
         course = rendered_parameters(self.model, hand, update_samples)
-        return [
-            first_peq(Parameters(*(part[[place]] for part in course)), rate_hz=rate_hz)
-            for place in places
-        ]
+        until = Parameters(*(part[: places[-1] + 1] for part in course))
+        systems = systems_of_layers(until, rate_hz=rate_hz)
+        levels = levels_in_motion(systems, samples=1)
+        filters = list[SpectralFilter]()
+        for place in places:
+            peq = first_peq(Parameters(*(part[[place]] for part in course)), rate_hz=rate_hz)
+            factor = levels[place] / level_at_rest(systems[place])
+            filters.append(
+                replace(peq, noise_gain=peq.noise_gain * factor, gains=peq.gains * factor)
+            )
+        return filters
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
         plan = RenderPlan(

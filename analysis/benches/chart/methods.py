@@ -13,7 +13,7 @@ from analysis.benches.chart.fitted import Fitted, Itself, Layered
 from analysis.benches.chart.rival_costs import block_samples
 from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from analysis.benches.chart.shaped_noise import fit_shaped_noise
-from analysis.benches.coefficients import fit_sections, tabled, tabled_layers
+from analysis.benches.coefficients import fit_sections, tabled, tabled_bands
 from analysis.benches.stored_sounds import Magnitude, grains_of, make_loops
 from analysis.textures.between import Measured, Truth
 from modeling import InputError, Spectrum, TextureModel, Threshold, regressed, simplify
@@ -130,7 +130,7 @@ def _direct_form(subject: Subject) -> Fitted:
     model = subject.joint
     if not model.n_layers:
         raise InputError("expected a model with layers, got none; it is white noise.")
-    return Filtered(tabled_layers(model), model.gains[..., 0].size)
+    return Filtered(tabled_bands(model), model.gains[..., 0].size)
 
 
 def _autoregressive(subject: Subject, *, order: int) -> Fitted:

@@ -42,6 +42,28 @@ def coefficients_cost(
     )
 
 
+def bands_cost(layers: int, *, nodes: int, update_samples: int, single: bool) -> Cost:
+    """Bands in direct form I by their coefficients, from a table of so many nodes.
+
+    Four bands share the difference of noise that they filter.
+    """
+    m, real_bytes = layers, 4 if single else 8
+    return Cost(
+        per_sample=_sum((1, Operations(-(-m // 4) + 3 * m, 1 + 3 * m, 0, 0)), (1, _NOISE)),
+        per_update=_sum(
+            (1, _GAIN),
+            (3 * m, _BLENDED),
+            (m, Operations(0, 1, 0, 0)),
+            (int(update_samples > 1), _EXTRAPOLATING),
+        ),
+        update_samples=update_samples,
+        table_bytes=nodes * (1 + 3 * m) * real_bytes,
+        state_bytes=(5 * m + 3 + _CHUNK) * real_bytes,
+        bytes_per_sample=(7 * m + 3) * real_bytes,
+        bytes_per_update=4 * (1 + 3 * m) * real_bytes,
+    )
+
+
 def loops_cost(*, nodes: int, numbers: int, update_samples: int, single: bool) -> Cost:
     """Looped wavetables of 16 bits, four of them blended with weights that ramp."""
     real_bytes = 4 if single else 8

@@ -11,6 +11,7 @@ import numpy as np
 from analysis.benches.chart.fitted import at, extrapolated, extrapolated_to_ends, update_samples
 from analysis.benches.chart.rival_costs import (
     COST_RATE_HZ,
+    bands_cost,
     block_samples,
     coefficients_cost,
     grains_cost,
@@ -18,7 +19,8 @@ from analysis.benches.chart.rival_costs import (
     shaped_noise_cost,
 )
 from analysis.benches.chart.shaped_noise import ShapedFilter, ShapedNoise
-from analysis.benches.coefficients import CoefficientTable, tabled_predictor
+from analysis.benches.coefficients import BandTable, CoefficientTable, tabled_predictor
+from analysis.benches.levels import level_at_rest, levels_in_motion
 from analysis.benches.stored_sounds import Grains, Loops, SampledResponse, Sounds
 from modeling import ARModel
 from modeling.arrays import Floats
@@ -33,12 +35,12 @@ class Filtered:
 
     Parameters
     ----------
-    model : CoefficientTable
+    model : CoefficientTable or BandTable
     conditions : int
         Whose filters are stored; the table between them is made of these beforehand.
     """
 
-    model: CoefficientTable
+    model: CoefficientTable | BandTable
     conditions: int
     layers: int = -1
 
@@ -57,17 +59,22 @@ class Filtered:
     def moving(
         self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
     ) -> list[SpectralFilter]:
+        """With the level that is really rendered: direct forms lose it while coefficients move."""
         course = extrapolated(hand, update_samples, rate_hz=rate_hz)
-        return [self.filter(*at(course, place // update_samples)) for place in places]
+        used = places[-1] // update_samples + 1
+        filters = [self.model.filter(*at(course, update)) for update in range(used)]
+        levels = levels_in_motion([one.system for one in filters], samples=update_samples)
+        there = [(place, filters[place // update_samples]) for place in places]
+        return [one.times(levels[place] / level_at_rest(one.system)) for place, one in there]
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
-        return coefficients_cost(
-            self.model.poles,
-            self.model.zeros,
-            nodes=self.model.values[..., 0].size,
-            update_samples=update_samples(update_ms, COST_RATE_HZ),
-            single=single,
-        )
+        nodes = self.model.values[..., 0].size
+        period = update_samples(update_ms, COST_RATE_HZ)
+        if isinstance(self.model, BandTable):
+            layers = self.model.layers
+            return bands_cost(layers, nodes=nodes, update_samples=period, single=single)
+        orders = self.model.poles, self.model.zeros
+        return coefficients_cost(*orders, nodes=nodes, update_samples=period, single=single)
 
 
 def stored_samples(sounds: Sounds) -> int:

@@ -14,7 +14,8 @@ import pandas as pd
 from analysis.benches.chart.fitted import Fitted, Layered, update_samples
 from analysis.benches.chart.rival_costs import COST_RATE_HZ
 from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
-from analysis.benches.rivals import COEFFICIENTS, CompiledStream, SoundStream
+from analysis.benches.coefficients import BandTable
+from analysis.benches.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream
 from modeling import Renderer
 from modeling.hand import Hand
 
@@ -78,7 +79,8 @@ def stream_of(fitted: Fitted, update_ms: float, *, single: bool) -> tuple[Run, i
     out = np.empty(SAMPLES)
     if isinstance(fitted, Filtered):
         table = replace(fitted.model, rate_hz=COST_RATE_HZ)
-        stream = CompiledStream(COEFFICIENTS, table, update_samples=period, seed=0)
+        kind = BANDS if isinstance(table, BandTable) else COEFFICIENTS
+        stream = CompiledStream(kind, table, update_samples=period, seed=0)
         return stream.calls(*hand, out, block=SAMPLES), SAMPLES
     if isinstance(fitted, Looped | Grained):
         sounds = SoundStream(fitted.model, update_samples=period, seed=0)

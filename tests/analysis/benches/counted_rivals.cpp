@@ -1,5 +1,5 @@
-/* Operations of the rivals, counted: `counted_rivals POLES ZEROS` of a filter by its coefficients, of
-   looped wavetables and of grains.
+/* Operations of the rivals, counted: `counted_rivals POLES ZEROS BANDS` of a filter by its coefficients,
+   of bands by theirs, of looped wavetables and of grains.
 
    Prints "RIVAL_sample_WHAT count" and "RIVAL_update_WHAT count"; WHAT is additions (subtractions
    included), multiplications, divisions or square_roots. The hand is on the grid. */
@@ -55,6 +55,21 @@ static void coefficients(int poles, int zeros)
     print("coefficients_update", counts, 1);
 }
 
+static void bands(int layers)
+{
+    Grid grid(1 + 3 * layers, 1000);
+    tq_rival rival{};
+    rival.kind = TQ_BANDS;
+    tq_rival_render(&grid.texture, &rival, speed.data(), force.data(), out.data(), out.size());
+    counts = Counts();
+    tq_rival_render(&grid.texture, &rival, speed.data(), force.data(), out.data(), out.size());
+    print("bands_sample", counts, SAMPLES);
+    counts = Counts();
+    const tq_hand hand = tq_hand_at(&grid.texture, speed[0], force[0]);
+    tq_rival_update(&grid.texture, &rival, &hand);
+    print("bands_update", counts, 1);
+}
+
 static void loops()
 {
     Grid grid(1, 1000);
@@ -91,6 +106,7 @@ static void grains()
 int main(int, char **texts)
 {
     coefficients(std::atoi(texts[1]), std::atoi(texts[2]));
+    bands(std::atoi(texts[3]));
     loops();
     grains();
     return 0;

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,11 +12,17 @@ from analysis.benches.coefficients import (
     CoefficientTable,
     fit_sections,
     tabled,
-    tabled_layers,
+    tabled_bands,
     tabled_predictor,
 )
-from analysis.benches.rivals import COEFFICIENTS, CompiledStream, layered_texture, predictor_of
-from modeling import PEQ, ARModel, InputError, Spectrum
+from analysis.benches.rivals import (
+    BANDS,
+    COEFFICIENTS,
+    CompiledStream,
+    layered_texture,
+    predictor_of,
+)
+from modeling import PEQ, ARModel, InputError, Renderer, Spectrum
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.noise import stream_key, white_noise
 from modeling.similarity import log_spectral_distance_db
@@ -64,34 +68,35 @@ def test_anywhere_it_is_within_a_decibel_of_blended_spectral_frequencies(
 
 
 @pytest.mark.parametrize("layers", [1, 3, 8])
-def test_layers_as_one_filter_have_the_same_response(layers: int) -> None:
+def test_bands_by_coefficients_have_the_layers_response(layers: int) -> None:
     texture = layered_texture(layers)
-    table = tabled_layers(texture)
-    assert (table.poles, table.zeros) == (2 * layers, 2 * layers)
+    table = tabled_bands(texture)
+    assert table.layers == layers
     for speed in texture.speeds_mm_s[:3]:
         for force in texture.forces_n[-2:]:
             expected = texture.peq(float(speed), float(force)).response(FREQUENCY_HZ)
             found = table.filter(float(speed), float(force)).response(FREQUENCY_HZ)
-            # Eight layers: the roots of a polynomial of order 16 lose digits.
-            assert found == pytest.approx(expected, rel=1e-6 if layers < 8 else 0.01)
+            assert found == pytest.approx(expected, rel=1e-9)
 
 
-def test_a_layer_without_noise_branch_has_zeros_on_the_unit_circle() -> None:
-    texture = layered_texture(2)
-    silent = replace(texture, noise_gains=0 * texture.noise_gains)
-    at = 100.0, 1.0
-    expected = silent.peq(*at).response(FREQUENCY_HZ)
-    found = tabled_layers(silent).filter(*at).response(FREQUENCY_HZ)
-    assert found == pytest.approx(expected, rel=0.02)
+def test_bands_by_coefficients_are_rendered_as_by_the_kernel() -> None:
+    texture = layered_texture(3)
+    hand = np.full(700, float(texture.speeds_mm_s[2])), np.full(700, float(texture.forces_n[3]))
+    stream = CompiledStream(BANDS, tabled_bands(texture), update_samples=5, seed=3)
+    expected = Renderer(texture, seed=3).render(*hand)
+    assert np.abs(stream.render(*hand) - expected).max() <= 1e-9 * expected.std()
 
 
 def test_poles_and_zeros_are_rendered_as_by_scipy() -> None:
-    table = tabled_layers(layered_texture(2))
+    values = np.broadcast_to([0.5, -1.2, 0.5, 0.1, -0.05, 0.4, 0.2, -0.3, 0.1], (2, 2, 9))
+    axes = np.array([50.0, 350.0]), np.array([0.5, 3.5])
+    table = CoefficientTable(
+        speeds_mm_s=axes[0], forces_n=axes[1], values=values, poles=4, rate_hz=RATE_HZ
+    )
     hand = np.full(700, 150.0), np.full(700, 1.5)
     found = CompiledStream(COEFFICIENTS, table, update_samples=5, seed=3).render(*hand)
-    at = table.filter(150.0, 1.5)
     noise = white_noise(stream_key(3), 0, 700)
-    expected = at.gain * lfilter([1.0, *at.zeros], [1.0, *at.poles], noise)
+    expected = 0.5 * lfilter([1.0, *values[0, 0, 5:]], [1.0, *values[0, 0, 1:5]], noise)
     assert np.abs(found - expected).max() <= 1e-9 * expected.std()
 
 
