@@ -72,6 +72,12 @@ def levels_in_motion(systems: Sequence[System], *, samples: int) -> Floats:
     return levels
 
 
+def louder_by(level: float, system: System) -> float:
+    """A level as a multiple of the system's own at rest; 1 where that is silent."""
+    own = level_at_rest(system)
+    return level / own if own > 0 else 1.0
+
+
 def _level(system: System, covariance: Floats) -> float:
     power = float(system.c @ covariance @ system.c)
     return float(np.sqrt(max(power, 0.0) + system.d**2))

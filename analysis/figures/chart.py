@@ -17,6 +17,7 @@ from analysis.benches.chart.methods import (
     AUTOREGRESSIVE,
     GRAINS,
     LOOPS,
+    METHODS,
     OURS,
     POLE_ZERO,
     SHAPED,
@@ -88,6 +89,7 @@ class Panel(NamedTuple):
     title: str
 
 
+WIDE = 1e3  # from here on an axis is labelled at powers of ten alone
 OPERATIONS = "operations per sample at 5 kHz"
 PANELS = (
     Panel("operations", OPERATIONS, AT, "at rest at the recorded conditions"),
@@ -143,11 +145,13 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
     _name_points(usual, panel.cost, error, ax=ax)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_locator(NullLocator())
     ax.margins(0.09)
+    for axis in (ax.xaxis, ax.yaxis):
+        low, high = axis.get_view_interval()
+        steps = (1.0, 2.0, 5.0) if high < WIDE * low else (1.0,)
+        axis.set_major_locator(LogLocator(subs=steps))
+        axis.set_major_formatter("{x:,g}")
+        axis.set_minor_locator(NullLocator())
     ax.set_xlabel(panel.cost_label)
     ax.set_ylabel("log-spectral distance from the truth (dB)")
     ax.set_title(panel.title, loc="left", fontsize=10)
@@ -203,6 +207,11 @@ def _short(method: str) -> str:
     return number.group() if number and is_step else SHORT.get(method, method)
 
 
+def _on_front(method: str) -> str:
+    """The same beside other families: what loops are made of would not tell."""
+    return method if method in METHODS and METHODS[method].family == LOOPS else _short(method)
+
+
 def _plot_front(every: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
     """The front as a staircase: what no other variant beats."""
     error = f"{panel.place}_distance_db"
@@ -237,11 +246,11 @@ def _name_front(front: pd.DataFrame, panel: Panel, *, ax: Axes) -> None:
     for index, row in front.iterrows():
         if index not in usual and row["method"] != WHITE:
             ax.annotate(
-                f"{_short(row['method'])}: {row['update_ms']:g} ms",
+                f"{_on_front(row['method'])}: {row['update_ms']:g} ms",
                 (row[panel.cost], row[error]),
-                xytext=(-4, -5),
+                xytext=(3, -3),
                 textcoords="offset points",
-                ha="right",
+                ha="left",
                 va="top",
                 fontsize=6.5,
                 color=STYLES[row["family"]][0],

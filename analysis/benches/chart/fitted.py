@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from analysis.benches.accuracy import rendered_parameters
 from analysis.benches.chart.rival_costs import COST_RATE_HZ
-from analysis.benches.levels import level_at_rest, levels_in_motion, systems_of_layers
+from analysis.benches.levels import levels_in_motion, louder_by, systems_of_layers
 from analysis.textures.between import Truth
 from modeling import RegressedModel, Renderer, TextureModel
 from modeling.arrays import Floats
@@ -93,7 +93,7 @@ class Layered:
         filters = list[SpectralFilter]()
         for place in places:
             peq = first_peq(Parameters(*(part[[place]] for part in course)), rate_hz=rate_hz)
-            factor = levels[place] / level_at_rest(systems[place])
+            factor = louder_by(levels[place], systems[place])
             filters.append(
                 replace(peq, noise_gain=peq.noise_gain * factor, gains=peq.gains * factor)
             )

@@ -20,7 +20,7 @@ from analysis.benches.chart.rival_costs import (
 )
 from analysis.benches.chart.shaped_noise import ShapedFilter, ShapedNoise
 from analysis.benches.coefficients import BandTable, CoefficientTable, tabled_predictor
-from analysis.benches.levels import level_at_rest, levels_in_motion
+from analysis.benches.levels import levels_in_motion, louder_by
 from analysis.benches.stored_sounds import Grains, Loops, SampledResponse, Sounds
 from modeling import ARModel
 from modeling.arrays import Floats
@@ -65,7 +65,7 @@ class Filtered:
         filters = [self.model.filter(*at(course, update)) for update in range(used)]
         levels = levels_in_motion([one.system for one in filters], samples=update_samples)
         there = [(place, filters[place // update_samples]) for place in places]
-        return [one.times(levels[place] / level_at_rest(one.system)) for place, one in there]
+        return [one.times(louder_by(levels[place], one.system)) for place, one in there]
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
         nodes = self.model.values[..., 0].size

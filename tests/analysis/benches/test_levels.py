@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.benches.coefficients import BandFilter, PoleZeroFilter
-from analysis.benches.levels import System, level_at_rest, levels_in_motion, systems_of_layers
+from analysis.benches.levels import (
+    System,
+    level_at_rest,
+    levels_in_motion,
+    louder_by,
+    systems_of_layers,
+)
 from modeling import PEQ
 from modeling.models.parameter_table import Parameters
 
@@ -28,6 +34,12 @@ def test_a_single_pole_rises_as_a_geometric_series(pole: float) -> None:
     expected = np.sqrt(np.cumsum(pole ** (2 * np.arange(20))))
     assert found == pytest.approx(expected)
     assert level_at_rest(one_pole(pole)) == pytest.approx(1 / np.sqrt(1 - pole**2))
+
+
+def test_a_silent_filter_is_louder_by_nothing() -> None:
+    silent = System(np.array([[0.5]]), np.array([0.0]), np.array([0.0]), 0.0)
+    assert louder_by(0.1, silent) == 1.0
+    assert louder_by(4.0, System(*silent[:3], 2.0)) == pytest.approx(2.0)
 
 
 def test_what_the_filter_before_has_left_dies_with_the_new_pole() -> None:
