@@ -150,7 +150,7 @@ def plot_panel(summary: pd.DataFrame, panel: Panel, ax: Axes | None = None) -> A
         low, high = axis.get_view_interval()
         steps = (1.0, 2.0, 5.0) if high < WIDE * low else (1.0,)
         axis.set_major_locator(LogLocator(subs=steps))
-        axis.set_major_formatter("{x:,g}")
+        axis.set_major_formatter("{x:,.7g}")
         axis.set_minor_locator(NullLocator())
     ax.set_xlabel(panel.cost_label)
     ax.set_ylabel("log-spectral distance from the truth (dB)")
