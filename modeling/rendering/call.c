@@ -1,7 +1,8 @@
 /* One call of the kernel from Python, as cheap as a call can be: `Call(owner, render, render_held,
-   texture, state, single)` holds addresses of the kernel's functions and of what they work on, and
-   `call(speed, force, samples, out)` renders. It takes what needs no conversion and answers None to
-   anything else; modeling.rendering.renderer converts and refuses.
+   render_on, texture, state, single)` holds addresses of the kernel's functions and of what they work on,
+   and `call(speed, force, samples, out)` renders; speed and force are None for the hand as last read.
+   It takes what needs no conversion and answers None to anything else; modeling.rendering.renderer
+   converts and refuses.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -24,27 +25,32 @@ typedef void held_double(const void *texture, void *state, double speed, double 
 typedef void held_single(const void *texture, void *state, float speed, float force, void *out,
                          size_t count);
 
+typedef void on_call(const void *texture, void *state, void *out, size_t count);
+
 typedef struct {
     PyObject_HEAD
     vectorcallfunc vectorcall;
     PyObject *owner; /* of texture and state */
-    uintptr_t render, held;
+    uintptr_t render, held, on;
     void *texture, *state;
     int single;
     int busy; /* rendering, perhaps while other threads of Python run */
 } Call;
 
-/* A hand: an array of doubles each, or two numbers where the arrays are NULL. */
+/* A hand: an array of doubles each, or two numbers where the arrays are NULL, or as last read. */
 typedef struct {
     const double *speeds, *forces;
     double speed, force;
+    int read;
 } Hand;
 
 static void in_kernel_precision(const Call *c, const Hand *hand, size_t from, void *out, size_t count)
 {
     float speeds[CHUNK], forces[CHUNK];
     size_t n;
-    if (!hand->speeds && c->single)
+    if (hand->read)
+        ((on_call *)c->on)(c->texture, c->state, out, count);
+    else if (!hand->speeds && c->single)
         ((held_single *)c->held)(c->texture, c->state, (float)hand->speed, (float)hand->force, out,
                                  count);
     else if (!hand->speeds)
@@ -92,14 +98,17 @@ static PyArrayObject *vector(PyObject *object, int type, int flags)
     return fits ? array : NULL;
 }
 
-/* 1 where both are arrays of doubles of one length, or both numbers; else 0. The length of arrays. */
+/* 1 where both are arrays of doubles of one length, both numbers or both None; else 0. The length of arrays. */
 static int hand_of(PyObject *speed, PyObject *force, Hand *hand, Py_ssize_t *length)
 {
     PyArrayObject *speeds = vector(speed, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
     PyArrayObject *forces = vector(force, NPY_DOUBLE, NPY_ARRAY_CARRAY_RO);
     hand->speeds = hand->forces = NULL;
     hand->speed = hand->force = 0;
+    hand->read = speed == Py_None && force == Py_None;
     *length = -1;
+    if (hand->read)
+        return 1;
     if (speeds && forces && PyArray_DIM(speeds, 0) == PyArray_DIM(forces, 0)) {
         *length = PyArray_DIM(speeds, 0);
         hand->speeds = PyArray_DATA(speeds);
@@ -188,12 +197,12 @@ static PyObject *called(PyObject *self, PyObject *const *arguments, size_t flags
 
 static PyObject *new_call(PyTypeObject *type, PyObject *arguments, PyObject *names)
 {
-    unsigned long long render, held, texture, state;
+    unsigned long long render, held, on, texture, state;
     PyObject *owner;
     int single;
     Call *c;
     (void)names;
-    if (!PyArg_ParseTuple(arguments, "OKKKKp", &owner, &render, &held, &texture, &state, &single))
+    if (!PyArg_ParseTuple(arguments, "OKKKKKp", &owner, &render, &held, &on, &texture, &state, &single))
         return NULL;
     c = (Call *)type->tp_alloc(type, 0);
     if (!c)
@@ -203,6 +212,7 @@ static PyObject *new_call(PyTypeObject *type, PyObject *arguments, PyObject *nam
     c->owner = owner;
     c->render = (uintptr_t)render;
     c->held = (uintptr_t)held;
+    c->on = (uintptr_t)on;
     c->texture = (void *)(uintptr_t)texture;
     c->state = (void *)(uintptr_t)state;
     c->single = single;
@@ -215,6 +225,11 @@ static void delete_call(PyObject *self)
     Py_TYPE(self)->tp_free(self);
 }
 
+static PyMemberDef members[] = {
+    {"busy", T_INT, offsetof(Call, busy), READONLY, "whether it renders, in another thread"},
+    {NULL, 0, 0, 0, NULL},
+};
+
 static PyTypeObject call_type = {
     PyVarObject_HEAD_INIT(NULL, 0).tp_name = "modeling.rendering._call.Call",
     .tp_basicsize = sizeof(Call),
@@ -223,6 +238,7 @@ static PyTypeObject call_type = {
     .tp_call = PyVectorcall_Call,
     .tp_new = new_call,
     .tp_dealloc = delete_call,
+    .tp_members = members,
 };
 
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, .m_name = "_call", .m_size = -1};

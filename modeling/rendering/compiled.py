@@ -70,7 +70,8 @@ class CompiledEngine:
     """Renders layered models; in double precision bit for bit the same as the `PythonEngine`."""
 
     # What renders: (speed, force, samples, out), None for what is not given. Each of speed and
-    # force is a contiguous array of float64 or a float. None for an answer: it takes none of these.
+    # force is a contiguous array of float64 or a float, or both are None: the hand as last read.
+    # None for an answer: it takes none of these.
     call: Callable[..., Any]
 
     def __init__(self, model: LayeredModel, plan: RenderPlan, *, key: np.uint64) -> None:
@@ -84,7 +85,10 @@ class CompiledEngine:
         self._memory = ffi.new("tq_real[]", reals)
         self._state = ffi.new("tq_state *")
         lib.tq_start(self._texture, self._state, self._memory, int(key))
-        functions = ffi.addressof(lib, "tq_render"), ffi.addressof(lib, "tq_render_held")
+        self._read = lib.tq_read
+        functions = (
+            ffi.addressof(lib, name) for name in ("tq_render", "tq_render_held", "tq_render_on")
+        )
         addresses = [
             int(ffi.cast("uintptr_t", at)) for at in (*functions, self._texture, self._state)
         ]
@@ -106,4 +110,18 @@ class CompiledEngine:
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""
         rendered: Floats = self.call(speed_mm_s, force_n, None, None)
+        return rendered
+
+    def read(self, ago: float, speed_mm_s: float, force_n: float) -> None:
+        """A reading that was made so many samples before the next one."""
+        if self.call.busy:  # type: ignore[attr-defined]
+            raise RuntimeError(
+                "expected a reading between two calls of a renderer, got one while another thread "
+                "renders; make a renderer for each thread."
+            )
+        self._read(self._texture, self._state, ago, speed_mm_s, force_n)
+
+    def render_on(self, samples: int) -> Floats:
+        """The next samples for the hand as it was last read."""
+        rendered: Floats = self.call(None, None, samples, None)
         return rendered

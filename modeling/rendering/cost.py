@@ -102,9 +102,9 @@ def cost_of(
         square_roots=int(rms_limited),
     )
     per_update = Operations(
-        additions=18 + 43 * layers + 14 * extrapolated,
-        multiplications=12 + 73 * layers + 2 * groups + 6 * extrapolated,
-        divisions=2 + 3 * layers + 4 * extrapolated,
+        additions=35 + 43 * layers + 8 * extrapolated,
+        multiplications=26 + 73 * layers + 2 * groups + 2 * extrapolated,
+        divisions=8 + 3 * layers + 4 * extrapolated,
         square_roots=layers,
     )
     return Cost(

@@ -14,7 +14,8 @@
    TQ_SQRT(x)       another square root of a tq_real.
 
    Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, taps) reals; then call
-   tq_render or tq_render_held as often as you like, with blocks of any size.
+   tq_render or tq_render_held as often as you like, with blocks of any size. Where readings of the hand
+   come at times of their own, call tq_read for each of them and tq_render_on for blocks.
 
    Copyright (C) 2026 the tactileq authors. SPDX-License-Identifier: GPL-3.0-or-later */
 
@@ -105,6 +106,9 @@ typedef struct {
     int update_samples; /* from one parameter update to the next, at least 1 */
     tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
     tq_real slope_share;  /* how much of a new change from update to update counts at once, up to 1 */
+    /* Readings, in samples: how long one counts where none follows, and how long there must have been no
+       contact until it counts as ended. */
+    tq_real hold, release;
     const tq_real *slews; /* (1 + layers): the furthest a gain moves in one update */
     /* Vibrator compensation (eq. 7): out - share * band-pass(out); share 0 is none. */
     tq_real notch_hz, notch_width_hz, notch_share;
@@ -121,19 +125,31 @@ typedef struct {
     tq_real p, q, r, b1, b2, tap;
 } tq_band;
 
-/* What was corrected: samples without a finite hand; samples while the hand, as last read, touched and
-   moved faster or pressed harder than the grid's highest, or else slower or more lightly than its
-   lowest; parameter values moved into the legal range; samples that each limit touched. */
+/* What was corrected: samples without a finite hand (of tq_render_on: without a reading that counts);
+   samples while the hand, as last read, touched and moved faster or pressed harder than the grid's
+   highest, or else slower or more lightly than its lowest; parameter values moved into the legal range;
+   samples that each limit touched. */
 typedef struct {
     uint64_t lift_offs, above_grid, below_grid, clamped, peak, rms, duration;
 } tq_counters;
 
+/* The hand, as last read; all 0 while none is known. */
+typedef struct {
+    int known;                        /* whether there is a reading that counts */
+    int above_grid, below_grid;       /* whether it is */
+    int leaving;                      /* whether there were readings without contact since */
+    tq_real speed, force;
+    tq_real speed_slope, force_slope; /* their change per update, smoothed */
+    tq_real speed_turn, force_turn;   /* the same smoothed half as long, for readings of the past */
+    /* It was read `ago` samples before position `read`, and first without contact `off_ago` before `off`. */
+    uint64_t read, off;
+    tq_real ago, off_ago;
+} tq_followed;
+
 typedef struct {
     uint64_t key, position;
     int since_update;
-    int above_grid, below_grid; /* whether the hand is, as last read */
-    tq_real speed, force;       /* as last read */
-    tq_real speed_slope, force_slope; /* their change per update, smoothed */
+    tq_followed hand;
     tq_real angle, per_sample, to_end; /* pi / rate; one sample and all but one of an update's time */
     tq_real floor_gain, floor_now, floor_step;
     tq_real *memory;
@@ -326,15 +342,15 @@ TQ_INLINE tq_real tq_settled(tq_real x, tq_real lowest)
     return x < least && x > -least ? 0 : x;
 }
 
-/* The exponentially smoothed change of a reading from update to update, by which the hand is
-   extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0 reset
-   it. */
-TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real furthest, tq_real share,
-                           tq_real lowest)
+/* The exponentially smoothed change of a reading per update, `updates` after the last one, by which the
+   hand is extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0
+   reset it. */
+TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real updates, tq_real furthest,
+                           tq_real share, tq_real lowest)
 {
     tq_real change = now - last;
     int goes_on = change <= furthest && change >= -furthest && now != 0;
-    return goes_on ? tq_settled(slope + share * (change - slope), lowest) : 0;
+    return goes_on ? tq_settled(slope + share * (change / updates - slope), lowest) : 0;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -390,33 +406,80 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
 
 /* Whether a hand that touches and moves is beyond the grid's highest speed or force, or else below
    its lowest. */
-TQ_INLINE void tq_locate(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
+TQ_INLINE void tq_locate(const tq_texture *t, tq_followed *hand)
 {
-    tq_real size = speed < 0 ? -speed : speed;
-    int strokes = (size > 0) & (force > 0) & (size - size == 0) & (force - force == 0);
+    tq_real speed = hand->speed, force = hand->force, size = speed < 0 ? -speed : speed;
+    int strokes = (size > 0) & (force > 0);
     int above = (size > t->speed_mm_s[t->speeds - 1]) | (force > t->force_n[t->forces - 1]);
     int below = (size < t->speed_mm_s[0]) | (force < t->force_n[0]);
-    s->above_grid = strokes & above;
-    s->below_grid = strokes & below & !above;
+    hand->above_grid = strokes & above;
+    hand->below_grid = strokes & below & !above;
 }
 
-/* The hand in the middle of the time to the next update, and just before it: linearly extrapolated. */
-TQ_INLINE void tq_follow(const tq_texture *t, tq_state *s, tq_real speed, tq_real force, tq_hand *amid,
-                         tq_hand *end)
+/* Samples from `ago` before position `from` to position `to`; from 2^30 on no more. */
+TQ_INLINE tq_real tq_age(uint64_t from, tq_real ago, uint64_t to)
 {
-    tq_real to_end = s->to_end, v = t->speed_mm_s[0], f = t->force_n[0];
-    if (s->position != 0 && to_end > 0) {
-        s->speed_slope = tq_slope(s->speed_slope, s->speed, speed, t->speed_change, t->slope_share, v);
-        s->force_slope = tq_slope(s->force_slope, s->force, force, t->force_change, t->slope_share, f);
+    uint64_t samples = to - from, most = UINT64_C(1) << 30;
+    return (tq_real)(int32_t)(samples < most ? samples : most) + ago;
+}
+
+/* Whether a reading without contact, `ago` samples ago, is still too short after the first of them to end
+   the contact: sensors miss it for a moment. */
+TQ_INLINE int tq_leaving(const tq_texture *t, tq_state *s, tq_real ago, tq_real since, tq_real force)
+{
+    tq_followed *hand = &s->hand;
+    if (!hand->known || !(hand->force > 0) || force > 0)
+        return 0;
+    if (!hand->leaving)
+        hand->leaving = 1, hand->off = s->position, hand->off_ago = ago;
+    return tq_age(hand->off, hand->off_ago, s->position) - ago < t->release && since <= t->hold;
+}
+
+/* Takes in a reading of the hand that was made `ago` samples before the next one. None counts that is not
+   finite, as if it had not come, or no later than a thousandth of a sample after the last one. */
+TQ_INLINE void tq_take_in(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
+{
+    tq_followed *hand = &s->hand;
+    tq_real since, v = t->speed_mm_s[0], f = t->force_n[0];
+    ago = ago > 0 ? ago : 0;
+    since = tq_age(hand->read, hand->ago, s->position) - ago;
+    if (!(speed - speed == 0 && force - force == 0) || (hand->known && !(since > (tq_real)1e-3)))
+        return;
+    if (tq_leaving(t, s, ago, since, force))
+        return;
+    if (hand->known) {
+        tq_real updates = since / (tq_real)t->update_samples, most = updates > 1 ? updates : 1;
+        tq_real speed_change = t->speed_change * most, force_change = t->force_change * most;
+        tq_real share = tq_within(t->slope_share * updates, 0, 1), more = tq_within(2 * share, 0, 1);
+        tq_real v0 = hand->speed, f0 = hand->force;
+        hand->speed_slope = tq_slope(hand->speed_slope, v0, speed, updates, speed_change, share, v);
+        hand->force_slope = tq_slope(hand->force_slope, f0, force, updates, force_change, share, f);
+        hand->speed_turn = tq_slope(hand->speed_turn, v0, speed, updates, speed_change, more, v);
+        hand->force_turn = tq_slope(hand->force_turn, f0, force, updates, force_change, more, f);
     }
-    s->speed = speed = tq_settled(speed, v);
-    s->force = force = tq_settled(force, f);
-    tq_locate(t, s, speed, force);
-    *end = tq_hand_at(t, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
+    hand->known = 1, hand->leaving = 0;
+    hand->read = s->position, hand->ago = ago;
+    hand->speed = tq_settled(speed, v);
+    hand->force = tq_settled(force, f);
+    tq_locate(t, hand);
+}
+
+/* The hand in the middle of the time to the next update, and just before it: linearly extrapolated, from
+   when it was read to now and on from there. A reading that is too old counts no longer: lift-off. */
+TQ_INLINE void tq_follow(const tq_texture *t, tq_state *s, tq_hand *amid, tq_hand *end)
+{
+    tq_followed *hand = &s->hand;
+    tq_real age = tq_age(hand->read, hand->ago, s->position), to_end = s->to_end, past, speed, force;
+    if (age > t->hold)
+        TQ_FILL(hand, 0, sizeof *hand);
+    past = age / (tq_real)t->update_samples;
+    speed = hand->speed + hand->speed_turn * past;
+    force = hand->force + hand->force_turn * past;
+    *end = tq_hand_at(t, speed + hand->speed_slope * to_end, force + hand->force_slope * to_end);
     *amid = *end;
     if (to_end > 0)
-        *amid = tq_hand_at(t, speed + s->speed_slope * (to_end / 2),
-                           force + s->force_slope * (to_end / 2));
+        *amid = tq_hand_at(t, speed + hand->speed_slope * (to_end / 2),
+                           force + hand->force_slope * (to_end / 2));
 }
 
 /* The ramp of the noise gain until the next update. */
@@ -431,14 +494,14 @@ TQ_INLINE void tq_update_floor(const tq_texture *t, tq_state *s, const tq_hand *
     s->floor_gain = next;
 }
 
-/* Parameters for the linearly extrapolated hand: those for the hand as it is read would be late.
+/* Parameters for the linearly extrapolated hand: those for the hand as it was read would be late.
    Frequencies and bandwidths are set for the middle of the time to the next update; gains ramp linearly
    to those for its last sample, so that nothing clicks. The first update sets all at once. */
-static void tq_update(const tq_texture *t, tq_state *s, tq_real speed, tq_real force)
+static void tq_update(const tq_texture *t, tq_state *s)
 {
     tq_hand amid, end;
     int i;
-    tq_follow(t, s, speed, force, &amid, &end);
+    tq_follow(t, s, &amid, &end);
     tq_update_floor(t, s, &end);
     for (i = 0; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
         tq_update_layers(t, s, &amid, &end, i, TQ_SIDE_BY_SIDE);
@@ -662,26 +725,31 @@ TQ_INLINE void tq_restrain(const tq_texture *t, tq_state *s, tq_real *out, int c
             out[n] = tq_limit(t, s, out[n]);
 }
 
-/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
+/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0); where `reads` is
+   0, for the hand as last read. */
 TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *speed,
-                            const tq_real *force, size_t step, tq_real *out, size_t count)
+                            const tq_real *force, size_t step, int reads, tq_real *out, size_t count)
 {
     while (count) {
         tq_real lowpassed[TQ_CHUNK];
         int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0;
         const tq_real *w = tq_inputs(t, s, lowpassed, chunk), *floor = t->taps > 1 ? lowpassed : w;
-        s->counters.lift_offs += tq_lift_offs(speed, force, step, chunk);
+        if (reads)
+            s->counters.lift_offs += tq_lift_offs(speed, force, step, chunk);
         while (done < chunk) {
             int left = t->update_samples - s->since_update, piece;
             if (s->position == 0 || left == 0) {
-                tq_update(t, s, speed[step * (size_t)done], force[step * (size_t)done]);
+                if (reads)
+                    tq_take_in(t, s, 0, speed[step * (size_t)done], force[step * (size_t)done]);
+                tq_update(t, s);
                 s->since_update = 0;
                 left = t->update_samples;
             }
             piece = left < chunk - done ? left : chunk - done;
             tq_filter(t, s, w + done, floor + done, out + done, piece);
-            s->counters.above_grid += (uint64_t)(s->above_grid * piece);
-            s->counters.below_grid += (uint64_t)(s->below_grid * piece);
+            s->counters.lift_offs += (uint64_t)(reads || s->hand.known ? 0 : piece);
+            s->counters.above_grid += (uint64_t)(s->hand.above_grid * piece);
+            s->counters.below_grid += (uint64_t)(s->hand.below_grid * piece);
             s->position += (uint64_t)piece;
             done += piece;
         }
@@ -694,18 +762,34 @@ TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *spe
 }
 
 /* The next `count` samples for a hand whose speed (mm/s, signed: without its sign the hand would be
-   extrapolated past its reversals) and force (N) are given at each of them. */
+   extrapolated past its reversals) and force (N) are given at each of them. What is not finite counts as
+   missing: the reading before it is held. */
 static inline void tq_render(const tq_texture *t, tq_state *s, const tq_real *speed,
                              const tq_real *force, tq_real *out, size_t count)
 {
-    tq_render_by(t, s, speed, force, 1, out, count);
+    tq_render_by(t, s, speed, force, 1, 1, out, count);
 }
 
 /* The next `count` samples for a hand whose speed and force are held, as with one reading per block. */
 static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real speed, tq_real force,
                                   tq_real *out, size_t count)
 {
-    tq_render_by(t, s, &speed, &force, 0, out, count);
+    tq_render_by(t, s, &speed, &force, 0, 1, out, count);
+}
+
+/* A reading of the hand, made `ago` samples (fractions count) before the next one to be rendered; below 0
+   counts as 0. Readings come in the order of their times: one that is not later than the last is ignored. */
+static inline void tq_read(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
+{
+    tq_take_in(t, s, ago, speed, force);
+}
+
+/* The next `count` samples for the hand as it was read by tq_read, extrapolated from the time of the
+   reading. */
+static inline void tq_render_on(const tq_texture *t, tq_state *s, tq_real *out, size_t count)
+{
+    const tq_real none = 0;
+    tq_render_by(t, s, &none, &none, 0, 0, out, count);
 }
 
 #endif

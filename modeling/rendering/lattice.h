@@ -116,11 +116,11 @@ TQ_INLINE void tq_lattice_angles(const tq_lattice *l, tq_lattice_state *f)
 
 /* The angles for the hand in the middle of the time to the next update, and the ramp of the gain. */
 TQ_INLINE void tq_lattice_update(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                 tq_lattice_state *f, tq_real speed, tq_real force)
+                                 tq_lattice_state *f)
 {
     tq_hand amid, end, row;
     int i;
-    tq_follow(t, s, speed, force, &amid, &end);
+    tq_follow(t, s, &amid, &end);
     tq_update_floor(t, s, &end);
     row = amid;
     for (i = 0; i < 4; i++) /* of a node the texture has one value, its gain */
@@ -134,14 +134,16 @@ TQ_INLINE void tq_lattice_update(const tq_texture *t, const tq_lattice *l, tq_st
 
 /* --- Filtering --------------------------------------------------------------------------------- */
 
-/* The next sample at the model's rate, into `past`. */
+/* The next sample at the model's rate, into `past`; `hand` is speed and force, NULL as last read. */
 TQ_INLINE void tq_lattice_sample(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                 tq_lattice_state *f, tq_real speed, tq_real force)
+                                 tq_lattice_state *f, const tq_real *hand)
 {
     tq_real forward, *held = f->held;
     int i = l->order - 1;
     if (s->position == 0 || s->since_update == t->update_samples) {
-        tq_lattice_update(t, l, s, f, speed, force);
+        if (hand)
+            tq_take_in(t, s, 0, hand[0], hand[1]);
+        tq_lattice_update(t, l, s, f);
         s->since_update = 0;
     }
     forward = tq_noise(s->key, s->position);
@@ -160,13 +162,13 @@ TQ_INLINE void tq_lattice_sample(const tq_texture *t, const tq_lattice *l, tq_st
 
 /* The next sample at the card's rate, before compensation and limits. */
 TQ_INLINE tq_real tq_lattice_next(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                  tq_lattice_state *f, tq_real speed, tq_real force)
+                                  tq_lattice_state *f, const tq_real *hand)
 {
     const tq_real *weights = l->lowpass + (size_t)f->phase * (size_t)l->taps, *past;
     tq_real sum = 0;
     int tap;
     for (; f->behind; f->behind--)
-        tq_lattice_sample(t, l, s, f, speed, force);
+        tq_lattice_sample(t, l, s, f, hand);
     past = f->past + f->newest;
     for (tap = 0; tap < l->taps; tap++)
         sum += weights[tap] * past[tap];
@@ -207,22 +209,50 @@ static inline void tq_lattice_start(const tq_texture *t, const tq_lattice *l, tq
     }
 }
 
+/* The next `count` samples at the card's rate, for a hand as of tq_lattice_sample. */
+TQ_INLINE void tq_lattice_render_by(const tq_texture *t, const tq_lattice *l, tq_state *s,
+                                    tq_lattice_state *f, const tq_real *hand, tq_real *out, size_t count)
+{
+    while (count) {
+        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, n;
+        if (hand)
+            s->counters.lift_offs += tq_lift_offs(hand, hand + 1, 0, chunk);
+        for (n = 0; n < chunk; n++) {
+            out[n] = tq_lattice_next(t, l, s, f, hand);
+            s->counters.lift_offs += hand || s->hand.known ? 0 : 1;
+            s->counters.above_grid += (uint64_t)s->hand.above_grid;
+            s->counters.below_grid += (uint64_t)s->hand.below_grid;
+        }
+        tq_restrain(t, s, out, chunk);
+        out += chunk, count -= (size_t)chunk;
+    }
+}
+
 /* The next `count` samples at the card's rate, for a hand whose speed and force are held. */
 static inline void tq_lattice_render_held(const tq_texture *t, const tq_lattice *l, tq_state *s,
                                           tq_lattice_state *f, tq_real speed, tq_real force,
                                           tq_real *out, size_t count)
 {
-    while (count) {
-        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, n;
-        s->counters.lift_offs += tq_lift_offs(&speed, &force, 0, chunk);
-        for (n = 0; n < chunk; n++) {
-            out[n] = tq_lattice_next(t, l, s, f, speed, force);
-            s->counters.above_grid += (uint64_t)s->above_grid;
-            s->counters.below_grid += (uint64_t)s->below_grid;
-        }
-        tq_restrain(t, s, out, chunk);
-        out += chunk, count -= (size_t)chunk;
-    }
+    tq_real hand[2];
+    hand[0] = speed, hand[1] = force;
+    tq_lattice_render_by(t, l, s, f, hand, out, count);
+}
+
+/* A reading of the hand, made `ago` samples at the card's rate before the next one; see tq_read. */
+static inline void tq_lattice_read(const tq_texture *t, const tq_lattice *l, tq_state *s,
+                                   const tq_lattice_state *f, tq_real ago, tq_real speed, tq_real force)
+{
+    /* Of the model's samples: the one to be filtered next is up to one ahead of the card's next one. */
+    tq_real before = ago > 0 ? ago * (tq_real)l->down : 0;
+    before += (tq_real)(f->behind ? 0 : l->up) - (tq_real)f->phase;
+    tq_take_in(t, s, before / (tq_real)l->up, speed, force);
+}
+
+/* The next `count` samples at the card's rate, for the hand as it was read by tq_lattice_read. */
+static inline void tq_lattice_render_on(const tq_texture *t, const tq_lattice *l, tq_state *s,
+                                        tq_lattice_state *f, tq_real *out, size_t count)
+{
+    tq_lattice_render_by(t, l, s, f, NULL, out, count);
 }
 
 #endif

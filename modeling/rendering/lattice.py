@@ -70,6 +70,7 @@ def lattice_fields(model: ARModel, plan: RenderPlan) -> LatticeFields:
         "speed_change": speed_change,
         "force_change": force_change,
         "slope_share": own.slope_share,
+        **own.readings,
         "slews": own.slews(np.array([model.gains.max()])),
     }
     lattice = {

@@ -31,7 +31,10 @@ typedef struct {
 /* tq_state for every stream. */
 typedef struct {
     V lowest_speed, highest_speed, lowest_force, highest_force;
-    V speed, force, speed_slope, force_slope;
+    V speed, force, speed_slope, force_slope; /* tq_followed */
+    M known, leaving;
+    V speed_turn, force_turn;
+    V age, off, past;
     TQ_(tq_hands) amid, end;
     V floor_gain, floor_now, floor_step, floor_slew;
     TQ_(tq_bits) keys;
@@ -117,11 +120,11 @@ TQ_WIDE V TQ_(tq_all_settled)(V x, V lowest)
     return (V)(~(TQ_(tq_sizes)(x) < (tq_real)1e-9 * lowest) & (M)x);
 }
 
-TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, tq_real furthest, tq_real share, V lowest)
+TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, V updates, V furthest, V share, V lowest)
 {
     V change = now - last;
     M goes_on = (TQ_(tq_sizes)(change) <= furthest) & (now != 0);
-    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change - slope), lowest));
+    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change / updates - slope), lowest));
 }
 
 TQ_WIDE V TQ_(tq_all_towards)(V gain, V wanted, V slew)
@@ -218,43 +221,78 @@ TQ_WIDE void TQ_(tq_hands_at)(const TQ_(tq_many) *s, TQ_(tq_hands) *hands, V spe
 TQ_WIDE void TQ_(tq_locate_all)(TQ_(tq_many) *s)
 {
     V force = s->force, size = TQ_(tq_sizes)(s->speed);
-    M strokes = (size > 0) & (force > 0) & (size - size == 0) & (force - force == 0);
+    M strokes = (size > 0) & (force > 0);
     s->above_grid = strokes & ((size > s->highest_speed) | (force > s->highest_force));
     s->below_grid = strokes & ((size < s->lowest_speed) | (force < s->lowest_force)) & ~s->above_grid;
 }
 
-/* tq_follow for every stream; whether any hand is elsewhere than at the last update. */
+/* tq_take_in for every stream, of readings at the update. */
+TQ_WIDE void TQ_(tq_take_in_all)(TQ_(tq_many) *s, V speed, V force)
+{
+    const tq_texture *t = &s->streams->texture;
+    M taken = (speed - speed) + (force - force) == 0;
+    M lifts = taken & s->known & (s->force > 0) & ~(force > 0), waits;
+    V one = TQ_(tq_all)(1), updates = TQ_(tq_either)(s->known, s->age / (tq_real)t->update_samples, one);
+    V most = TQ_(tq_either)(updates > 1, updates, one), share = t->slope_share * updates, more;
+    share = TQ_(tq_either)(share < 1, share, one);
+    more = TQ_(tq_either)(2 * share < 1, 2 * share, one);
+    s->off = (V)(~(lifts & ~s->leaving) & (M)s->off);
+    waits = lifts & (s->off < t->release) & (s->age <= t->hold);
+    taken &= ~waits;
+    s->leaving = (s->leaving | lifts) & ~taken;
+#define TQ_TURNED(slope, now, change, by)                                                               \
+    s->now##_##slope = TQ_(tq_either)(                                                                  \
+        taken, (V)(s->known & (M)TQ_(tq_all_slopes)(s->now##_##slope, s->now, now, updates, change * most, by, \
+                                                    s->lowest_##now)),                                  \
+        s->now##_##slope)
+    TQ_TURNED(slope, speed, t->speed_change, share);
+    TQ_TURNED(slope, force, t->force_change, share);
+    TQ_TURNED(turn, speed, t->speed_change, more);
+    TQ_TURNED(turn, force, t->force_change, more);
+#undef TQ_TURNED
+    s->speed = TQ_(tq_either)(taken, TQ_(tq_all_settled)(speed, s->lowest_speed), s->speed);
+    s->force = TQ_(tq_either)(taken, TQ_(tq_all_settled)(force, s->lowest_force), s->force);
+    s->age = (V)(~taken & (M)s->age);
+    s->known |= taken;
+}
+
+/* tq_follow for every stream, behind the reading of its hand; whether any hand is elsewhere than at the
+   last update. */
 TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
 {
     const tq_texture *t = &s->streams->texture;
     tq_real to_end = s->to_end;
     tq_real read[2][TQ_W] = {{0}};
-    V speed, force, speed_slope = s->speed_slope, force_slope = s->force_slope;
-    M held;
+    V speed = s->speed, force = s->force, speed_slope = s->speed_slope, force_slope = s->force_slope;
+    V read_speed, read_force, past = s->past;
+    M held, kept;
     int l;
     for TQ_EACH(l)
         if (s->position < s->streams[l].count) {
             read[0][l] = s->streams[l].speed[s->position];
             read[1][l] = s->streams[l].force[s->position];
         }
-    TQ_COPY(&speed, read[0], sizeof speed);
-    TQ_COPY(&force, read[1], sizeof force);
-    if (s->position != 0 && to_end > 0) {
-        tq_real share = t->slope_share;
-        s->speed_slope = TQ_(tq_all_slopes)(s->speed_slope, s->speed, speed, t->speed_change, share,
-                                            s->lowest_speed);
-        s->force_slope = TQ_(tq_all_slopes)(s->force_slope, s->force, force, t->force_change, share,
-                                            s->lowest_force);
+    TQ_COPY(&read_speed, read[0], sizeof read_speed);
+    TQ_COPY(&read_force, read[1], sizeof read_force);
+    if (s->position != 0) {
+        s->age += (tq_real)t->update_samples;
+        s->off += (tq_real)t->update_samples;
     }
-    speed = TQ_(tq_all_settled)(speed, s->lowest_speed);
-    force = TQ_(tq_all_settled)(force, s->lowest_force);
+    TQ_(tq_take_in_all)(s, read_speed, read_force);
+    kept = ~(s->age > t->hold);
+    s->known &= kept, s->leaving &= kept;
+    s->speed = (V)(kept & (M)s->speed), s->force = (V)(kept & (M)s->force);
+    s->speed_slope = (V)(kept & (M)s->speed_slope), s->force_slope = (V)(kept & (M)s->force_slope);
+    s->age = (V)(kept & (M)s->age), s->off = (V)(kept & (M)s->off);
+    s->speed_turn = (V)(kept & (M)s->speed_turn), s->force_turn = (V)(kept & (M)s->force_turn);
+    s->past = s->age / (tq_real)t->update_samples;
     held = (speed == s->speed) & (force == s->force) & (speed_slope == s->speed_slope) &
-           (force_slope == s->force_slope);
+           (force_slope == s->force_slope) & (past == s->past);
     if (s->position != 0 && !TQ_WIDE_ANY(~held))
         return 0;
-    s->speed = speed;
-    s->force = force;
     TQ_(tq_locate_all)(s);
+    speed = s->speed + s->speed_turn * s->past;
+    force = s->force + s->force_turn * s->past;
     TQ_(tq_hands_at)(s, &s->end, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
     TQ_(tq_hands_at)(s, &s->amid, speed + s->speed_slope * (to_end / 2),
                      force + s->force_slope * (to_end / 2));

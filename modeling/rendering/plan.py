@@ -23,6 +23,10 @@ SLOPE_S = 4e-3
 # A reading that changes faster is a step of the device, not a hand's motion (2 g; a sharp tap).
 FASTEST_SPEED_CHANGE_MM_S2 = 2e4
 FASTEST_FORCE_CHANGE_N_S = 200.0
+# How long the hand is extrapolated from a reading where none follows.
+HOLD_S = 20e-3
+# How long there must have been no contact until it counts as ended: sensors miss it for a moment.
+RELEASE_S = 3e-3
 _EDGE_SHARE = 0.2
 _LONGEST_UPDATE = 1_000_000
 _FOR_EVER = 2**62
@@ -59,7 +63,8 @@ class Notch(Protocol):
 class RenderCounters:
     """What a renderer had to correct so far.
 
-    `lift_offs`: samples with a speed or force that is not finite. `above_grid`: samples while the
+    `lift_offs`: samples with a speed or force that is not finite; of readings with times of their
+    own, samples for which none counts. `above_grid`: samples while the
     hand, as last read, touched and moved faster or pressed harder than the highest condition of the
     model's grid; `below_grid`: or else slower or more lightly than the lowest, but not at rest.
     `clamped`: parameter values moved into the legal range. The rest: samples that each of the
@@ -133,6 +138,11 @@ class RenderPlan:
         return min(1.0, self.update_samples / (SLOPE_S * self.rate_hz))
 
     @property
+    def readings(self) -> dict[str, float]:
+        """What `tq_texture` holds of readings (docs/method/rendering.md#readings), in samples."""
+        return {"hold": HOLD_S * self.rate_hz, "release": RELEASE_S * self.rate_hz}
+
+    @property
     def mean_share(self) -> float:
         """What a new square adds to the running mean square."""
         return float(-np.expm1(-1 / (self.limits.rms_window_s * self.rate_hz)))
@@ -194,6 +204,7 @@ class RenderPlan:
             "speed_change": speed_change,
             "force_change": force_change,
             "slope_share": self.slope_share,
+            **self.readings,
             "slews": self.slews(table.largest_gains),
         }
         return fields | self.restraints()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from modeling.arrays import Floats
-from modeling.checks import is_whole
+from modeling.checks import is_number, is_whole
 from modeling.errors import InputError, shown
 from modeling.models.ar_model import ARModel
 from modeling.rendering.compiled import CompiledEngine, is_compiled
@@ -37,6 +37,10 @@ class Engine(Protocol):
     def counters(self) -> RenderCounters: ...
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats: ...
+
+    def read(self, ago: float, speed_mm_s: float, force_n: float) -> None: ...
+
+    def render_on(self, samples: int) -> Floats: ...
 
 
 class Renderer:
@@ -168,7 +172,9 @@ class Renderer:
             Tangential speed (mm/s; its sign is the direction) and normal force (N) at each sample.
             Signed speed is better than |v|, which is extrapolated past its corner where the hand
             turns (docs/method/rendering.md#extrapolation). NaN and infinite values count as
-            lift-off and are counted.
+            missing and are counted: the reading before is held for 20 ms, then the hand is lifted
+            off. Contact ends 3 ms after the first force of 0 or less
+            (docs/method/rendering.md#readings).
         samples : int, optional
             Number of samples where speed and force are scalars; by default the size of `out`.
         out : (n,) ndarray of float64 or float32, optional
@@ -198,6 +204,64 @@ class Renderer:
         out[:] = self._engine.render(speed, force)
         return out
 
+    def read(self, speed_mm_s: float, force_n: float, *, ago: float = 0.0) -> None:
+        """Take in a reading of the hand that was made at a time of its own, for `render_on`.
+
+        Parameters
+        ----------
+        speed_mm_s, force_n : float
+            Tangential speed (mm/s; its sign is the direction) and normal force (N). One that is not
+            finite is ignored, as if it had not come.
+        ago : float
+            How many samples before the next one it was made, fractions included; ≥ 0. Readings come
+            in the order of their times: one that is not later than the last one is ignored.
+
+        Raises
+        ------
+        InputError
+            For what is no number, and a time below 0 (in the future) or not finite.
+        RuntimeError
+            While another thread renders with the same compiled renderer.
+        """
+        if not (is_number(ago) and 0 <= ago < np.inf):
+            raise InputError(
+                "expected the time since a reading as a number of samples, 0 or more, got "
+                f"{shown(ago)}; a reading is made before it is used."
+            )
+        speed, force = as_floats(speed_mm_s, force_n)
+        if speed.ndim or force.ndim:
+            raise InputError(
+                "expected one speed and one force of a reading, got shapes "
+                f"{speed.shape} and {force.shape}; call read for each reading."
+            )
+        self._engine.read(float(ago), float(speed), float(force))
+
+    def render_on(self, samples: int) -> Floats:
+        """The next samples for the hand as it was last `read`, extrapolated from that time.
+
+        A reading counts for 20 ms. Before the first one, and when none counts any more, the hand is
+        lifted off (docs/method/rendering.md#readings).
+
+        Parameters
+        ----------
+        samples : int
+            0 or more; any division into calls gives the same bits.
+
+        Returns
+        -------
+        (samples,) ndarray
+            Acceleration in the model's unit (g).
+
+        Raises
+        ------
+        InputError
+            For another number of samples.
+        RuntimeError
+            For a call while another thread renders with the same compiled renderer.
+        """
+        _check_samples(samples)
+        return self._engine.render_on(int(samples))
+
 
 def _converted(*arguments: object) -> None:
     """In place of an engine's call that takes some arguments as they are."""
@@ -220,11 +284,8 @@ def _checked(
     speed_mm_s: ArrayLike, force_n: ArrayLike, *, samples: int | None, count: int | None
 ) -> tuple[Floats, Floats]:
     speed, force = as_floats(speed_mm_s, force_n)
-    if samples is not None and not (is_whole(samples) and 0 <= samples <= MOST_SAMPLES):
-        raise InputError(
-            f"expected samples as a whole number of 0 … {MOST_SAMPLES}, got {shown(samples)}; "
-            "render more in several calls."
-        )
+    if samples is not None:
+        _check_samples(samples)
     if speed.ndim == force.ndim == 0 and count is not None:
         return np.full(count, float(speed)), np.full(count, float(force))
     if speed.ndim != 1 or speed.shape != force.shape or samples is not None:
@@ -233,6 +294,14 @@ def _checked(
             f"got shapes {speed.shape} and {force.shape} with samples={samples}; match them."
         )
     return speed, force
+
+
+def _check_samples(samples: int) -> None:
+    if not (is_whole(samples) and 0 <= samples <= MOST_SAMPLES):
+        raise InputError(
+            f"expected samples as a whole number of 0 … {MOST_SAMPLES}, got {shown(samples)}; "
+            "render more in several calls."
+        )
 
 
 def _check_out(out: NDArray[Any], count: int) -> None:

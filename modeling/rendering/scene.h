@@ -74,7 +74,8 @@ TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
     return h->state.floor_gain == 0;
 }
 
-/* The wanted texture, from its beginning, behind the same compensation and limits as before. */
+/* The wanted texture, from its beginning, behind the same compensation and limits as before; its hand is
+   still to be read. */
 static void tq_scene_next(tq_scene_hand *h)
 {
     tq_state before = h->state;
@@ -89,32 +90,69 @@ static void tq_scene_next(tq_scene_hand *h)
     h->state.counters = before.counters;
 }
 
-/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0). */
-static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_real *force, size_t step,
-                               tq_real *out, size_t count)
+/* The hand on the next texture is as it was read on the last one, up to `position`. */
+TQ_INLINE void tq_scene_keep(tq_scene_hand *h, tq_followed hand, const tq_texture *last, uint64_t position)
+{
+    const tq_texture *t = tq_scene_texture(h);
+    tq_real longer = (tq_real)t->update_samples / (tq_real)last->update_samples;
+    hand.read -= position; /* modulo 2^64, as all positions */
+    hand.off -= position;
+    hand.speed_slope *= longer;
+    hand.force_slope *= longer;
+    hand.speed_turn *= longer;
+    hand.force_turn *= longer;
+    tq_locate(t, &hand);
+    h->state.hand = hand;
+}
+
+/* The next samples without a force, at most up to the next update, for a hand as of tq_scene_render_by. */
+TQ_INLINE void tq_scene_lifted(tq_scene_hand *h, const tq_real *speed, const tq_real *force, size_t step,
+                               int reads, tq_real *out, size_t count)
 {
     tq_state *s = &h->state;
+    tq_followed hand = s->hand;
     const tq_real off = 0;
+    uint64_t lift_offs = s->counters.lift_offs; /* those of the hand, not of what is read for it */
+    if (reads) {
+        lift_offs += tq_lift_offs(speed, force, step, (int)count);
+        s->hand.force = s->hand.force_slope = s->hand.force_turn = 0; /* no contact that has to end first */
+        tq_render_by(tq_scene_texture(h), s, speed, &off, 0, 1, out, count);
+    } else {
+        lift_offs += hand.known ? 0 : count;
+        TQ_FILL(&s->hand, 0, sizeof s->hand);
+        tq_render_by(tq_scene_texture(h), s, &off, &off, 0, 0, out, count);
+        s->hand = hand;
+    }
+    s->counters.lift_offs = lift_offs;
+}
+
+/* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0); where `reads` is
+   0, for the hand as last read. */
+static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_real *force, size_t step,
+                               int reads, tq_real *out, size_t count)
+{
+    tq_state *s = &h->state;
     while (count) {
         const tq_texture *t = tq_scene_texture(h);
-        int left = s->position == 0 ? 0 : t->update_samples - s->since_update, changes, lifted;
+        int left = s->position == 0 ? 0 : t->update_samples - s->since_update, changes;
         size_t piece = count;
-        uint64_t lift_offs = s->counters.lift_offs;
         if (left == 0 && h->wanted != h->now && tq_scene_silent(h)) {
+            tq_followed hand = s->hand;
+            uint64_t position = s->position;
             tq_scene_next(h);
+            if (!reads)
+                tq_scene_keep(h, hand, t, position);
             t = tq_scene_texture(h);
         }
         changes = h->wanted != h->now || (h->switches && s->position == 0);
-        lifted = changes && left == 0; /* as the next update reads the hand */
         if (changes) {
             size_t most = (size_t)(left ? left : t->update_samples);
             piece = count < most ? count : most;
         }
-        if (lifted)
-            lift_offs += tq_lift_offs(speed, force, step, (int)piece);
-        tq_render_by(t, s, speed, lifted ? &off : force, lifted ? 0 : step, out, piece);
-        if (lifted) /* those of the hand, not of what was read for it */
-            s->counters.lift_offs = lift_offs;
+        if (changes && left == 0) /* the next update finds the hand lifted */
+            tq_scene_lifted(h, speed, force, step, reads, out, piece);
+        else
+            tq_render_by(t, s, speed, force, step, reads, out, piece);
         speed += step * piece, force += step * piece;
         out += piece, count -= piece;
     }
@@ -147,13 +185,26 @@ static inline void tq_scene_switch(tq_scene_hand *h, int texture)
 static inline void tq_scene_render(tq_scene_hand *h, const tq_real *speed, const tq_real *force,
                                    tq_real *out, size_t count)
 {
-    tq_scene_render_by(h, speed, force, 1, out, count);
+    tq_scene_render_by(h, speed, force, 1, 1, out, count);
 }
 
 static inline void tq_scene_render_held(tq_scene_hand *h, tq_real speed, tq_real force, tq_real *out,
                                         size_t count)
 {
-    tq_scene_render_by(h, &speed, &force, 0, out, count);
+    tq_scene_render_by(h, &speed, &force, 0, 1, out, count);
+}
+
+/* A reading of the hand at a time of its own, and the next samples for the hand as last read, as of
+   tq_read and tq_render_on. */
+static inline void tq_scene_read(tq_scene_hand *h, tq_real ago, tq_real speed, tq_real force)
+{
+    tq_read(tq_scene_texture(h), &h->state, ago, speed, force);
+}
+
+static inline void tq_scene_render_on(tq_scene_hand *h, tq_real *out, size_t count)
+{
+    const tq_real none = 0;
+    tq_scene_render_by(h, &none, &none, 0, 0, out, count);
 }
 
 #endif

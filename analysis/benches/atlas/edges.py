@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from analysis.benches.atlas.case import FAILS, HOLDS, Case, Verdict
 
 CELLS = {False: 3, True: 5}
-BISECTIONS = {False: 2, True: 6}
+# From mild to severe as long as a method holds: an edge is no single lucky run.
+SEARCHED = {False: 3, True: 17}
+BISECTIONS = {False: 2, True: 4}
 
 
 @dataclass(frozen=True)
@@ -31,12 +33,12 @@ class Examined:
     at_default : Cell or None
         The run at the default.
     holds_to : float
-        The most severe value, from the mild end on, with which the method holds; NaN where it does
-        not even hold there. The severe end of the axis where it holds throughout.
+        The most severe value up to which the method holds in all runs, from the mild end on; NaN
+        where it does not even hold there. The severe end of the axis where it holds throughout.
     fails_from : float
         The value from which on it fails; NaN where it does not within the axis.
     returns : bool
-        Whether it holds again at some cell beyond `holds_to`, so that there are several edges.
+        Whether it holds again in some run beyond `holds_to`, so that there are several edges.
     runs : int
         Number of runs of the case.
     """
@@ -59,9 +61,11 @@ class Examined:
 def examine(case: Case, column: str, *, full: bool) -> Examined:
     """Cells and edges of one column of a case.
 
-    The edge is located by bisection between the first cell that no longer holds and the one before
-    it, to 1/256 of the axis (1/8 in the reduced atlas); likewise for failure. An edge is the most
-    severe value at which the runs still held, so it is too mild by that much at most.
+    The runs go from mild to severe in steps of 1/16 of the axis (1/2 in the reduced atlas) until
+    one no longer holds. The edge is located by bisection between that one and the one before it,
+    to 1/256 of the axis (1/8); likewise for failure. An edge is the most severe value up to which
+    all runs held, so it is too mild by that much at most. What comes and goes within a step is
+    missed.
     """
     probe = _Probe(case, column, full=full)
     count = CELLS[full]
@@ -69,12 +73,13 @@ def examine(case: Case, column: str, *, full: bool) -> Examined:
     cells = tuple(probe(share) for share in shares)
 
     def edge(is_past: Callable[[Verdict], bool]) -> tuple[float, float] | None:
-        past = next((i for i, cell in enumerate(cells) if is_past(cell.verdict)), None)
+        steps = SEARCHED[full] - 1
+        past = next((i for i in range(steps + 1) if is_past(probe(i / steps).verdict)), None)
         if past is None:
             return None
         if past == 0:
             return float("nan"), 0.0
-        low, high = shares[past - 1], shares[past]
+        low, high = (past - 1) / steps, past / steps
         for _ in range(BISECTIONS[full]):
             middle = (low + high) / 2
             if is_past(probe(middle).verdict):
@@ -84,7 +89,6 @@ def examine(case: Case, column: str, *, full: bool) -> Examined:
         return low, high
 
     not_held, failed = edge(lambda v: v != HOLDS), edge(lambda v: v == FAILS)
-    first = next((i for i, cell in enumerate(cells) if cell.verdict != HOLDS), count)
     default = case.axis.default
     return Examined(
         case=case,
@@ -93,7 +97,7 @@ def examine(case: Case, column: str, *, full: bool) -> Examined:
         at_default=None if default is None else probe.at_value(default),
         holds_to=case.axis.severe if not_held is None else case.axis.at(not_held[0]),
         fails_from=float("nan") if failed is None else case.axis.at(failed[1]),
-        returns=any(cell.verdict == HOLDS for cell in cells[first:]),
+        returns=not_held is not None and probe.holds_beyond(case.axis.at(not_held[1])),
         runs=probe.runs,
     )
 
@@ -111,6 +115,14 @@ class _Probe:
 
     def __call__(self, share: float) -> Cell:
         return self.at_value(self._case.axis.at(share))
+
+    def holds_beyond(self, value: float) -> bool:
+        """Whether any run so far holds that is more severe than a value."""
+        harder = 1 if self._case.axis.severe > self._case.axis.mild else -1
+        return any(
+            cell.verdict == HOLDS and (cell.value - value) * harder > 0
+            for cell in self._done.values()
+        )
 
     def at_value(self, value: float) -> Cell:
         if value not in self._done:

@@ -10,7 +10,7 @@ from modeling.equalizer.bands import band_coefficients, clamp_bands
 from modeling.hand import Hand
 from modeling.rendering.noise import white_noise
 from modeling.rendering.plan import LayeredModel, RenderPlan, noise_lowpass
-from modeling.rendering.reference.hand import Extrapolator, GainRamps
+from modeling.rendering.reference.hand import GainRamps
 
 
 class BandFilter:
@@ -28,20 +28,19 @@ class BandFilter:
         self.axes = (self._table.speeds_mm_s, self._table.forces_n)
         self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
         self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
-        self._extrapolate = Extrapolator(plan, self.axes)
         self._gains = GainRamps(plan, self._table.largest_gains)
         self._bands = [(0.0,) * 5] * self._table.n_layers
         self._state = [(0.0, 0.0)] * self._table.n_layers
 
-    def settings(self, hand: Hand) -> list[Any]:
+    def settings(self, amid: Hand, end: Hand) -> list[Any]:
         """All gains that are wanted, and the coefficients of every band, at each update."""
-        amid, end = (self._table.at(*at) for at in self._extrapolate(hand))
+        middle, last = self._table.at(*amid), self._table.at(*end)
         frequency, bandwidth, clamped = clamp_bands(
-            amid.frequencies_hz, amid.bandwidths_hz, rate_hz=self._plan.rate_hz
+            middle.frequencies_hz, middle.bandwidths_hz, rate_hz=self._plan.rate_hz
         )
         self.clamped += clamped
         c = band_coefficients(frequency, bandwidth, rate_hz=self._plan.rate_hz)
-        gains = np.concatenate([end.noise_gain[:, None], end.gains], axis=1)
+        gains = np.concatenate([last.noise_gain[:, None], last.gains], axis=1)
         taps = np.concatenate([np.ones((gains.shape[0], 1)), c.tap], axis=1)
         table = np.stack([c.p, c.q, c.r, c.b1, c.b2], axis=-1)
         bands = [[tuple(band) for band in update] for update in table.tolist()]

@@ -7,6 +7,7 @@ floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bit
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,7 @@ from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.plan import RenderCounters, RenderPlan
 from modeling.rendering.reference.compensator import Compensator
-from modeling.rendering.reference.hand import settled
+from modeling.rendering.reference.hand import Extrapolator
 from modeling.rendering.reference.limiter import Limiter
 
 
@@ -28,8 +29,8 @@ class StreamFilter(Protocol):
     clamped: int
     axes: tuple[Floats, Floats]  # speeds (mm/s) and forces (N) of the model's grid
 
-    def settings(self, hand: Hand) -> list[Any]:
-        """One setting for each of the n readings of the hand."""
+    def settings(self, amid: Hand, end: Hand) -> list[Any]:
+        """One setting for each of n updates, given the hand amid and at the end of each."""
 
     def update(self, setting: Any) -> None:
         """Put a setting into force."""
@@ -48,7 +49,7 @@ class PythonEngine:
         self._filter, self._plan, self._key = stream_filter, plan, key
         self._position = 0
         self._lift_offs = 0
-        self._outside = (False, False)  # above and below the grid, as the hand was last read
+        self._hand = Extrapolator(plan, stream_filter.axes)
         self._samples_outside = [0, 0]
         self._limiter = Limiter(plan)
         self._compensator = Compensator(plan)
@@ -63,33 +64,41 @@ class PythonEngine:
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""
-        count, period = speed_mm_s.size, self._plan.update_samples
         finite = np.isfinite(speed_mm_s) & np.isfinite(force_n)
-        self._lift_offs += count - int(np.count_nonzero(finite))
+        self._lift_offs += finite.size - int(np.count_nonzero(finite))
+        return self._rendered(finite.size, Hand(speed_mm_s, force_n))
+
+    def read(self, ago: float, speed_mm_s: float, force_n: float) -> None:
+        """A reading that was made so many samples before the next one."""
+        self._hand.read(ago, speed_mm_s, force_n)
+
+    def render_on(self, samples: int) -> Floats:
+        """The next samples for the hand as it was last read."""
+        return self._rendered(samples, None)
+
+    def _rendered(self, count: int, hand: Hand | None) -> Floats:
+        period = self._plan.update_samples
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))
         bounds = [*starts, count]
-        self._count_outside(bounds[0])
+        self._go_on(bounds[0], counts=hand is None)
         output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
-        read = Hand(speed_mm_s[starts], force_n[starts])
-        settings, outside = self._filter.settings(read), _outside(read, *self._filter.axes)
-        for start, stop, setting, where in zip(starts, bounds[1:], settings, outside, strict=True):
+        followed = []
+        for start, stop in pairwise(bounds):
+            if hand is not None:
+                self._hand.read(0.0, float(hand.speed_mm_s[start]), float(hand.force_n[start]))
+            followed.append(self._hand.follow())
+            self._go_on(stop - start, counts=hand is None)
+        amid, end = np.array(followed).reshape(-1, 2, 2).transpose(1, 2, 0)
+        settings = self._filter.settings(Hand(*amid), Hand(*end))
+        for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
             self._filter.update(setting)
-            self._outside = where
-            self._count_outside(stop - start)
             output += self._filter.filter(*(part[start:stop] for part in inputs))
         self._position += count
         return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
 
-    def _count_outside(self, samples: int) -> None:
-        for which, outside in enumerate(self._outside):
+    def _go_on(self, samples: int, *, counts: bool) -> None:
+        self._hand.go_on(samples)
+        self._lift_offs += samples * (counts and not self._hand.known)
+        for which, outside in enumerate(self._hand.outside):
             self._samples_outside[which] += samples * outside
-
-
-def _outside(hand: Hand, speeds: Floats, forces: Floats) -> list[tuple[bool, bool]]:
-    """Whether each reading of a hand that touches and moves is above the grid, or else below it."""
-    speed, force = settled(np.abs(hand.speed_mm_s), speeds[0]), settled(hand.force_n, forces[0])
-    strokes = np.isfinite(speed) & np.isfinite(force) & (speed > 0) & (force > 0)
-    above = strokes & ((speed > speeds[-1]) | (force > forces[-1]))
-    below = strokes & ~above & ((speed < speeds[0]) | (force < forces[0]))
-    return list(zip(above.tolist(), below.tolist(), strict=True))

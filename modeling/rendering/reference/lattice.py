@@ -12,7 +12,7 @@ from modeling.models.ar_model import ARModel
 from modeling.models.line_spectral import prediction_coefficients, reflection_coefficients
 from modeling.rendering.noise import white_noise
 from modeling.rendering.plan import RenderPlan
-from modeling.rendering.reference.hand import Extrapolator, GainRamps
+from modeling.rendering.reference.hand import GainRamps
 
 # Rounding must not put a pole on the unit circle.
 _HIGHEST_REFLECTION = 1 - 1e-12
@@ -38,19 +38,18 @@ class LatticeFilter:
         self.axes = (model.speeds_mm_s, model.forces_n)
         self._state = [0.0] * model.order
         self._stages = [(0.0, 1.0)] * model.order
-        self._extrapolate = Extrapolator(plan, self.axes)
         self._gain = GainRamps(plan, np.array([model.gains.max()]))
 
-    def settings(self, hand: Hand) -> list[Any]:
+    def settings(self, amid: Hand, end: Hand) -> list[Any]:
         """Gain, RMS per gain, and sine and cosine of every stage from the highest order down."""
-        amid, end = (self._model.parameters(*at) for at in self._extrapolate(hand))
-        sine = reflection_coefficients(prediction_coefficients(amid.line_spectral_frequencies))
+        middle, last = self._model.parameters(*amid), self._model.parameters(*end)
+        sine = reflection_coefficients(prediction_coefficients(middle.line_spectral_frequencies))
         sine = np.nan_to_num(np.clip(sine, -_HIGHEST_REFLECTION, _HIGHEST_REFLECTION))
         cosine = np.sqrt((1 - sine) * (1 + sine))
         rms = 1 / cosine.prod(axis=-1)
         table = np.stack([sine, cosine], axis=-1)[:, ::-1]
         stages = [[tuple(stage) for stage in update] for update in table.tolist()]
-        return list(zip(end.gain.tolist(), rms.tolist(), stages, strict=True))
+        return list(zip(last.gain.tolist(), rms.tolist(), stages, strict=True))
 
     def update(self, setting: Any) -> None:
         """Put angles into force, and start the ramp of the gain."""

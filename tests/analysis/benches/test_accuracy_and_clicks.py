@@ -26,7 +26,7 @@ from analysis.benches.stability import FORMS, OURS, PLAIN, STROKE_HZ, simulate
 from modeling import Recording, Renderer, TextureModel, similarity
 from modeling.hand import Hand
 from modeling.rendering.noise import stream_key, white_noise
-from modeling.rendering.plan import RenderPlan
+from modeling.rendering.plan import RELEASE_S, RenderPlan
 from stimuli.planted.textures import TEXTURES, planted_texture
 
 RATE_HZ = 5000.0
@@ -208,4 +208,4 @@ def test_streams_of_a_step_are_the_same_until_the_hand_steps(step: str) -> None:
         switched(*STEPS[step], form=OURS, streams=5),
     )
     assert np.abs(at_once - ours)[:, times_s() < 0].max() < 1e-9
-    assert np.abs(at_once - ours)[:, times_s() > 0.005].max() < 1e-9  # faded
+    assert np.abs(at_once - ours)[:, times_s() > 0.005 + RELEASE_S].max() < 1e-9  # faded

@@ -112,10 +112,19 @@ struct Motion {
         return render(samples);
     }
 
+    /* An update is due, one period after the last one. */
+    void due()
+    {
+        state.since_update = texture.update_samples;
+        state.hand.read = state.position - static_cast<uint64_t>(texture.update_samples);
+    }
+
     Counts update()
     {
+        due();
         counts = Counts();
-        tq_update(&texture, &state, speed, force);
+        tq_read(&texture, &state, 0, speed, force);
+        tq_update(&texture, &state);
         return counts;
     }
 };
@@ -150,7 +159,7 @@ int main(int count, char **texts)
     print("chunk", less(2, four, eight, 1));
     print("update", motion.update());
     const int samples = UPDATES * made.texture.update_samples;
-    motion.state.since_update = made.texture.update_samples; /* an update is due */
+    motion.due();
     print("block", motion.render(samples));
     std::printf("block_samples %d\nblock_updates %d\n", samples, UPDATES);
     std::printf("block_chunks %d\n", (samples + TQ_CHUNK - 1) / TQ_CHUNK);

@@ -46,7 +46,8 @@ static void start(tq_texture *t, tq_state *s, tq_real *values, tq_real *memory)
     t->rate_hz = (tq_real)rate_hz, t->noise_scale = 1;
     t->update_samples = 48, t->taps = 1;
     tq_start(t, s, memory, 1);
-    tq_update(t, s, 1, 1);
+    tq_read(t, s, 0, 1, 1);
+    tq_update(t, s);
 }
 
 /* Uniform on +-1 in 23 bits, which single precision holds. */

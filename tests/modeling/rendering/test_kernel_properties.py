@@ -16,7 +16,7 @@ from modeling import Limits, Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.rendering.compiled import _kernel, is_compiled
 from modeling.rendering.noise import stream_key, white_noise
-from modeling.rendering.plan import FADE_S, noise_lowpass
+from modeling.rendering.plan import FADE_S, HOLD_S, RELEASE_S, noise_lowpass
 
 MODEL_RATE_HZ = 5000.0
 RATES_HZ = (5000.0, 48000.0)
@@ -98,8 +98,13 @@ def test_at_rest_it_fades_within_5_ms_and_is_exactly_silent(
     rate_hz: float,
     update_samples: int,
 ) -> None:
-    """5 ms after the update that sees it, in whole updates, nothing is left."""
+    """5 ms after the update that sees it, in whole updates, nothing is left.
+
+    A missing hand is held for 20 ms and contact for 3 ms more, or for one update.
+    """
     seen_at = -(-hand.shape[1] // update_samples) * update_samples
+    held = HOLD_S if np.isnan(rest[0]) else RELEASE_S if rest[1] <= 0 else 0.0
+    seen_at += (int(held * rate_hz) // update_samples + 1) * update_samples if held else 0
     fade = int(np.ceil(FADE_S * rate_hz / update_samples)) * update_samples
     renderer = Renderer(model, rate_hz=rate_hz, update_samples=update_samples)
     renderer.render(*hand)

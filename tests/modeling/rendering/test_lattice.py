@@ -273,11 +273,13 @@ def test_lift_off_and_rest_end_in_exact_zeros(speed_mm_s: float, force_n: float)
     lattice = CompiledLattice(planted_ar(), rate_hz=CARD_HZ)
     before = lattice.held(150.0, 1.5, samples=4800)
     after = lattice.held(speed_mm_s, force_n, samples=4800)
+    # Contact ends after 3 ms, a missing hand is held for 20; to the next update each.
+    held = 0.021 if np.isnan(speed_mm_s) else 0.004 if force_n == 0 else 0.0
     # The gain falls within an update and 5 ms; the low-pass is as long as 87 samples of the model.
-    tail = int(CARD_HZ * (0.001 + 0.005 + 88 / 5000))
+    tail = int(CARD_HZ * (held + 0.001 + 0.005 + 88 / 5000))
     # What is heard is gone sooner.
     heard = np.flatnonzero(np.abs(after) > 0.01 * before.std())
-    assert heard[-1] < CARD_HZ * 0.015
+    assert heard[-1] < CARD_HZ * (held + 0.015)
     assert before.all()
     assert not after[tail:].any()
     assert lattice.counters.lift_offs == (4800 if np.isnan(speed_mm_s) else 0)

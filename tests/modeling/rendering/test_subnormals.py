@@ -32,8 +32,12 @@ def kept(made: Renderer) -> dict[str, np.ndarray]:
     """Every real number of a stream's state and memory."""
     engine: Any = made._engine
     found = {
-        name: np.array(getattr(engine._state, name))
-        for name, field in engine._ffi.typeof("tq_state").fields
+        name: np.array(getattr(structure, name))
+        for kind, structure in {
+            "tq_state": engine._state,
+            "tq_followed": engine._state.hand,
+        }.items()
+        for name, field in engine._ffi.typeof(kind).fields
         if field.type.cname in ("double", "float")
     }
     found["memory"] = np.frombuffer(engine._ffi.buffer(engine._memory), dtype=engine._real)

@@ -215,8 +215,9 @@ def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None
     live.write_reading(now_s() - 1, 0.0, y_mm=0.0, speed_mm_s=150.0, force_n=1.5, flags=CONTACT)
     after = callback.play_on(4800)
     assert np.count_nonzero(before) > 4700
-    # An update, 5 ms of fade, and 88 samples of the low-pass at the model's 5 kHz.
-    assert not after[int((0.001 + 0.005 + 88 / 5000) * RATE_HZ) :].any()
+    # An update, 3 ms for the end of contact to the next update, 5 ms of fade, and 88 samples of the
+    # low-pass at the model's 5 kHz.
+    assert not after[int((0.001 + 0.004 + 0.005 + 88 / 5000) * RATE_HZ) :].any()
     assert callback.log()["flags"].tolist() == [0, STALE]
 
 

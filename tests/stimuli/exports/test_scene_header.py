@@ -230,6 +230,12 @@ def switches_of(rate_hz: float) -> list[tuple[int, int]]:
 # --- What is expected, by Renderers alone ---------------------------------------------------------
 
 
+def end_contact(renderer: Renderer) -> None:
+    """No force from now on ends nothing any more: it is felt at once."""
+    hand: Any = renderer._engine._state.hand  # type: ignore[attr-defined]
+    hand.force = hand.force_slope = hand.force_turn = 0.0
+
+
 @dataclass
 class Reference:
     """A hand over the textures of a case, update by update, as docs/method/rendering.md says."""
@@ -291,6 +297,8 @@ class Reference:
         here = slice(position, position + self.plans[self.now].update_samples)
         speed, force = (part[here] for part in self.hand)
         was = self._counters()
+        if lifted:
+            end_contact(self.renderer)
         self.samples[here] = self.renderer.render(speed, np.zeros(force.size) if lifted else force)
         self.counted += self._counters() - was
         return speed.size
@@ -455,10 +463,59 @@ def test_switching_back_within_a_fade_lets_the_texture_rise_again(
     hand = steady(5000.0, 0.3)
     played = program("5 kHz").play(hand, [(1000, 1), (1010, 0)], block=1)
     assert not played.now.any()
-    lifted = hand[1].copy()
-    lifted[1000:1010] = 0.0  # two updates of a millisecond
-    rendered = Renderer(MODELS[0], seed=SEED).render(hand[0], lifted)
-    assert np.array_equal(played.samples, rendered)
+    renderer = Renderer(MODELS[0], seed=SEED)
+    before = renderer.render(*(part[:1000] for part in hand))
+    end_contact(renderer)
+    off = renderer.render(hand[0][1000:1010], np.zeros(10))  # two updates of a millisecond
+    after = renderer.render(*(part[1010:] for part in hand))
+    assert np.array_equal(played.samples, np.concatenate([before, off, after]))
+
+
+READ = """
+#include <stdio.h>
+#include "read.h"
+
+int main(void)
+{
+    static tq_real memory[SCENE_memory], out[200];
+    static tq_scene_hand hand;
+    int n;
+    tq_scene_start(&hand, &SCENE, memory, 0, 0);
+    tq_scene_read(&hand, 2.5, 120, 1.5);
+    tq_scene_render_on(&hand, out, 50);
+    tq_scene_switch(&hand, 1);
+    tq_scene_render_on(&hand, out + 50, 10);
+    tq_scene_read(&hand, 0.5, 125, 1.5);
+    tq_scene_render_on(&hand, out + 60, 140);
+    for (n = 0; n < 200; n++)
+        printf("%a\\n", out[n]);
+    return 0;
+}
+"""
+
+
+def test_readings_at_times_of_their_own_go_on_over_a_switch(tmp_path: Path) -> None:
+    """Read while one texture fades, the hand strokes the next one, until the reading is too old.
+
+    That begins at sample 75, after five updates, and is silent for one.
+    """
+    scene = scene_identifier("read")
+    rendered = [(model, plan_for(model.rate_hz)) for model in MODELS[:2]]
+    (tmp_path / "read.h").write_text(scene_header("read.h", "read", rendered, seed=SEED))
+    (tmp_path / "read.c").write_text(READ.replace("SCENE", scene))
+    compiling = [*C, "-O2", "-ffp-contract=off", "read.c", "-o", "read", "-lm"]
+    subprocess.run(compiling, check=True, cwd=tmp_path)
+    run = subprocess.run([tmp_path / "read"], check=True, capture_output=True, text=True)
+    played = np.array([float.fromhex(line) for line in run.stdout.split()])
+    first, second = (Renderer(model, seed=SEED, stream=n) for n, (model, _) in enumerate(rendered))
+    first.read(120.0, 1.5, ago=2.5)
+    assert np.array_equal(played[:50], first.render_on(50))
+    assert np.array_equal(played[75:80], second.render_on(5))
+    # Its change, by 5 mm/s within 62 samples, is the hand's slope per update of 5 samples.
+    second.read(120.0, 1.5, ago=82.5)
+    second.read(125.0, 1.5, ago=20.5)
+    assert np.array_equal(played[80:], second.render_on(120))
+    assert played[80:].any()
 
 
 def test_limits_hold_for_what_leaves_whatever_plays(program: Callable[[str], Program]) -> None:

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from analysis.benches.atlas.case import DEGRADES, FAILS, HOLDS, Axis, Case, Measure
-from analysis.benches.atlas.edges import BISECTIONS, CELLS, Examined, examine
+from analysis.benches.atlas.edges import BISECTIONS, CELLS, SEARCHED, Examined, examine
 
 LOGARITHMIC = Axis(name="speed", unit="Hz", mild=1.0, severe=1000.0, default=2.0)
 BACKWARDS = Axis(name="width", unit="Hz", mild=1000.0, severe=1.0, default=500.0)
 LINEAR = Axis(name="level", unit="dB", mild=-20.0, severe=20.0, default=0.0, logarithmic=False)
-STEP = {full: 1 / (CELLS[full] - 1) / 2 ** BISECTIONS[full] for full in (False, True)}
+STEP = {full: 1 / (SEARCHED[full] - 1) / 2 ** BISECTIONS[full] for full in (False, True)}
 
 
 def measure_of(figure: Callable[[float], float]) -> Measure:
@@ -105,6 +105,14 @@ def test_the_mildest_edge_counts_where_a_method_holds_again_farther_on() -> None
     assert found.holds_to == pytest.approx(10, rel=0.6)
     assert found.holds_to <= 10
     assert [cell.verdict for cell in found.cells] == [HOLDS, FAILS, HOLDS]
+
+
+def test_a_lucky_run_beyond_a_failure_between_cells_is_no_edge() -> None:
+    """Held at every cell but the last, but not from 3 to 5, between the first and the second."""
+    found = found_in(lambda value: 50.0 if 3 < value < 5 or value > 700 else 0.0, full=True)
+    assert found.holds_to == pytest.approx(3, rel=0.03)
+    assert found.holds_to <= 3
+    assert found.returns
 
 
 def test_no_run_is_done_twice_and_the_effort_is_passed_on() -> None:
