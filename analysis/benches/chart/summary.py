@@ -100,8 +100,13 @@ class Ratio(NamedTuple):
 
     def text(self) -> str:
         """`1.8 (1.6–2.1)`."""
-        between = f" ({self.low:.2g}–{self.high:.2g})" if self.is_known else ""
-        return f"{self.mean:.2g}{between}"
+        between = f" ({_short(self.low)}–{_short(self.high)})" if self.is_known else ""
+        return f"{_short(self.mean)}{between}"
+
+
+def _short(value: float) -> str:
+    """With two digits, as `0.42`, `1.8` or `1,400`."""
+    return f"{float(f'{value:.2g}'):,.4g}" if value < 1e4 else f"{value:,.0f}"
 
 
 def ratio_over_surfaces(numerator: Floats, denominator: Floats) -> Ratio:
@@ -167,8 +172,9 @@ _AHEAD = {
     BETWEEN: "distance between them",
     STROKING: "distance during strokes",
 }
+AHEAD = 0.99  # a ratio of at most this is more than a difference of rounding
 # Where dominance is judged: at rest no update is late; during strokes all are.
-_HANDS = {BETWEEN: "For a hand at rest between the conditions", STROKING: "During strokes"}
+_HANDS = {BETWEEN: "At rest between the conditions", STROKING: "During strokes"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,12 +206,12 @@ class Comparison:
     def ahead(self) -> str:
         """In what the rival's default is ahead of ours, by the intervals."""
         found = [
-            f"{_AHEAD[name]} ({ratio.mean:.2g} times)"
+            f"{_AHEAD[name]} ({_short(ratio.mean)} times)"
             for name, ratio in self.ratios.items()
-            if ratio.high < 1
+            if ratio.high < AHEAD
         ]
         theirs, ours = self.worst_db
-        if theirs < ours:
+        if theirs < AHEAD * ours:
             found.append(f"the worst surface between ({theirs:.2g} compared with {ours:.2g} dB)")
         return ", ".join(found) or "nothing"
 
@@ -225,7 +231,7 @@ class Comparison:
             else:
                 continue
             found.append(f"{hand} {told}")
-        return "; ".join(found)
+        return ". ".join(found)
 
     @property
     def sentence(self) -> str:
