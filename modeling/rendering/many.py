@@ -61,7 +61,7 @@ def render_many(
         What to render; a model may occur several times.
     hands : (k,) sequence of pairs of (n_i,) array_like
         Tangential speed (mm/s, either direction) and normal force (N) at each sample, each pair of
-        its own length. NaN and infinite values count as lift-off.
+        its own length. NaN and infinite values count as missing.
     seeds, streams : (k,) sequences of int
         Which noise, 0 … 2⁶⁴ − 1; streams are 0 by default.
     rate_hz, update_samples, limits, compensation : optional

@@ -70,10 +70,10 @@ class Renderer:
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
-        Samples from one reading of speed and force to the next, 1 … 1 000 000; by default one
-        millisecond (5 at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was
-        compiled for a scene the interval that keeps the scene's bound. For a device that reads less
-        often, use its period.
+        Samples from one parameter update to the next, 1 … 1 000 000; by default one millisecond (5
+        at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was compiled for a
+        scene the interval that keeps the scene's bound. `render` reads speed and force at each
+        update; readings at times of their own are for `read` and `render_on`.
     limits : Limits, optional
         Peak, RMS and duration that the output does not exceed; none by default.
     compensation : Compensation, optional

@@ -61,6 +61,7 @@ static void begin(walk *k)
     t->rate_hz = (tq_real)rates[below(3)];
     t->noise_scale = (tq_real)sqrt(t->rate_hz / 5000);
     t->update_samples = t->taps = 1;
+    t->hold = (tq_real)below(4), t->release = (tq_real)below(4);
     t->speed_mm_s = k->axes, t->force_n = k->axes + 2;
     t->values = k->values, t->signs = k->signs, t->slews = k->slews, t->lowpass = k->lowpass;
     k->lowpass[0] = 1;

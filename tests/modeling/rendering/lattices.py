@@ -77,6 +77,19 @@ class CompiledLattice:
         self._lib.tq_lattice_render_held(*states, speed_mm_s, force_n, into, samples)
         return out
 
+    def read(self, speed_mm_s: float, force_n: float, *, ago: float) -> None:
+        """A reading that was made so many samples before the next one."""
+        states = self._texture, self._lattice, self._state, self._filter
+        self._lib.tq_lattice_read(*states, ago, speed_mm_s, force_n)
+
+    def on(self, samples: int) -> Floats:
+        """The next samples for the hand as last read."""
+        out = np.full(samples, np.nan)
+        into = self._ffi.from_buffer("tq_real[]", out)
+        states = self._texture, self._lattice, self._state, self._filter
+        self._lib.tq_lattice_render_on(*states, into, samples)
+        return out
+
     def blocks(self, speeds: Floats, forces: Floats, *, block: int) -> Floats:
         """The next samples for hands that are held for a block each."""
         pairs = zip(speeds.tolist(), forces.tolist(), strict=True)

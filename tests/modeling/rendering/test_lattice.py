@@ -285,6 +285,41 @@ def test_lift_off_and_rest_end_in_exact_zeros(speed_mm_s: float, force_n: float)
     assert lattice.counters.lift_offs == (4800 if np.isnan(speed_mm_s) else 0)
 
 
+def stroke(time_s: Floats) -> tuple[Floats, Floats]:
+    """From rest to 300 mm/s and back, within the grid's forces."""
+    return 300 * np.sin(4 * np.pi * time_s), 1.5 + np.sin(2 * np.pi * time_s)
+
+
+def test_readings_at_times_of_their_own_are_those_of_python() -> None:
+    lattice, python = CompiledLattice(planted_ar(), rate_hz=5000.0), Renderer(planted_ar())
+    rng = np.random.default_rng(0)
+    for samples in rng.integers(0, 12, 100).tolist():
+        reading, ago = rng.uniform((-300, -1), (300, 3)).tolist(), rng.uniform(0, 5)
+        lattice.read(*reading, ago=ago)
+        python.read(*reading, ago=ago)
+        assert lattice.on(samples) == pytest.approx(python.render_on(samples), abs=1e-12)
+    assert lattice.counters == python.counters
+
+
+def test_readings_late_by_up_to_a_millisecond_are_within_6_db_of_the_hand_at_every_sample() -> None:
+    """At the card's rate, against Python with updates at each of the model's samples."""
+    count, rng = 24000, np.random.default_rng(1)
+    hand = stroke(np.arange(count) / CARD_HZ)
+    exact = in_python(planted_ar(), *hand, rate_hz=CARD_HZ, update_samples=1)
+    locked = in_python(planted_ar(), *hand, rate_hz=CARD_HZ)
+    lattice = CompiledLattice(planted_ar(), rate_hz=CARD_HZ)
+    times_s = (np.arange(0, count, 48) + rng.uniform(0, 48, count // 48)) / CARD_HZ
+    parts, done = [], 0
+    for time_s, speed, force in zip(times_s, *stroke(times_s), strict=True):
+        now = min(int(np.ceil(time_s * CARD_HZ)), count)
+        parts.append(lattice.on(now - done))
+        lattice.read(speed, force, ago=now - time_s * CARD_HZ)
+        done = now
+    read = np.concatenate([*parts, lattice.on(count - done)])
+    off, at_updates = (np.mean((of - exact) ** 2) for of in (read, locked))
+    assert 10 * np.log10(off / at_updates) <= 6
+
+
 def test_a_hand_outside_the_grid_is_counted_at_every_sample() -> None:
     lattice = CompiledLattice(planted_ar(), rate_hz=CARD_HZ)
     lattice.held(400.0, 1.5, samples=4800)

@@ -12,8 +12,10 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from modeling import InputError
+from modeling import InputError, Renderer
+from modeling.arrays import Floats
 from rig.hand import serial_sensor
+from rig.hand.following import Follower
 from rig.hand.loop import HandLoop
 from rig.hand.reader import HandReader
 from rig.hand.sample import ConnectedDevice, DeviceLost
@@ -21,6 +23,7 @@ from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
+from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
 from tests.rig.waiting import is_gone, wait_until
@@ -57,12 +60,12 @@ class ScriptedPort:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, line: Callable[[int], bytes]) -> None:
         self.now_s, self.sent, self.speaks = 0.0, 0, True
-        self._line, self._waits, self._whole_s = line, b"", list[float]()
+        self._line, self.waits, self._whole_s = line, b"", list[float]()
         self.whole = self.late = self.torn = 0  # lines that were read, that were over 0.1 s old
         monkeypatch.setattr(serial_sensor, "now_s", lambda: self.now_s)
 
     def read(self, size: int) -> bytes:
-        waited, self._waits = self._waits, b""
+        waited, self.waits = self.waits, b""
         self.whole += len(self._whole_s)
         self.late += sum(self.now_s - sent_s > 0.1 for sent_s in self._whole_s)
         self._whole_s = []
@@ -73,11 +76,11 @@ class ScriptedPort:
         self.now_s += seconds
         while (sent_s := self.sent * PERIOD_US * 1e-6) <= self.now_s:
             line = self._line(self.sent) if self.speaks else b""
-            fits = line[: self.ROOM - len(self._waits)]
+            fits = line[: self.ROOM - len(self.waits)]
             if fits and fits == line:
                 self._whole_s.append(sent_s)
             self.torn += 0 < len(fits) < len(line)
-            self._waits += fits
+            self.waits += fits
             self.sent += 1
 
 
@@ -174,6 +177,53 @@ def test_held_up_again_and_again_the_hands_process_blames_no_clock(
     assert any(re.match(late, fault) for fault in told)
     # The board's thread may be held up, too: then it was silent.
     assert all(re.match(late, fault) or "got none for 0.1 s" in fault for fault in told)
+
+
+def stroke_line(number: int, time_s: float) -> bytes:
+    """To and fro at 2 Hz, up to 300 mm/s."""
+    x_um = round(300e3 / (4 * np.pi) * (1 - np.cos(4 * np.pi * time_s)))
+    time_us = round(1e6 * time_s)
+    return encode(SensorLine(number, time_us, (x_um, 0), 2000, contact=True, button=False))
+
+
+def rendered_error_db(times_s: Floats, settings: HandSettings, port: ScriptedPort) -> float:
+    """Canvas by a sensor's lines, which are read as they come, against the hand that it tells of.
+
+    That is the true hand, later by the delay of the tracking filter; the start is left out.
+    """
+    count, rate_hz, done, parts = 5000, 5000, 0, []
+    sensor = SerialSensor(port)  # type: ignore[arg-type]
+    follower = Follower(settings, rest_s=sensor.rest_s)
+    renderer = Renderer(planted_texture("canvas"))
+    for number, time_s in enumerate(times_s.tolist()):
+        port.now_s, port.waits = time_s, stroke_line(number, time_s)
+        now = int(np.ceil(time_s * rate_hz))
+        parts.append(renderer.render_on(now - done))
+        done = now
+        for sample in sensor.read():
+            reading = follower.update(sample)
+            ago = max(0.0, now - reading.time_s * rate_hz)
+            renderer.read(reading.speed_mm_s, reading.force_n, ago=ago)
+    rendered = np.concatenate([*parts, renderer.render_on(max(0, count - done))])[:count]
+    speed = 300 * np.sin(4 * np.pi * (np.arange(count) / rate_hz - settings.filter_delay_s))
+    exact = Renderer(planted_texture("canvas"), update_samples=1)
+    wanted = exact.render(speed, np.full(count, 2.0))
+    settled = slice(count // 5, None)
+    error = (rendered - wanted)[settled]
+    return float(10 * np.log10(np.mean(error**2) / np.mean(wanted[settled] ** 2)))
+
+
+def test_irregular_and_missing_lines_are_within_6_db_of_regular_and_whole_ones(
+    monkeypatch: pytest.MonkeyPatch, board: Board
+) -> None:
+    settings, rng = settings_of(board), np.random.default_rng(0)
+    beat = np.arange(0, 1, 1e-3)
+    jittered, kept = beat + rng.uniform(0, 1e-3, beat.size), rng.uniform(size=beat.size) > 0.05
+    regular, *others = (
+        rendered_error_db(times_s, settings, ScriptedPort(monkeypatch, at_constant_speed))
+        for times_s in (beat, jittered, beat[kept], jittered[kept])
+    )
+    assert max(others) <= regular + 6
 
 
 def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
