@@ -62,16 +62,31 @@ TQ_INLINE uint64_t tq_scene_key(const tq_scene_hand *h)
     return tq_scene_mix((h->scene->noise ^ stream) + UINT64_C(0x9E3779B97F4A7C15));
 }
 
-/* Whether no gain is left, as at lift-off and in the first update after a switch. */
+/* Whether no gain is left, as at lift-off and in the first update after a switch, and nothing that is yet
+   to be interpolated. */
 TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
 {
     const tq_texture *t = tq_scene_texture(h);
-    const tq_real *gain = tq_row(t, &h->state, TQ_GAIN);
+    const tq_real *gain = tq_row(t, &h->state, TQ_GAIN), *past = tq_past(t, &h->state);
     int i;
     for (i = 0; i < t->layers; i++)
         if (gain[i] != 0)
             return 0;
+    for (i = 0; t->up && i < TQ_DOUBLING - 1; i++)
+        if (past[i] != 0)
+            return 0;
+    for (i = 0; t->up && i < TQ_PHASE + 1; i++)
+        if (past[TQ_KEPT + i] != 0)
+            return 0;
     return h->state.floor_gain == 0;
+}
+
+/* Samples until the next parameter update. */
+TQ_INLINE size_t tq_scene_left(const tq_scene_hand *h)
+{
+    const tq_texture *t = tq_scene_texture(h);
+    const tq_state *s = &h->state;
+    return s->position ? tq_outputs_before(t, s->phase, t->update_samples - s->since_update) : 0;
 }
 
 /* The wanted texture, from its beginning, behind the same compensation and limits as before. */
@@ -97,8 +112,8 @@ static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_
     const tq_real off = 0;
     while (count) {
         const tq_texture *t = tq_scene_texture(h);
-        int left = s->position == 0 ? 0 : t->update_samples - s->since_update, changes, lifted;
-        size_t piece = count;
+        int changes, lifted;
+        size_t left = tq_scene_left(h), piece = count;
         uint64_t lift_offs = s->counters.lift_offs;
         if (left == 0 && h->wanted != h->now && tq_scene_silent(h)) {
             tq_scene_next(h);
@@ -107,7 +122,7 @@ static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_
         changes = h->wanted != h->now || (h->switches && s->position == 0);
         lifted = changes && left == 0; /* as the next update reads the hand */
         if (changes) {
-            size_t most = (size_t)(left ? left : t->update_samples);
+            size_t most = left ? left : tq_outputs_before(t, s->phase, t->update_samples);
             piece = count < most ? count : most;
         }
         if (lifted)

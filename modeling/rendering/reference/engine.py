@@ -7,6 +7,7 @@ floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +17,7 @@ from modeling.hand import Hand
 from modeling.rendering.plan import RenderCounters, RenderPlan
 from modeling.rendering.reference.compensator import Compensator
 from modeling.rendering.reference.hand import settled
+from modeling.rendering.reference.interpolator import Interpolator
 from modeling.rendering.reference.limiter import Limiter
 
 
@@ -42,7 +44,7 @@ class StreamFilter(Protocol):
 
 
 class PythonEngine:
-    """Renders with any `StreamFilter`: updates, filters, compensates and limits."""
+    """Renders with any `StreamFilter`: updates, filters, interpolates, compensates and limits."""
 
     def __init__(self, stream_filter: StreamFilter, plan: RenderPlan, *, key: np.uint64) -> None:
         self._filter, self._plan, self._key = stream_filter, plan, key
@@ -50,6 +52,7 @@ class PythonEngine:
         self._lift_offs = 0
         self._outside = (False, False)  # above and below the grid, as the hand was last read
         self._samples_outside = [0, 0]
+        self._interpolator = Interpolator(plan)
         self._limiter = Limiter(plan)
         self._compensator = Compensator(plan)
 
@@ -63,23 +66,32 @@ class PythonEngine:
 
     def render(self, speed_mm_s: Floats, force_n: Floats) -> Floats:
         """The next samples for (n,) speeds and forces."""
-        count, period = speed_mm_s.size, self._plan.update_samples
         finite = np.isfinite(speed_mm_s) & np.isfinite(force_n)
-        self._lift_offs += count - int(np.count_nonzero(finite))
+        self._lift_offs += finite.size - int(np.count_nonzero(finite))
+        made = self._made(Hand(speed_mm_s, force_n), self._interpolator.made_before(finite.size))
+        output = self._compensator.filter(self._interpolator.output(made, finite.size))
+        return np.array(self._limiter.limit(output), dtype=np.float64)
+
+    def _made(self, hand: Hand, places: Sequence[int]) -> list[float]:
+        """The next samples at the model's rate, each for one place in the output."""
+        count, period = len(places), self._plan.own.update_samples
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))
         bounds = [*starts, count]
-        self._count_outside(bounds[0])
         output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
-        read = Hand(speed_mm_s[starts], force_n[starts])
+        readings = [places[start] for start in starts]
+        self._count_outside([*readings, hand.speed_mm_s.size][0])
+        read = Hand(hand.speed_mm_s[readings], hand.force_n[readings])
         settings, outside = self._filter.settings(read), _outside(read, *self._filter.axes)
-        for start, stop, setting, where in zip(starts, bounds[1:], settings, outside, strict=True):
+        lasting = np.diff([*readings, hand.speed_mm_s.size]).tolist()
+        pieces = zip(starts, bounds[1:], settings, outside, lasting, strict=True)
+        for start, stop, setting, where, samples in pieces:
             self._filter.update(setting)
             self._outside = where
-            self._count_outside(stop - start)
+            self._count_outside(samples)
             output += self._filter.filter(*(part[start:stop] for part in inputs))
         self._position += count
-        return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
+        return output
 
     def _count_outside(self, samples: int) -> None:
         for which, outside in enumerate(self._outside):

@@ -25,14 +25,17 @@ class Extrapolator:
     """Linear extrapolation of the hand by the exponentially smoothed slope of its readings.
 
     A step, which is a change beyond what a hand can do, and a reading of 0 reset the slope: neither
-    is extrapolated.
+    is extrapolated. By `lead` updates it goes further, since so late the output is felt.
     """
 
-    def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats]) -> None:
+    def __init__(
+        self, plan: RenderPlan, axes: tuple[Floats, Floats], *, lead: float = 0.0
+    ) -> None:
         self._furthest, self._share = plan.hand_changes, plan.slope_share
         self._lowest = np.array([axis[0] for axis in axes])
         self._least = (_SMALLEST_SHARE * self._lowest).tolist()
-        self._to_end = (plan.update_samples - 1) / plan.update_samples
+        to_end = (plan.update_samples - 1) / plan.update_samples
+        self._to_middle, self._to_end = to_end / 2 + lead, to_end + lead
         self._last: list[float] = []
         self._slopes = [0.0, 0.0]
 
@@ -43,7 +46,7 @@ class Extrapolator:
         pairs = zip(raw.T.tolist(), read.T.tolist(), strict=True)
         slopes = np.array([self._slopes_at(*pair) for pair in pairs]).reshape(-1, 2).T
         with np.errstate(over="ignore"):
-            amid, end = read + slopes * (self._to_end / 2), read + slopes * self._to_end
+            amid, end = read + slopes * self._to_middle, read + slopes * self._to_end
         return Hand(*amid), Hand(*end)
 
     def _slopes_at(self, now: list[float], kept: list[float]) -> list[float]:

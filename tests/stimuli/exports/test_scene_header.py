@@ -534,14 +534,14 @@ def test_constants_on_a_micro_controller_are_the_arrays_and_the_structures(
 
 
 def test_a_hand_has_the_memory_of_the_neediest_texture(tmp_path: Path) -> None:
-    """The one has more layers, the other, made at a lower rate, a longer low-pass."""
+    """The one has more layers, the other, made at a lower rate, is interpolated."""
     many = planted_texture("canvas")
     slow = many.at_rate(4000.0).with_layers([0])
     for order in ([many, slow], [slow, many], [many, many]):
-        rendered = [(model, plan_for(model.rate_hz, rate_hz=48_000.0)) for model in order]
+        rendered = [(model, plan_for(model.rate_hz, rate_hz=many.rate_hz)) for model in order]
         text = scene_header("scene.h", "m", rendered)
-        lengths = [(m.n_layers, p.texture(m)["taps"]) for m, p in rendered]
-        needed = [f"TQ_MEMORY({layers}, {taps})" for layers, taps in lengths]
+        lengths = [(m.n_layers, p.texture(m).get("up", 0)) for m, p in rendered]
+        needed = [f"TQ_MEMORY({layers}, {up})" for layers, up in lengths]
         checks = " && ".join(f"scene_m_memory >= {one}" for one in needed)
         equals = " || ".join(f"scene_m_memory == {one}" for one in needed)
         source = f'#include "scene.h"\nchar right[(({checks}) && ({equals})) ? 1 : -1];\n'
