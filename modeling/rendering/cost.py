@@ -16,7 +16,7 @@ from modeling.rendering.interpolation import DOUBLING, PHASE
 _SIDE_BY_SIDE, _CHUNK, _ROWS = 4, 64, 10
 # Of these a sample reads and writes so many: of each layer, and of the noise branch.
 _READ, _WRITTEN, _NOISE_BRANCH = 9, 3, 3
-# What interpolation remembers, with a chunk of the model's samples and the twice as many made of them.
+# What interpolation keeps, with a chunk of the model's samples and the twice as many made of it.
 _PAST, _DOUBLED = DOUBLING - 1 + _CHUNK, PHASE + 1 + 2 * _CHUNK
 
 
@@ -123,7 +123,7 @@ def cost_of(
     per_update = Operations(
         additions=18 + 43 * layers + 14 * extrapolated,
         multiplications=12 + 73 * layers + 2 * groups + 6 * extrapolated,
-        divisions=2 + 3 * layers + 4 * extrapolated,
+        divisions=2 + 3 * layers + 2 * extrapolated,
         square_roots=layers,
     )
     return Cost(

@@ -10,6 +10,7 @@ from fractions import Fraction
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from modeling.arrays import Floats
 from modeling.errors import InputError
@@ -55,12 +56,12 @@ class Interpolation:
         """Impulse responses of both stages, each at the rate that it leads to."""
         return self.doubling[::-1].ravel(), self.phases.T[::-1].ravel()
 
-    def response(self, frequency: Floats) -> Floats:
-        """Gain (n,) at frequencies in shares of the model's rate, that at 0 being 1; complex."""
+    def response(self, frequency: Floats) -> NDArray[np.complex128]:
+        """Gain (n,) at frequencies in shares of the model's rate, that at 0 being 1."""
         gain = np.ones(np.shape(frequency), dtype=np.complex128)
         for impulse, rate in zip(self._impulses, (2, 2 * self.up), strict=True):
             at = np.exp(-2j * np.pi * np.asarray(frequency) / rate)
-            gain *= np.polynomial.polynomial.polyval(at, impulse) / impulse.sum()
+            gain = gain * np.polynomial.polynomial.polyval(at, impulse) / impulse.sum()
         return gain
 
 
@@ -109,7 +110,7 @@ def _phases(up: int) -> Floats:
         return there
     from scipy.signal import firwin
 
-    # Images of the model's band lie around whole multiples of twice its rate. PHASE is even, so the length is odd.
+    # Images of the model's band lie around whole multiples of twice its rate. The length is odd.
     length = PHASE * up - 1
     return _by_phase(firwin(length, 0.5, fs=up, window=("kaiser", _BETA)), up)
 

@@ -285,8 +285,6 @@ CASES: tuple[Case, ...] = (
         measure=at_rate,
         across="level",
         columns={"whole level": WHOLE_LEVEL, "third octaves": THIRD_OCTAVES},
-        exception="skirts near the model's Nyquist frequency change at other rates; "
-        "stimulus sets render at the model's rate and resample",
     ),
     Case(
         family="hands",

@@ -246,7 +246,7 @@ def block_samples(block_s: float, rate_hz: float) -> int:
 # --- Operations, counted (tests/analysis/benches/test_counted_rivals.py counts them)
 
 _CHUNK = 64  # samples that a stream keeps of its noise, as the kernel does
-_EXTRAPOLATING = Operations(14, 6, 4, 0)
+_EXTRAPOLATING = Operations(14, 6, 2, 0)
 _READING = Operations(12, 5, 2, 0)  # the place in the grid, and one value of it
 _BLENDED = Operations(6, 6, 0, 0)  # another value
 _NOISE = Operations(1, 2, 0, 0)  # a number of noise

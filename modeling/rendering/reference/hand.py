@@ -28,9 +28,7 @@ class Extrapolator:
     is extrapolated. By `lead` updates it goes further, since so late the output is felt.
     """
 
-    def __init__(
-        self, plan: RenderPlan, axes: tuple[Floats, Floats], *, lead: float = 0.0
-    ) -> None:
+    def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats], *, lead: float = 0.0) -> None:
         self._furthest, self._share = plan.hand_changes, plan.slope_share
         self._lowest = np.array([axis[0] for axis in axes])
         self._least = (_SMALLEST_SHARE * self._lowest).tolist()

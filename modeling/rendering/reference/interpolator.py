@@ -22,14 +22,12 @@ class Interpolator:
             self._doubled = np.zeros(way.phases.shape[1] + 1)
 
     def made_before(self, count: int) -> Sequence[int]:
-        """Before which of the next `count` samples of the output the model makes each of its own."""
+        """Before which of the next `count` output samples the model makes each of its own."""
         way = self._way
         if way is None:
             return range(count)
         samples = (self._phase + (count - 1) * way.down) // (2 * way.up) if count else 0
-        return [
-            -(-(2 * way.up * (made + 1) - self._phase) // way.down) for made in range(samples)
-        ]
+        return [-(-(2 * way.up * (made + 1) - self._phase) // way.down) for made in range(samples)]
 
     def output(self, made: list[float], count: int) -> list[float]:
         """The next `count` samples of the output, for which the model has made some of its own."""

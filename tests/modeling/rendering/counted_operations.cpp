@@ -126,13 +126,15 @@ struct Motion {
     /* What follows the model's samples, of one of the output. */
     Counts follow()
     {
-        std::vector<Counted> v(1, speed), f(1, force), out(1);
+        std::vector<Counted> v(1, speed), f(1, force), out(1, Counted(1));
         const Counts idle = lifted(v, f);
+        const int phase = state.phase;
         counts = Counts();
         if (texture.up)
             tq_interpolate(&texture, &state, 0, out.data(), 1);
         tq_restrain(&texture, &state, out.data(), 1);
         counts.additions += idle.additions;
+        state.phase = phase;
         return counts;
     }
 

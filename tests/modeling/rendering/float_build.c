@@ -76,7 +76,7 @@ int main(int count, char **arguments)
     for (; blocks > 0; blocks--) {
         for (n = 0; n < BLOCK; n++)
             w[n] = noise(&seed);
-        tq_filter(&t, &s, w, w, out, BLOCK);
+        tq_filter(&t, &s, w, out, BLOCK);
         for (n = 0; n < BLOCK; n++) {
             double pair[] = {out[n], direct_form_next(&direct, w[n])};
             fwrite(pair, sizeof pair, 1, stdout);

@@ -61,7 +61,9 @@ class CompiledLattice:
         fields = lattice_fields(model, plan_for(model.rate_hz, rate_hz=rate_hz, **plan))
         self._texture, arrays = filled(self._ffi, "tq_texture", fields.texture, real=np.float64)
         self._lattice, more = filled(self._ffi, "tq_lattice", fields.lattice, real=np.float64)
-        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(self._texture, self._lattice))
+        memory = self._ffi.new(
+            "tq_real[]", self._lib.tq_lattice_memory(self._texture, self._lattice)
+        )
         self._state, self._filter = self._ffi.new("tq_state *"), self._ffi.new("tq_lattice_state *")
         self._kept = (arrays, more, memory)
         self._order = model.order

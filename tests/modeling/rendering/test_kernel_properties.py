@@ -65,9 +65,7 @@ def output_bound(model: TextureModel, rate_hz: float, *, seed: int, count: int) 
     way = plan_for(MODEL_RATE_HZ, rate_hz=rate_hz).interpolation
     most = 1.0
     if way is not None:  # the largest sums of absolute weights
-        most = float(
-            np.abs(way.doubling).sum(axis=0).max() * np.abs(way.phases).sum(axis=1).max()
-        )
+        most = float(np.abs(way.doubling).sum(axis=0).max() * np.abs(way.phases).sum(axis=1).max())
     floor = model.noise_gains.max() * np.sqrt(3)
     bound: Floats = most * (gain * np.sqrt(np.cumsum(w**2)) + floor)
     return bound

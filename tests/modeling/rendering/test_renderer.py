@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from modeling import (
-    PEQ,
     ARModel,
     Compensation,
     InputError,
@@ -28,7 +26,6 @@ from modeling.hand import Hand
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import Call, is_compiled
-from stimuli.planted.textures import CATALOGUE, planted_texture
 from tests.refusals import refused
 
 
