@@ -75,7 +75,7 @@ TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
     for (i = 0; t->up && i < TQ_DOUBLING - 1; i++)
         if (past[i] != 0)
             return 0;
-    for (i = 0; t->up && i < TQ_PHASE + 1; i++)
+    for (i = 2; t->up && i < TQ_PHASE + 1; i++) /* two for what came before an update */
         if (past[TQ_KEPT + i] != 0)
             return 0;
     return h->state.floor_gain == 0;

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -255,6 +257,7 @@ class Reference:
 
     def _begin(self, texture: int) -> None:
         self.now, plan = texture, self.plans[texture]
+        self.updates = 0  # of this texture so far
         stream = self.number * 2**32 + len(self.starts) - 1
         self.renderer = Renderer(
             MODELS[texture],
@@ -277,8 +280,10 @@ class Reference:
             return self._rendered(position, lifted=False)
         before = self.counted.copy()
         count = self._rendered(position, lifted=True)
-        # From 0 to 0; of a single sample the end alone is heard, so the one before tells.
-        begin = position - 1 if self.plans[self.now].update_samples == 1 else position
+        # From 0 to 0; of a single sample the end alone is heard, so the one before tells (where it
+        # is not among those that are interpolated).
+        plan = self.plans[self.now]
+        begin = position - 1 if plan.update_samples == 1 else position
         gone = not self.samples[max(0, begin) : position + count].any()
         if wanted == self.now or not gone:
             return count
@@ -288,7 +293,12 @@ class Reference:
         return self._rendered(position, lifted=True)
 
     def _rendered(self, position: int, *, lifted: bool) -> int:
-        here = slice(position, position + self.plans[self.now].update_samples)
+        plan = self.plans[self.now]
+        # Output samples for each update: of the first one for which the model makes its own.
+        outputs = Fraction(plan.rate_hz) / 5000 * plan.own.update_samples
+        begin, end = (math.ceil(n * outputs) for n in (self.updates, self.updates + 1))
+        self.updates += 1
+        here = slice(position, position + end - begin)
         speed, force = (part[here] for part in self.hand)
         was = self._counters()
         self.samples[here] = self.renderer.render(speed, np.zeros(force.size) if lifted else force)
