@@ -43,7 +43,8 @@ class Cost:
     output, of which there are as many or more; `per_update` is what a parameter update adds while
     the hand is on the grid, nothing is clamped and no gain is at its slew. With an RMS limit every
     sample is taken to be limited. The noise adds integer operations, three multiplications of 64
-    bits a sample; a call or chunk of 64 samples adds three additions.
+    bits a sample; a call or chunk of 64 samples adds three additions, and
+    where it is compensated a multiplication.
 
     `table_bytes` are all numbers of the texture, `state_bytes` the memory of a stream
     (`TQ_MEMORY`), each beside a structure of a few hundred bytes. `bytes_per_update` are read from

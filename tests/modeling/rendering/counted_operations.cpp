@@ -123,31 +123,17 @@ struct Motion {
         return render(samples * outputs());
     }
 
-    /* What follows the model's samples, of one of the output. */
-    Counts follow()
+    /* What samples of the output cost that need none of the model. */
+    Counts follow(size_t samples)
     {
-        std::vector<Counted> v(1, speed), f(1, force), out(1, Counted(1));
-        const Counts idle = lifted(v, f);
+        std::vector<Counted> v(samples, speed), f(samples, force), out(samples, Counted(1));
         const int phase = state.phase;
         counts = Counts();
+        tq_lift_offs(v.data(), f.data(), 1, static_cast<int>(samples));
         if (texture.up)
-            tq_interpolate(&texture, &state, 0, out.data(), 1);
-        tq_restrain(&texture, &state, out.data(), 1);
-        counts.additions += idle.additions;
+            tq_interpolate(&texture, &state, 0, out.data(), samples);
+        tq_restrain(&texture, &state, out.data(), static_cast<int>(samples));
         state.phase = phase;
-        return counts;
-    }
-
-    /* Looking for lift-offs: what a sample more costs. */
-    static Counts lifted(std::vector<Counted> &v, std::vector<Counted> &f)
-    {
-        v.resize(2, v[0]), f.resize(2, f[0]);
-        counts = Counts();
-        tq_lift_offs(v.data(), f.data(), 1, 2);
-        const long two = counts.additions;
-        counts = Counts();
-        tq_lift_offs(v.data(), f.data(), 1, 1);
-        counts.additions = two - counts.additions;
         return counts;
     }
 
@@ -184,7 +170,7 @@ int main(int count, char **texts)
 {
     const Texture made(count, texts);
     Motion motion(made.texture);
-    const Counts output = motion.follow();
+    const Counts one = motion.follow(1), output = less(1, motion.follow(2), one, 1);
     const Counts four = motion.render_between(4), eight = motion.render_between(8);
     const int outputs = motion.outputs();
     print("output", output);
