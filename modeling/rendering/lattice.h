@@ -1,5 +1,5 @@
 /* All-pole (autoregressive) models in real time: a normalised lattice.
-   docs/method/rendering.md#ar-models-at-a-cards-rate
+   docs/method/rendering.md#ar-models
 
    A lattice is a tq_texture without layers, whose only values are the gains over the grid: so the hand, the
    ramp of the gain, interpolation, compensation, limits and counters are those of kernel.h. The rest of the

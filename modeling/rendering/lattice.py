@@ -1,6 +1,6 @@
 """All-pole models in real time: their representation in `lattice.h`.
 
-docs/method/rendering.md#ar-models-at-a-cards-rate
+docs/method/rendering.md#ar-models
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ int main(int, char **texts)
     tq_texture texture{};
     texture.speeds = 3, texture.forces = 2, texture.layers = layers;
     texture.speed_mm_s = speeds.data(), texture.force_n = forces.data();
-    texture.values = values.data(), texture.rate_hz = 5000, texture.noise_scale = 1;
+    texture.values = values.data(), texture.model_rate_hz = texture.rate_hz = 5000;
     texture.update_samples = 1000;
     tq_rival rival{};
     rival.kind = TQ_PREDICTOR, rival.order = order;
