@@ -43,7 +43,7 @@ def binding(
     name: str,
     *headers: Path,
     real: str = "double",
-    constants: str = "TQ_CHUNK, TQ_LANES, TQ_ROWS",
+    constants: str = "TQ_KEPT, TQ_KEPT_DOUBLED, TQ_LANES, TQ_ROWS",
     included: tuple[Path, ...] = (),
     arguments: list[str] = COMPILER_ARGUMENTS,
 ) -> FFI:
@@ -91,7 +91,8 @@ def live_binding() -> FFI:
     builder.cdef(
         "\n".join(
             (
-                "typedef double tq_real; static const int TQ_CHUNK, TQ_LANES, TQ_ROWS, TQ_RING;",
+                "typedef double tq_real; static const int TQ_KEPT, TQ_KEPT_DOUBLED, TQ_LANES;",
+                "static const int TQ_RING, TQ_ROWS;",
                 "typedef struct tq_live tq_live; typedef struct tq_sound tq_sound;",
                 declarations(KERNEL),
                 declarations(LATTICE),

@@ -6,16 +6,15 @@ From responses: no random numbers. docs/method/rendering.md#other-rates
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from modeling import PEQ
 from modeling.arrays import Floats
-from modeling.rendering.plan import noise_lowpass
+from modeling.rendering.interpolation import interpolation
 
-# Midpoints of intervals: far below the width of any layer; above the model's band there are skirts.
+# Midpoints of intervals: far below the width of any layer; above the model's band there are images.
 STEP_HZ = 0.5
 STEP_ABOVE_HZ = 2.5
 # Exact centres of the nominal 16 Hz to 2 kHz: the highest whose band ends below 2.5 kHz.
@@ -53,10 +52,13 @@ def rate_errors(conditions: Sequence[PEQ], *, model_rate_hz: float, rate_hz: flo
     """
     within = _midpoints(0.0, model_rate_hz / 2, step_hz=STEP_HZ)
     above = _midpoints(model_rate_hz / 2, rate_hz / 2, step_hz=STEP_ABOVE_HZ)
-    lowpass = noise_lowpass(model_rate_hz, rate_hz)
+    way = interpolation(model_rate_hz, rate_hz)
     own = np.array([peq.response(within) ** 2 for peq in conditions])
-    rendered, skirts = (
-        _rendered_power(conditions, at, lowpass=lowpass, rate_hz=rate_hz) for at in (within, above)
+    folded = np.abs((above + model_rate_hz / 2) % model_rate_hz - model_rate_hz / 2)
+    imaged = np.array([peq.response(folded) ** 2 for peq in conditions])
+    rendered, images = (
+        power if way is None else power * np.abs(way.response(at / model_rate_hz)) ** 2
+        for power, at in ((own, within), (imaged, above))
     )
     own_power, power = (part.sum(axis=1) * STEP_HZ for part in (own, rendered))
     thirds = [
@@ -65,24 +67,10 @@ def rate_errors(conditions: Sequence[PEQ], *, model_rate_hz: float, rate_hz: flo
     ]
     return RateErrors(
         10 * np.log10(power / own_power),
-        10 * np.log10((power + skirts.sum(axis=1) * STEP_ABOVE_HZ) / own_power),
+        10 * np.log10((power + images.sum(axis=1) * STEP_ABOVE_HZ) / own_power),
         10 * np.log10(np.stack(thirds, axis=1)),
     )
 
 
 def _midpoints(low_hz: float, high_hz: float, *, step_hz: float) -> Floats:
     return np.arange(low_hz + step_hz / 2, high_hz, step_hz)
-
-
-def _rendered_power(
-    conditions: Sequence[PEQ], frequency_hz: Floats, *, lowpass: Floats, rate_hz: float
-) -> Floats:
-    """Squared responses (n, frequencies); the variance of w makes up for the rate."""
-    delays = np.arange(lowpass.size) - lowpass.size // 2  # symmetric about 0: a real response
-    passed = np.cos(2 * np.pi / rate_hz * np.outer(frequency_hz, delays)) @ lowpass
-    bands = (
-        replace(peq, noise_gain=0.0, rate_hz=rate_hz).complex_response(frequency_hz)
-        for peq in conditions
-    )
-    pairs = zip(conditions, bands, strict=True)
-    return np.array([np.abs(peq.noise_gain * passed + band) ** 2 for peq, band in pairs])

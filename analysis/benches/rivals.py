@@ -20,7 +20,7 @@ from modeling.fitting.autoregressive import fit_filter
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import CompiledEngine, filled_texture
 from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import LayeredModel, RenderPlan
+from modeling.rendering.plan import LayeredModel, plan_for
 from stimuli.planted.textures import FORCES_N, SPEEDS_MM_S
 
 RATE_HZ = 5000.0
@@ -144,7 +144,7 @@ class CompiledStream:
     ) -> None:
         self._ffi, lib = compiled_parts("analysis.benches._rivals")
         key = stream_key(seed)
-        plan = RenderPlan(rate_hz=rate_hz or model.rate_hz, update_samples=update_samples)
+        plan = plan_for(model.rate_hz, rate_hz=rate_hz, update_samples=update_samples)
         # Kept, because it owns what the texture points at.
         self._engine = CompiledEngine(model, plan, key=key)
         # Of another cffi module; the structures are the same, from the same header.

@@ -66,6 +66,12 @@ def render_counters(counters: Any) -> RenderCounters:
     )
 
 
+def memory_reals(lib: Any, texture: Any) -> int:
+    """TQ_MEMORY of a texture."""
+    rows: int = lib.TQ_ROWS * (-(-texture.layers // lib.TQ_LANES) * lib.TQ_LANES)
+    return rows + (lib.TQ_KEPT + lib.TQ_KEPT_DOUBLED if texture.up else 0)
+
+
 class CompiledEngine:
     """Renders layered models; in double precision bit for bit the same as the `PythonEngine`."""
 
@@ -79,10 +85,8 @@ class CompiledEngine:
         self._ffi, self._real = module.ffi, plan.precision
         ffi, lib = module.ffi, module.lib
         self._texture, arrays = filled_texture(ffi, plan.texture(model), self._real)
-        layers, taps = self._texture.layers, self._texture.taps
-        self._row = -(-layers // lib.TQ_LANES) * lib.TQ_LANES
-        reals = lib.TQ_ROWS * self._row + taps - 1 + lib.TQ_CHUNK  # TQ_MEMORY
-        self._memory = ffi.new("tq_real[]", reals)
+        self._row = -(-self._texture.layers // lib.TQ_LANES) * lib.TQ_LANES
+        self._memory = ffi.new("tq_real[]", memory_reals(lib, self._texture))
         self._state = ffi.new("tq_state *")
         lib.tq_start(self._texture, self._state, self._memory, int(key))
         self._read = lib.tq_read

@@ -9,11 +9,15 @@ from __future__ import annotations
 
 from dataclasses import astuple, dataclass
 
+from modeling.rendering.interpolation import DOUBLING, PHASE
+
 # Of kernel.h: layers whose parameters are updated together, samples that are filtered in one go,
 # numbers of a layer's state.
 _SIDE_BY_SIDE, _CHUNK, _ROWS = 4, 64, 10
 # Of these a sample reads and writes so many: of each layer, and of the noise branch.
 _READ, _WRITTEN, _NOISE_BRANCH = 9, 3, 3
+# What interpolation keeps, with a chunk of the model's samples and the twice as many made of it.
+_PAST, _DOUBLED = DOUBLING - 1 + _CHUNK, PHASE + 1 + 2 * _CHUNK
 
 
 @dataclass(frozen=True)
@@ -35,23 +39,28 @@ class Operations:
 class Cost:
     """What a stream costs, whatever the machine.
 
-    `per_sample` is that of each sample, `per_update` what a parameter update adds while the hand is
-    on the grid, nothing is clamped and no gain is at its slew; with an RMS limit every sample is
-    taken to be limited. The noise adds integer operations, three multiplications of 64 bits a
-    sample; a call or chunk of 64 samples adds three additions and a multiplication.
+    `per_sample` is that of each sample at the model's rate, `per_output` that of each sample of the
+    output, of which there are as many or more; `per_update` is what a parameter update adds while
+    the hand is on the grid, nothing is clamped and no gain is at its slew. With an RMS limit every
+    sample is taken to be limited. The noise adds integer operations, three multiplications of 64
+    bits a sample; a call or chunk of 64 samples adds three additions, and
+    where it is compensated a multiplication.
 
     `table_bytes` are all numbers of the texture, `state_bytes` the memory of a stream
     (`TQ_MEMORY`), each beside a structure of a few hundred bytes. `bytes_per_update` are read from
-    the table; `bytes_per_sample` are read from and written to states, gains and coefficients.
+    the table; `bytes_per_sample`, at the model's rate, are read from and written to states, gains
+    and coefficients.
     """
 
     per_sample: Operations
     per_update: Operations
-    update_samples: int
+    update_samples: int  # at the model's rate
     table_bytes: int
     state_bytes: int
     bytes_per_sample: int
     bytes_per_update: int
+    per_output: Operations = Operations(0, 0, 0, 0)
+    samples_per_output: float = 1.0
 
     @property
     def bytes(self) -> int:
@@ -60,19 +69,21 @@ class Cost:
 
     @property
     def operations(self) -> float:
-        """Operations per sample, updates included."""
-        return self.per_sample.total + self.per_update.total / self.update_samples
+        """Operations per sample of the output, updates included."""
+        sample = self.per_sample.total + self.per_update.total / self.update_samples
+        return self.per_output.total + sample * self.samples_per_output
 
     @property
     def most_operations(self) -> int:
-        """Operations of a sample with a parameter update."""
-        return self.per_sample.total + self.per_update.total
+        """Operations of a sample of the output with a parameter update."""
+        return self.per_output.total + self.per_sample.total + self.per_update.total
 
 
 def cost_of(
     *,
     layers: int,
-    taps: int,
+    interpolated: bool,
+    samples_per_output: float,
     update_samples: int,
     compensated: bool,
     rms_limited: bool,
@@ -83,8 +94,12 @@ def cost_of(
 
     Parameters
     ----------
-    layers, taps, update_samples : int
+    layers, update_samples : int
         As in `tq_texture`.
+    interpolated : bool
+        Whether the output has another rate than the model.
+    samples_per_output : float
+        At the model's rate for each sample of the output, at most 1.
     compensated, rms_limited : bool
         Whether there is a vibrator compensation, and a limit to the RMS.
     numbers : int
@@ -93,11 +108,16 @@ def cost_of(
         Of one number.
     """
     groups = -(-layers // _SIDE_BY_SIDE)
-    lowpassed = taps > 1
-    extrapolated = update_samples > 1
+    extrapolated = update_samples > 1 or interpolated
     per_sample = Operations(
-        additions=6 + 9 * layers + 9 * compensated + 3 * rms_limited + (taps - 1) * lowpassed,
-        multiplications=4 + 7 * layers + 7 * compensated + 5 * rms_limited + taps * lowpassed,
+        additions=2 + 9 * layers + 2 * (DOUBLING - 1) * interpolated,
+        multiplications=3 + 7 * layers + 2 * DOUBLING * interpolated,
+        divisions=0,
+        square_roots=0,
+    )
+    per_output = Operations(
+        additions=4 + 9 * compensated + 3 * rms_limited + (PHASE - 1) * interpolated,
+        multiplications=7 * compensated + 5 * rms_limited + PHASE * interpolated,
         divisions=int(rms_limited),
         square_roots=int(rms_limited),
     )
@@ -112,7 +132,9 @@ def cost_of(
         per_update=per_update,
         update_samples=update_samples,
         table_bytes=numbers * real_bytes,
-        state_bytes=(_ROWS * layers + taps - 1 + _CHUNK) * real_bytes,
+        state_bytes=(_ROWS * layers + (_PAST + _DOUBLED) * interpolated) * real_bytes,
         bytes_per_sample=((_READ + _WRITTEN) * layers + _NOISE_BRANCH) * real_bytes,
         bytes_per_update=4 * (1 + 3 * layers) * real_bytes,
+        per_output=per_output,
+        samples_per_output=samples_per_output,
     )

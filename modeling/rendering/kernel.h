@@ -13,7 +13,7 @@
    TQ_LANES         1, if two layers in one operation are no faster than one after the other.
    TQ_SQRT(x)       another square root of a tq_real.
 
-   Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, taps) reals; then call
+   Use: fill a tq_texture; give tq_start a tq_state and TQ_MEMORY(layers, up) reals; then call
    tq_render or tq_render_held as often as you like, with blocks of any size. Where readings of the hand
    come at times of their own, call tq_read for each of them and tq_render_on for blocks.
 
@@ -81,14 +81,21 @@ typedef tq_real tq_lanes __attribute__((vector_size(2 * sizeof(tq_real))));
 #endif
 
 #define TQ_CHUNK 64       /* samples that are filtered in one go */
+#define TQ_DOUBLING 32    /* samples at the model's rate that one at twice the rate is made of */
+#define TQ_PHASE 10       /* samples at twice the model's rate that one of the output is made of; even */
 #define TQ_SIDE_BY_SIDE 4 /* layers whose recursions run side by side, a multiple of TQ_LANES */
 
-/* Rows of the state's memory, each one value per layer, filled up to whole lanes; the noise follows. */
+/* Rows of the state's memory, each one value per layer, filled up to whole lanes; what is interpolated
+   follows. */
 enum { TQ_S1, TQ_S2, TQ_GAIN, TQ_P, TQ_Q, TQ_R, TQ_B1, TQ_B2, TQ_NOW, TQ_STEP, TQ_ROWS };
 #define TQ_ROW(layers) (((layers) + TQ_LANES - 1) / TQ_LANES * TQ_LANES)
 
-/* How many reals of memory a state needs; taps is 1 at the model's own rate. */
-#define TQ_MEMORY(layers, taps) (TQ_ROWS * TQ_ROW(layers) + (taps) - 1 + TQ_CHUNK)
+/* Samples that interpolation remembers, and a chunk more: at the model's rate, and at twice that rate. */
+#define TQ_KEPT (TQ_DOUBLING - 1 + TQ_CHUNK)
+#define TQ_KEPT_DOUBLED (TQ_PHASE + 1 + 2 * TQ_CHUNK)
+
+/* How many reals of memory a state needs; up is 0 at the model's own rate. */
+#define TQ_MEMORY(layers, up) (TQ_ROWS * TQ_ROW(layers) + ((up) ? TQ_KEPT + TQ_KEPT_DOUBLED : 0))
 
 /* What is rendered, and where: constant while it plays. */
 typedef struct {
@@ -99,11 +106,14 @@ typedef struct {
     const tq_real *speed_mm_s, *force_n; /* (speeds), (forces): rising, above 0, at least two each */
     const tq_real *values;               /* (speeds, forces, 1 + 3 layers) */
     const tq_real *signs;                /* (layers) */
-    /* Time. Noise of unit variance at the model's rate has noise_scale^2 = rate / model rate here. */
-    tq_real rate_hz, noise_scale;
-    const tq_real *lowpass; /* (taps), odd and symmetric: the noise branch ends at the model's Nyquist */
-    int taps;
-    int update_samples; /* from one parameter update to the next, at least 1 */
+    /* Time. Bands, noise and updates run at the model's rate. The output's is up / down times twice that
+       rate, at least once; at the model's own rate there is no interpolation and up is 0. */
+    tq_real model_rate_hz, rate_hz;
+    int up, down;
+    const tq_real *doubling; /* (TQ_DOUBLING, 2): two samples for each one, weights of the oldest first */
+    const tq_real *phases;   /* (up, TQ_PHASE): of those, each phase of the output's, oldest first */
+    tq_real lead;            /* the delay of both, in updates: so much further a hand is extrapolated */
+    int update_samples;      /* from one parameter update to the next at the model's rate, at least 1 */
     tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
     tq_real slope_share;  /* how much of a new change from update to update counts at once, up to 1 */
     /* Readings, in samples: how long one counts where none follows, and how long there must have been no
@@ -128,7 +138,7 @@ typedef struct {
 /* What was corrected: samples without a finite hand (of tq_render_on: without a reading that counts);
    samples while the hand, as last read, touched and moved faster or pressed harder than the grid's
    highest, or else slower or more lightly than its lowest; parameter values moved into the legal range;
-   samples that each limit touched. */
+   samples that each limit touched. All samples are those of the output. */
 typedef struct {
     uint64_t lift_offs, above_grid, below_grid, clamped, peak, rms, duration;
 } tq_counters;
@@ -147,10 +157,12 @@ typedef struct {
 } tq_followed;
 
 typedef struct {
-    uint64_t key, position;
+    uint64_t key, position; /* of the noise, and so samples at the model's rate */
     int since_update;
+    int phase; /* of the next output sample since the newest of the model, of which one has 2 up */
     tq_followed hand;
-    tq_real angle, per_sample, to_end; /* pi / rate; one sample and all but one of an update's time */
+    tq_real angle, per_sample; /* pi / rate; a sample's share of an update */
+    tq_real to_middle, to_end; /* from an update to the middle and the end of its time, in updates */
     tq_real floor_gain, floor_now, floor_step;
     tq_real *memory;
     tq_band notch;
@@ -165,8 +177,8 @@ TQ_INLINE tq_real *tq_row(const tq_texture *t, const tq_state *s, int row)
     return s->memory + (size_t)row * (size_t)TQ_ROW(t->layers);
 }
 
-/* The noise around the next sample, taps - 1 of it, then that for a chunk. */
-TQ_INLINE tq_real *tq_wide(const tq_texture *t, const tq_state *s)
+/* The last samples at the model's rate; then those at twice that rate. */
+TQ_INLINE tq_real *tq_past(const tq_texture *t, const tq_state *s)
 {
     return tq_row(t, s, TQ_ROWS);
 }
@@ -374,7 +386,7 @@ TQ_INLINE void tq_update_layers(const tq_texture *t, tq_state *s, const tq_hand 
                                 const tq_hand *end, int from, int width)
 {
     tq_real f[TQ_SIDE_BY_SIDE], b[TQ_SIDE_BY_SIDE], now[TQ_SIDE_BY_SIDE], next[TQ_SIDE_BY_SIDE];
-    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
+    tq_real highest = (tq_real)0.49 * t->model_rate_hz, widest = (tq_real)0.45 * t->model_rate_hz;
     tq_real *gain = tq_row(t, s, TQ_GAIN) + from;
     int first = s->position == 0, m = t->layers, row, i;
     tq_blend_all(amid, 1 + from, width, f);
@@ -435,13 +447,12 @@ TQ_INLINE int tq_leaving(const tq_texture *t, tq_state *s, tq_real ago, tq_real 
     return tq_age(hand->off, hand->off_ago, s->position) - ago < t->release && since <= t->hold;
 }
 
-/* Takes in a reading of the hand that was made `ago` samples before the next one. None counts that is not
+/* Takes in a reading of the hand that was made `ago` samples before the next one of the model. None counts that is not
    finite, as if it had not come, or no later than a thousandth of a sample after the last one. */
 TQ_INLINE void tq_take_in(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
 {
     tq_followed *hand = &s->hand;
     tq_real since, v = t->speed_mm_s[0], f = t->force_n[0];
-    ago = ago > 0 ? ago : 0;
     since = tq_age(hand->read, hand->ago, s->position) - ago;
     if (!(speed - speed == 0 && force - force == 0) || (hand->known && !(since > (tq_real)1e-3)))
         return;
@@ -478,8 +489,8 @@ TQ_INLINE void tq_follow(const tq_texture *t, tq_state *s, tq_hand *amid, tq_han
     *end = tq_hand_at(t, speed + hand->speed_slope * to_end, force + hand->force_slope * to_end);
     *amid = *end;
     if (to_end > 0)
-        *amid = tq_hand_at(t, speed + hand->speed_slope * (to_end / 2),
-                           force + hand->force_slope * (to_end / 2));
+        *amid = tq_hand_at(t, speed + hand->speed_slope * s->to_middle,
+                           force + hand->force_slope * s->to_middle);
 }
 
 /* The ramp of the noise gain until the next update. */
@@ -554,14 +565,13 @@ TQ_INLINE void tq_layers(const tq_texture *t, tq_state *s, int first, int width,
 }
 
 /* All layers and the noise branch, between two updates. */
-static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const tq_real *floor,
-                      tq_real *out, int count)
+static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, tq_real *out, int count)
 {
     int i = 0, n;
     tq_real now = s->floor_now;
     for (n = 0; n < count; n++) {
         now += s->floor_step;
-        out[n] = now * floor[n];
+        out[n] = now * w[n];
     }
     s->floor_now = now;
     for (; i + TQ_SIDE_BY_SIDE <= t->layers; i += TQ_SIDE_BY_SIDE)
@@ -573,48 +583,92 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, const 
     default: break;
     }
     s->since_update += count;
+    s->position += (uint64_t)count;
 }
 
-/* The output of a FIR filter of `taps` weights for `taps` - 1 + `count` samples: several sums at a time in
-   registers, each in the order of the taps. */
-TQ_INLINE void tq_convolve(const tq_real *TQ_RESTRICT weights, int taps,
-                           const tq_real *TQ_RESTRICT wide, tq_real *TQ_RESTRICT out, int count)
+/* --- Interpolation ----------------------------------------------------------------------------- */
+
+/* Of the output, how many samples precede sample `samples` (from 0) of those that are next at the model's
+   rate: that one is made for the next of them, and by its hand. */
+TQ_INLINE size_t tq_outputs_before(const tq_texture *t, int phase, int samples)
 {
-    enum { SUMS = 4, SAMPLES = SUMS * TQ_LANES };
+    if (!t->up)
+        return (size_t)samples;
+    return (size_t)(((int64_t)(samples + 1) * 2 * t->up - phase + t->down - 1) / t->down);
+}
+
+/* How many samples at the model's rate the next `count` of the output need. */
+TQ_INLINE int tq_samples_for(const tq_texture *t, int phase, size_t count)
+{
+    if (!t->up)
+        return (int)count;
+    return (int)((phase + (int64_t)(count - 1) * t->down) / (2 * t->up));
+}
+
+/* The phase after those. */
+TQ_INLINE int tq_phase_after(const tq_texture *t, int phase, int samples, size_t count)
+{
+    return (int)(phase + (int64_t)count * t->down - (int64_t)samples * 2 * t->up);
+}
+
+/* Two samples for each of `width` at x[TQ_DOUBLING - 1] and on. */
+TQ_INLINE void tq_double(const tq_real *weights, const tq_real *x, tq_real *out, int width)
+{
+    enum { MOST = 4, PAIR = 2 / TQ_LANES };
+    tq_lanes sum[MOST][PAIR];
+    int tap, n, i;
+    for (n = 0; n < width; n++)
+        for (i = 0; i < PAIR; i++)
+            sum[n][i] = tq_load(weights + i * TQ_LANES) * x[n];
+    for (tap = 1; tap < TQ_DOUBLING; tap++)
+        for (n = 0; n < width; n++)
+            for (i = 0; i < PAIR; i++)
+                sum[n][i] += tq_load(weights + 2 * tap + i * TQ_LANES) * x[tap + n];
+    for (n = 0; n < width; n++)
+        for (i = 0; i < PAIR; i++)
+            tq_store(out + 2 * n + i * TQ_LANES, sum[n][i]);
+}
+
+/* One sample of the output: the sum of the even terms and that of the odd ones. */
+TQ_INLINE tq_real tq_between(const tq_real *weights, const tq_real *x)
+{
+    enum { PAIR = 2 / TQ_LANES };
+    tq_lanes sum[PAIR];
+    tq_real each[2];
     int tap, i;
-    for (; count >= SAMPLES; count -= SAMPLES, wide += SAMPLES, out += SAMPLES) {
-        tq_lanes sum[SUMS];
-        const tq_real *x = wide;
-        for (i = 0; i < SUMS; i++)
-            sum[i] = weights[0] * tq_load(x + i * TQ_LANES);
-        for (tap = 1, x++; tap < taps; tap++, x++)
-            for (i = 0; i < SUMS; i++)
-                sum[i] += weights[tap] * tq_load(x + i * TQ_LANES);
-        for (i = 0; i < SUMS; i++)
-            tq_store(out + i * TQ_LANES, sum[i]);
-    }
-    for (; count > 0; count--, wide++, out++) {
-        tq_real sum = 0;
-        for (tap = 0; tap < taps; tap++)
-            sum += weights[tap] * wide[tap];
-        *out = sum;
-    }
+    for (i = 0; i < PAIR; i++)
+        sum[i] = tq_load(weights + i * TQ_LANES) * tq_load(x + i * TQ_LANES);
+    for (tap = 2; tap < TQ_PHASE; tap += 2)
+        for (i = 0; i < PAIR; i++)
+            sum[i] += tq_load(weights + tap + i * TQ_LANES) * tq_load(x + tap + i * TQ_LANES);
+    for (i = 0; i < PAIR; i++)
+        tq_store(each + i * TQ_LANES, sum[i]);
+    return each[0] + each[1];
 }
 
-/* The next noise for the bands. For the noise branch it is low-passed with zero phase, which is
-   possible because future noise is known; at the model's own rate there is nothing to remove,
-   and `lowpassed` is unchanged. */
-static const tq_real *tq_inputs(const tq_texture *t, tq_state *s, tq_real *lowpassed, int count)
+/* The next `count` samples of the output, for which `samples` at the model's rate were added to the past. */
+static void tq_interpolate(const tq_texture *t, tq_state *s, int samples, tq_real *out, size_t count)
 {
-    tq_real *wide = tq_wide(t, s), *fresh = wide + t->taps - 1;
-    int half = t->taps / 2, n;
-    uint64_t ahead = s->position + (uint64_t)half;
-    for (n = 0; n < count; n++)
-        fresh[n] = t->noise_scale * tq_noise(s->key, ahead + (uint64_t)n);
-    if (t->taps > 1)
-        tq_convolve(t->lowpass, t->taps, wide, lowpassed, count);
-    return wide + half;
+    enum { SIDE_BY_SIDE = 4 };
+    tq_real *past = tq_past(t, s), *doubled = past + TQ_KEPT, *fresh = doubled + TQ_PHASE + 1;
+    const tq_real *x = doubled + s->phase / t->up;
+    int phase = s->phase % t->up, i = 0;
+    size_t n;
+    for (; i + SIDE_BY_SIDE <= samples; i += SIDE_BY_SIDE)
+        tq_double(t->doubling, past + i, fresh + 2 * i, SIDE_BY_SIDE);
+    for (; i < samples; i++)
+        tq_double(t->doubling, past + i, fresh + 2 * i, 1);
+    for (n = 0; n < count; n++) {
+        out[n] = tq_between(t->phases + (size_t)phase * TQ_PHASE, x);
+        for (phase += t->down; phase >= t->up; phase -= t->up)
+            x++;
+    }
+    TQ_MOVE(past, past + samples, (TQ_DOUBLING - 1) * sizeof(tq_real));
+    TQ_MOVE(doubled, doubled + 2 * samples, (TQ_PHASE + 1) * sizeof(tq_real));
+    s->phase = tq_phase_after(t, s->phase, samples, count);
 }
+
+/* --- Compensation ------------------------------------------------------------------------------ */
 
 /* Eq. 7: out - share * band-pass(out). Non-finite values would stay in the state and count as silence;
    decayed values are set to 0 instead of becoming subnormal. */
@@ -674,25 +728,25 @@ TQ_INLINE tq_real tq_limit(const tq_texture *t, tq_state *s, tq_real y)
 
 /* --- The calls --------------------------------------------------------------------------------- */
 
-/* Silence at position 0 of a noise stream. `memory` holds TQ_MEMORY(layers, taps) reals and must
-   live as long as the state. */
+/* Silence at position 0 of a noise stream. `memory` holds TQ_MEMORY(layers, up) reals and must live as
+   long as the state. */
 static void tq_start(const tq_texture *t, tq_state *s, tq_real *memory, uint64_t key)
 {
-    int n, half = t->taps / 2;
-    tq_real *wide;
+    tq_real notch_angle = (tq_real)3.141592653589793 / t->rate_hz;
+    int n;
     TQ_FILL(s, 0, sizeof *s);
     s->key = key;
-    s->angle = (tq_real)3.141592653589793 / t->rate_hz;
+    s->phase = 2 * t->up;
+    s->angle = (tq_real)3.141592653589793 / t->model_rate_hz;
     s->per_sample = 1 / (tq_real)t->update_samples;
     s->to_end = (tq_real)(t->update_samples - 1) / (tq_real)t->update_samples;
+    s->to_middle = s->to_end / 2 + t->lead;
+    s->to_end += t->lead;
     s->memory = memory;
-    for (n = 0; n < TQ_MEMORY(t->layers, t->taps); n++)
+    for (n = 0; n < TQ_MEMORY(t->layers, t->up); n++)
         memory[n] = 0;
-    wide = tq_wide(t, s);
-    for (n = 0; n < t->taps - 1; n++) /* the noise around the first sample, but what is still ahead */
-        wide[n] = t->noise_scale * tq_noise(key, (uint64_t)((int64_t)n - half));
     if (t->notch_share != 0)
-        s->notch = tq_band_of(s->angle * t->notch_hz, s->angle * t->notch_width_hz);
+        s->notch = tq_band_of(notch_angle * t->notch_hz, notch_angle * t->notch_width_hz);
 }
 
 /* Of a hand that has `step` = 1 reading for each sample, or is held (0): samples without a finite one. */
@@ -725,39 +779,60 @@ TQ_INLINE void tq_restrain(const tq_texture *t, tq_state *s, tq_real *out, int c
             out[n] = tq_limit(t, s, out[n]);
 }
 
+/* Of the output, samples with the hand beyond the grid, as last read, and where `reads` is 0 without one. */
+TQ_INLINE void tq_count_hand(tq_state *s, int reads, size_t count)
+{
+    s->counters.lift_offs += (uint64_t)!(reads || s->hand.known) * count;
+    s->counters.above_grid += (uint64_t)s->hand.above_grid * count;
+    s->counters.below_grid += (uint64_t)s->hand.below_grid * count;
+}
+
+/* The next `samples` at the model's rate, at most a chunk, for `count` of the output. */
+static void tq_render_model(const tq_texture *t, tq_state *s, const tq_real *speed,
+                            const tq_real *force, size_t step, int reads, tq_real *out, int samples,
+                            size_t count)
+{
+    tq_real w[TQ_CHUNK];
+    size_t counted = 0;
+    int done = 0, n;
+    for (n = 0; n < samples; n++)
+        w[n] = tq_noise(s->key, s->position + (uint64_t)n);
+    while (done < samples) {
+        int left = t->update_samples - s->since_update, piece;
+        if (s->position == 0 || left == 0) {
+            size_t now = tq_outputs_before(t, s->phase, done);
+            tq_count_hand(s, reads, now - counted);
+            counted = now;
+            if (reads)
+                tq_take_in(t, s, 0, speed[step * now], force[step * now]);
+            tq_update(t, s);
+            s->since_update = 0;
+            left = t->update_samples;
+        }
+        piece = left < samples - done ? left : samples - done;
+        tq_filter(t, s, w + done, out + done, piece);
+        done += piece;
+    }
+    tq_count_hand(s, reads, count - counted);
+}
+
 /* The next `count` samples for a hand of `step` = 1 reading for each, or that is held (0); where `reads` is
    0, for the hand as last read. */
 TQ_INLINE void tq_render_by(const tq_texture *t, tq_state *s, const tq_real *speed,
                             const tq_real *force, size_t step, int reads, tq_real *out, size_t count)
 {
     while (count) {
-        tq_real lowpassed[TQ_CHUNK];
-        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, done = 0;
-        const tq_real *w = tq_inputs(t, s, lowpassed, chunk), *floor = t->taps > 1 ? lowpassed : w;
+        size_t most = tq_outputs_before(t, s->phase, TQ_CHUNK), chunk = count < most ? count : most;
+        tq_real *made = t->up ? tq_past(t, s) + TQ_DOUBLING - 1 : out;
+        int samples = tq_samples_for(t, s->phase, chunk);
         if (reads)
-            s->counters.lift_offs += tq_lift_offs(speed, force, step, chunk);
-        while (done < chunk) {
-            int left = t->update_samples - s->since_update, piece;
-            if (s->position == 0 || left == 0) {
-                if (reads)
-                    tq_take_in(t, s, 0, speed[step * (size_t)done], force[step * (size_t)done]);
-                tq_update(t, s);
-                s->since_update = 0;
-                left = t->update_samples;
-            }
-            piece = left < chunk - done ? left : chunk - done;
-            tq_filter(t, s, w + done, floor + done, out + done, piece);
-            s->counters.lift_offs += (uint64_t)(reads || s->hand.known ? 0 : piece);
-            s->counters.above_grid += (uint64_t)(s->hand.above_grid * piece);
-            s->counters.below_grid += (uint64_t)(s->hand.below_grid * piece);
-            s->position += (uint64_t)piece;
-            done += piece;
-        }
-        tq_restrain(t, s, out, chunk);
-        if (t->taps > 1) /* on to the next noise */
-            TQ_MOVE(tq_wide(t, s), tq_wide(t, s) + chunk, (size_t)(t->taps - 1) * sizeof(tq_real));
-        speed += step * (size_t)chunk, force += step * (size_t)chunk;
-        out += chunk, count -= (size_t)chunk;
+            s->counters.lift_offs += tq_lift_offs(speed, force, step, (int)chunk);
+        tq_render_model(t, s, speed, force, step, reads, made, samples, chunk);
+        if (t->up)
+            tq_interpolate(t, s, samples, out, chunk);
+        tq_restrain(t, s, out, (int)chunk);
+        speed += step * chunk, force += step * chunk;
+        out += chunk, count -= chunk;
     }
 }
 
@@ -781,6 +856,9 @@ static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real spee
    counts as 0. Readings come in the order of their times: one that is not later than the last is ignored. */
 static inline void tq_read(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
 {
+    ago = ago > 0 ? ago : 0;
+    if (t->up) /* from samples of the output to those of the model, and to the next one of these */
+        ago = 1 + (ago * (tq_real)t->down - (tq_real)s->phase) / (tq_real)(2 * t->up);
     tq_take_in(t, s, ago, speed, force);
 }
 

@@ -1,10 +1,9 @@
-/* All-pole (autoregressive) models in real time: a normalised lattice, brought to the card's rate.
-   docs/method/rendering.md#ar-models-at-a-cards-rate
+/* All-pole (autoregressive) models in real time: a normalised lattice.
+   docs/method/rendering.md#ar-models
 
    A lattice is a tq_texture without layers, whose only values are the gains over the grid: so the hand, the
-   ramp of the gain, compensation, limits and counters are those of kernel.h. The rest of the filter is in a
-   tq_lattice. It runs at the model's own rate, since an all-pole filter has no equivalent at another
-   one; a low-pass in `up` phases then makes up / down samples of each.
+   ramp of the gain, interpolation, compensation, limits and counters are those of kernel.h. The rest of the
+   filter is in a tq_lattice.
 
    Every stage rotates (its input, its state) by an angle, so all states keep unit variance however the
    parameters move, and a jump of them cannot make the filter grow (Gray and Markel 1975).
@@ -20,24 +19,17 @@
 
 #include "kernel.h"
 
-/* The filter, and its conversion to the card's rate: constant while playing. The texture beside it has no
-   layers and one tap; its update_samples, slews and changes of the hand are for the model's rate, its
-   rate_hz, compensation and limits for the card's. */
+/* The filter: constant while playing. The texture beside it has no layers. */
 typedef struct {
     int order;                  /* at least 1 */
     const tq_real *frequencies; /* (speeds, forces, order): line spectral ones, rising in (0, pi) */
-    int up, down, taps;         /* the card's rate is up / down times the model's, at least 1 times */
-    const tq_real *lowpass;     /* (up, taps): the weights of each phase, that of the newest sample first */
 } tq_lattice;
 
 typedef struct {
-    int phase, behind; /* of the next sample; samples at the model's rate that it still needs */
-    int newest;        /* where the newest of them is in `past` */
-    tq_real rms;       /* of the filter of gain 1 */
-    tq_real *cosines;  /* (4 order + 8): cos(pi n / (2 order + 4)) */
+    tq_real rms;      /* of the filter of gain 1 */
+    tq_real *cosines; /* (4 order + 8): cos(pi n / (2 order + 4)) */
     tq_real *symmetric, *antisymmetric; /* (order + 3) each */
     tq_real *sine, *cosine, *held;      /* (order) each: angles and states of the stages */
-    tq_real *past;                      /* (2 taps): what was filtered, twice in a row */
 } tq_lattice_state;
 
 /* --- Coefficients ------------------------------------------------------------------------------ */
@@ -134,19 +126,11 @@ TQ_INLINE void tq_lattice_update(const tq_texture *t, const tq_lattice *l, tq_st
 
 /* --- Filtering --------------------------------------------------------------------------------- */
 
-/* The next sample at the model's rate, into `past`; `hand` is speed and force, NULL as last read. */
-TQ_INLINE void tq_lattice_sample(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                 tq_lattice_state *f, const tq_real *hand)
+/* The next sample at the model's rate. */
+TQ_INLINE tq_real tq_lattice_sample(const tq_lattice *l, tq_state *s, tq_lattice_state *f)
 {
-    tq_real forward, *held = f->held;
+    tq_real forward = tq_noise(s->key, s->position), *held = f->held;
     int i = l->order - 1;
-    if (s->position == 0 || s->since_update == t->update_samples) {
-        if (hand)
-            tq_take_in(t, s, 0, hand[0], hand[1]);
-        tq_lattice_update(t, l, s, f);
-        s->since_update = 0;
-    }
-    forward = tq_noise(s->key, s->position);
     for (; i >= 0; i--) {
         tq_real backward = f->sine[i] * forward + f->cosine[i] * held[i];
         forward = f->cosine[i] * forward - f->sine[i] * held[i];
@@ -155,35 +139,39 @@ TQ_INLINE void tq_lattice_sample(const tq_texture *t, const tq_lattice *l, tq_st
     }
     held[0] = forward;
     s->floor_now += s->floor_step;
-    f->newest = (f->newest + l->taps - 1) % l->taps;
-    f->past[f->newest] = f->past[f->newest + l->taps] = s->floor_now * f->rms * forward;
     s->position++, s->since_update++;
+    return s->floor_now * f->rms * forward;
 }
 
-/* The next sample at the card's rate, before compensation and limits. */
-TQ_INLINE tq_real tq_lattice_next(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                  tq_lattice_state *f, const tq_real *hand)
+/* The next `samples` at the model's rate, for `count` of the output; `hand` is speed and force, NULL as last
+   read. */
+TQ_INLINE void tq_lattice_model(const tq_texture *t, const tq_lattice *l, tq_state *s,
+                                tq_lattice_state *f, const tq_real *hand, tq_real *out, int samples,
+                                size_t count)
 {
-    const tq_real *weights = l->lowpass + (size_t)f->phase * (size_t)l->taps, *past;
-    tq_real sum = 0;
-    int tap;
-    for (; f->behind; f->behind--)
-        tq_lattice_sample(t, l, s, f, hand);
-    past = f->past + f->newest;
-    for (tap = 0; tap < l->taps; tap++)
-        sum += weights[tap] * past[tap];
-    f->phase += l->down;
-    if (f->phase >= l->up) /* down <= up: never two of them */
-        f->phase -= l->up, f->behind = 1;
-    return sum;
+    size_t counted = 0;
+    int n;
+    for (n = 0; n < samples; n++) {
+        if (s->position == 0 || s->since_update == t->update_samples) {
+            size_t now = tq_outputs_before(t, s->phase, n);
+            tq_count_hand(s, hand != NULL, now - counted);
+            counted = now;
+            if (hand)
+                tq_take_in(t, s, 0, hand[0], hand[1]);
+            tq_lattice_update(t, l, s, f);
+            s->since_update = 0;
+        }
+        out[n] = tq_lattice_sample(l, s, f);
+    }
+    tq_count_hand(s, hand != NULL, count - counted);
 }
 
 /* --- The calls --------------------------------------------------------------------------------- */
 
 /* How many reals of memory a lattice needs, that of its texture included. */
-static inline size_t tq_lattice_memory(const tq_lattice *l)
+static inline size_t tq_lattice_memory(const tq_texture *t, const tq_lattice *l)
 {
-    return (size_t)(TQ_MEMORY(0, 1) + 9 * l->order + 14 + 2 * l->taps);
+    return (size_t)(TQ_MEMORY(0, t->up) + 9 * l->order + 14);
 }
 
 /* Silence at position 0 of a noise stream. `memory` holds tq_lattice_memory reals and must live as long as
@@ -194,41 +182,36 @@ static inline void tq_lattice_start(const tq_texture *t, const tq_lattice *l, tq
     int p = l->order, half = 2 * (p + 2), n;
     tq_start(t, s, memory, key);
     TQ_FILL(f, 0, sizeof *f);
-    f->behind = 1;
-    f->cosines = memory + TQ_MEMORY(0, 1);
+    f->cosines = memory + TQ_MEMORY(0, t->up);
     f->symmetric = f->cosines + 2 * half, f->antisymmetric = f->symmetric + p + 3;
     f->sine = f->antisymmetric + p + 3, f->cosine = f->sine + p, f->held = f->cosine + p;
-    f->past = f->held + p;
     for (n = 0; n < p; n++)
         f->held[n] = 0;
-    for (n = 0; n < 2 * l->taps; n++)
-        f->past[n] = 0;
     for (n = 0; n <= half; n++) {
         f->cosines[n] = tq_cosine((tq_real)3.141592653589793 * (tq_real)n / (tq_real)half);
         f->cosines[(2 * half - n) % (2 * half)] = f->cosines[n];
     }
 }
 
-/* The next `count` samples at the card's rate, for a hand as of tq_lattice_sample. */
+/* The next `count` samples, for a hand as of tq_lattice_model. */
 TQ_INLINE void tq_lattice_render_by(const tq_texture *t, const tq_lattice *l, tq_state *s,
                                     tq_lattice_state *f, const tq_real *hand, tq_real *out, size_t count)
 {
     while (count) {
-        int chunk = count < TQ_CHUNK ? (int)count : TQ_CHUNK, n;
+        size_t most = tq_outputs_before(t, s->phase, TQ_CHUNK), chunk = count < most ? count : most;
+        tq_real *made = t->up ? tq_past(t, s) + TQ_DOUBLING - 1 : out;
+        int samples = tq_samples_for(t, s->phase, chunk);
         if (hand)
-            s->counters.lift_offs += tq_lift_offs(hand, hand + 1, 0, chunk);
-        for (n = 0; n < chunk; n++) {
-            out[n] = tq_lattice_next(t, l, s, f, hand);
-            s->counters.lift_offs += hand || s->hand.known ? 0 : 1;
-            s->counters.above_grid += (uint64_t)s->hand.above_grid;
-            s->counters.below_grid += (uint64_t)s->hand.below_grid;
-        }
-        tq_restrain(t, s, out, chunk);
-        out += chunk, count -= (size_t)chunk;
+            s->counters.lift_offs += tq_lift_offs(hand, hand + 1, 0, (int)chunk);
+        tq_lattice_model(t, l, s, f, hand, made, samples, chunk);
+        if (t->up)
+            tq_interpolate(t, s, samples, out, chunk);
+        tq_restrain(t, s, out, (int)chunk);
+        out += chunk, count -= chunk;
     }
 }
 
-/* The next `count` samples at the card's rate, for a hand whose speed and force are held. */
+/* The next `count` samples, for a hand whose speed and force are held. */
 static inline void tq_lattice_render_held(const tq_texture *t, const tq_lattice *l, tq_state *s,
                                           tq_lattice_state *f, tq_real speed, tq_real force,
                                           tq_real *out, size_t count)
@@ -238,17 +221,7 @@ static inline void tq_lattice_render_held(const tq_texture *t, const tq_lattice 
     tq_lattice_render_by(t, l, s, f, hand, out, count);
 }
 
-/* A reading of the hand, made `ago` samples at the card's rate before the next one; see tq_read. */
-static inline void tq_lattice_read(const tq_texture *t, const tq_lattice *l, tq_state *s,
-                                   const tq_lattice_state *f, tq_real ago, tq_real speed, tq_real force)
-{
-    /* Of the model's samples: the one to be filtered next is up to one ahead of the card's next one. */
-    tq_real before = ago > 0 ? ago * (tq_real)l->down : 0;
-    before += (tq_real)(f->behind ? 0 : l->up) - (tq_real)f->phase;
-    tq_take_in(t, s, before / (tq_real)l->up, speed, force);
-}
-
-/* The next `count` samples at the card's rate, for the hand as it was read by tq_lattice_read. */
+/* The next `count` samples, for the hand as it was read by tq_read. */
 static inline void tq_lattice_render_on(const tq_texture *t, const tq_lattice *l, tq_state *s,
                                         tq_lattice_state *f, tq_real *out, size_t count)
 {

@@ -39,14 +39,15 @@ static inline size_t tq_table_row(int layers)
 }
 
 /* Reals of memory that a call needs; the last ones are for alignment. */
-static inline size_t tq_many_memory(int layers, int taps)
+static inline size_t tq_many_memory(int layers)
 {
-    size_t values = (size_t)((TQ_ROWS + TQ_MORE_ROWS) * layers + taps - 1 + TQ_CHUNK) + tq_table_row(layers);
+    size_t rows = (size_t)((TQ_ROWS + TQ_MORE_ROWS) * layers);
+    size_t values = rows + TQ_KEPT + TQ_KEPT_DOUBLED + tq_table_row(layers);
     return TQ_STREAMS * values + 8;
 }
 
 /* One stream: what is rendered, with `values` in rows as above; by which hand, of how many samples,
-   where to, and what was corrected. Layers, rates, taps and update_samples are the same in one call;
+   where to, and what was corrected. Layers, rates and update_samples are the same in one call;
    a count of 0 leaves a lane empty. */
 typedef struct {
     tq_texture texture;
@@ -102,7 +103,7 @@ static int tq_widest(void)
 }
 
 /* Fresh streams, as many as there are lanes, from position 0 to their ends: 2, 4 or 8 lanes, at most
-   tq_widest(). `memory` holds tq_many_memory(layers, taps) reals. */
+   tq_widest(). `memory` holds tq_many_memory(layers) reals. */
 static void tq_render_many(tq_stream *streams, tq_real *memory, int lanes)
 {
     tq_real *aligned = memory + (64 - (uintptr_t)memory % 64) % 64 / sizeof(tq_real);

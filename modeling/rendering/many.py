@@ -147,7 +147,7 @@ class _Texture:
         fields = plan.texture(model) | {"values": _rows(model.table)}
         self.filled, self._arrays = filled_texture(ffi, fields, np.float64)
         # What all streams of one vector have in common.
-        self.kind = (self.filled.layers, model.rate_hz, plan.rate_hz, plan.update_samples)
+        self.kind = (self.filled.layers, model.rate_hz, plan.rate_hz, plan.own.update_samples)
 
 
 def _rows(table: ParameterTable) -> Floats:
@@ -192,7 +192,7 @@ class _Task(NamedTuple):
             filled[lane].out = ffi.from_buffer("double[]", stream.signal)
             filled[lane].count = stream.signal.size
         texture = filled[0].texture
-        memory = np.empty(lib.tq_many_memory(texture.layers, texture.taps))
+        memory = np.empty(lib.tq_many_memory(texture.layers))
         lib.tq_render_many(filled, ffi.from_buffer("double[]", memory), self.lanes)
         return [render_counters(filled[lane].counters) for lane in range(len(self.streams))]
 

@@ -39,10 +39,11 @@ typedef struct {
     V floor_gain, floor_now, floor_step, floor_slew;
     TQ_(tq_bits) keys;
     M above_grid, below_grid, samples_above, samples_below;
-    tq_real angle, per_sample, to_end;
-    size_t position, longest, shortest;
+    tq_real angle, per_sample, to_middle, to_end;
+    size_t position, reading, longest, shortest; /* at the model's rate; in the output, of the next update */
+    int phase;
     tq_stream *streams;
-    V *rows, *wide;
+    V *rows, *past, *doubled; /* the last two as of tq_past */
     V *blended; /* one row of a table */
     size_t beside[TQ_W]; /* from a node of a table to that of the next speed */
     tq_state limited[TQ_W]; /* what comes behind the sum, stream by stream */
@@ -268,9 +269,9 @@ TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
     M held, kept;
     int l;
     for TQ_EACH(l)
-        if (s->position < s->streams[l].count) {
-            read[0][l] = s->streams[l].speed[s->position];
-            read[1][l] = s->streams[l].force[s->position];
+        if (s->reading < s->streams[l].count) {
+            read[0][l] = s->streams[l].speed[s->reading];
+            read[1][l] = s->streams[l].force[s->reading];
         }
     TQ_COPY(&read_speed, read[0], sizeof read_speed);
     TQ_COPY(&read_force, read[1], sizeof read_force);
@@ -294,8 +295,8 @@ TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
     speed = s->speed + s->speed_turn * s->past;
     force = s->force + s->force_turn * s->past;
     TQ_(tq_hands_at)(s, &s->end, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
-    TQ_(tq_hands_at)(s, &s->amid, speed + s->speed_slope * (to_end / 2),
-                     force + s->force_slope * (to_end / 2));
+    TQ_(tq_hands_at)(s, &s->amid, speed + s->speed_slope * s->to_middle,
+                     force + s->force_slope * s->to_middle);
     return 1;
 }
 
@@ -326,7 +327,7 @@ TQ_WIDE M TQ_(tq_update_layer)(TQ_(tq_many) *s, size_t i, int moving)
 {
     const tq_texture *t = &s->streams->texture;
     size_t gains = tq_gains_at(t->layers);
-    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
+    tq_real highest = (tq_real)0.49 * t->model_rate_hz, widest = (tq_real)0.45 * t->model_rate_hz;
     V f = s->blended[2 * i], b = s->blended[2 * i + 1];
     V wanted = s->blended[gains + 1 + i], now, next;
     V f_legal = TQ_(tq_all_within)(f, TQ_(tq_all)(1), TQ_(tq_all)(highest));
@@ -349,10 +350,10 @@ TQ_WIDE M TQ_(tq_update_layer)(TQ_(tq_many) *s, size_t i, int moving)
 TQ_WIDE void TQ_(tq_count_moved)(TQ_(tq_many) *s)
 {
     const tq_texture *t = &s->streams->texture;
-    tq_real highest = (tq_real)0.49 * t->rate_hz, widest = (tq_real)0.45 * t->rate_hz;
+    tq_real highest = (tq_real)0.49 * t->model_rate_hz, widest = (tq_real)0.45 * t->model_rate_hz;
     int l, i;
     for TQ_EACH(l)
-        for (i = 0; i < t->layers && s->position < s->streams[l].count; i++) {
+        for (i = 0; i < t->layers && s->reading < s->streams[l].count; i++) {
             tq_real f = s->blended[2 * i][l], b = s->blended[2 * i + 1][l];
             s->streams[l].counters.clamped +=
                 (uint64_t)(tq_moved(f, tq_within(f, 1, highest)) +
@@ -421,15 +422,14 @@ TQ_WIDE void TQ_(tq_layers_all)(TQ_(tq_many) *s, size_t first, int width, const 
 }
 
 /* tq_filter for every stream. */
-TQ_WIDE void TQ_(tq_filter_all)(TQ_(tq_many) *s, const V *w, const V *floor,
-                                V *out, int count)
+TQ_WIDE void TQ_(tq_filter_all)(TQ_(tq_many) *s, const V *w, V *out, int count)
 {
     size_t layers = (size_t)s->streams->texture.layers, i = 0;
     V now = s->floor_now;
     int n;
     for (n = 0; n < count; n++) {
         now += s->floor_step;
-        out[n] = now * floor[n];
+        out[n] = now * w[n];
     }
     s->floor_now = now;
     for (; i + TQ_SIDE_BY_SIDE <= layers; i += TQ_SIDE_BY_SIDE)
@@ -457,47 +457,54 @@ TQ_WIDE V TQ_(tq_noise_all)(TQ_(tq_bits) key, uint64_t position)
     return ((upper + lower) * (tq_real)0x1p-52 - 1) * (tq_real)1.7320508075688772;
 }
 
-/* tq_convolve for every stream. */
-TQ_WIDE void TQ_(tq_convolve_all)(const tq_real *weights, int taps, const V *wide,
-                                  V *out, int count)
+/* tq_double for every stream. */
+TQ_WIDE void TQ_(tq_double_all)(const tq_real *weights, const V *x, V *out, int width)
 {
-    enum { SUMS = 8 };
-    int tap, i;
-    for (; count >= SUMS; count -= SUMS, wide += SUMS, out += SUMS) {
-        V sum[SUMS];
-        const V *x = wide;
-        for (i = 0; i < SUMS; i++)
-            sum[i] = weights[0] * x[i];
-        for (tap = 1, x++; tap < taps; tap++, x++)
-            for (i = 0; i < SUMS; i++)
-                sum[i] += weights[tap] * x[i];
-        for (i = 0; i < SUMS; i++)
-            out[i] = sum[i];
-    }
-    for (; count > 0; count--, wide++, out++) {
-        V sum = weights[0] * wide[0];
-        for (tap = 1; tap < taps; tap++)
-            sum += weights[tap] * wide[tap];
-        *out = sum;
-    }
+    V sum[2][2];
+    int tap, n;
+    for (n = 0; n < width; n++)
+        sum[n][0] = weights[0] * x[n], sum[n][1] = weights[1] * x[n];
+    for (tap = 1; tap < TQ_DOUBLING; tap++)
+        for (n = 0; n < width; n++) {
+            sum[n][0] += weights[2 * tap] * x[tap + n];
+            sum[n][1] += weights[2 * tap + 1] * x[tap + n];
+        }
+    for (n = 0; n < width; n++)
+        out[2 * n] = sum[n][0], out[2 * n + 1] = sum[n][1];
 }
 
-/* tq_inputs for every stream. */
-TQ_WIDE const V *TQ_(tq_inputs_all)(TQ_(tq_many) *s, V *floor, int count)
+/* tq_between for every stream. */
+TQ_WIDE V TQ_(tq_between_all)(const tq_real *weights, const V *x)
+{
+    V even = weights[0] * x[0], odd = weights[1] * x[1];
+    int tap;
+    for (tap = 2; tap < TQ_PHASE; tap += 2) {
+        even += weights[tap] * x[tap];
+        odd += weights[tap + 1] * x[tap + 1];
+    }
+    return even + odd;
+}
+
+/* tq_interpolate for every stream. */
+TQ_WIDE void TQ_(tq_interpolate_all)(TQ_(tq_many) *s, int samples, V *out, size_t count)
 {
     const tq_texture *t = &s->streams->texture;
-    V *wide = s->wide, *fresh = wide + t->taps - 1;
-    uint64_t ahead = s->position + (uint64_t)(t->taps / 2);
-    int n;
-    for (n = 0; n < count; n++)
-        fresh[n] = t->noise_scale * TQ_(tq_noise_all)(s->keys, ahead + (uint64_t)n);
-    if (t->taps == 1) {
-        for (n = 0; n < count; n++)
-            floor[n] = wide[n];
-        return wide;
+    const V *x = s->doubled + s->phase / t->up;
+    V *fresh = s->doubled + TQ_PHASE + 1;
+    int phase = s->phase % t->up, i = 0;
+    size_t n;
+    for (; i + 2 <= samples; i += 2)
+        TQ_(tq_double_all)(t->doubling, s->past + i, fresh + 2 * i, 2);
+    if (i < samples)
+        TQ_(tq_double_all)(t->doubling, s->past + i, fresh + 2 * i, 1);
+    for (n = 0; n < count; n++) {
+        out[n] = TQ_(tq_between_all)(t->phases + (size_t)phase * TQ_PHASE, x);
+        for (phase += t->down; phase >= t->up; phase -= t->up)
+            x++;
     }
-    TQ_(tq_convolve_all)(t->lowpass, t->taps, wide, floor, count);
-    return wide + t->taps / 2;
+    TQ_MOVE(s->past, s->past + samples, (TQ_DOUBLING - 1) * sizeof(V));
+    TQ_MOVE(s->doubled, s->doubled + 2 * samples, (TQ_PHASE + 1) * sizeof(V));
+    s->phase = tq_phase_after(t, s->phase, samples, count);
 }
 
 /* A chunk of every stream to where it belongs, but no further than to its end. */
@@ -523,11 +530,11 @@ TQ_WIDE void TQ_(tq_hand_out)(const TQ_(tq_many) *s, V *out, size_t from, size_t
                 s->streams[l].out[from + n] = out[n][l];
 }
 
-/* Hands every stream out, behind tq_restrain, and moves on to the next noise. */
+/* Hands every stream out, behind tq_restrain. */
 TQ_WIDE void TQ_(tq_finish_all)(TQ_(tq_many) *s, V *out, size_t from, size_t count)
 {
     const tq_texture *t = &s->streams->texture;
-    int l, i;
+    int l;
     TQ_(tq_hand_out)(s, out, from, count);
     for TQ_EACH(l) {
         tq_stream *stream = s->streams + l;
@@ -539,18 +546,16 @@ TQ_WIDE void TQ_(tq_finish_all)(TQ_(tq_many) *s, V *out, size_t from, size_t cou
             tq_lift_offs(stream->speed + from, stream->force + from, 1, mine);
         tq_restrain(t, s->limited + l, stream->out + from, mine);
     }
-    for (i = 0; i < t->taps - 1; i++)
-        s->wide[i] = s->wide[(size_t)i + count];
 }
 
-/* Samples above and below the grid, as many as there are of each stream. */
-TQ_WIDE void TQ_(tq_count_grid)(TQ_(tq_many) *s, size_t piece)
+/* Samples above and below the grid, as many as there are of each stream, of `piece` from `from` on. */
+TQ_WIDE void TQ_(tq_count_grid)(TQ_(tq_many) *s, size_t from, size_t piece)
 {
     M mine = (M){0} + (int64_t)piece;
     int l;
-    if (s->position + piece > s->shortest)
+    if (from + piece > s->shortest)
         for TQ_EACH(l) {
-            size_t count = s->streams[l].count, left = count < s->position ? 0 : count - s->position;
+            size_t count = s->streams[l].count, left = count < from ? 0 : count - from;
             mine[l] = (int64_t)(left < piece ? left : piece);
         }
     s->samples_above += s->above_grid & mine;
@@ -561,18 +566,23 @@ TQ_WIDE void TQ_(tq_count_grid)(TQ_(tq_many) *s, size_t piece)
 TQ_WIDE void TQ_(tq_start_all)(TQ_(tq_many) *s, tq_stream *streams, tq_real *memory)
 {
     const tq_texture *t = &streams->texture;
+    tq_real notch_angle = (tq_real)3.141592653589793 / t->rate_hz;
     size_t layers = (size_t)t->layers, i;
-    int l, n;
+    int l;
     TQ_FILL(s, 0, sizeof *s);
     s->streams = streams;
-    s->angle = (tq_real)3.141592653589793 / t->rate_hz;
+    s->angle = (tq_real)3.141592653589793 / t->model_rate_hz;
+    s->phase = 2 * t->up;
     s->per_sample = 1 / (tq_real)t->update_samples;
     s->to_end = (tq_real)(t->update_samples - 1) / (tq_real)t->update_samples;
+    s->to_middle = s->to_end / 2 + t->lead;
+    s->to_end += t->lead;
     s->shortest = s->longest = streams->count;
     s->rows = (V *)memory;
-    s->wide = s->rows + TQ_ALL_ROWS * layers;
-    s->blended = s->wide + t->taps - 1 + TQ_CHUNK;
-    TQ_FILL(memory, 0, TQ_ALL_ROWS * layers * sizeof(V));
+    s->past = s->rows + TQ_ALL_ROWS * layers;
+    s->doubled = s->past + TQ_KEPT;
+    s->blended = s->doubled + TQ_KEPT_DOUBLED;
+    TQ_FILL(memory, 0, (TQ_ALL_ROWS * layers + TQ_KEPT + TQ_KEPT_DOUBLED) * sizeof(V));
     for TQ_EACH(l) {
         const tq_texture *mine = &streams[l].texture;
         size_t count = streams[l].count;
@@ -589,39 +599,58 @@ TQ_WIDE void TQ_(tq_start_all)(TQ_(tq_many) *s, tq_stream *streams, tq_real *mem
         for (i = 0; i < layers; i++)
             TQ_AT(TQ_SIGN, i)[l] = mine->signs[i], TQ_AT(TQ_SLEW, i)[l] = mine->slews[1 + i];
         if (t->notch_share != 0)
-            s->limited[l].notch = tq_band_of(s->angle * t->notch_hz, s->angle * t->notch_width_hz);
+            s->limited[l].notch = tq_band_of(notch_angle * t->notch_hz, notch_angle * t->notch_width_hz);
     }
-    for (n = 0; n < t->taps - 1; n++)
-        s->wide[n] = t->noise_scale *
-                     TQ_(tq_noise_all)(s->keys, (uint64_t)((int64_t)n - t->taps / 2));
+}
+
+/* tq_render_model for every stream, from sample `from` of the output on; `left` is until the next update. */
+TQ_WIDE void TQ_(tq_render_models)(TQ_(tq_many) *s, V *out, int samples, size_t from, size_t count,
+                                   int *left)
+{
+    const tq_texture *t = &s->streams->texture;
+    V w[TQ_CHUNK];
+    size_t counted = 0;
+    int done = 0, n;
+    for (n = 0; n < samples; n++)
+        w[n] = TQ_(tq_noise_all)(s->keys, s->position + (uint64_t)n);
+    while (done < samples) {
+        int piece;
+        if (*left == 0) {
+            size_t now = tq_outputs_before(t, s->phase, done);
+            TQ_(tq_count_grid)(s, from + counted, now - counted);
+            counted = now;
+            s->reading = from + now;
+            TQ_(tq_update_all)(s);
+            *left = t->update_samples;
+        }
+        piece = *left < samples - done ? *left : samples - done;
+        TQ_(tq_filter_all)(s, w + done, out + done, piece);
+        s->position += (size_t)piece;
+        done += piece;
+        *left -= piece;
+    }
+    TQ_(tq_count_grid)(s, from + counted, count - counted);
 }
 
 /* What is rendered, for TQ_WIDE_LANES streams from start to end. */
 static TQ_WIDE_TARGET void TQ_(tq_together)(tq_stream *streams, tq_real *memory)
 {
+    const tq_texture *t = &streams->texture;
     TQ_(tq_many) many, *s = &many;
-    V floor[TQ_CHUNK], out[TQ_CHUNK];
+    V out[TQ_CHUNK];
+    size_t from = 0, chunk;
     int left = 0;
     int l;
     TQ_(tq_start_all)(s, streams, memory);
-    while (s->position < s->longest) {
-        size_t from = s->position, rest = s->longest - from;
-        int chunk = rest < TQ_CHUNK ? (int)rest : TQ_CHUNK, done = 0;
-        const V *w = TQ_(tq_inputs_all)(s, floor, chunk);
-        while (done < chunk) {
-            int piece;
-            if (left == 0) {
-                TQ_(tq_update_all)(s);
-                left = streams->texture.update_samples;
-            }
-            piece = left < chunk - done ? left : chunk - done;
-            TQ_(tq_filter_all)(s, w + done, floor + done, out + done, piece);
-            TQ_(tq_count_grid)(s, (size_t)piece);
-            s->position += (size_t)piece;
-            done += piece;
-            left -= piece;
-        }
-        TQ_(tq_finish_all)(s, out, from, (size_t)chunk);
+    for (; from < s->longest; from += chunk) {
+        size_t rest = s->longest - from;
+        int samples;
+        chunk = rest < TQ_CHUNK ? rest : TQ_CHUNK;
+        samples = tq_samples_for(t, s->phase, chunk);
+        TQ_(tq_render_models)(s, t->up ? s->past + TQ_DOUBLING - 1 : out, samples, from, chunk, &left);
+        if (t->up)
+            TQ_(tq_interpolate_all)(s, samples, out, chunk);
+        TQ_(tq_finish_all)(s, out, from, chunk);
     }
     for TQ_EACH(l) {
         tq_counters *counters = &streams[l].counters, *limited = &s->limited[l].counters;

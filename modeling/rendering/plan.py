@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,6 +15,7 @@ from modeling.errors import InputError, shown
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.parameter_table import ParameterTable
 from modeling.rendering.cost import Cost, cost_of
+from modeling.rendering.interpolation import Interpolation, interpolation
 from modeling.rendering.limits import Limits
 
 UPDATE_S = 1e-3
@@ -27,7 +29,6 @@ FASTEST_FORCE_CHANGE_N_S = 200.0
 HOLD_S = 20e-3
 # How long there must have been no contact until it counts as ended: sensors miss it for a moment.
 RELEASE_S = 3e-3
-_EDGE_SHARE = 0.2
 _LONGEST_UPDATE = 1_000_000
 _FOR_EVER = 2**62
 _LARGEST_EXCESS = 0.05  # of a mean square in single precision
@@ -68,7 +69,7 @@ class RenderCounters:
     hand, as last read, touched and moved faster or pressed harder than the highest condition of the
     model's grid; `below_grid`: or else slower or more lightly than the lowest, but not at rest.
     `clamped`: parameter values moved into the legal range. The rest: samples that each of the
-    `Limits` touched.
+    `Limits` touched. All samples are those of the output.
     """
 
     lift_offs: int = 0
@@ -87,8 +88,12 @@ class RenderPlan:
     Parameters
     ----------
     rate_hz : float
+        Of the output.
     update_samples : int
-        From one parameter update to the next, 1 … 1 000 000.
+        Of the output, from one parameter update to the next, 1 … 1 000 000; at another rate than
+        the model's rounded to whole samples of the model, at least one.
+    model_rate_hz : float, optional
+        At most the output's, which is the default.
     limits : Limits
         None by default.
     compensation : Notch, optional
@@ -99,11 +104,13 @@ class RenderPlan:
     Raises
     ------
     InputError
-        For an update period out of range, or a compensation for another rate.
+        For an update period out of range, or a compensation for another rate; for rates that
+        `interpolation` refuses.
     """
 
     rate_hz: float
     update_samples: int
+    model_rate_hz: float | None = None
     limits: Limits = field(default_factory=Limits)
     compensation: Notch | None = None
     single: bool = False
@@ -120,6 +127,40 @@ class RenderPlan:
                 f"expected a vibrator compensation for {self.rate_hz:g} Hz, got one for "
                 f"{self.compensation.rate_hz:g} Hz; make it for the rate of rendering."
             )
+        self.interpolation  # noqa: B018  (refuses rates)
+
+    @cached_property
+    def interpolation(self) -> Interpolation | None:
+        """How the output comes from samples at the model's rate; None where that is its own."""
+        return interpolation(self.own_rate_hz, self.rate_hz)
+
+    @property
+    def own_rate_hz(self) -> float:
+        """The model's."""
+        return self.rate_hz if self.model_rate_hz is None else self.model_rate_hz
+
+    @property
+    def own(self) -> RenderPlan:
+        """How samples at the model's rate are made, before interpolation, compensation, limits."""
+        if self.interpolation is None:
+            return self
+        samples = max(1, round(self.update_samples * self.own_rate_hz / self.rate_hz))
+        return RenderPlan(rate_hz=self.own_rate_hz, update_samples=samples, single=self.single)
+
+    @property
+    def delay_s(self) -> float:
+        """By how much the output is late at low frequencies: the interpolation's group delay.
+
+        For it the hand is extrapolated; what cannot be foreseen, such as a lift-off, is felt late.
+        """
+        interpolated = self.interpolation
+        return interpolated.delay_samples / self.own_rate_hz if interpolated else 0.0
+
+    @property
+    def lead(self) -> float:
+        """The delay in parameter updates."""
+        own = self.own
+        return self.delay_s * own.rate_hz / own.update_samples
 
     @property
     def precision(self) -> type[np.floating[Any]]:
@@ -158,11 +199,12 @@ class RenderPlan:
 
     def cost(self, model: LayeredModel) -> Cost:
         """What rendering a model costs, in counted operations and bytes; refused as `texture`."""
-        fields = self.texture(model)
+        fields, own = self.texture(model), self.own
         return cost_of(
             layers=fields["layers"],
-            taps=fields["taps"],
-            update_samples=self.update_samples,
+            interpolated=self.interpolation is not None,
+            samples_per_output=own.rate_hz / self.rate_hz,
+            update_samples=own.update_samples,
             compensated=self.compensation is not None and self.compensation.band_share != 0,
             rms_limited=bool(np.isfinite(self.limits.rms)),
             numbers=sum(np.size(value) for value in fields.values() if np.ndim(value)),
@@ -177,8 +219,8 @@ class RenderPlan:
         Raises
         ------
         InputError
-            For numbers that single precision cannot hold or tell apart; for a rate below the
-            model's.
+            For numbers that single precision cannot hold or tell apart; for a model of another rate
+            than the plan's.
         """
         fields = self._texture(model)
         if not self.single:
@@ -186,8 +228,12 @@ class RenderPlan:
         return {name: _in_single(name, value) for name, value in fields.items()}
 
     def _texture(self, model: LayeredModel) -> dict[str, int | float | Floats]:
-        table, lowpass = model.table, noise_lowpass(model.rate_hz, self.rate_hz)
-        speed_change, force_change = self.hand_changes
+        if model.rate_hz != self.own_rate_hz:
+            raise InputError(
+                f"expected a model of {self.own_rate_hz:g} Hz, got one of {model.rate_hz:g} Hz; "
+                "make the plan for the model's rate."
+            )
+        table = model.table
         fields: dict[str, int | float | Floats] = {
             "speeds": table.speeds_mm_s.size,
             "forces": table.forces_n.size,
@@ -196,18 +242,25 @@ class RenderPlan:
             "force_n": table.forces_n,
             "values": table.values.reshape(-1, table.values.shape[-1]),
             "signs": table.signs,
-            "rate_hz": self.rate_hz,
-            "noise_scale": float(np.sqrt(self.rate_hz / model.rate_hz)),
-            "lowpass": lowpass,
-            "taps": lowpass.size,
-            "update_samples": self.update_samples,
+        }
+        return fields | self.timing(table.largest_gains) | self.restraints()
+
+    def timing(self, largest_gains: Floats) -> dict[str, Any]:
+        """What `tq_texture` holds of rates, updates and the hand, for (k,) gains."""
+        own, way = self.own, self.interpolation
+        fields: dict[str, Any] = {"model_rate_hz": own.rate_hz, "rate_hz": self.rate_hz}
+        if way is not None:
+            fields |= {"up": way.up, "down": way.down}
+            fields |= {"doubling": way.doubling, "phases": way.phases, "lead": self.lead}
+        speed_change, force_change = own.hand_changes
+        return fields | {
+            "update_samples": own.update_samples,
             "speed_change": speed_change,
             "force_change": force_change,
-            "slope_share": self.slope_share,
-            **self.readings,
-            "slews": self.slews(table.largest_gains),
+            "slope_share": own.slope_share,
+            **own.readings,
+            "slews": own.slews(largest_gains),
         }
-        return fields | self.restraints()
 
     def restraints(self) -> dict[str, Any]:
         """What `tq_texture` holds of compensation and limits.
@@ -280,6 +333,7 @@ def plan_for(
     return RenderPlan(
         rate_hz=rate_hz,
         update_samples=update_samples,
+        model_rate_hz=model_rate_hz,
         limits=limits or Limits(),
         compensation=compensation,
         single=single,
@@ -302,27 +356,3 @@ def _in_single(member: str, value: int | float | Floats) -> int | np.float32 | N
             f"{member}; take double precision."
         )
     return rounded[()]  # a scalar where it was one
-
-
-def noise_lowpass(model_rate_hz: float, rate_hz: float) -> Floats:
-    """Taps of a linear-phase low-pass at the model's Nyquist frequency; [1] at its own rate.
-
-    Raises
-    ------
-    InputError
-        For a rate below the model's, or not finite.
-    """
-    if not (np.isfinite(rate_hz) and rate_hz >= model_rate_hz):
-        raise InputError(
-            f"expected a rendering rate of at least the model's {model_rate_hz:g} Hz, got "
-            f"{rate_hz:g}; render at that rate and resample."
-        )
-    if rate_hz == model_rate_hz:
-        return np.ones(1)
-    from scipy.signal import firwin
-
-    transition_hz = _EDGE_SHARE * model_rate_hz / 2
-    taps = 2 * round(1.65 * rate_hz / transition_hz) + 1  # Hamming: 3.3 fs/transition
-    cutoff_hz = min(model_rate_hz / 2, rate_hz / 2 * 0.999)
-    lowpass: Floats = firwin(taps, cutoff_hz, fs=rate_hz)
-    return lowpass

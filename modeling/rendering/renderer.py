@@ -60,18 +60,16 @@ class Renderer:
     model : TextureModel, RegressedModel or ARModel
         What to render.
     rate_hz : float, optional
-        Output rate, at least the model's (the default). Peaks and widths stay the same: w gets the
-        variance rate/model rate and the noise branch ends at the model's Nyquist frequency. Skirts
-        that come close to that frequency do not, as the filter warps less: at 48 kHz third octaves
-        of the planted textures differ by −0.7 to +3.2 dB, their level below 2.5 kHz by up to
-        0.15 dB, and that of the whole band, with skirts above 2.5 kHz, by up to 0.24 dB.
-        For the exact spectrum render at the model's rate and resample, as stimulus sets do. An
-        ARModel is rendered at its own rate only.
+        Output rate, at least the model's (the default). All is rendered at the model's rate and
+        interpolated, which keeps the spectrum within 0.06 dB up to 0.9 of the model's Nyquist
+        frequency and is late by `delay_s` (docs/method/rendering.md#other-rates). The ratio to
+        twice the model's rate is one of whole numbers up to 4000.
     seed, stream : int
         Which noise; two renderers with the same pair give the same signal.
     update_samples : int, optional
-        Samples from one parameter update to the next, 1 … 1 000 000; by default one millisecond (5
-        at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was compiled for a
+        Samples of the output from one parameter update to the next, 1 … 1 000 000, in effect the
+        nearest whole number of samples at the model's rate, at least 1; by default one millisecond
+        (5 at 5 kHz, docs/method/rendering.md#moving-parameters), of a model that was compiled for a
         scene the interval that keeps the scene's bound. `render` reads speed and force at each
         update; readings at times of their own are for `read` and `render_on`.
     limits : Limits, optional
@@ -86,7 +84,7 @@ class Renderer:
     Raises
     ------
     InputError
-        For a rate below the model's, or another one than an ARModel's; for a compensation made for
+        For a rate below the model's, or in no such ratio to it; for a compensation made for
         another rate; for `update_samples` out of range; for single precision of an ARModel, of
         numbers that it cannot hold or tell apart, or without the compiled kernel.
     """
@@ -134,6 +132,11 @@ class Renderer:
     def counters(self) -> RenderCounters:
         """What the renderer had to correct so far."""
         return self._engine.counters
+
+    @property
+    def delay_s(self) -> float:
+        """By how much the output is late at low frequencies; 0 at the model's rate."""
+        return self.plan.delay_s
 
     @overload
     def render(

@@ -62,16 +62,31 @@ TQ_INLINE uint64_t tq_scene_key(const tq_scene_hand *h)
     return tq_scene_mix((h->scene->noise ^ stream) + UINT64_C(0x9E3779B97F4A7C15));
 }
 
-/* Whether no gain is left, as at lift-off and in the first update after a switch. */
+/* Whether no gain is left, as at lift-off and in the first update after a switch, and nothing that is yet
+   to be interpolated. */
 TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
 {
     const tq_texture *t = tq_scene_texture(h);
-    const tq_real *gain = tq_row(t, &h->state, TQ_GAIN);
+    const tq_real *gain = tq_row(t, &h->state, TQ_GAIN), *past = tq_past(t, &h->state);
     int i;
     for (i = 0; i < t->layers; i++)
         if (gain[i] != 0)
             return 0;
+    for (i = 0; t->up && i < TQ_DOUBLING - 1; i++)
+        if (past[i] != 0)
+            return 0;
+    for (i = 2; t->up && i < TQ_PHASE + 1; i++) /* two for what came before an update */
+        if (past[TQ_KEPT + i] != 0)
+            return 0;
     return h->state.floor_gain == 0;
+}
+
+/* Samples until the next parameter update. */
+TQ_INLINE size_t tq_scene_left(const tq_scene_hand *h)
+{
+    const tq_texture *t = tq_scene_texture(h);
+    const tq_state *s = &h->state;
+    return s->position ? tq_outputs_before(t, s->phase, t->update_samples - s->since_update) : 0;
 }
 
 /* The wanted texture, from its beginning, behind the same compensation and limits as before; its hand is
@@ -90,13 +105,29 @@ static void tq_scene_next(tq_scene_hand *h)
     h->state.counters = before.counters;
 }
 
-/* The hand on the next texture is as it was read on the last one, up to `position`. */
-TQ_INLINE void tq_scene_keep(tq_scene_hand *h, tq_followed hand, const tq_texture *last, uint64_t position)
+/* A time as so many samples before the model's next one: of a texture with another rate of the model, where
+   `now` is how far the output is behind. */
+TQ_INLINE tq_real tq_scene_ago(uint64_t *from, tq_real ago, uint64_t position, tq_real now, tq_real shorter)
+{
+    *from -= position; /* modulo 2^64, as all positions */
+    if (shorter != 1) {
+        ago = tq_age(*from, ago, 0);
+        *from = 0;
+    }
+    return (ago - now) * shorter;
+}
+
+/* The hand on the next texture is as it was read on the last one, whose state `before` was. */
+TQ_INLINE void tq_scene_keep(tq_scene_hand *h, const tq_state *before, const tq_texture *last)
 {
     const tq_texture *t = tq_scene_texture(h);
-    tq_real longer = (tq_real)t->update_samples / (tq_real)last->update_samples;
-    hand.read -= position; /* modulo 2^64, as all positions */
-    hand.off -= position;
+    tq_followed hand = before->hand;
+    tq_real shorter = t->model_rate_hz / last->model_rate_hz, now = 0;
+    tq_real longer = (tq_real)t->update_samples / (tq_real)last->update_samples / shorter;
+    if (last->up)
+        now = 1 - (tq_real)before->phase / (tq_real)(2 * last->up);
+    hand.ago = tq_scene_ago(&hand.read, hand.ago, before->position, now, shorter);
+    hand.off_ago = tq_scene_ago(&hand.off, hand.off_ago, before->position, now, shorter);
     hand.speed_slope *= longer;
     hand.force_slope *= longer;
     hand.speed_turn *= longer;
@@ -134,19 +165,19 @@ static void tq_scene_render_by(tq_scene_hand *h, const tq_real *speed, const tq_
     tq_state *s = &h->state;
     while (count) {
         const tq_texture *t = tq_scene_texture(h);
-        int left = s->position == 0 ? 0 : t->update_samples - s->since_update, changes;
-        size_t piece = count;
+        size_t left = tq_scene_left(h), piece = count;
+        int changes;
         if (left == 0 && h->wanted != h->now && tq_scene_silent(h)) {
-            tq_followed hand = s->hand;
-            uint64_t position = s->position;
+            tq_state before = *s;
             tq_scene_next(h);
             if (!reads)
-                tq_scene_keep(h, hand, t, position);
+                tq_scene_keep(h, &before, t);
             t = tq_scene_texture(h);
         }
         changes = h->wanted != h->now || (h->switches && s->position == 0);
         if (changes) {
-            size_t most = (size_t)(left ? left : t->update_samples);
+            int period = t->update_samples < TQ_CHUNK ? t->update_samples : TQ_CHUNK;
+            size_t most = left ? left : tq_outputs_before(t, s->phase, period);
             piece = count < most ? count : most;
         }
         if (changes && left == 0) /* the next update finds the hand lifted */

@@ -91,8 +91,9 @@ def check_models(rig: RigFile, models: Iterable[AnyModel]) -> None:
                 f"expected models of at most sound.rate_hz, {rig.sound.rate_hz:g} Hz in {rig.path},"
                 f" got {model.texture} of {model.rate_hz:g} Hz; choose a higher rate of the card."
             )
+        plan = plan_for(model.rate_hz, rate_hz=rig.sound.rate_hz)
         if isinstance(model, ARModel):
-            lattice_fields(model, plan_for(model.rate_hz, rate_hz=rig.sound.rate_hz))
+            lattice_fields(model, plan)
 
 
 def _check_latency(rig: RigFile, override: str | None) -> None:

@@ -196,8 +196,8 @@ class SoundOutput:
         Parameters
         ----------
         model : TextureModel, RegressedModel or ARModel
-            Of a rate up to the card's. An ARModel is filtered at its own rate and brought to the
-            card's, which adds a delay: docs/method/rendering.md#ar-models-at-a-cards-rate
+            Of a rate up to the card's. It is rendered at its own rate and interpolated, which adds
+            a delay: docs/method/rendering.md#other-rates
 
         Raises
         ------

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from modeling.errors import InputError
-from modeling.rendering.compiled import filled, render_counters
+from modeling.rendering.compiled import filled, memory_reals, render_counters
 from rig.live.driven import settings_from_parent, tell
 from rig.live.memory import HEARTBEAT_S, Live, compiled, now_s
 from rig.sound.devices import check_rate, find_device, portaudio
@@ -109,14 +109,12 @@ class Playing:
         number, key = wanted["presentation"], wanted["key"]
         if "lattice" in wanted:
             lattice, more = self._filled("tq_lattice", wanted["lattice"])
-            memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(lattice))
+            memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(texture, lattice))
             start = self._lib.tq_surface_start_lattice
             start(source, texture, lattice, memory, key, number)
             arrays += [lattice, *more]
         else:
-            row = -(-texture.layers // self._lib.TQ_LANES) * self._lib.TQ_LANES
-            reals = self._lib.TQ_ROWS * row + texture.taps - 1 + self._lib.TQ_CHUNK  # TQ_MEMORY
-            memory = self._ffi.new("tq_real[]", reals)
+            memory = self._ffi.new("tq_real[]", memory_reals(self._lib, texture))
             self._lib.tq_surface_start(source, texture, memory, key, number)
         self._sources[number] = _Source("surface", source, (texture, arrays, memory))
         self._want(surface=source)

@@ -146,7 +146,7 @@ def _tables(name: str, members: Mapping[str, Any]) -> str:
     """The arrays of a texture, the texture itself and the memory that it needs, in C."""
     arrays = arrays_of(members)
     entries = initializer(members, {member: f"{name}_{member}" for member in arrays})
-    memory = f"TQ_MEMORY({members['layers']}, {members['taps']})"
+    memory = f"TQ_MEMORY({members['layers']}, {members.get('up', 0)})"
     return "".join(
         [
             *(array(f"{name}_{member}", value) for member, value in arrays.items()),

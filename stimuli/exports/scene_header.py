@@ -190,14 +190,14 @@ class _Pool:
 
 def _largest(textures: Sequence[Mapping[str, Any]]) -> str:
     """The largest memory that any of the textures needs, in C; lanes are known only there."""
-    sizes = sorted({(members["layers"], members["taps"]) for members in textures}, reverse=True)
-    largest = ""
-    most_taps = 0
-    for layers, taps in sizes:
-        if taps > most_taps:  # else one with as many layers needs as much
-            reals, most_taps = f"TQ_MEMORY({layers}, {taps})", taps
-            largest = f"TQ_LARGER({reals}, {largest})" if largest else reals
-    return largest
+    most: dict[bool, tuple[int, int]] = {}  # layers and `up` by whether there is interpolation
+    for members in textures:
+        size = members["layers"], members.get("up", 0)
+        most[size[1] > 0] = max(size, most.get(size[1] > 0, size))
+    if True in most and False in most and most[False][0] <= most[True][0]:
+        del most[False]
+    sizes = [f"TQ_MEMORY({layers}, {up})" for layers, up in most.values()]
+    return sizes[0] if len(sizes) == 1 else f"TQ_LARGER({sizes[0]}, {sizes[1]})"
 
 
 # --- Comment --------------------------------------------------------------------------------------

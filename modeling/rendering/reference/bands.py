@@ -9,12 +9,12 @@ import numpy as np
 from modeling.equalizer.bands import band_coefficients, clamp_bands
 from modeling.hand import Hand
 from modeling.rendering.noise import white_noise
-from modeling.rendering.plan import LayeredModel, RenderPlan, noise_lowpass
+from modeling.rendering.plan import LayeredModel, RenderPlan
 from modeling.rendering.reference.hand import GainRamps
 
 
 class BandFilter:
-    """A PEQ of m bands (docs/method/equalizer.md#recursion) at the model's rate or above.
+    """A PEQ of m bands (docs/method/equalizer.md#recursion) at the model's rate.
 
     Parameters are those for the extrapolated hand: those for the hand as it is read would be
     late. Frequencies and bandwidths are set for the middle of the time to the next update; gains
@@ -24,11 +24,9 @@ class BandFilter:
 
     def __init__(self, model: LayeredModel, plan: RenderPlan) -> None:
         self.clamped = 0
-        self._table, self._plan = model.table, plan
+        self._table, self._plan = model.table, plan.own
         self.axes = (self._table.speeds_mm_s, self._table.forces_n)
-        self._scale = np.sqrt(plan.rate_hz / model.rate_hz)
-        self._lowpass = noise_lowpass(model.rate_hz, plan.rate_hz)
-        self._gains = GainRamps(plan, self._table.largest_gains)
+        self._gains = GainRamps(plan.own, self._table.largest_gains)
         self._bands = [(0.0,) * 5] * self._table.n_layers
         self._state = [(0.0, 0.0)] * self._table.n_layers
 
@@ -52,23 +50,14 @@ class BandFilter:
         self._gains.update(wanted, taps)
 
     def inputs(self, key: np.uint64, start: int, *, count: int) -> tuple[list[float], ...]:
-        """The next noise for the bands and, low-passed without delay, for the noise branch.
-
-        The noise is known ahead, so the low-pass has zero phase and the sum stays coherent.
-        """
-        half = self._lowpass.size // 2
-        wide = self._scale * white_noise(key, start - half, count + 2 * half)
-        # Tap by tap: the order of additions, and so the result, is the same for any block size.
-        floor_noise = np.zeros(count)
-        for tap, weight in enumerate(self._lowpass):
-            floor_noise += weight * wide[tap : tap + count]
-        return wide[half : half + count].tolist(), floor_noise.tolist()
+        """The next noise, for the bands and the noise branch."""
+        return (white_noise(key, start, count).tolist(),)
 
     def filter(self, *inputs: list[float]) -> list[float]:
         """The recursion of docs/method/equalizer.md#recursion with the parameters in force."""
-        noise, floor_noise = inputs
+        [noise] = inputs
         floor_gains = self._gains.course(0, len(noise))
-        output = [gain * w for gain, w in zip(floor_gains, floor_noise, strict=True)]
+        output = [gain * w for gain, w in zip(floor_gains, noise, strict=True)]
         for layer, (p, q, r, b1, b2) in enumerate(self._bands):
             s1, s2 = self._state[layer]
             course = self._gains.course(1 + layer, len(noise))

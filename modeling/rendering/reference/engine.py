@@ -7,7 +7,7 @@ floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bit
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +17,7 @@ from modeling.hand import Hand
 from modeling.rendering.plan import RenderCounters, RenderPlan
 from modeling.rendering.reference.compensator import Compensator
 from modeling.rendering.reference.hand import Extrapolator
+from modeling.rendering.reference.interpolator import Interpolator
 from modeling.rendering.reference.limiter import Limiter
 
 
@@ -43,14 +44,15 @@ class StreamFilter(Protocol):
 
 
 class PythonEngine:
-    """Renders with any `StreamFilter`: updates, filters, compensates and limits."""
+    """Renders with any `StreamFilter`: updates, filters, interpolates, compensates and limits."""
 
     def __init__(self, stream_filter: StreamFilter, plan: RenderPlan, *, key: np.uint64) -> None:
         self._filter, self._plan, self._key = stream_filter, plan, key
         self._position = 0
         self._lift_offs = 0
-        self._hand = Extrapolator(plan, stream_filter.axes)
+        self._hand = Extrapolator(plan.own, stream_filter.axes, lead=plan.lead)
         self._samples_outside = [0, 0]
+        self._interpolator = Interpolator(plan)
         self._limiter = Limiter(plan)
         self._compensator = Compensator(plan)
 
@@ -70,35 +72,43 @@ class PythonEngine:
 
     def read(self, ago: float, speed_mm_s: float, force_n: float) -> None:
         """A reading that was made so many samples before the next one."""
-        self._hand.read(ago, speed_mm_s, force_n)
+        self._hand.read(self._interpolator.before_next_made(ago), speed_mm_s, force_n)
 
     def render_on(self, samples: int) -> Floats:
         """The next samples for the hand as it was last read."""
         return self._rendered(samples, None)
 
     def _rendered(self, count: int, hand: Hand | None) -> Floats:
-        period = self._plan.update_samples
+        made = self._made(hand, self._interpolator.made_before(count), count)
+        output = self._compensator.filter(self._interpolator.output(made, count))
+        return np.array(self._limiter.limit(output), dtype=np.float64)
+
+    def _made(self, hand: Hand | None, places: Sequence[int], outputs: int) -> list[float]:
+        """The next samples at the model's rate, each for one place in the next ones of the output."""
+        count, period = len(places), self._plan.own.update_samples
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))
         bounds = [*starts, count]
-        self._go_on(bounds[0], counts=hand is None)
+        passed = [*(places[start] for start in starts), outputs]
+        self._go_on(bounds[0], passed[0], counts=hand is None)
         output = self._filter.filter(*(part[: bounds[0]] for part in inputs))
         followed = []
-        for start, stop in pairwise(bounds):
+        for (start, stop), (place, until) in zip(pairwise(bounds), pairwise(passed), strict=True):
             if hand is not None:
-                self._hand.read(0.0, float(hand.speed_mm_s[start]), float(hand.force_n[start]))
+                self._hand.read(0.0, float(hand.speed_mm_s[place]), float(hand.force_n[place]))
             followed.append(self._hand.follow())
-            self._go_on(stop - start, counts=hand is None)
+            self._go_on(stop - start, until - place, counts=hand is None)
         amid, end = np.array(followed).reshape(-1, 2, 2).transpose(1, 2, 0)
         settings = self._filter.settings(Hand(*amid), Hand(*end))
         for start, stop, setting in zip(starts, bounds[1:], settings, strict=True):
             self._filter.update(setting)
             output += self._filter.filter(*(part[start:stop] for part in inputs))
         self._position += count
-        return np.array(self._limiter.limit(self._compensator.filter(output)), dtype=np.float64)
+        return output
 
-    def _go_on(self, samples: int, *, counts: bool) -> None:
+    def _go_on(self, samples: int, outputs: int, *, counts: bool) -> None:
+        """So many samples of the model pass, for so many of the output."""
         self._hand.go_on(samples)
-        self._lift_offs += samples * (counts and not self._hand.known)
+        self._lift_offs += outputs * (counts and not self._hand.known)
         for which, outside in enumerate(self._hand.outside):
-            self._samples_outside[which] += samples * outside
+            self._samples_outside[which] += outputs * outside

@@ -24,8 +24,8 @@ class Extrapolator:
     """Linear extrapolation of the hand by the exponentially smoothed slope of its readings.
 
     A step, which is a change beyond what a hand can do, and a reading of 0 reset the slope: neither
-    is extrapolated. docs/method/rendering.md#readings: how long a reading counts, and when contact
-    ends.
+    is extrapolated. By `lead` updates it goes further, since so late the output is felt.
+    docs/method/rendering.md#readings: how long a reading counts, and when contact ends.
     """
 
     known: bool  # whether there is a reading that counts
@@ -39,12 +39,13 @@ class Extrapolator:
     _read: tuple[int, float]
     _off: tuple[int, float]
 
-    def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats]) -> None:
+    def __init__(self, plan: RenderPlan, axes: tuple[Floats, Floats], *, lead: float = 0.0) -> None:
         self._period, self._share = plan.update_samples, plan.slope_share
         self._furthest, self._times = plan.hand_changes, plan.readings
         self._highest = [float(axis[-1]) for axis in axes]
         self._lowest = [float(axis[0]) for axis in axes]
-        self._to_end = (plan.update_samples - 1) / plan.update_samples
+        to_end = (plan.update_samples - 1) / plan.update_samples
+        self._to_middle, self._to_end = to_end / 2 + lead, to_end + lead
         self._position = 0
         self._forget()
 
@@ -81,7 +82,7 @@ class Extrapolator:
         now = [last + turn * past for last, turn in zip(self._last, self._turns, strict=True)]
         amid, end = (
             [at + slope * until for at, slope in zip(now, self._slopes, strict=True)]
-            for until in (self._to_end / 2, self._to_end)
+            for until in (self._to_middle, self._to_end)
         )
         return amid, end
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from modeling.errors import InputError
 from modeling.hand import Hand
 from modeling.models.ar_model import ARModel
 from modeling.models.line_spectral import prediction_coefficients, reflection_coefficients
@@ -27,18 +26,12 @@ class LatticeFilter:
     """
 
     def __init__(self, model: ARModel, plan: RenderPlan) -> None:
-        if plan.rate_hz != model.rate_hz:
-            raise InputError(
-                f"expected the AR model's own rate of {model.rate_hz:g} Hz, got "
-                f"{plan.rate_hz:g} (an all-pole filter has no equal at another rate); render at "
-                "that rate and resample."
-            )
         self.clamped = 0
         self._model = model
         self.axes = (model.speeds_mm_s, model.forces_n)
         self._state = [0.0] * model.order
         self._stages = [(0.0, 1.0)] * model.order
-        self._gain = GainRamps(plan, np.array([model.gains.max()]))
+        self._gain = GainRamps(plan.own, np.array([model.gains.max()]))
 
     def settings(self, amid: Hand, end: Hand) -> list[Any]:
         """Gain, RMS per gain, and sine and cosine of every stage from the highest order down."""

@@ -235,7 +235,7 @@ def test_memory_grows_by_whole_layers() -> None:
     ffi, lib = compiled_parts("modeling.rendering._kernel")
     assert more - few == 4 * lib.TQ_ROWS * ffi.sizeof("double")
     assert many - more == 2 * (more - few)
-    assert few > lib.TQ_CHUNK * ffi.sizeof("double")
+    assert few > 4 * lib.TQ_ROWS * ffi.sizeof("double")
 
 
 def test_without_a_compiler_the_sentence_says_what_to_do() -> None:

@@ -2,12 +2,13 @@
    with it.
 
    counted_operations [NAME=NUMBER ...], all of them optional:
-       layers=4 taps=1 update_samples=5   as in tq_texture
+       layers=4 update_samples=5          as in tq_texture
+       interpolated=0                     1: eight samples of the output for one of the model
        notch=0 peak=0 rms=0 duration=0    1: with vibrator compensation, with that limit
 
    Prints lines "PART_WHAT count". PART is
-       sample    one sample between updates, in a block of a multiple of four (where the noise is
-                 low-passed, a sample left over may cost an addition more)
+       sample    one sample of the model between updates, in a block of a multiple of four
+       output    one sample of the output between updates for which the model makes none
        update    one parameter update, without the sample that follows
        chunk     what a call, or a chunk of TQ_CHUNK samples in it, costs beside its samples
        block     12 updates and their samples in one call
@@ -40,7 +41,7 @@ static int argument(int count, char **texts, const std::string &name, int otherw
 
 /* A texture of 3 speeds and 2 forces, with what its pointers point to. */
 struct Texture {
-    std::vector<Counted> speeds{10, 100, 300}, forces{0.25, 1}, values, signs, lowpass, slews;
+    std::vector<Counted> speeds{10, 100, 300}, forces{0.25, 1}, values, signs, doubling, phases, slews;
     tq_texture texture{};
 
     Texture(int count, char **texts)
@@ -48,7 +49,6 @@ struct Texture {
         tq_texture &t = texture;
         t.speeds = 3, t.forces = 2;
         t.layers = argument(count, texts, "layers", 4);
-        t.taps = argument(count, texts, "taps", 1);
         t.update_samples = argument(count, texts, "update_samples", 5);
         for (int condition = 0; condition < t.speeds * t.forces; condition++)
             append_condition(t.layers);
@@ -56,10 +56,15 @@ struct Texture {
             value.of_table = true;
         signs.assign(static_cast<size_t>(t.layers) + 1, 1);
         slews.assign(static_cast<size_t>(t.layers) + 1, 1);
-        lowpass.assign(static_cast<size_t>(t.taps), 1.0 / t.taps);
+        doubling.assign(2 * TQ_DOUBLING, 1.0 / TQ_DOUBLING);
+        phases.assign(4 * TQ_PHASE, 1.0 / TQ_PHASE);
         t.speed_mm_s = speeds.data(), t.force_n = forces.data(), t.values = values.data();
-        t.signs = signs.data(), t.slews = slews.data(), t.lowpass = lowpass.data();
-        t.rate_hz = 5000, t.noise_scale = 1;
+        t.signs = signs.data(), t.slews = slews.data();
+        t.model_rate_hz = t.rate_hz = 5000;
+        if (argument(count, texts, "interpolated", 0)) {
+            t.rate_hz = 40000, t.up = 4, t.down = 1, t.lead = 0.4;
+            t.doubling = doubling.data(), t.phases = phases.data();
+        }
         t.speed_change = 100, t.force_change = 1, t.slope_share = 0.5;
         if (argument(count, texts, "notch", 0))
             t.notch_hz = 80, t.notch_width_hz = 60, t.notch_share = 0.7;
@@ -90,10 +95,16 @@ struct Motion {
     Counted speed = 150, force = 0.5;
 
     explicit Motion(const tq_texture &t)
-        : texture(t), memory(static_cast<size_t>(TQ_MEMORY(t.layers, t.taps)))
+        : texture(t), memory(static_cast<size_t>(TQ_MEMORY(t.layers, t.up)))
     {
         tq_start(&texture, &state, memory.data(), 7);
-        render(10 * texture.update_samples);
+        render(10 * texture.update_samples * outputs());
+    }
+
+    /* Samples of the output for each of the model. */
+    int outputs() const
+    {
+        return texture.up ? 2 * texture.up : 1;
     }
 
     Counts render(int samples)
@@ -105,11 +116,25 @@ struct Motion {
         return counts;
     }
 
-    /* That many samples before the next update is due. */
+    /* That many samples of the model before the next update is due. */
     Counts render_between(int samples)
     {
         state.since_update = texture.update_samples - samples;
-        return render(samples);
+        return render(samples * outputs());
+    }
+
+    /* What samples of the output cost that need none of the model. */
+    Counts follow(size_t samples)
+    {
+        std::vector<Counted> v(samples, speed), f(samples, force), out(samples, Counted(1));
+        const int phase = state.phase;
+        counts = Counts();
+        tq_lift_offs(v.data(), f.data(), 1, static_cast<int>(samples));
+        if (texture.up)
+            tq_interpolate(&texture, &state, 0, out.data(), samples);
+        tq_restrain(&texture, &state, out.data(), static_cast<int>(samples));
+        state.phase = phase;
+        return counts;
     }
 
     /* An update is due, one period after the last one. */
@@ -123,7 +148,7 @@ struct Motion {
     {
         due();
         counts = Counts();
-        tq_read(&texture, &state, 0, speed, force);
+        tq_take_in(&texture, &state, 0, speed, force);
         tq_update(&texture, &state);
         return counts;
     }
@@ -154,14 +179,18 @@ int main(int count, char **texts)
 {
     const Texture made(count, texts);
     Motion motion(made.texture);
+    const Counts one = motion.follow(1), output = less(1, motion.follow(2), one, 1);
     const Counts four = motion.render_between(4), eight = motion.render_between(8);
-    print("sample", less(1, eight, four, 4));
+    const int outputs = motion.outputs();
+    print("output", output);
+    print("sample", less(1, less(1, eight, four, 4), less(outputs, output, Counts(), 1), 1));
     print("chunk", less(2, four, eight, 1));
     print("update", motion.update());
-    const int samples = UPDATES * made.texture.update_samples;
+    const int samples = UPDATES * made.texture.update_samples, all = samples * outputs;
     motion.due();
-    print("block", motion.render(samples));
-    std::printf("block_samples %d\nblock_updates %d\n", samples, UPDATES);
+    print("block", motion.render(all));
+    std::printf("block_samples %d\nblock_outputs %d\n", samples, all);
+    std::printf("block_updates %d\n", UPDATES);
     std::printf("block_chunks %d\n", (samples + TQ_CHUNK - 1) / TQ_CHUNK);
     return 0;
 }

@@ -38,13 +38,13 @@ static tq_real direct_form_next(direct_form *d, tq_real w)
 /* The kernel with one layer of unit gain and no noise branch. */
 static void start(tq_texture *t, tq_state *s, tq_real *values, tq_real *memory)
 {
-    static const tq_real axis[] = {1, 2}, none[2], one[] = {1};
+    static const tq_real axis[] = {1, 2}, none[2];
     t->speeds = t->forces = 2;
     t->layers = 1;
     t->speed_mm_s = t->force_n = axis;
-    t->values = values, t->signs = t->slews = none, t->lowpass = one;
-    t->rate_hz = (tq_real)rate_hz, t->noise_scale = 1;
-    t->update_samples = 48, t->taps = 1;
+    t->values = values, t->signs = t->slews = none;
+    t->model_rate_hz = t->rate_hz = (tq_real)rate_hz;
+    t->update_samples = 48;
     tq_start(t, s, memory, 1);
     tq_read(t, s, 0, 1, 1);
     tq_update(t, s);
@@ -63,7 +63,7 @@ int main(int count, char **arguments)
     long blocks = count == 4 ? atol(arguments[1]) : 0;
     double frequency_hz = count == 4 ? atof(arguments[2]) : 1;
     double width_hz = count == 4 ? atof(arguments[3]) : 1;
-    tq_real values[16], memory[TQ_MEMORY(1, 1)], w[BLOCK], out[BLOCK];
+    tq_real values[16], memory[TQ_MEMORY(1, 0)], w[BLOCK], out[BLOCK];
     direct_form direct = direct_form_of(frequency_hz, width_hz);
     uint64_t seed = 2026;
     tq_texture t = {0};
@@ -77,7 +77,7 @@ int main(int count, char **arguments)
     for (; blocks > 0; blocks--) {
         for (n = 0; n < BLOCK; n++)
             w[n] = noise(&seed);
-        tq_filter(&t, &s, w, w, out, BLOCK);
+        tq_filter(&t, &s, w, out, BLOCK);
         for (n = 0; n < BLOCK; n++) {
             double pair[] = {out[n], direct_form_next(&direct, w[n])};
             fwrite(pair, sizeof pair, 1, stdout);

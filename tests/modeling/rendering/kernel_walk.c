@@ -43,7 +43,7 @@ static double anywhere(double lowest, double highest)
 typedef struct {
     tq_texture texture;
     tq_real axes[4], values[4 * (1 + 3 * MOST_LAYERS)], signs[MOST_LAYERS];
-    tq_real slews[1 + MOST_LAYERS], lowpass[1], memory[TQ_MEMORY(MOST_LAYERS, 1)];
+    tq_real slews[1 + MOST_LAYERS], memory[TQ_MEMORY(MOST_LAYERS, 0)];
     double largest[1 + MOST_LAYERS]; /* of the noise gain and of every layer's gain */
     tq_state state;
 } walk;
@@ -58,13 +58,11 @@ static void begin(walk *k)
     memset(k, 0, sizeof *k);
     t->speeds = t->forces = 2;
     t->layers = 1 + below(MOST_LAYERS);
-    t->rate_hz = (tq_real)rates[below(3)];
-    t->noise_scale = (tq_real)sqrt(t->rate_hz / 5000);
-    t->update_samples = t->taps = 1;
+    t->model_rate_hz = t->rate_hz = (tq_real)rates[below(3)];
+    t->update_samples = 1;
     t->hold = (tq_real)below(4), t->release = (tq_real)below(4);
     t->speed_mm_s = k->axes, t->force_n = k->axes + 2;
-    t->values = k->values, t->signs = k->signs, t->slews = k->slews, t->lowpass = k->lowpass;
-    k->lowpass[0] = 1;
+    t->values = k->values, t->signs = k->signs, t->slews = k->slews;
     for (i = 0; i < 4; i += 2) {
         k->axes[i] = (tq_real)pow(10, 4 * uniform() - 2);
         k->axes[i + 1] = k->axes[i] * (tq_real)(1 + 10 * uniform() + 1e-3);
@@ -156,7 +154,7 @@ static long double reach(const walk *k, int layer)
 static void step(walk *k, tq_real speed, tq_real force, sight *seen)
 {
     const tq_texture *t = &k->texture;
-    tq_real w = t->noise_scale * tq_noise(k->state.key, k->state.position), out;
+    tq_real w = tq_noise(k->state.key, k->state.position), out;
     long double before[MOST_LAYERS], bound = k->largest[0] * fabsl((long double)w);
     tq_real p = tq_row(t, &k->state, TQ_P)[0];
     int i, lifted = !(isfinite(speed) && isfinite(force));

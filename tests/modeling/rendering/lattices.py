@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import upfirdn
 
 from modeling import Renderer
 from modeling.arrays import Floats
 from modeling.models.ar_model import ARModel
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import filled, render_counters
-from modeling.rendering.lattice import lattice_fields, rate_ratio, upsampling_phases
+from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, plan_for
 from rig.live.memory import compiled
@@ -62,7 +61,9 @@ class CompiledLattice:
         fields = lattice_fields(model, plan_for(model.rate_hz, rate_hz=rate_hz, **plan))
         self._texture, arrays = filled(self._ffi, "tq_texture", fields.texture, real=np.float64)
         self._lattice, more = filled(self._ffi, "tq_lattice", fields.lattice, real=np.float64)
-        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(self._lattice))
+        memory = self._ffi.new(
+            "tq_real[]", self._lib.tq_lattice_memory(self._texture, self._lattice)
+        )
         self._state, self._filter = self._ffi.new("tq_state *"), self._ffi.new("tq_lattice_state *")
         self._kept = (arrays, more, memory)
         self._order = model.order
@@ -79,8 +80,7 @@ class CompiledLattice:
 
     def read(self, speed_mm_s: float, force_n: float, *, ago: float) -> None:
         """A reading that was made so many samples before the next one."""
-        states = self._texture, self._lattice, self._state, self._filter
-        self._lib.tq_lattice_read(*states, ago, speed_mm_s, force_n)
+        self._lib.tq_read(self._texture, self._state, ago, speed_mm_s, force_n)
 
     def on(self, samples: int) -> Floats:
         """The next samples for the hand as last read."""
@@ -108,12 +108,5 @@ class CompiledLattice:
 def in_python(
     model: ARModel, speeds: Floats, forces: Floats, *, rate_hz: float, **renderer: Any
 ) -> Floats:
-    """The same at this rate, for hands given at each of its samples: `Renderer`, then `upfirdn`."""
-    ratio = rate_ratio(model.rate_hz, rate_hz)
-    up, down = ratio.numerator, ratio.denominator
-    # The model's sample k is made when the first sample of the output needs it.
-    when = -(-np.arange(-(-speeds.size * down // up)) * up // down)
-    own = Renderer(model, **renderer).render(speeds[when], forces[when])
-    weights = upsampling_phases(up).T.ravel()
-    played: Floats = upfirdn(weights, own, up, down)[: speeds.size]
-    return played
+    """The same at this rate, for hands given at each of its samples."""
+    return Renderer(model, rate_hz=rate_hz, **renderer).render(speeds, forces)

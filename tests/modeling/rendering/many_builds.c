@@ -18,7 +18,7 @@ static double between(double low, double high)
 
 static tq_real speeds[SPEEDS] = {20, 150, 351.3}, forces[FORCES] = {0.3, 1.1, 2.2, 3.5};
 static tq_real values[NODES][1 + 3 * LAYERS], rows[NODES * 64], signs[LAYERS], slews[1 + LAYERS];
-static tq_real lowpass[] = {0.1, 0.2, 0.4, 0.2, 0.1};
+static tq_real doubling[2 * TQ_DOUBLING], phases[7 * TQ_PHASE];
 static tq_real hands[2][TQ_STREAMS][LONGEST], single[LONGEST], many[TQ_STREAMS][LONGEST];
 
 /* The values of the grid, for one stream and for many. */
@@ -56,11 +56,12 @@ static void draw_hand(size_t stream)
     }
 }
 
-static tq_texture texture(int taps, int update_samples, int all)
+static tq_texture texture(int up, int update_samples, int all)
 {
     tq_texture t = {.speeds = SPEEDS, .forces = FORCES, .layers = LAYERS};
     t.speed_mm_s = speeds, t.force_n = forces, t.values = &values[0][0], t.signs = signs;
-    t.rate_hz = 5000, t.noise_scale = 1.1, t.lowpass = lowpass, t.taps = taps;
+    t.model_rate_hz = 5000, t.rate_hz = up ? 10000.0 * up / 3 : 5000;
+    t.up = up, t.down = up ? 3 : 0, t.doubling = doubling, t.phases = phases, t.lead = up ? 0.4 : 0;
     t.update_samples = update_samples, t.slews = slews;
     t.speed_change = 20, t.force_change = 0.2, t.slope_share = 0.25;
     if (all) {
@@ -75,8 +76,8 @@ static tq_texture texture(int taps, int update_samples, int all)
 static int differing(tq_texture t, int lanes)
 {
     tq_stream streams[TQ_STREAMS];
-    tq_real *memory = malloc(tq_many_memory(t.layers, t.taps) * sizeof *memory);
-    tq_real alone[TQ_MEMORY(LAYERS, 5)];
+    tq_real *memory = malloc(tq_many_memory(t.layers) * sizeof *memory);
+    tq_real alone[TQ_MEMORY(LAYERS, 1)];
     int different = 0, l;
     tq_state state;
     memset(streams, 0, sizeof streams);
@@ -100,16 +101,20 @@ static int differing(tq_texture t, int lanes)
 int main(void)
 {
     static const int periods[] = {1, 5, 64, 700};
-    int lanes, taps, all, different = 0;
+    int lanes, up, all, different = 0;
     size_t i;
     draw_grid();
+    for (i = 0; i < sizeof doubling / sizeof *doubling; i++)
+        doubling[i] = between(-0.1, 0.2);
+    for (i = 0; i < sizeof phases / sizeof *phases; i++)
+        phases[i] = between(-0.1, 0.3);
     for (i = 0; i < TQ_STREAMS; i++)
         draw_hand(i);
     for (lanes = 2; lanes <= tq_widest(); lanes *= 2) {
         for (i = 0; i < sizeof periods / sizeof *periods; i++)
-            for (taps = 1; taps <= 5; taps += 4)
+            for (up = 0; up <= 7; up += 7)
                 for (all = 0; all < 2; all++)
-                    different += differing(texture(taps, periods[i], all), lanes);
+                    different += differing(texture(up, periods[i], all), lanes);
         printf("%d ", lanes);
     }
     printf("%d\n", different);

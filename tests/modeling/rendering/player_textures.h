@@ -6,7 +6,7 @@
 
 #include "player.h"
 
-enum { TEXTURES = 3, LAYERS = 2, MEMORY = TQ_MEMORY(LAYERS, 1), FORCE = 1 };
+enum { TEXTURES = 3, LAYERS = 2, MEMORY = TQ_MEMORY(LAYERS, 0), FORCE = 1 };
 static const tq_real peaks_hz[TEXTURES][LAYERS] = {{20, 60}, {35, 90}, {15, 45}};
 static const tq_real speeds[] = {20, 200}, forces[] = {(tq_real)0.5, 2}, one[] = {1};
 static const tq_real zeros[LAYERS] = {0, 0};
@@ -32,8 +32,8 @@ static inline void fill_textures(void)
         memset(t, 0, sizeof *t);
         t->speeds = t->forces = 2, t->layers = LAYERS;
         t->speed_mm_s = speeds, t->force_n = forces, t->values = values[i][0];
-        t->signs = zeros, t->slews = slews, t->lowpass = one;
-        t->rate_hz = 5000, t->noise_scale = 1, t->taps = 1, t->update_samples = 5;
+        t->signs = zeros, t->slews = slews;
+        t->model_rate_hz = t->rate_hz = 5000, t->update_samples = 5;
         t->speed_change = 20, t->force_change = (tq_real)0.2, t->slope_share = (tq_real)0.2;
     }
 }

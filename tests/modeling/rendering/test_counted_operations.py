@@ -15,7 +15,7 @@ import pytest
 import modeling.rendering
 from analysis.benches.rivals import layered_texture
 from modeling import Limits, compensation_for
-from modeling.rendering.plan import RenderPlan
+from modeling.rendering.plan import RenderPlan, plan_for
 from stimuli.planted.vibrators import planted_vibrator
 
 HERE = Path(__file__).parent
@@ -24,14 +24,14 @@ pytestmark = pytest.mark.skipif(
     shutil.which("g++") is None, reason="g++ is not installed (see tools/system-packages)"
 )
 WHAT = ("additions", "multiplications", "divisions", "square_roots", "table_reads")
-PARTS = ("sample", "update", "chunk")
+PARTS = ("sample", "output", "update", "chunk")
 
 Count = Callable[..., dict[str, int]]
 
 
 @pytest.fixture(scope="module")
 def count(tmp_path_factory: pytest.TempPathFactory) -> Count:
-    """Counts for a texture of these layers, taps and so on, by name."""
+    """Counts for a texture of these layers and so on, by name."""
     program = tmp_path_factory.mktemp("programs") / "counted_operations"
     options = ["-std=c++17", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{KERNEL_FOLDER}"]
     source = HERE / "counted_operations.cpp"
@@ -47,11 +47,11 @@ def count(tmp_path_factory: pytest.TempPathFactory) -> Count:
 
 @pytest.mark.parametrize("restrained", [0, 1])
 @pytest.mark.parametrize("update_samples", [1, 5, 32])
-@pytest.mark.parametrize("taps", [1, 317])
+@pytest.mark.parametrize("interpolated", [0, 1])
 def test_counts_are_linear_in_layers(
-    count: Count, taps: int, update_samples: int, restrained: int
+    count: Count, interpolated: int, update_samples: int, restrained: int
 ) -> None:
-    texture = {"taps": taps, "update_samples": update_samples}
+    texture = {"interpolated": interpolated, "update_samples": update_samples}
     texture |= dict.fromkeys(("notch", "peak", "rms", "duration"), restrained)
     layers = np.arange(9)
     counts = [count(layers=some, **texture) for some in layers]
@@ -63,7 +63,7 @@ def test_counts_are_linear_in_layers(
         assert (np.diff(by_layers) == by_layers[1] - by_layers[0]).all(), (part, what)
 
 
-@pytest.mark.parametrize("texture", [{"layers": 3}, {"taps": 317, "rms": 1, "notch": 1}])
+@pytest.mark.parametrize("texture", [{"layers": 3}, {"interpolated": 1, "rms": 1, "notch": 1}])
 @pytest.mark.parametrize("update_samples", [1, 5, 32])
 def test_parts_add_up_to_a_block(
     count: Count, texture: dict[str, int], update_samples: int
@@ -86,19 +86,21 @@ def test_counts_are_those_of_the_equations(count: Count) -> None:
     assert none["update_table_reads"] == 4  # the noise gain
 
 
-def test_filter_compensation_and_limits_cost_what_they_say(count: Count) -> None:
-    """The noise's low-pass, a band without layer, and the running mean square with its root."""
+def test_interpolation_compensation_and_limits_cost_what_they_say(count: Count) -> None:
+    """FIR filters of so many taps, a band without layer, the running mean square with its root."""
     bare = count()
     for more, expected in {
-        "taps": [316, 317, 0, 0, 0],
+        "interpolated": [9, 10, 0, 0, 0],
         "notch": [9, 7, 0, 0, 0],
         "rms": [3, 5, 1, 1, 0],
         "peak": [0] * 5,
         "duration": [0] * 5,
     }.items():
-        counts = count(**{more: 317 if more == "taps" else 1})
-        added = [counts[f"sample_{what}"] - bare[f"sample_{what}"] for what in WHAT]
+        counts = count(**{more: 1})
+        added = [counts[f"output_{what}"] - bare[f"output_{what}"] for what in WHAT]
         assert added == expected, more
+        twice = [counts[f"sample_{what}"] - bare[f"sample_{what}"] for what in WHAT]
+        assert twice == ([2 * 31, 2 * 32, 0, 0, 0] if more == "interpolated" else [0] * 5)
 
 
 @pytest.mark.parametrize("layers", range(9))
@@ -113,15 +115,20 @@ def test_a_plan_tells_what_was_counted(
     if restrained:
         restraints["limits"] = Limits(peak=1.0, rms=0.5, duration_s=1.0)
         restraints["compensation"] = compensation_for(planted_vibrator(), rate_hz=rate_hz)
-    plan = RenderPlan(rate_hz=rate_hz, update_samples=update_samples, **restraints)
-    cost, taps = plan.cost(model), plan.texture(model)["taps"]
+    samples = round(update_samples * rate_hz / 5000)
+    plan = plan_for(5000.0, rate_hz=rate_hz, update_samples=samples, **restraints)
+    cost = plan.cost(model)
     on = dict.fromkeys(("notch", "peak", "rms", "duration"), int(restrained))
-    counts = count(layers=layers, taps=taps, update_samples=update_samples, **on)
-    for part, told in (("sample", cost.per_sample), ("update", cost.per_update)):
+    interpolated = int(rate_hz > 5000)
+    counts = count(layers=layers, interpolated=interpolated, update_samples=update_samples, **on)
+    for part in ("sample", "update", "output"):
+        told = getattr(cost, f"per_{part}")
         assert vars(told) == {what: counts[f"{part}_{what}"] for what in vars(told)}
     assert cost.bytes_per_update == 8 * counts["update_table_reads"]
-    assert cost.most_operations == cost.per_sample.total + cost.per_update.total
-    assert cost.operations == cost.per_sample.total + cost.per_update.total / update_samples
+    together = cost.per_sample.total + cost.per_update.total + cost.per_output.total
+    assert cost.most_operations == together
+    sample = cost.per_sample.total + cost.per_update.total / update_samples
+    assert cost.operations == pytest.approx(cost.per_output.total + sample * 5000 / rate_hz)
 
 
 def test_a_plan_tells_the_bytes_of_a_texture_and_its_state() -> None:
@@ -130,7 +137,7 @@ def test_a_plan_tells_the_bytes_of_a_texture_and_its_state() -> None:
     double, single = (RenderPlan(rate_hz=5000.0, update_samples=5, single=s) for s in (False, True))
     arrays = [value for value in double.texture(model).values() if np.ndim(value)]
     assert double.cost(model).table_bytes == sum(np.asarray(array).nbytes for array in arrays)
-    assert double.cost(model).state_bytes == 8 * (10 * 3 + 64)
+    assert double.cost(model).state_bytes == 8 * 10 * 3
     halved = ("table_bytes", "state_bytes", "bytes_per_sample", "bytes_per_update")
     for name in halved:
         assert getattr(single.cost(model), name) * 2 == getattr(double.cost(model), name)

@@ -116,7 +116,7 @@ def test_bits_are_equal_in_logarithms_and_of_one_speed_or_force(
     assert_same_bits(lambda: Renderer(model, seed=seed), *hand)
 
 
-@pytest.mark.parametrize("rate_hz", [5000.0, 5001.0, 44100.0, 48000.0])
+@pytest.mark.parametrize("rate_hz", [5000.0, 5500.0, 8000.0, 44100.0, 48000.0, 96000.0])
 @pytest.mark.parametrize("texture", sorted(CATALOGUE))
 def test_bits_are_equal_at_other_rates(texture: str, rate_hz: float) -> None:
     stroke = 200 * np.sin(np.linspace(0, 12, 900)), np.linspace(-0.2, 4, 900)

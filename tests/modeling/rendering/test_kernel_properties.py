@@ -16,7 +16,7 @@ from modeling import Limits, Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.rendering.compiled import _kernel, is_compiled
 from modeling.rendering.noise import stream_key, white_noise
-from modeling.rendering.plan import FADE_S, HOLD_S, RELEASE_S, noise_lowpass
+from modeling.rendering.plan import FADE_S, HOLD_S, RELEASE_S, plan_for
 
 MODEL_RATE_HZ = 5000.0
 RATES_HZ = (5000.0, 48000.0)
@@ -59,12 +59,15 @@ def output_bound(model: TextureModel, rate_hz: float, *, seed: int, count: int) 
     A band's output is √k/(1+k)·(cos θ·s1 − sin θ·s2) + k/(1+k)·w, at most
     √(k/(1+k))·√(‖s‖² + w²), and ‖s‖² is at most the sum of all w² before.
     """
-    scale = np.sqrt(rate_hz / MODEL_RATE_HZ)
-    w = scale * white_noise(stream_key(seed), 0, count)
-    k = np.tan(np.pi * model.bandwidths_hz.max(axis=(0, 1)) / rate_hz)
+    w = white_noise(stream_key(seed), 0, count)
+    k = np.tan(np.pi * model.bandwidths_hz.max(axis=(0, 1)) / MODEL_RATE_HZ)
     gain = np.abs(model.gains).max(axis=(0, 1)) @ np.sqrt(k / (1 + k))
-    loudest_noise = np.sqrt(3) * scale * np.abs(noise_lowpass(MODEL_RATE_HZ, rate_hz)).sum()
-    bound: Floats = gain * np.sqrt(np.cumsum(w**2)) + model.noise_gains.max() * loudest_noise
+    way = plan_for(MODEL_RATE_HZ, rate_hz=rate_hz).interpolation
+    most = 1.0
+    if way is not None:  # the largest sums of absolute weights
+        most = float(np.abs(way.doubling).sum(axis=0).max() * np.abs(way.phases).sum(axis=1).max())
+    floor = model.noise_gains.max() * np.sqrt(3)
+    bound: Floats = most * (gain * np.sqrt(np.cumsum(w**2)) + floor)
     return bound
 
 
@@ -98,18 +101,22 @@ def test_at_rest_it_fades_within_5_ms_and_is_exactly_silent(
     rate_hz: float,
     update_samples: int,
 ) -> None:
-    """5 ms after the update that sees it, in whole updates, nothing is left.
+    """5 ms after the update that sees it, in whole updates, and what is interpolated.
 
     A missing hand is held for 20 ms and contact for 3 ms more, or for one update.
     """
-    seen_at = -(-hand.shape[1] // update_samples) * update_samples
-    held = HOLD_S if np.isnan(rest[0]) else RELEASE_S if rest[1] <= 0 else 0.0
-    seen_at += (int(held * rate_hz) // update_samples + 1) * update_samples if held else 0
-    fade = int(np.ceil(FADE_S * rate_hz / update_samples)) * update_samples
     renderer = Renderer(model, rate_hz=rate_hz, update_samples=update_samples)
     renderer.render(*hand)
-    signal = renderer.render(*rest, samples=seen_at - hand.shape[1] + fade + 400)
-    assert not signal[seen_at - hand.shape[1] + fade :].any()
+    own, share = renderer.plan.own, rate_hz / MODEL_RATE_HZ
+    period = own.update_samples
+    seen_at = -(-hand.shape[1] // (period * share)) * period
+    held = HOLD_S if np.isnan(rest[0]) else RELEASE_S if rest[1] <= 0 else 0.0
+    seen_at += (int(held * MODEL_RATE_HZ) // period + 1) * period if held else 0
+    fade = np.ceil(FADE_S * MODEL_RATE_HZ / period) * period
+    kept = 0 if rate_hz == MODEL_RATE_HZ else 37
+    silent = int((seen_at + fade + kept) * share) + 1 - hand.shape[1]
+    signal = renderer.render(*rest, samples=silent + 400)
+    assert not signal[silent:].any()
 
 
 @st.composite

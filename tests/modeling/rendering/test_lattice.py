@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.signal import freqz, group_delay, lfilter, welch
+from scipy.signal import lfilter, welch
 
 import modeling.rendering
 from modeling import InputError, Limits, Recording, Renderer
 from modeling.arrays import Floats
 from modeling.fitting.autoregressive import HIGHEST_ORDER, fit_ar
 from modeling.models.ar_model import ARModel
-from modeling.rendering.lattice import lattice_fields, rate_ratio, upsampling_phases
+from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.plan import plan_for
 from modeling.rendering.reference.compensator import Compensator
 from modeling.vibrators.compensation import Compensation
@@ -121,7 +121,7 @@ def test_filters_on_the_brink_are_finite_and_leave_nothing_behind() -> None:
 
 
 @pytest.mark.parametrize("rates_hz", [*RATES_HZ, (10000.0, 48000.0), (3000.0, 48000.0)])
-def test_at_the_cards_rate_it_is_upfirdn_of_the_python_lattice(
+def test_at_the_cards_rate_it_is_the_python_lattice(
     rates_hz: tuple[float, float],
 ) -> None:
     model = planted_ar(rate_hz=rates_hz[0])
@@ -158,25 +158,6 @@ def test_memory_of_just_its_size_is_enough(tmp_path: Path) -> None:
 # --- Spectra --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("up", [2, 12, 48, 441, 1000])
-def test_the_low_pass_is_flat_then_60_db_down_and_as_late_as_told(up: int) -> None:
-    weights = upsampling_phases(up).T.ravel()
-    assert upsampling_phases(up).shape[1] <= 88
-    assert weights.sum() == pytest.approx(up)
-    # Frequencies in shares of the model's Nyquist frequency.
-    flat, images = np.linspace(0, 0.9, 40), np.linspace(1, min(up, 6), 300)
-    passed, stopped = (
-        20 * np.log10(np.abs(freqz(weights, worN=np.pi * at / up)[1]) / up) for at in (flat, images)
-    )
-    assert np.ptp(passed) < 0.01
-    assert stopped.max() < -60
-    if up <= 48:
-        _, late = group_delay((weights, [1.0]), w=np.pi * np.array([0.01, 0.5, 0.9]) / up)
-        assert late[0] / up < 2.6
-        assert late[1] / up < 4
-        assert 13 < late[2] / up < 14.2
-
-
 @pytest.mark.parametrize("rates_hz", RATES_HZ[:3])
 def test_the_spectrum_is_the_filters_and_no_image_is_louder_than_60_db_below_it(
     rates_hz: tuple[float, float],
@@ -191,7 +172,7 @@ def test_the_spectrum_is_the_filters_and_no_image_is_louder_than_60_db_below_it(
     for which in np.array_split(np.flatnonzero(flat), 12):
         ratio_db = 10 * np.log10(density[which].sum() / wanted[which].sum())
         assert abs(ratio_db) < 0.25
-    image = frequency >= own_hz / 2 * 1.02
+    image = frequency >= 0.55 * own_hz
     # An image of each frequency is 60 dB below what it is the image of.
     folded = np.abs((frequency + own_hz / 2) % own_hz - own_hz / 2)
     of = model.filter(150.0, 1.5).response(folded) ** 2 * 2 / own_hz
@@ -264,7 +245,7 @@ def test_steps_of_the_hand_bring_nothing_above_the_models_band() -> None:
     speeds = np.tile([60.0, 340.0, 0.0], 200)
     played = lattice.blocks(speeds, np.tile([0.6, 3.4], 300), block=480)
     frequency, density = welch(played, CARD_HZ, window="blackmanharris", nperseg=8192)
-    above = frequency > 2600
+    above = frequency > 2750
     assert density[above].sum() < 1e-6 * density[~above].sum()
 
 
@@ -275,8 +256,8 @@ def test_lift_off_and_rest_end_in_exact_zeros(speed_mm_s: float, force_n: float)
     after = lattice.held(speed_mm_s, force_n, samples=4800)
     # Contact ends after 3 ms, a missing hand is held for 20; to the next update each.
     held = 0.021 if np.isnan(speed_mm_s) else 0.004 if force_n == 0 else 0.0
-    # The gain falls within an update and 5 ms; the low-pass is as long as 87 samples of the model.
-    tail = int(CARD_HZ * (held + 0.001 + 0.005 + 88 / 5000))
+    # The gain falls within an update and 5 ms; 37 samples of the model are interpolated.
+    tail = int(CARD_HZ * (held + 0.001 + 0.005 + 37 / 5000))
     # What is heard is gone sooner.
     heard = np.flatnonzero(np.abs(after) > 0.01 * before.std())
     assert heard[-1] < CARD_HZ * (held + 0.015)
@@ -347,9 +328,3 @@ def test_what_no_callback_can_play_is_refused_in_a_sentence() -> None:
     )
     with refused(InputError, expected=["AR", 100], got=[101, "too much"]):
         lattice_fields(model, plan_for(5000.0, rate_hz=CARD_HZ))
-    with refused(InputError, expected="5000 Hz", got=4000):
-        rate_ratio(5000.0, 4000.0)
-    with refused(InputError, expected=1000, got=["AR", "5000.1 Hz", "48000.0 Hz"]):
-        rate_ratio(5000.1, CARD_HZ)
-    with refused(InputError, expected="5000 Hz", got="nan"):
-        rate_ratio(5000.0, np.nan)

@@ -131,7 +131,7 @@ def test_bits_are_equal_whatever_the_hands_do(data: st.DataObject) -> None:
     )
 
 
-@pytest.mark.parametrize("rate_hz", [5000.0, 5001.0, 48000.0])
+@pytest.mark.parametrize("rate_hz", [5000.0, 5500.0, 48000.0])
 def test_bits_are_equal_on_strokes(lanes: int, rate_hz: float) -> None:
     """Logarithmic tables, regressions, mixed layers; lengths around those of chunks."""
     models = [planted_texture(texture) for texture in TEXTURES]

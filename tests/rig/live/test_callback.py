@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from modeling.rendering.compiled import filled, filled_texture
+from modeling.rendering.compiled import filled, filled_texture, memory_reals
 from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
@@ -36,11 +37,11 @@ class Callback:
 
     def texture(self, number: int, limits: Limits, gain: float = 1.0) -> None:
         made = planted_texture("MDF")
+        made = replace(made, noise_gains=gain * made.noise_gains, gains=gain * made.gains)
         fields = plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits).texture(made)
         texture, arrays = filled_texture(self._ffi, fields, np.float64)
-        memory = self._ffi.new("tq_real[]", self._lib.TQ_ROWS * 64 + texture.taps + 64)
+        memory = self._ffi.new("tq_real[]", memory_reals(self._lib, texture))
         source = self._ffi.new("tq_surface *")
-        texture.noise_scale *= gain
         self._kept += [texture, arrays, memory, source]
         self._lib.tq_surface_start(source, texture, memory, 1, number)
         self.want(surface=source)
@@ -51,7 +52,7 @@ class Callback:
         fields = lattice_fields(made, plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits))
         texture, arrays = filled(self._ffi, "tq_texture", fields.texture, real=np.float64)
         lattice, more = filled(self._ffi, "tq_lattice", fields.lattice, real=np.float64)
-        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(lattice))
+        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(texture, lattice))
         source = self._ffi.new("tq_surface *")
         self._kept += [texture, lattice, arrays, more, memory, source]
         key = int(stream_key(0))
@@ -215,9 +216,9 @@ def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None
     live.write_reading(now_s() - 1, 0.0, y_mm=0.0, speed_mm_s=150.0, force_n=1.5, flags=CONTACT)
     after = callback.play_on(4800)
     assert np.count_nonzero(before) > 4700
-    # An update, 3 ms for the end of contact to the next update, 5 ms of fade, and 88 samples of the
-    # low-pass at the model's 5 kHz.
-    assert not after[int((0.001 + 0.004 + 0.005 + 88 / 5000) * RATE_HZ) :].any()
+    # An update, 3 ms for the end of contact to the next update, 5 ms of fade, and 37 samples of the
+    # model's 5 kHz that are interpolated.
+    assert not after[int((0.001 + 0.004 + 0.005 + 37 / 5000) * RATE_HZ) :].any()
     assert callback.log()["flags"].tolist() == [0, STALE]
 
 

@@ -191,9 +191,9 @@ def test_a_step_clicks_where_gains_are_switched_and_not_here() -> None:
     )
 
 
-def test_other_rates_keep_the_level_and_not_the_third_octaves() -> None:
-    assert hands.at_rate(48e3, hands.WHOLE_LEVEL, full=True) == pytest.approx(0.15, abs=0.01)
-    assert hands.at_rate(48e3, hands.THIRD_OCTAVES, full=True) == pytest.approx(3.15, abs=0.05)
+def test_other_rates_keep_the_level_and_the_third_octaves() -> None:
+    assert hands.at_rate(48e3, hands.WHOLE_LEVEL, full=True) < 0.12
+    assert hands.at_rate(48e3, hands.THIRD_OCTAVES, full=True) == pytest.approx(0.05, abs=0.005)
     assert hands.at_rate(5e3, hands.THIRD_OCTAVES, full=True) < 1e-9
 
 
