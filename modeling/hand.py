@@ -13,9 +13,9 @@ class Hand(NamedTuple):
     Parameters
     ----------
     speed_mm_s : (n,) ndarray
-        Tangential speed; its sign is the direction. NaN counts as lift-off.
+        Tangential speed; its sign is the direction. NaN where it was not read.
     force_n : (n,) ndarray
-        Normal force; 0 and below is lift-off, as is NaN.
+        Normal force; 0 and below is lift-off; NaN where it was not read.
     """
 
     speed_mm_s: Floats

@@ -123,8 +123,8 @@ def cost_of(
     )
     per_update = Operations(
         additions=35 + 43 * layers + 8 * extrapolated,
-        multiplications=26 + 73 * layers + 2 * groups + 2 * extrapolated,
-        divisions=8 + 3 * layers + 4 * extrapolated,
+        multiplications=30 + 73 * layers + 2 * groups + 2 * extrapolated,
+        divisions=5 + 3 * layers + 4 * extrapolated,
         square_roots=layers,
     )
     return Cost(

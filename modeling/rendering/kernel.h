@@ -150,7 +150,7 @@ typedef struct {
     int leaving;                      /* whether there were readings without contact since */
     tq_real speed, force;
     tq_real speed_slope, force_slope; /* their change per update, smoothed */
-    tq_real speed_turn, force_turn;   /* the same smoothed half as long, for readings of the past */
+    tq_real speed_turn, force_turn;   /* the same smoothed half as long, from then to now */
     /* It was read `ago` samples before position `read`, and first without contact `off_ago` before `off`. */
     uint64_t read, off;
     tq_real ago, off_ago;
@@ -354,15 +354,15 @@ TQ_INLINE tq_real tq_settled(tq_real x, tq_real lowest)
     return x < least && x > -least ? 0 : x;
 }
 
-/* The exponentially smoothed change of a reading per update, `updates` after the last one, by which the
-   hand is extrapolated linearly. A step, which is a change beyond what a hand can do, and a reading of 0
-   reset it. */
-TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real updates, tq_real furthest,
+/* The exponentially smoothed change of a reading per update, by which the hand is extrapolated linearly;
+   the last reading was 1 / `rate` updates ago. A step, which is a change beyond what a hand can do, and a
+   reading of 0 reset it. */
+TQ_INLINE tq_real tq_slope(tq_real slope, tq_real last, tq_real now, tq_real rate, tq_real furthest,
                            tq_real share, tq_real lowest)
 {
     tq_real change = now - last;
     int goes_on = change <= furthest && change >= -furthest && now != 0;
-    return goes_on ? tq_settled(slope + share * (change / updates - slope), lowest) : 0;
+    return goes_on ? tq_settled(slope + share * (change * rate - slope), lowest) : 0;
 }
 
 /* The next gain: `wanted`, or as far towards it as one update may go. */
@@ -460,13 +460,14 @@ TQ_INLINE void tq_take_in(const tq_texture *t, tq_state *s, tq_real ago, tq_real
         return;
     if (hand->known) {
         tq_real updates = since / (tq_real)t->update_samples, most = updates > 1 ? updates : 1;
+        tq_real rate = 1 / updates;
         tq_real speed_change = t->speed_change * most, force_change = t->force_change * most;
         tq_real share = tq_within(t->slope_share * updates, 0, 1), more = tq_within(2 * share, 0, 1);
         tq_real v0 = hand->speed, f0 = hand->force;
-        hand->speed_slope = tq_slope(hand->speed_slope, v0, speed, updates, speed_change, share, v);
-        hand->force_slope = tq_slope(hand->force_slope, f0, force, updates, force_change, share, f);
-        hand->speed_turn = tq_slope(hand->speed_turn, v0, speed, updates, speed_change, more, v);
-        hand->force_turn = tq_slope(hand->force_turn, f0, force, updates, force_change, more, f);
+        hand->speed_slope = tq_slope(hand->speed_slope, v0, speed, rate, speed_change, share, v);
+        hand->force_slope = tq_slope(hand->force_slope, f0, force, rate, force_change, share, f);
+        hand->speed_turn = tq_slope(hand->speed_turn, v0, speed, rate, speed_change, more, v);
+        hand->force_turn = tq_slope(hand->force_turn, f0, force, rate, force_change, more, f);
     }
     hand->known = 1, hand->leaving = 0;
     hand->read = s->position, hand->ago = ago;

@@ -121,11 +121,11 @@ TQ_WIDE V TQ_(tq_all_settled)(V x, V lowest)
     return (V)(~(TQ_(tq_sizes)(x) < (tq_real)1e-9 * lowest) & (M)x);
 }
 
-TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, V updates, V furthest, V share, V lowest)
+TQ_WIDE V TQ_(tq_all_slopes)(V slope, V last, V now, V rate, V furthest, V share, V lowest)
 {
     V change = now - last;
     M goes_on = (TQ_(tq_sizes)(change) <= furthest) & (now != 0);
-    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change / updates - slope), lowest));
+    return (V)(goes_on & (M)TQ_(tq_all_settled)(slope + share * (change * rate - slope), lowest));
 }
 
 TQ_WIDE V TQ_(tq_all_towards)(V gain, V wanted, V slew)
@@ -234,7 +234,7 @@ TQ_WIDE void TQ_(tq_take_in_all)(TQ_(tq_many) *s, V speed, V force)
     M taken = (speed - speed) + (force - force) == 0;
     M lifts = taken & s->known & (s->force > 0) & ~(force > 0), waits;
     V one = TQ_(tq_all)(1), updates = TQ_(tq_either)(s->known, s->age / (tq_real)t->update_samples, one);
-    V most = TQ_(tq_either)(updates > 1, updates, one), share = t->slope_share * updates, more;
+    V most = TQ_(tq_either)(updates > 1, updates, one), share = t->slope_share * updates, more, rate = 1 / updates;
     share = TQ_(tq_either)(share < 1, share, one);
     more = TQ_(tq_either)(2 * share < 1, 2 * share, one);
     s->off = (V)(~(lifts & ~s->leaving) & (M)s->off);
@@ -243,7 +243,7 @@ TQ_WIDE void TQ_(tq_take_in_all)(TQ_(tq_many) *s, V speed, V force)
     s->leaving = (s->leaving | lifts) & ~taken;
 #define TQ_TURNED(slope, now, change, by)                                                               \
     s->now##_##slope = TQ_(tq_either)(                                                                  \
-        taken, (V)(s->known & (M)TQ_(tq_all_slopes)(s->now##_##slope, s->now, now, updates, change * most, by, \
+        taken, (V)(s->known & (M)TQ_(tq_all_slopes)(s->now##_##slope, s->now, now, rate, change * most, by, \
                                                     s->lowest_##now)),                                  \
         s->now##_##slope)
     TQ_TURNED(slope, speed, t->speed_change, share);

@@ -109,7 +109,7 @@ class Extrapolator:
             last, lowest = self._last[axis], self._lowest[axis]
             furthest = self._furthest[axis] * most
             for slopes, by in zip((self._slopes, self._turns), shares, strict=True):
-                slopes[axis] = _slope(slopes[axis], last, new, updates, furthest, by, lowest)
+                slopes[axis] = _slope(slopes[axis], last, new, 1 / updates, furthest, by, lowest)
 
     def _leaving(self, ago: float, since: float, force: float) -> bool:
         """Whether a reading without contact is too soon after the first of them to end it."""
@@ -138,14 +138,14 @@ def _slope(
     slope: float,
     last: float,
     now: float,
-    updates: float,
+    rate: float,
     furthest: float,
     share: float,
     lowest: float,
 ) -> float:
     change = now - last
     goes_on = -furthest <= change <= furthest and now != 0
-    return _settled(slope + share * (change / updates - slope), lowest) if goes_on else 0.0
+    return _settled(slope + share * (change * rate - slope), lowest) if goes_on else 0.0
 
 
 class GainRamps:
