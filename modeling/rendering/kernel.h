@@ -589,13 +589,13 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, tq_rea
 
 /* --- Interpolation ----------------------------------------------------------------------------- */
 
-/* Of the output, how many samples precede sample `samples` (from 0) of those that are next at the model's
+/* Of the output, how many samples precede sample `samples` (from 0, at most a chunk) of those that are next at the model's
    rate: that one is made for the next of them, and by its hand. */
 TQ_INLINE size_t tq_outputs_before(const tq_texture *t, int phase, int samples)
 {
     if (!t->up)
         return (size_t)samples;
-    return (size_t)(((int64_t)(samples + 1) * 2 * t->up - phase + t->down - 1) / t->down);
+    return (size_t)((2 * (samples + 1) * t->up - phase + t->down - 1) / t->down);
 }
 
 /* How many samples at the model's rate the next `count` of the output need. */
@@ -603,13 +603,13 @@ TQ_INLINE int tq_samples_for(const tq_texture *t, int phase, size_t count)
 {
     if (!t->up)
         return (int)count;
-    return (int)((phase + (int64_t)(count - 1) * t->down) / (2 * t->up));
+    return (phase + ((int)count - 1) * t->down) / (2 * t->up);
 }
 
 /* The phase after those. */
 TQ_INLINE int tq_phase_after(const tq_texture *t, int phase, int samples, size_t count)
 {
-    return (int)(phase + (int64_t)count * t->down - (int64_t)samples * 2 * t->up);
+    return phase + (int)count * t->down - 2 * samples * t->up;
 }
 
 /* Two samples for each of `width` at x[TQ_DOUBLING - 1] and on. */

@@ -81,12 +81,13 @@ TQ_INLINE int tq_scene_silent(const tq_scene_hand *h)
     return h->state.floor_gain == 0;
 }
 
-/* Samples until the next parameter update. */
+/* Samples until the next parameter update, or for a chunk at the texture's rate. */
 TQ_INLINE size_t tq_scene_left(const tq_scene_hand *h)
 {
     const tq_texture *t = tq_scene_texture(h);
     const tq_state *s = &h->state;
-    return s->position ? tq_outputs_before(t, s->phase, t->update_samples - s->since_update) : 0;
+    int left = t->update_samples - s->since_update;
+    return s->position ? tq_outputs_before(t, s->phase, left < TQ_CHUNK ? left : TQ_CHUNK) : 0;
 }
 
 /* The wanted texture, from its beginning, behind the same compensation and limits as before; its hand is
