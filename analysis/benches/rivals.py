@@ -204,7 +204,7 @@ class SoundStream:
 
     def __init__(self, sounds: Loops | Grains, *, update_samples: int, seed: int) -> None:
         self._ffi, lib = compiled_parts("analysis.benches._rivals")
-        plan = RenderPlan(rate_hz=sounds.rate_hz, update_samples=update_samples)
+        plan = plan_for(sounds.rate_hz, update_samples=update_samples)
         self._texture, self._arrays = filled_texture(self._ffi, plan.texture(sounds), np.float64)
         samples = np.ascontiguousarray(sounds.samples)
         state = {"sounds": self._ffi.from_buffer("int16_t[]", samples), "length": sounds.length}

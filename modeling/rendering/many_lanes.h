@@ -34,7 +34,7 @@ typedef struct {
     V speed, force, speed_slope, force_slope; /* tq_followed */
     M known, leaving;
     V speed_turn, force_turn;
-    V age, off, past;
+    V age, off, updates_ago;
     TQ_(tq_hands) amid, end;
     V floor_gain, floor_now, floor_step, floor_slew;
     TQ_(tq_bits) keys;
@@ -265,7 +265,7 @@ TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
     tq_real to_end = s->to_end;
     tq_real read[2][TQ_W] = {{0}};
     V speed = s->speed, force = s->force, speed_slope = s->speed_slope, force_slope = s->force_slope;
-    V read_speed, read_force, past = s->past;
+    V read_speed, read_force, past = s->updates_ago;
     M held, kept;
     int l;
     for TQ_EACH(l)
@@ -286,14 +286,14 @@ TQ_WIDE int TQ_(tq_follow_all)(TQ_(tq_many) *s)
     s->speed_slope = (V)(kept & (M)s->speed_slope), s->force_slope = (V)(kept & (M)s->force_slope);
     s->age = (V)(kept & (M)s->age), s->off = (V)(kept & (M)s->off);
     s->speed_turn = (V)(kept & (M)s->speed_turn), s->force_turn = (V)(kept & (M)s->force_turn);
-    s->past = s->age / (tq_real)t->update_samples;
+    s->updates_ago = s->age / (tq_real)t->update_samples;
     held = (speed == s->speed) & (force == s->force) & (speed_slope == s->speed_slope) &
-           (force_slope == s->force_slope) & (past == s->past);
+           (force_slope == s->force_slope) & (past == s->updates_ago);
     if (s->position != 0 && !TQ_WIDE_ANY(~held))
         return 0;
     TQ_(tq_locate_all)(s);
-    speed = s->speed + s->speed_turn * s->past;
-    force = s->force + s->force_turn * s->past;
+    speed = s->speed + s->speed_turn * s->updates_ago;
+    force = s->force + s->force_turn * s->updates_ago;
     TQ_(tq_hands_at)(s, &s->end, speed + s->speed_slope * to_end, force + s->force_slope * to_end);
     TQ_(tq_hands_at)(s, &s->amid, speed + s->speed_slope * s->to_middle,
                      force + s->force_slope * s->to_middle);

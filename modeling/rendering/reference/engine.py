@@ -8,6 +8,7 @@ floats are IEEE doubles, and all is computed in the order of `kernel.h`: the bit
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -84,7 +85,7 @@ class PythonEngine:
         return np.array(self._limiter.limit(output), dtype=np.float64)
 
     def _made(self, hand: Hand | None, places: Sequence[int], outputs: int) -> list[float]:
-        """The next samples at the model's rate, each for one place in the next ones of the output."""
+        """The next samples at the model's rate, each for one place in the output."""
         count, period = len(places), self._plan.own.update_samples
         inputs = self._filter.inputs(self._key, self._position, count=count)
         starts = list(range(-self._position % period, count, period))

@@ -22,7 +22,7 @@ class Interpolator:
             self._doubled = np.zeros(way.phases.shape[1] + 1)
 
     def before_next_made(self, ago: float) -> float:
-        """From a time `ago` before the next output sample to the model's next one, in its samples."""
+        """From `ago` samples before the next one of the output to the model's next one."""
         way = self._way
         return ago if way is None else 1 + (ago * way.down - self._phase) / (2 * way.up)
 

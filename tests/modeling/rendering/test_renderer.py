@@ -27,6 +27,7 @@ from modeling.models.compiled_for import CompiledFor
 from modeling.models.line_spectral import line_spectral_frequencies
 from modeling.rendering.compiled import Call, is_compiled
 from modeling.rendering.reference.hand import Extrapolator
+from modeling.rendering.reference.lattice import LatticeFilter
 from tests.refusals import refused
 
 
