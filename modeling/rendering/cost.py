@@ -124,7 +124,7 @@ def cost_of(
     per_update = Operations(
         additions=35 + 43 * layers + 8 * extrapolated,
         multiplications=30 + 73 * layers + 2 * groups + 2 * extrapolated,
-        divisions=5 + 3 * layers + 4 * extrapolated,
+        divisions=5 + 3 * layers + 2 * extrapolated,
         square_roots=layers,
     )
     return Cost(

@@ -10,7 +10,8 @@ from modeling.rendering.cost import Cost, Operations
 COST_RATE_HZ = 5000.0
 _CHUNK = 64  # samples that a stream keeps of its noise, as the kernel does
 _SOUND_BYTES = 2
-_EXTRAPOLATING = Operations(14, 6, 4, 0)
+# Of readings at updates; the kernel takes in readings at times of their own, for 28 more.
+_EXTRAPOLATING = Operations(14, 6, 2, 0)
 _READING = Operations(12, 5, 2, 0)  # the place in the grid, and one value of it
 _GAIN = Operations(12, 7, 2, 0)  # the same, and the level below the grid
 _BLENDED = Operations(6, 6, 0, 0)  # another value
