@@ -19,6 +19,7 @@ from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 RATE_HZ = 5000
+OTHER_RATES_HZ = (8000, 44100, 48000)
 LOCKED_DB = 6.0  # within so much of locked and whole readings
 needs_kernel = pytest.mark.skipif(Call is None, reason="no kernel was compiled")
 READING = st.tuples(
@@ -43,28 +44,29 @@ def stroke(time_s: Floats) -> tuple[Floats, Floats]:
     return 300 * np.sin(2 * np.pi * 2 * time_s), np.full(time_s.size, 2.0)
 
 
-def read_at(times_s: Floats, *, duration_s: float = 1.0, **options: int) -> Floats:
+def read_at(times_s: Floats, *, duration_s: float = 1.0, rate_hz: int = RATE_HZ) -> Floats:
     """Canvas by readings of the stroke at these times, each known from the next sample on."""
-    renderer = Renderer(planted_texture("canvas"), **options)
-    count, done, parts = round(duration_s * RATE_HZ), 0, []
+    renderer = Renderer(planted_texture("canvas"), rate_hz=rate_hz)
+    count, done, parts = round(duration_s * rate_hz), 0, []
     for time_s, speed, force in zip(times_s, *stroke(times_s), strict=True):
-        now = int(np.ceil(time_s * RATE_HZ - 1e-9))
+        now = int(np.ceil(time_s * rate_hz - 1e-9))
         if now >= count:
             break
         parts.append(renderer.render_on(now - done))
         done = now
-        renderer.read(speed, force, ago=max(0.0, now - time_s * RATE_HZ))
+        renderer.read(speed, force, ago=max(0.0, now - time_s * rate_hz))
     return np.concatenate([*parts, renderer.render_on(count - done)])
 
 
-def exact(duration_s: float = 1.0) -> tuple[Floats, tuple[Floats, Floats]]:
+def exact(duration_s: float = 1.0, rate_hz: int = RATE_HZ) -> tuple[Floats, tuple[Floats, Floats]]:
     """Canvas by the stroke as it is at every sample, and the stroke."""
-    hand = stroke(np.arange(round(duration_s * RATE_HZ)) / RATE_HZ)
-    return Renderer(planted_texture("canvas"), update_samples=1).render(*hand), hand
+    hand = stroke(np.arange(round(duration_s * rate_hz)) / rate_hz)
+    made = Renderer(planted_texture("canvas"), rate_hz=rate_hz, update_samples=1)
+    return made.render(*hand), hand
 
 
-def error_db(rendered: Floats) -> float:
-    wanted, _ = exact(rendered.size / RATE_HZ)
+def error_db(rendered: Floats, *, rate_hz: int = RATE_HZ) -> float:
+    wanted, _ = exact(rendered.size / rate_hz, rate_hz)
     return float(10 * np.log10(np.mean((rendered - wanted) ** 2) / np.mean(wanted**2)))
 
 
@@ -87,15 +89,21 @@ def test_readings_at_every_update_are_a_hand_given_at_every_sample(engine: str) 
 
 @needs_kernel
 @settings(max_examples=60, deadline=None)
-@given(st.lists(READING, max_size=25), st.integers(1, 12), st.integers(0, 300))
+@given(
+    st.lists(READING, max_size=25),
+    st.integers(1, 12),
+    st.integers(0, 300),
+    st.sampled_from([RATE_HZ, *OTHER_RATES_HZ]),
+)
 def test_both_engines_have_equal_bits(
-    readings: list[tuple[int, float, float, float]], update_samples: int, rest: int
+    readings: list[tuple[int, float, float, float]], update_samples: int, rest: int, rate_hz: int
 ) -> None:
     signals, counters = [], []
     for switch in ("", "1"):
         with pytest.MonkeyPatch.context() as patch:
             patch.setenv(SWITCH, switch)
-            made = Renderer(planted_texture("canvas"), update_samples=update_samples)
+            canvas = planted_texture("canvas")
+            made = Renderer(canvas, rate_hz=rate_hz, update_samples=update_samples)
         parts = []
         for samples, ago, speed, force in readings:
             parts.append(made.render_on(samples))
@@ -124,6 +132,18 @@ def test_readings_off_the_beat_are_within_6_db_of_locked_ones(
     times = np.arange(0, 1, 1e-3 * interval_ms)
     locked, late = error_db(read_at(times)), error_db(read_at(times + 1e-3 * late_ms))
     assert late <= locked + LOCKED_DB
+
+
+@pytest.mark.parametrize("rate_hz", OTHER_RATES_HZ)
+def test_times_of_readings_hold_at_other_rates(rate_hz: int) -> None:
+    """In samples of the output; wrong ones would be as far off as the old rule, −29 dB."""
+    times = np.arange(0, 1, 2e-3)
+    locked, late = (
+        error_db(read_at(each, rate_hz=rate_hz), rate_hz=rate_hz)
+        for each in (times, times + 0.2e-3)
+    )
+    assert late <= locked + LOCKED_DB
+    assert late < -40
 
 
 def mean_db(errors_db: list[float]) -> float:
@@ -254,11 +274,14 @@ GAPS: dict[str, Gap] = {
 
 @needs_kernel
 @pytest.mark.parametrize("gap", GAPS)
-@pytest.mark.parametrize("update_samples", [1, 5, 16])
-def test_many_streams_have_equal_bits(gap: str, update_samples: int) -> None:
+@pytest.mark.parametrize(
+    ("update_samples", "rate_hz"), [(1, RATE_HZ), (5, RATE_HZ), (16, RATE_HZ), (48, 48000)]
+)
+def test_many_streams_have_equal_bits(gap: str, update_samples: int, rate_hz: int) -> None:
     hands = [GAPS[gap](exact(0.4)[1]), exact(0.3)[1], GAPS[gap](exact(0.2)[1])]
     model = planted_texture("canvas")
-    many = render_many([model] * 3, hands, seeds=[1, 2, 3], update_samples=update_samples)
+    options = {"update_samples": update_samples, "rate_hz": rate_hz}
+    many = render_many([model] * 3, hands, seeds=[1, 2, 3], **options)
     for seed, hand, signal in zip((1, 2, 3), hands, many, strict=True):
-        alone = Renderer(model, seed=seed, update_samples=update_samples).render(*hand)
+        alone = Renderer(model, seed=seed, **options).render(*hand)
         assert np.array_equal(signal, alone)
