@@ -32,7 +32,7 @@ struct Grid {
                 values.push_back(column ? 3.0 * column / columns : 0.1);
         texture.speeds = 3, texture.forces = 2, texture.layers = (columns - 1) / 3;
         texture.speed_mm_s = speeds.data(), texture.force_n = forces.data();
-        texture.values = values.data(), texture.rate_hz = 5000, texture.noise_scale = 1;
+        texture.values = values.data(), texture.model_rate_hz = texture.rate_hz = 5000;
         texture.update_samples = update_samples;
     }
 };
