@@ -31,12 +31,14 @@ from analysis.benches.rivals import (
     CompiledStream,
     LfilterStream,
     SosfiltStream,
+    SoundStream,
     compiled_parts,
     layered_texture,
     operations,
     predictor_of,
 )
-from modeling import Renderer
+from analysis.benches.stored_sounds import Loops, make_loops
+from modeling import Renderer, TextureModel
 from modeling.arrays import Floats
 from modeling.hand import Hand
 from modeling.rendering.noise import stream_key
@@ -50,7 +52,7 @@ BLOCKS = (32, 1024)
 SWEEP = (1, 2, 3, 4, 6, 8, 12, 16)
 SWEEP_UPDATE = 5
 SOUND_CARD_HZ, SOUND_CARD_UPDATE = 48_000.0, 48
-SOSFILT, LFILTER, PYTHON = "sosfilt", "lfilter", "Python"
+SOSFILT, LFILTER, PYTHON, LOOPED = "sosfilt", "lfilter", "Python", "looped wavetables"
 # As users call it: two numbers and an array of their own for each block.
 RENDERER = "Renderer"
 BY_BLOCK = (SOSFILT, LFILTER, RENDERER)
@@ -188,7 +190,16 @@ class RenderingBench:
     @property
     def sound_card_ns(self) -> float:
         """ns per sample of the kernel at 48 kHz, 3 layers, an update each millisecond."""
-        return float(self.times.loc[self.times["called"] == SOUND_CARD, "ns_per_sample"].iloc[0])
+        return self._at_sound_card_ns(KERNEL)
+
+    @property
+    def looped_ns(self) -> float:
+        """The same of looped wavetables, which hold samples at 48 kHz."""
+        return self._at_sound_card_ns(LOOPED)
+
+    def _at_sound_card_ns(self, name: str) -> float:
+        here = (self.times["called"] == SOUND_CARD) & (self.times["filter"] == name)
+        return float(self.times.loc[here, "ns_per_sample"].iloc[0])
 
     @property
     def aims(self) -> pd.DataFrame:
@@ -369,14 +380,28 @@ def _in_python() -> dict[Setting, Turn]:
 
 
 def _at_sound_card(effort: Effort) -> dict[Setting, Turn]:
-    stream = CompiledStream(
-        KERNEL,
-        layered_texture(3),
-        update_samples=SOUND_CARD_UPDATE,
-        seed=0,
-        rate_hz=SOUND_CARD_HZ,
-    )
-    return {Setting(SOUND_CARD, KERNEL, 3, SOUND_CARD_UPDATE): _in_calls(stream, effort)}
+    texture, update = layered_texture(3), SOUND_CARD_UPDATE
+    stream = CompiledStream(KERNEL, texture, update_samples=update, seed=0, rate_hz=SOUND_CARD_HZ)
+    hand, out = stroke(effort.samples, rate_hz=RATE_HZ), np.empty(effort.samples)
+    loops = SoundStream(_loops_for_sound_card(texture), update_samples=update, seed=0)
+    return {
+        Setting(SOUND_CARD, KERNEL, 3, update): _in_calls(stream, effort),
+        Setting(SOUND_CARD, LOOPED, 3, update): Turn(loops.calls(*hand, out), effort.samples),
+    }
+
+
+def _loops_for_sound_card(texture: TextureModel) -> Loops:
+    """One second for each condition, of the texture up to its Nyquist frequency."""
+
+    def magnitude(speed: float, force: float, frequency: Floats) -> Floats:
+        inside = np.minimum(frequency, texture.rate_hz / 2)
+        response = texture.peq(speed, force).response(inside)
+        share = np.sqrt(SOUND_CARD_HZ / texture.rate_hz)
+        return np.where(frequency <= texture.rate_hz / 2, share * response, 0.0)
+
+    axes = texture.speeds_mm_s, texture.forces_n
+    rng = np.random.default_rng(0)
+    return make_loops(axes, magnitude, rate_hz=SOUND_CARD_HZ, seconds=1.0, rng=rng)
 
 
 def _kernel_stream(layers: int, update: int) -> CompiledStream:

@@ -218,7 +218,8 @@ def _tell_bench(bench: RenderingBench) -> None:
     print(
         f"kernel: {line.ns_at_none:.2f} ns + {line.ns_per_layer:.2f} ns per layer (R² = "
         f"{line.r_squared:.4f}); {bench.memory_bytes} bytes per stream of 3 layers\n"
-        f"at 48 kHz, 3 layers, an update every millisecond: {bench.sound_card_ns:.0f} ns\n"
+        f"at 48 kHz, 3 layers, an update every millisecond: {bench.sound_card_ns:.1f} ns; looped "
+        f"wavetables {bench.looped_ns:.1f} ns\n"
         f"rendering in Python, 3 layers: {bench.python_ns:.0f} ns\n"
     )
     aims = bench.aims.assign(met=bench.aims["met"].map({True: "met", False: "not met"}))

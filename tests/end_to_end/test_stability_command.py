@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.benches.atlas.blending import CASES
+from analysis.benches.atlas.cases import CASES
 
 CONTENTS = {
     "cells.tsv",
@@ -25,7 +25,8 @@ def test_stability_prints_and_writes_the_atlas(run, main, tmp_path: Path) -> Non
     assert done.returncode == 0, done.stderr
     out = tmp_path / "atlas"
     assert {path.name for path in out.iterdir()} == CONTENTS
-    columns = [(case.method, next(iter(case.columns))) for case in CASES]
+    blending = [case for case in CASES if case.family == "blending"]
+    columns = [(case.method, next(iter(case.columns))) for case in blending]
     edges = pd.read_csv(out / "edges.tsv", sep="\t", keep_default_na=False, na_values="n/a")
     assert list(zip(edges["method"], edges["column"], strict=True)) == columns
     cells = pd.read_csv(out / "cells.tsv", sep="\t", na_values="n/a")
@@ -33,7 +34,8 @@ def test_stability_prints_and_writes_the_atlas(run, main, tmp_path: Path) -> Non
     assert cells["simulated"].all()
     assert edges["simulated"].all()
     margins = pd.read_csv(out / "margins.tsv", sep="\t", na_values="n/a")
-    assert (margins["margin"] >= 2).all()
+    assert ((margins["margin"] >= 2) | margins["exception"].notna()).all()
+    assert (margins["margin"] >= 2).any()
     lines = done.stdout.strip().splitlines()
     assert lines[-1] == "simulated: atlas/atlas.html"
     assert sum("PEQ, logarithmic" in line and "× more severe" in line for line in lines) == 1

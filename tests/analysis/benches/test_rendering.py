@@ -15,6 +15,7 @@ from analysis.benches.rendering import (
     LAYERS,
     LFILTER,
     LIVE,
+    LOOPED,
     ONE_CALL,
     PYTHON,
     RENDERER,
@@ -78,6 +79,7 @@ def planted() -> RenderingBench:
     rows += [(ONE_CALL, KERNEL, m, SWEEP_UPDATE, 3.0 * m) for m in SWEEP if m not in LAYERS]
     rows.append((ONE_CALL, PYTHON, 3, 5, 1500.0))
     rows.append((SOUND_CARD, KERNEL, 3, 48, 40.0))
+    rows.append((SOUND_CARD, LOOPED, 3, 48, 10.0))
     columns = ["called", "filter", "layers", "update_samples", "ns_per_sample"]
     return RenderingBench(
         times=pd.DataFrame(rows, columns=columns),
@@ -97,6 +99,7 @@ def test_every_combination_is_measured(bench: RenderingBench) -> None:
     wanted = set(product((ONE_CALL, LIVE), COMPILED, LAYERS, UPDATES))
     wanted |= set(product([FROM_PYTHON], BY_BLOCK, LAYERS, BLOCKS))
     wanted |= {(ONE_CALL, PYTHON, 3, 5), (SOUND_CARD, KERNEL, 3, 48)}
+    wanted.add((SOUND_CARD, LOOPED, 3, 48))
     wanted |= set(product([ONE_CALL], [KERNEL], SWEEP, [SWEEP_UPDATE]))
     assert measured == wanted
     assert len(times) == len(measured)
@@ -142,7 +145,7 @@ def test_ratios_and_verdicts_of_known_times() -> None:
     assert bench.blocks["sosfilt / Renderer"].to_numpy() == pytest.approx(50.0)
     assert bench.blocks["lfilter / Renderer"].to_numpy() == pytest.approx(10.0)
     assert bench.python_ns == 1500.0
-    assert bench.sound_card_ns == 40.0
+    assert (bench.sound_card_ns, bench.looped_ns) == (40.0, 10.0)
     verdicts = bench.aims.set_index(["what", "where"])["met"]
     assert verdicts["kernel / direct form I, one call"].all()
     assert not verdicts["kernel / direct form II, one call"].any()

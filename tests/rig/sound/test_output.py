@@ -21,6 +21,7 @@ from scipy.signal import lfilter
 from modeling import InputError, Renderer, TextureModel
 from modeling.hand import Hand
 from modeling.rendering.limits import Limits
+from modeling.rendering.plan import RELEASE_S
 from rig.live.memory import BLOCK, CONTACT, GONE, HEARTBEAT_S, NO_HEARTBEAT, STALE, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
 from tests.modeling.rendering.lattices import in_python, planted_ar
@@ -397,9 +398,12 @@ def test_a_hand_that_is_old_or_gone_fades_to_silence(server: Any, tmp_path: Path
     assert not stale["force_n"].any()
     if how == "stopped":
         assert stale["time_s"][0] - live_last["time_s"] < 0.2  # its age was below 0.1 s there
-    # From the last block with a hand on: one update and the 5 ms in which gains fall.
+    # From the last block with a hand on: one update, 3 ms until contact has ended and the update
+    # after it, the 5 ms in which gains fall, and what is interpolated.
+    ends = FRAMES + 48 + round(RELEASE_S * RATE_HZ) + 48
+    lasting = FADE + round(37 * RATE_HZ / 5000) + FRAMES
     loud = rows[rows["square_sum_g2"] > 0][-1]
-    assert int(loud["position"]) - int(last["position"]) <= 128 + 48 + FADE + 128
+    assert int(loud["position"]) - int(last["position"]) <= ends + lasting
     assert silent_from(captured) < captured.size - RATE_HZ // 10
 
 
