@@ -116,7 +116,7 @@ typedef struct {
     int update_samples;      /* from one parameter update to the next at the model's rate, at least 1 */
     tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
     tq_real slope_share;  /* how much of a new change from update to update counts at once, up to 1 */
-    /* Readings, in samples: how long one counts where none follows, and how long there must have been no
+    /* Readings, in samples at the model's rate: how long one counts where none follows, and how long there must have been no
        contact until it counts as ended. */
     tq_real hold, release;
     const tq_real *slews; /* (1 + layers): the furthest a gain moves in one update */
@@ -447,8 +447,9 @@ TQ_INLINE int tq_leaving(const tq_texture *t, tq_state *s, tq_real ago, tq_real 
     return tq_age(hand->off, hand->off_ago, s->position) - ago < t->release && since <= t->hold;
 }
 
-/* Takes in a reading of the hand that was made `ago` samples before the next one of the model. None counts that is not
-   finite, as if it had not come, or no later than a thousandth of a sample after the last one. */
+/* Takes in a reading of the hand that was made `ago` samples before the next one, at the model's rate. None
+   counts that is not finite, as if it had not come, or no later than a thousandth of such a sample after the
+   last one. */
 TQ_INLINE void tq_take_in(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
 {
     tq_followed *hand = &s->hand;
@@ -589,8 +590,8 @@ static void tq_filter(const tq_texture *t, tq_state *s, const tq_real *w, tq_rea
 
 /* --- Interpolation ----------------------------------------------------------------------------- */
 
-/* Of the output, how many samples precede sample `samples` (from 0, at most a chunk) of those that are next at the model's
-   rate: that one is made for the next of them, and by its hand. */
+/* Of the output, how many samples precede sample `samples` (from 0, at most a chunk) of those that are next
+   at the model's rate: that one is made for the next of them, and by its hand. */
 TQ_INLINE size_t tq_outputs_before(const tq_texture *t, int phase, int samples)
 {
     if (!t->up)
@@ -853,7 +854,7 @@ static inline void tq_render_held(const tq_texture *t, tq_state *s, tq_real spee
     tq_render_by(t, s, &speed, &force, 0, 1, out, count);
 }
 
-/* A reading of the hand, made `ago` samples (fractions count) before the next one to be rendered; below 0
+/* A reading of the hand, made `ago` samples of the output (fractions count) before the next one; below 0
    counts as 0. Readings come in the order of their times: one that is not later than the last is ignored. */
 static inline void tq_read(const tq_texture *t, tq_state *s, tq_real ago, tq_real speed, tq_real force)
 {

@@ -180,7 +180,10 @@ class RenderPlan:
 
     @property
     def readings(self) -> dict[str, float]:
-        """What `tq_texture` holds of readings (docs/method/rendering.md#readings), in samples."""
+        """What `tq_texture` holds of readings, in samples at the plan's rate.
+
+        docs/method/rendering.md#readings; a texture has those of `own`.
+        """
         return {"hold": HOLD_S * self.rate_hz, "release": RELEASE_S * self.rate_hz}
 
     @property

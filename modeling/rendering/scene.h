@@ -4,9 +4,9 @@
 
    Each hand has one state and one memory, whatever it touches. After a switch the present texture fades
    out as if the hand had lifted off: every gain is at 0 after 5 ms or one parameter update, whichever is
-   longer. Then the next texture starts, in silence for one parameter update, and its gains rise from 0
-   to those of the hand, the largest of them in 5 ms again. So it is heard after 6 ms with updates every
-   millisecond. In between there is silence: a state renders one texture at a time, and the most
+   longer; at another rate than the model's, 37 samples of the model ring out. Then the next texture starts,
+   in silence for one parameter update, and its gains rise from 0 to those of the hand, the largest of them
+   in 5 ms again. So at the model's rate it is heard after 6 ms with updates every millisecond. In between there is silence: a state renders one texture at a time, and the most
    expensive sample costs one tq_start and one tq_render.
 
    All textures of a scene must have the same rate, compensation and limits. The states of the limits and
@@ -154,6 +154,7 @@ TQ_INLINE void tq_scene_lifted(tq_scene_hand *h, const tq_real *speed, const tq_
         TQ_FILL(&s->hand, 0, sizeof s->hand);
         tq_render_by(tq_scene_texture(h), s, &off, &off, 0, 0, out, count);
         s->hand = hand;
+        tq_count_hand(s, 1, count); /* as last read, which does not depend on blocks */
     }
     s->counters.lift_offs = lift_offs;
 }

@@ -483,41 +483,77 @@ def test_switching_back_within_a_fade_lets_the_texture_rise_again(
 
 READ = """
 #include <stdio.h>
+#include <stdlib.h>
 #include "read.h"
 
-int main(void)
+static tq_scene_hand hand;
+
+static void on(tq_real *out, int count, int block)
+{
+    int n;
+    for (n = 0; n < count; n += block)
+        tq_scene_render_on(&hand, out + n, (size_t)(block < count - n ? block : count - n));
+}
+
+int main(int count, char **texts)
 {
     static tq_real memory[SCENE_memory], out[200];
-    static tq_scene_hand hand;
+    const int block = atoi(texts[1]);
+    const tq_real faster = (tq_real)atof(texts[2]);
     int n;
+    (void)count;
     tq_scene_start(&hand, &SCENE, memory, 0, 0);
-    tq_scene_read(&hand, 2.5, 120, 1.5);
-    tq_scene_render_on(&hand, out, 50);
+    tq_scene_read(&hand, 2.5, 120 + faster, 1.5);
+    on(out, 50, block);
     tq_scene_switch(&hand, 1);
-    tq_scene_render_on(&hand, out + 50, 10);
-    tq_scene_read(&hand, 0.5, 125, 1.5);
-    tq_scene_render_on(&hand, out + 60, 140);
+    on(out + 50, 10, block);
+    tq_scene_read(&hand, 0.5, 125 + faster, 1.5);
+    on(out + 60, 140, block);
     for (n = 0; n < 200; n++)
         printf("%a\\n", out[n]);
+    printf("%a ", (double)hand.state.counters.above_grid);
+    printf("%a\\n", (double)hand.state.counters.lift_offs);
     return 0;
 }
 """
 
 
-def test_readings_at_times_of_their_own_go_on_over_a_switch(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def read_and_play(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., list[float]]:
+    """Runs `READ`: its samples, then how many were above the grid, and without a reading."""
+    folder, scene = tmp_path_factory.mktemp("read"), scene_identifier("read")
+    rendered = [(model, plan_for(model.rate_hz)) for model in MODELS[:2]]
+    (folder / "read.h").write_text(scene_header("read.h", "read", rendered, seed=SEED))
+    (folder / "read.c").write_text(READ.replace("SCENE", scene))
+    compiling = [*C, "-O2", "-ffp-contract=off", "read.c", "-o", "read", "-lm"]
+    subprocess.run(compiling, check=True, cwd=folder)
+
+    def run(*, block: int, faster: float) -> list[float]:
+        words = [folder / "read", str(block), str(faster)]
+        done = subprocess.run(words, check=True, capture_output=True, text=True)
+        return [float.fromhex(number) for number in done.stdout.split()]
+
+    return run
+
+
+def test_readings_in_a_scene_have_equal_bits_and_counters_in_blocks_of_any_size(
+    read_and_play: Callable[..., list[float]],
+) -> None:
+    whole = read_and_play(block=200, faster=380.0)
+    assert whole[-2] > 100  # all but those after the reading was too old
+    for block in (1, 2, 5, 7):
+        assert read_and_play(block=block, faster=380.0) == whole
+
+
+def test_readings_at_times_of_their_own_go_on_over_a_switch(
+    read_and_play: Callable[..., list[float]],
+) -> None:
     """Read while one texture fades, the hand strokes the next one, until the reading is too old.
 
     That begins at sample 75, after five updates, and is silent for one.
     """
-    scene = scene_identifier("read")
-    rendered = [(model, plan_for(model.rate_hz)) for model in MODELS[:2]]
-    (tmp_path / "read.h").write_text(scene_header("read.h", "read", rendered, seed=SEED))
-    (tmp_path / "read.c").write_text(READ.replace("SCENE", scene))
-    compiling = [*C, "-O2", "-ffp-contract=off", "read.c", "-o", "read", "-lm"]
-    subprocess.run(compiling, check=True, cwd=tmp_path)
-    run = subprocess.run([tmp_path / "read"], check=True, capture_output=True, text=True)
-    played = np.array([float.fromhex(line) for line in run.stdout.split()])
-    first, second = (Renderer(model, seed=SEED, stream=n) for n, (model, _) in enumerate(rendered))
+    played = np.array(read_and_play(block=200, faster=0.0)[:200])
+    first, second = (Renderer(MODELS[n], seed=SEED, stream=n) for n in (0, 1))
     first.read(120.0, 1.5, ago=2.5)
     assert np.array_equal(played[:50], first.render_on(50))
     assert np.array_equal(played[75:80], second.render_on(5))
