@@ -151,7 +151,7 @@ class CoefficientTable:
     Raises
     ------
     InputError
-        For a filter that is unstable at a node or between nodes.
+        For a filter that is unstable at a node, or at a quarter, half or three quarters of a cell.
     """
 
     speeds_mm_s: Floats

@@ -10,7 +10,7 @@ from time import process_time
 import numpy as np
 
 from analysis.benches.chart.fitted import Fitted, Itself, Layered
-from analysis.benches.chart.rival_costs import block_samples
+from analysis.benches.chart.rival_costs import block_samples, grain_samples
 from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from analysis.benches.chart.shaped_noise import fit_shaped_noise
 from analysis.benches.coefficients import fit_sections, tabled, tabled_bands
@@ -195,7 +195,7 @@ def _grains(subject: Subject, *, block_s: float) -> Fitted:
     for recording, spectrum in subject.measured:
         if not is_silent(spectrum):
             records.setdefault(recording.condition, []).append(recording)
-    block = block_samples(block_s, subject.rate_hz)
+    block = grain_samples(block_s, subject.rate_hz)
     return Grained(grains_of(records, texture=subject.texture, block=block), block_s)
 
 

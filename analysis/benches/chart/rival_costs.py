@@ -19,8 +19,13 @@ _NOISE = Operations(1, 2, 0, 0)  # a number of noise
 
 
 def block_samples(block_s: float, rate_hz: float) -> int:
-    """Length of a block or grain: the power of two next to so many seconds."""
+    """Length of a block: the power of two next to so many seconds."""
     return int(2 ** np.rint(np.log2(block_s * rate_hz)))
+
+
+def grain_samples(grain_s: float, rate_hz: float) -> int:
+    """Length of a grain, which is even."""
+    return 2 * round(grain_s * rate_hz / 2)
 
 
 def coefficients_cost(

@@ -14,6 +14,7 @@ from analysis.benches.chart.rival_costs import (
     bands_cost,
     block_samples,
     coefficients_cost,
+    grain_samples,
     grains_cost,
     loops_cost,
     shaped_noise_cost,
@@ -25,6 +26,7 @@ from analysis.benches.stored_sounds import Grains, Loops, SampledResponse, Sound
 from modeling import ARModel
 from modeling.arrays import Floats
 from modeling.hand import Hand
+from modeling.models.grid import within_grid
 from modeling.rendering.cost import Cost
 from modeling.similarity import SpectralFilter
 
@@ -82,6 +84,17 @@ def stored_samples(sounds: Sounds) -> int:
     return sounds.nodes * round(sounds.length * COST_RATE_HZ / sounds.rate_hz)
 
 
+def _towards(axis: Floats, wanted: Floats) -> Floats:
+    """`tq_cell_towards`: a step ends at the edge of the cell that it leads into, at the latest."""
+    at, reached = float(wanted[0]), []
+    for to in wanted.tolist():
+        passed = axis <= at if to > at else axis < at
+        cell = min(max(int(passed.sum()) - 1, 0), axis.size - 2)
+        at = float(np.clip(to, axis[cell], axis[cell + 1]))
+        reached.append(at)
+    return np.array(reached)
+
+
 @dataclass(frozen=True, eq=False)
 class Looped:
     """Looped wavetables, whose weights ramp from update to update."""
@@ -99,14 +112,26 @@ class Looped:
     def moving(
         self, hand: Hand, update_samples: int, *, places: Sequence[int], rate_hz: float
     ) -> list[SpectralFilter]:
+        """As `sounds.h` plays: weights lead to the next update, at most to the edge of a cell."""
         ends = extrapolated_to_ends(hand, update_samples, rate_hz=rate_hz)
-        filters = []
+        used = places[-1] // update_samples + 1
+        led, level = self._led(*(reading[:used] for reading in ends))
+        filters = list[SpectralFilter]()
         for place in places:
             update, into = divmod(place, update_samples)
-            share = (into + 1) / update_samples
-            before, now = (np.array(at(ends, max(k, 0))) for k in (update - 1, update))
-            filters.append(self.filter(*(before * (1 - share) + now * share).tolist()))
+            share, before = (into + 1) / update_samples, max(update - 1, 0)
+            at_speed, at_force = (led[before] * (1 - share) + led[update] * share).tolist()
+            there = self.model.filter(at_speed, at_force)
+            louder = level[before] * (1 - share) + level[update] * share
+            filters.append(replace(there, magnitude=there.magnitude * louder))
         return filters
+
+    def _led(self, speed_mm_s: Floats, force_n: Floats) -> tuple[Floats, Floats]:
+        """Where the weights stand after each update, (n, 2), and the level left there, (n,)."""
+        axes = self.model.speeds_mm_s, self.model.forces_n
+        wanted, level = within_grid(*axes, speed_mm_s=speed_mm_s, force_n=force_n)
+        along = [_towards(axis, to) for axis, to in zip(axes, wanted, strict=True)]
+        return np.stack(along, axis=1), level
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
         return loops_cost(
@@ -136,8 +161,8 @@ class ByBlock:
 
     @property
     def interval_ms(self) -> float:
-        """From one block to the next at 5 kHz."""
-        return 1e3 * block_samples(self.block_s, COST_RATE_HZ) / 2 / COST_RATE_HZ
+        """From one block to the next."""
+        return 1e3 * self.block_s / 2
 
     def filter(self, speed_mm_s: float, force_n: float) -> SpectralFilter:
         return self.model.filter(speed_mm_s, force_n)
@@ -170,7 +195,9 @@ class Shaped(ByBlock):
 
     @property
     def numbers(self) -> int:
-        return self.model.magnitudes.size
+        """At the lines of a block at 5 kHz."""
+        lines = block_samples(self.block_s, COST_RATE_HZ) // 2 + 1
+        return self.model.magnitudes[..., 0].size * lines
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
         return shaped_noise_cost(
@@ -190,7 +217,7 @@ class Grained(ByBlock):
 
     def cost(self, update_ms: float, *, single: bool) -> Cost:
         return grains_cost(
-            block_samples(self.block_s, COST_RATE_HZ),
+            grain_samples(self.block_s, COST_RATE_HZ),
             nodes=self.model.nodes,
             numbers=self.numbers,
             single=single,

@@ -310,7 +310,7 @@ def _dominating(variants: pd.DataFrame, target: pd.DataFrame, place: str) -> Dom
         pair = _paired(rows.set_index("surface"), target)
         operations = _ratio("operations", *pair)
         distance = _ratio(f"{place}_distance_db", *pair)
-        if operations.high <= 1 and distance.high < 1:
+        if operations.high <= 1 and distance.high <= 1 and distance.mean < 1:
             first = rows.iloc[0]
             variant = Variant(first["method"], first["blending"], float(first["update_ms"]))
             found.append(Dominating(variant, operations, distance))

@@ -13,12 +13,22 @@
 #include "counted.h"
 #include "sounds.h"
 
+/* Of each sample alike. */
+static long each(long all, int samples)
+{
+    if (all % samples) {
+        std::fprintf(stderr, "%ld operations in %d samples\n", all, samples);
+        std::exit(1);
+    }
+    return all / samples;
+}
+
 static void print(const char *part, const Counts &of, int samples)
 {
-    std::printf("%s_additions %ld\n", part, of.additions / samples);
-    std::printf("%s_multiplications %ld\n", part, of.multiplications / samples);
-    std::printf("%s_divisions %ld\n", part, of.divisions / samples);
-    std::printf("%s_square_roots %ld\n", part, of.square_roots / samples);
+    std::printf("%s_additions %ld\n", part, each(of.additions, samples));
+    std::printf("%s_multiplications %ld\n", part, each(of.multiplications, samples));
+    std::printf("%s_divisions %ld\n", part, each(of.divisions, samples));
+    std::printf("%s_square_roots %ld\n", part, each(of.square_roots, samples));
 }
 
 /* Three speeds and two forces, whose table has so many columns. */

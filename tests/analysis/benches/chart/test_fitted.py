@@ -13,7 +13,7 @@ import pytest
 import analysis.benches
 import modeling.rendering
 from analysis.benches.accuracy import stroke
-from analysis.benches.chart.fitted import Layered
+from analysis.benches.chart.fitted import Layered, extrapolated_to_ends
 from analysis.benches.chart.rival_costs import (
     COST_RATE_HZ,
     bands_cost,
@@ -27,7 +27,7 @@ from analysis.benches.chart.rival_fits import Filtered, Grained, Looped, Shaped
 from analysis.benches.chart.shaped_noise import ShapedNoise
 from analysis.benches.coefficients import BandTable, tabled_bands
 from analysis.benches.rivals import BANDS, COEFFICIENTS, CompiledStream, SoundStream, predictor_of
-from analysis.benches.stored_sounds import Grains, make_loops
+from analysis.benches.stored_sounds import Grains, Loops
 from modeling import regressed, render_many
 from modeling.hand import Hand
 from modeling.rendering.cost import Cost
@@ -184,25 +184,28 @@ def test_filters_by_coefficients_in_motion_are_what_is_rendered(kind: str) -> No
 GRID = np.array([50.0, 150.0, 350.0]), np.array([0.5, 1.5, 3.5])
 
 
-def test_loops_in_motion_are_what_is_played() -> None:
-    """Updates every 5 samples, whose hand is the one at their ends, as it is extrapolated."""
-    texture = planted_texture("canvas")
-    hand = stroke(texture.rate_hz, duration_s=0.5)
-    ends = Hand(*(np.roll(reading, -4) for reading in hand))
-    rendered = []
-    for seed in range(400):
-        loops = make_loops(
-            GRID,
-            lambda v, f, frequency: texture.peq(v, f).response(frequency),
-            rate_hz=texture.rate_hz,
-            seconds=0.1,
-            rng=np.random.default_rng(seed),
-        )
-        rendered.append(SoundStream(loops, update_samples=5, seed=0).render(*ends))
-    filters = Looped(loops).moving(hand, 5, places=PLACES, rate_hz=texture.rate_hz)
-    found = found_levels(rendered, PLACES)
-    # Each value is a sum of 250 lines of random phase: √800 draws scatter by 3.5 %.
-    assert found / levels(filters, texture.rate_hz) == pytest.approx(1, abs=0.15)
+@pytest.mark.parametrize("update_samples", [1, 5, 20, 80])
+def test_loops_in_motion_are_what_is_played(update_samples: int) -> None:
+    """Of loops that hold one number, so that levels are exact; the hand is read at updates.
+
+    Between the nodes of a cell weights ramp, where the place is blended: up to 1 % apart.
+    """
+    rate_hz, speeds, forces = 5000.0, np.linspace(25.0, 350.0, 14), np.linspace(0.5, 3.5, 13)
+    loops = Loops(
+        speeds_mm_s=speeds,
+        forces_n=forces,
+        samples=np.ones((14, 13, 50), dtype=np.int16),
+        scales=speeds[:, None] ** 0.8 * forces**0.5,
+        rate_hz=rate_hz,
+    )
+    hand = stroke(rate_hz, duration_s=0.5)
+    ends = extrapolated_to_ends(hand, update_samples, rate_hz=rate_hz)
+    read = Hand(*(np.repeat(reading, update_samples)[: hand.speed_mm_s.size] for reading in ends))
+    played = SoundStream(loops, update_samples=update_samples, seed=0).render(*read)
+    filters = Looped(loops).moving(hand, update_samples, places=PLACES, rate_hz=rate_hz)
+    # A number is a line at 0 Hz, of √N times its amplitude.
+    found = np.array([one.response(np.zeros(1))[0] for one in filters]) / np.sqrt(50)
+    assert found == pytest.approx(played[PLACES], rel=0.02)
 
 
 def test_grains_in_motion_are_what_is_played() -> None:
