@@ -8,7 +8,6 @@ read linearly, as the kernel reads its parameters.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
 from itertools import pairwise
@@ -27,6 +26,7 @@ from modeling.models.line_spectral import (
     reflection_coefficients,
 )
 from modeling.models.parameter_table import ParameterTable, wide_enough
+from modeling.recordings.spectrum import smooth
 
 PARTS = (2, 4, 8)  # of a cell, among which the fewest are taken that are stable between nodes
 _WITHIN = np.array([0.25, 0.5, 0.75])  # of a cell, where stability is checked
@@ -305,26 +305,15 @@ def tabled(
     """
     speeds, values = wide_enough(axes[0], values, along=0)
     forces, values = wide_enough(axes[1], values, along=1)
-
-    def nodes(parts: int) -> Floats:
+    for parts in PARTS:
         finer = _finer(_finer(values, parts).swapaxes(0, 1), parts).swapaxes(0, 1)
         each = [finer[..., 1 : 1 + poles], finer[..., 1 + poles :]]
         coefficients = [prediction_coefficients(part) for part in each if part.shape[-1]]
-        return np.concatenate((finer[..., :1], *coefficients), axis=-1)
-
-    return _stable_between((speeds, forces), nodes, poles=poles, rate_hz=rate_hz)
-
-
-def _stable_between(
-    axes: tuple[Floats, Floats], nodes: Callable[[int], Floats], *, poles: int, rate_hz: float
-) -> CoefficientTable:
-    """With as few parts of a cell as are stable between their nodes."""
-    for parts in PARTS:
         try:
             return CoefficientTable(
-                speeds_mm_s=_finer(axes[0], parts),
-                forces_n=_finer(axes[1], parts),
-                values=nodes(parts),
+                speeds_mm_s=_finer(speeds, parts),
+                forces_n=_finer(forces, parts),
+                values=np.concatenate((finer[..., :1], *coefficients), axis=-1),
                 poles=poles,
                 rate_hz=rate_hz,
             )
@@ -387,12 +376,8 @@ def fit_sections(measured: Spectrum, *, order: int) -> Floats:
 
 def _smoothed_log_power(measured: Spectrum) -> tuple[Floats, Floats]:
     """At some hundreds of angles (n,), in radians per sample."""
-    from scipy.ndimage import gaussian_filter1d
-
     step_hz = measured.rate_hz / measured.n_samples
-    power = gaussian_filter1d(
-        measured.without_leakage**2 * np.pi / 4, SMOOTHING_HZ / step_hz, mode="reflect"
-    )
+    power = smooth(measured.without_leakage**2 * np.pi / 4, SMOOTHING_HZ, step_hz=step_hz)
     every = slice(None, None, max(1, round(SMOOTHING_HZ / 4 / step_hz)))
     audible = np.maximum(power, _QUIETEST * power.max())[every]
     angle = 2 * np.pi * measured.frequency_hz[every] / measured.rate_hz

@@ -116,8 +116,8 @@ typedef struct {
     int update_samples;      /* from one parameter update to the next at the model's rate, at least 1 */
     tq_real speed_change, force_change; /* the furthest a hand gets in one update (mm/s, N) */
     tq_real slope_share;  /* how much of a new change from update to update counts at once, up to 1 */
-    /* Readings, in samples at the model's rate: how long one counts where none follows, and how long there must have been no
-       contact until it counts as ended. */
+    /* Readings, in samples at the model's rate: how long one counts where none follows, and how long there
+       must have been no contact until it counts as ended. */
     tq_real hold, release;
     const tq_real *slews; /* (1 + layers): the furthest a gain moves in one update */
     /* Vibrator compensation (eq. 7): out - share * band-pass(out); share 0 is none. */

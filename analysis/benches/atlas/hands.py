@@ -196,7 +196,7 @@ _click = partial(
     holds=HOLDS_CLICK_DB,
     degrades=DEGRADES_CLICK_DB,
 )
-_error = partial(
+error_case = partial(
     Case,
     family="hands",
     figure="difference from a rendering with the exact hand movement",
@@ -223,7 +223,7 @@ CASES: tuple[Case, ...] = (
         for read in (SIGNED, UNSIGNED, AS_READ)
     ),
     *(
-        _error(
+        error_case(
             method=read,
             ours=read == SIGNED,
             axis=_INTERVAL,
@@ -243,7 +243,7 @@ CASES: tuple[Case, ...] = (
         measure=late_level,
     ),
     *(
-        _error(
+        error_case(
             method=method,
             ours=method == "smoothed slope",
             axis=Axis(name="noise of readings", unit="mm/s", mild=0.1, severe=100.0),

@@ -14,14 +14,13 @@ from analysis.benches.accuracy import stroke
 from analysis.benches.atlas.case import Axis, Case
 from analysis.benches.atlas.hands import (
     AS_READ,
-    DEGRADES_ERROR_DB,
     DEGRADES_LEVEL_DB,
-    HOLDS_ERROR_DB,
     HOLDS_LEVEL_DB,
     LEAST_DIFFERENCE_DB,
     RATE_HZ,
     STROKE_S,
     UPDATE_S,
+    error_case,
 )
 from modeling import Renderer
 from modeling.arrays import Floats
@@ -158,18 +157,9 @@ def _band_errors_db(
     return errors
 
 
-_error = partial(
-    Case,
-    family="hands",
-    figure="difference from a rendering with the exact hand movement",
-    unit="dB",
-    holds=HOLDS_ERROR_DB,
-    degrades=DEGRADES_ERROR_DB,
-)
-
 CASES: tuple[Case, ...] = (
     *(
-        _error(
+        error_case(
             method=method,
             ours=method == WITH_TIMES,
             axis=Axis(
@@ -186,7 +176,7 @@ CASES: tuple[Case, ...] = (
         for method in (WITH_TIMES, AS_OF_NOW)
     ),
     *(
-        _error(
+        error_case(
             method=method,
             ours=method == WITH_TIMES,
             axis=Axis(name="jitter of readings", unit="ms", mild=0.1, severe=20.0, default=1.0),
@@ -194,7 +184,7 @@ CASES: tuple[Case, ...] = (
         )
         for method in (WITH_TIMES, AS_OF_NOW)
     ),
-    _error(
+    error_case(
         method=WITH_TIMES,
         ours=True,
         axis=Axis(name="missing readings", unit="", mild=0.01, severe=0.9, default=0.05),
@@ -202,14 +192,14 @@ CASES: tuple[Case, ...] = (
         across="in a row",
         columns={"1 ms": 1.0, "8 ms": 8.0},
     ),
-    _error(
+    error_case(
         method="contact that ends after 3 ms",
         ours=True,
         axis=Axis(name="contact missed, 40 times a second", unit="ms", mild=0.5, severe=12.0),
         measure=chattering,
     ),
     *(
-        _error(
+        error_case(
             method=method,
             ours=method == "smoothed slope",
             axis=Axis(
