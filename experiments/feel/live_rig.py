@@ -12,10 +12,9 @@ from modeling import InputError
 from modeling.models.loading import Layered
 from modeling.rendering.plan import RenderCounters
 from rig.hand.reader import HandReader
-from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, Live, now_s
+from rig.live.memory import CONTACT, FORCE_ASSUMED, GONE, OLDEST_READING_S, Live, now_s
 from rig.sound.output import SoundLost, SoundOutput
 
-STALE_S = 0.1  # an older hand counts as lifted off, as in the audio callback
 LEVEL_S = 0.25
 MASKING_LEVEL = 0.1  # RMS, share of full scale
 _LIMITS = {"peak": "limited_peak", "RMS": "limited_rms", "duration": "limited_duration"}
@@ -96,7 +95,11 @@ class LiveRig:
     def hand(self) -> HandNow:
         """The latest reading."""
         reading = self._live.latest()
-        if reading is None or reading["flags"] & GONE or now_s() - reading["time_s"] > STALE_S:
+        if (
+            reading is None
+            or reading["flags"] & GONE
+            or now_s() - reading["time_s"] > OLDEST_READING_S
+        ):
             return NO_HAND
         touches = bool(reading["flags"] & CONTACT)
         return HandNow(

@@ -100,6 +100,8 @@ class RenderPlan:
         At this rate.
     single : bool
         In single precision instead of double.
+    hold_s : float
+        How long a reading of the hand counts where none follows.
 
     Raises
     ------
@@ -114,6 +116,7 @@ class RenderPlan:
     limits: Limits = field(default_factory=Limits)
     compensation: Notch | None = None
     single: bool = False
+    hold_s: float = HOLD_S
 
     def __post_init__(self) -> None:
         if not (is_whole(self.update_samples) and 1 <= self.update_samples <= _LONGEST_UPDATE):
@@ -145,7 +148,12 @@ class RenderPlan:
         if self.interpolation is None:
             return self
         samples = max(1, round(self.update_samples * self.own_rate_hz / self.rate_hz))
-        return RenderPlan(rate_hz=self.own_rate_hz, update_samples=samples, single=self.single)
+        return RenderPlan(
+            rate_hz=self.own_rate_hz,
+            update_samples=samples,
+            single=self.single,
+            hold_s=self.hold_s,
+        )
 
     @property
     def delay_s(self) -> float:
@@ -184,7 +192,7 @@ class RenderPlan:
 
         docs/method/rendering.md#readings; a texture has those of `own`.
         """
-        return {"hold": HOLD_S * self.rate_hz, "release": RELEASE_S * self.rate_hz}
+        return {"hold": self.hold_s * self.rate_hz, "release": RELEASE_S * self.rate_hz}
 
     @property
     def mean_share(self) -> float:
@@ -325,6 +333,7 @@ def plan_for(
     limits: Limits | None = None,
     compensation: Notch | None = None,
     single: bool = False,
+    hold_s: float = HOLD_S,
 ) -> RenderPlan:
     """The plan of a `Renderer` with these arguments, of a model at this rate; refused as there.
 
@@ -340,6 +349,7 @@ def plan_for(
         limits=limits or Limits(),
         compensation=compensation,
         single=single,
+        hold_s=hold_s,
     )
 
 

@@ -15,9 +15,10 @@
    exactly 0 and costs a memset. A voice that is selected again without being prepared again continues
    where it stopped.
 
-   A hand is held for a block. Apart from that, output does not depend on the blocks: with equal hands,
-   and changes between blocks at equal samples, it has equal bits. A voice between its fades is the
-   output of tq_render or tq_lattice_render_held, rounded to single precision.
+   The hand is read by tq_player_read, whenever there is a reading; a voice that starts begins with the last
+   one. Output does not depend on the blocks: with readings and changes between blocks at equal samples it
+   has equal bits. A voice between its fades is the output of tq_render_on or tq_lattice_render_on, rounded
+   to single precision.
 
    Every sample is rendered by one voice at most. So the most expensive block costs its rendering and,
    where a voice begins, up to 64 squarings more. Stack: 4 TQ_CHUNK reals.
@@ -34,7 +35,7 @@
 
        static tq_player player;
 
-       void hand(tq_real *speed, tq_real *force);
+       void hand(tq_real *ago, tq_real *speed, tq_real *force);
 
        void begin(void)
        {
@@ -53,10 +54,11 @@
        int callback(const void *in, void *out, unsigned long count, const void *times,
                     unsigned long flags, void *user)
        {
-           tq_real speed, force;
+           tq_real ago, speed, force;
            (void)in, (void)times, (void)flags, (void)user;
-           hand(&speed, &force);
-           tq_player_render(&player, speed, force, (float *)out, count);
+           hand(&ago, &speed, &force);
+           tq_player_read(&player, ago, speed, force);
+           tq_player_render(&player, (float *)out, count);
            return 0;
        }
 
@@ -110,6 +112,8 @@ typedef struct {
     /* What the limits remembered when the last voice left, and samples of silence since. */
     tq_real mean_square;
     uint64_t sounding, silent, idle;
+    /* The last reading of the hand, 0 before the first, and how many samples ago it was made. */
+    tq_real speed, force, ago;
 } tq_player;
 
 /* --- The control thread ------------------------------------------------------------------------ */
@@ -175,11 +179,13 @@ TQ_INLINE tq_real tq_power(tq_real x, uint64_t n)
     return power;
 }
 
-/* A voice takes over what the limits remember, as if it had itself been silent since. */
+/* A voice takes over the hand, and what the limits remember, as if it had itself been silent since. */
 TQ_INLINE void tq_player_remind(const tq_player *p, tq_voice *v)
 {
     const tq_texture *t = v->texture;
     tq_state *s = &v->state;
+    TQ_FILL(&s->hand, 0, sizeof s->hand);
+    tq_read(t, s, p->ago, p->speed, p->force);
     s->mean_square = p->mean_square * tq_power(1 - t->mean_share, p->idle);
     s->mean_square = tq_within(s->mean_square, 0, t->mean_square);
     s->silent = p->silent + p->idle;
@@ -211,17 +217,17 @@ TQ_INLINE void tq_player_leave(tq_player *p, const tq_voice *v)
 }
 
 /* The next samples of a voice, at most a chunk and at most up to the end of a fade-out; how many. */
-TQ_INLINE size_t tq_player_chunk(tq_player *p, tq_voice *v, int leaves, tq_real speed, tq_real force,
-                                 float *out, size_t count)
+TQ_INLINE size_t tq_player_chunk(tq_player *p, tq_voice *v, int leaves, float *out, size_t count)
 {
     tq_real chunk[TQ_CHUNK];
     size_t most = count < TQ_CHUNK ? count : TQ_CHUNK, n;
     if (leaves && most > (size_t)p->level)
         most = (size_t)p->level;
     if (v->lattice)
-        tq_lattice_render_held(v->texture, v->lattice, &v->state, &v->filter, speed, force, chunk, most);
+        tq_lattice_render_on(v->texture, v->lattice, &v->state, &v->filter, chunk, most);
     else
-        tq_render_held(v->texture, &v->state, speed, force, chunk, most);
+        tq_render_on(v->texture, &v->state, chunk, most);
+    p->ago += (tq_real)most;
     for (n = 0; n < most && (leaves || p->level < p->fade); n++) {
         p->level += leaves ? -1 : 1;
         chunk[n] *= p->level < p->fade ? (tq_real)p->level * p->step : 1;
@@ -231,8 +237,18 @@ TQ_INLINE size_t tq_player_chunk(tq_player *p, tq_voice *v, int leaves, tq_real 
     return most;
 }
 
-/* The next `count` samples for a hand whose speed and force are held: what is wanted, or zeros. */
-static inline void tq_player_render(tq_player *p, tq_real speed, tq_real force, float *out, size_t count)
+/* A reading of the hand, made `ago` samples before the next one; see tq_read. */
+static inline void tq_player_read(tq_player *p, tq_real ago, tq_real speed, tq_real force)
+{
+    tq_voice *v = TQ_GET(&p->playing);
+    if (v)
+        tq_read(v->texture, &v->state, ago, speed, force);
+    if (speed - speed == 0 && force - force == 0)
+        p->ago = ago > 0 ? ago : 0, p->speed = speed, p->force = force;
+}
+
+/* The next `count` samples, of what is wanted, or zeros. */
+static inline void tq_player_render(tq_player *p, float *out, size_t count)
 {
     tq_voice *v = TQ_GET(&p->playing);
     int leaves = v && TQ_GET(&p->wanted) != v;
@@ -244,7 +260,7 @@ static inline void tq_player_render(tq_player *p, tq_real speed, tq_real force, 
         }
         if (!v)
             break;
-        done = tq_player_chunk(p, v, leaves, speed, force, out, count);
+        done = tq_player_chunk(p, v, leaves, out, count);
         out += done, count -= done;
         if (p->level == 0) {
             tq_player_leave(p, v);
@@ -253,6 +269,7 @@ static inline void tq_player_render(tq_player *p, tq_real speed, tq_real force, 
     }
     TQ_FILL(out, 0, count * sizeof *out);
     p->idle += count;
+    p->ago += (tq_real)count;
 }
 
 #endif

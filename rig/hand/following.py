@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rig.hand.sample import DeviceLost, Sample
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import TrackingFilter
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, REPEATED, SIMULATED, Live
 
 
 class Reading(NamedTuple):
@@ -46,6 +46,7 @@ class Follower:
     def __init__(self, settings: HandSettings, *, rest_s: float) -> None:
         self._settings = settings
         self._filter = TrackingFilter(settings.filter_delay_s, rest_s=rest_s)
+        self._rest_s = rest_s
         self._sample: Sample | None = None
         self._always = SIMULATED if settings.kind == "scripted" else 0
 
@@ -64,14 +65,21 @@ class Follower:
         return self._reading(sample, sample.time_s, speed_mm_s=speed)
 
     def at(self, time_s: float) -> Reading:
-        """The reading at a later moment at which the device has said nothing new."""
+        """The reading at a later moment at which the device has said nothing new.
+
+        Until the device rests it repeats the last one and is marked so: the hand has moved on, and
+        what is rendered extrapolates from the time of the sample.
+        """
         sample = self._sample
         if sample is None:
             return Reading(time_s, nan, nan, 0.0, 0.0, self._always)
         speed = sample.speed_mm_s
         if speed is None:
             speed = self._filter.at(time_s)
-        return self._reading(sample, time_s, speed_mm_s=speed)
+        reading = self._reading(sample, time_s, speed_mm_s=speed)
+        if time_s - sample.time_s > self._rest_s:
+            return reading
+        return reading._replace(flags=reading.flags | REPEATED)
 
     def gone(self, time_s: float) -> Reading:
         """The reading without a device: nothing moves, nothing touches."""

@@ -14,7 +14,7 @@ from rig.hand.following import Follower, Reading
 from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
-from rig.live.memory import Live, now_s
+from rig.live.memory import REPEATED, Live, now_s
 
 BEAT_S = 0.002  # readings are written so often, also at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
@@ -107,7 +107,7 @@ class HandLoop:
             self._told = ""
             # At once, whenever the last beat was; but of a fast device not every sample is kept.
             is_due = reading.time_s >= self._sample_s + 0.9 * BEAT_S
-            if is_due or reading.flags != self._written.flags:
+            if is_due or reading.flags != self._written.flags & ~REPEATED:
                 self._sample_s = reading.time_s
                 self._write(reading)
         if device.firmware != self._firmware:

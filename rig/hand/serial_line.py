@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from binascii import crc_hqx
+from collections import deque
 from typing import NamedTuple
 
 LONGEST_LINE = 80  # bytes, without its end
@@ -142,25 +143,66 @@ class LineReader:
 class SensorClock:
     """From a sensor's clock, which wraps around and drifts, to that of the rig.
 
-    A line arrives after it was written, never before. So the shortest delay so far says how the
-    clocks differ; it is let grow slowly, to follow a sensor whose clock is slow.
+    A line arrives after it was written, never before. So the clocks' relation is a straight line
+    that no arrival lies below: the edge of the lower convex hull of arrivals that spans the middle
+    of the last half minute (Zhang, Liu and Xia 2002, "Clock synchronization algorithms for network
+    measurements", IEEE INFOCOM). Its slope is that of a clock within `DRIFT`; in the first second,
+    which says too little of it, the sensor's clock is taken to be that slow.
     """
 
     DRIFT = 0.005  # that of a ceramic resonator; a crystal's is a hundredth of it
+    SPAN_S = 30.0
+    SETTLED_S = 1.0
 
     def __init__(self) -> None:
         self._last_us: int | None = None
         self._elapsed_us = 0
-        self._offset_s = 0.0
+        self._hull: deque[tuple[float, float]] = deque()  # elapsed time, how much later it arrived
 
     def time_s(self, time_us: int, arrived_s: float) -> float:
         """When a line was written, on the clock on which it arrived."""
         step_us = 0 if self._last_us is None else (time_us - self._last_us) % CLOCK_US
         if self._last_us is None or step_us >= CLOCK_US // 2:  # restarted
-            self._elapsed_us, self._offset_s = 0, arrived_s
+            self._elapsed_us = 0
+            self._hull.clear()
         else:
             self._elapsed_us += step_us
-            grown_s = self._offset_s + self.DRIFT * step_us * 1e-6
-            self._offset_s = min(grown_s, arrived_s - self._elapsed_us * 1e-6)
         self._last_us = time_us
-        return self._offset_s + self._elapsed_us * 1e-6
+        elapsed_s = self._elapsed_us * 1e-6
+        self._add(elapsed_s, arrived_s - elapsed_s)
+        drift = self._drift()
+        offset_s = min(later_s - drift * at_s for at_s, later_s in self._hull)
+        return min(elapsed_s + offset_s + drift * elapsed_s, arrived_s)
+
+    def _add(self, at_s: float, later_s: float) -> None:
+        hull = self._hull
+        if hull and at_s <= hull[-1][0]:
+            if later_s >= hull[-1][1]:
+                return
+            hull.pop()
+        while len(hull) > 1 and _is_above(hull[-1], hull[-2], (at_s, later_s)):
+            hull.pop()
+        hull.append((at_s, later_s))
+        while len(hull) > 2 and hull[1][0] < at_s - self.SPAN_S:
+            hull.popleft()
+
+    def _drift(self) -> float:
+        """Seconds by which the sensor's clock falls behind in one of its own."""
+        hull = self._hull
+        (first_s, _), (last_s, _) = hull[0], hull[-1]
+        if last_s - first_s < self.SETTLED_S:
+            return self.DRIFT
+        middle_s = (first_s + last_s) / 2
+        for index in range(1, len(hull)):
+            (t0, later0), (t1, later1) = hull[index - 1], hull[index]
+            if t1 >= middle_s:
+                break
+        return min(max((later1 - later0) / (t1 - t0), -self.DRIFT), self.DRIFT)
+
+
+def _is_above(
+    point: tuple[float, float], before: tuple[float, float], after: tuple[float, float]
+) -> bool:
+    """Whether a point lies on or above the line between two others."""
+    (x0, y0), (x, y), (x1, y1) = before, point, after
+    return (y - y0) * (x1 - x0) >= (y1 - y0) * (x - x0)

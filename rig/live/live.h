@@ -22,15 +22,17 @@
 #include <time.h>
 #endif
 
-#define TQ_LIVE_FORMAT 0x7471000000000002u /* changes with anything in this file */
+#define TQ_LIVE_FORMAT 0x7471000000000003u /* changes with anything in this file */
 #define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
 
 /* Flags of a reading. */
-enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16 };
+enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16,
+       TQ_REPEATED = 32 };
 /* Flags of a block. */
 enum { TQ_STALE = 1, TQ_UNDERFLOW = 2, TQ_NO_HEARTBEAT = 4 };
 
-/* A reading of the hand; NaN where nothing measures. */
+/* A reading of the hand; NaN where nothing measures. A repeated one is that before, for who looks at the
+   hand: the device has said nothing since, and nothing is rendered by it. */
 typedef struct {
     double time_s; /* of tq_now */
     double x_mm, y_mm, speed_mm_s, force_n;
@@ -41,12 +43,14 @@ typedef struct {
 typedef struct {
     double time_s;                         /* of tq_now, when it was called */
     double dac_time_s;                     /* when its first sample leaves, as the driver states */
-    double speed_mm_s, force_n;            /* the hand that was rendered */
+    double speed_mm_s, force_n;            /* the hand as read last; 0 where that is stale */
+    double hand_s;                         /* the hand of its first sample is that of this time */
     double square_sum_g2;                  /* of all its samples */
     uint64_t position;                     /* samples since the stream began */
+    uint64_t readings;                     /* how many were written up to the last that it took in */
     uint32_t frames, presentation;         /* what played in it last, 0 for nothing */
     float peak_g, seconds;                 /* largest absolute value; how long the call took */
-    uint32_t flags, spare;
+    uint32_t flags, taken;                 /* how many of them it was the first to look at */
 } tq_block;
 
 #define TQ_WORDS(type) (sizeof(type) / sizeof(uint64_t))

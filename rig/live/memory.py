@@ -25,10 +25,11 @@ except ImportError:  # no compiler at installation
     _live = None
 
 # Flags of a reading, and of a block.
-CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
+CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, REPEATED = 1, 2, 4, 8, 16, 32
 STALE, UNDERFLOW, NO_HEARTBEAT = 1, 2, 4
 
 HEARTBEAT_S = 1.0  # the session writes a heartbeat at least this often
+OLDEST_READING_S = 0.1  # a hand whose last reading is older counts as lifted off
 
 READING = np.dtype(
     [
@@ -47,14 +48,16 @@ BLOCK = np.dtype(
         ("dac_time_s", "f8"),
         ("speed_mm_s", "f8"),
         ("force_n", "f8"),
+        ("hand_s", "f8"),
         ("square_sum_g2", "f8"),
         ("position", "u8"),
+        ("readings", "u8"),
         ("frames", "u4"),
         ("presentation", "u4"),
         ("peak_g", "f4"),
         ("seconds", "f4"),
         ("flags", "u4"),
-        ("spare", "u4"),
+        ("taken", "u4"),
     ]
 )
 _PREFIX, _LOCK = "tactileq-live-", ".lock"
@@ -179,7 +182,7 @@ class Live:
         force_n : float
             ≥ 0.
         flags : int
-            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE.
+            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, REPEATED.
         """
         self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
 

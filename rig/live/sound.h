@@ -22,6 +22,9 @@
 #include "live.h"
 
 #define TQ_PIECE 256     /* samples that are rendered in one go */
+#define TQ_FRESH 64      /* readings that a block takes in at most, the latest */
+#define TQ_CLOCK_S 0.1   /* over which the times of blocks are smoothed */
+#define TQ_PAUSE_S 0.05  /* a block so much out of time begins a new sequence of them */
 #define TQ_UNDERFLOWED 4 /* of PortAudio: paOutputUnderflow */
 
 /* A voice with a number, by which the log knows it. */
@@ -48,11 +51,15 @@ struct tq_sound {
     tq_live *live;
     int channels, vibration, masking; /* channels count from 0; masking is -1 for none */
     float scale;                      /* full scale per g */
+    double rate_hz;
     double stale_s;                   /* a hand older than this counts as lifted off */
     double heartbeat_s;               /* the session looks as often at least while something plays */
     /* The callback's own. */
     double halted_s; /* when that was asked for which was halted last */
     int halted;      /* whether that is what is asked for now */
+    double due_s;    /* when the next block is */
+    tq_reading hand; /* the last that was taken in */
+    uint64_t readings; /* how many were written up to that */
     tq_real masking_level;
     uint64_t masking_key, position, signal_samples;
 };
@@ -66,13 +73,14 @@ static inline size_t tq_sound_size(void)
 }
 
 /* Silence. Before the callback is first called. Fades take `fade` samples. */
-static inline void tq_sound_start(tq_sound *s, tq_live *live, int fade, int channels, int vibration,
-                                  int masking, float scale, double stale_s, double heartbeat_s,
-                                  uint64_t masking_key)
+static inline void tq_sound_start(tq_sound *s, tq_live *live, double rate_hz, int fade, int channels,
+                                  int vibration, int masking, float scale, double stale_s,
+                                  double heartbeat_s, uint64_t masking_key)
 {
     TQ_FILL(s, 0, sizeof *s);
     tq_player_start(&s->player, fade);
-    s->live = live;
+    s->live = live, s->rate_hz = rate_hz;
+    s->hand.flags = TQ_GONE, s->due_s = -1;
     s->channels = channels, s->vibration = vibration, s->masking = masking;
     s->scale = scale, s->stale_s = stale_s, s->heartbeat_s = heartbeat_s;
     s->halted_s = -1;
@@ -138,15 +146,43 @@ static inline int tq_sound_plays(tq_sound *s)
 
 /* --- The callback ------------------------------------------------------------------------------ */
 
-/* The hand as it is now; 1 where it is too old, or gone, and counts as lifted off. */
-TQ_INLINE int tq_hand_now(const tq_sound *s, double now_s, double *speed, double *force)
+/* The time of a block of so many seconds that was called now. A callback comes late by a varying time, or
+   several come at once, but samples leave evenly: times are smoothed, so that the hand moves evenly, too. */
+TQ_INLINE double tq_block_time(tq_sound *s, double now_s, double seconds)
 {
-    tq_reading hand;
-    *speed = *force = 0;
-    if (!tq_latest(s->live, &hand) || hand.flags & TQ_GONE || !(now_s - hand.time_s <= s->stale_s))
-        return 1;
-    *speed = hand.speed_mm_s, *force = hand.force_n;
-    return 0;
+    double off = now_s - s->due_s, time_s;
+    if (!(off < TQ_PAUSE_S && off > -TQ_PAUSE_S))
+        s->due_s = now_s;
+    else
+        s->due_s += off * (seconds < TQ_CLOCK_S ? seconds / TQ_CLOCK_S : 1);
+    time_s = s->due_s;
+    s->due_s += seconds;
+    return time_s;
+}
+
+/* Takes in what was read of the hand up to the time of a block; what was read later is for the next. */
+TQ_INLINE void tq_hand_take(tq_sound *s, tq_block *block)
+{
+    tq_reading rows[TQ_FRESH];
+    uint64_t written = tq_readings_written(s->live), first;
+    uint64_t from = written - s->readings < TQ_FRESH ? s->readings : written < TQ_FRESH ? 0 : written - TQ_FRESH;
+    size_t count = tq_readings(s->live, from, rows, TQ_FRESH, &first), n;
+    for (n = 0; n < count && rows[n].time_s <= block->hand_s; n++) {
+        s->readings = first + n + 1;
+        if (rows[n].flags & TQ_REPEATED)
+            continue;
+        s->hand = rows[n];
+        if (s->hand.flags & TQ_GONE)
+            s->hand.speed_mm_s = s->hand.force_n = 0;
+        tq_player_read(&s->player, (tq_real)((block->hand_s - s->hand.time_s) * s->rate_hz),
+                       s->hand.speed_mm_s, s->hand.force_n);
+    }
+    block->readings = s->readings, block->taken = (uint32_t)n;
+    /* A hand that is too old counts as lifted off, as it does in the voices. */
+    if (s->hand.flags & TQ_GONE || !(block->hand_s - s->hand.time_s <= s->stale_s))
+        block->flags |= TQ_STALE;
+    else
+        block->speed_mm_s = s->hand.speed_mm_s, block->force_n = s->hand.force_n;
 }
 
 /* Halts what plays where the session has neither asked for it nor looked after it for too long. It stays
@@ -232,7 +268,7 @@ TQ_INLINE uint32_t tq_surface_now(tq_sound *s)
     return u ? u->presentation : 0;
 }
 
-/* The next samples, at most a piece, with the block's hand; `block` collects what the log says of them. */
+/* The next samples, at most a piece; `block` collects what the log says of them. */
 TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t count)
 {
     float piece[TQ_PIECE];
@@ -240,7 +276,7 @@ TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t 
     uint32_t before = tq_surface_now(s), after;
     size_t n;
     tq_sound_tell(s);
-    tq_player_render(&s->player, block->speed_mm_s, block->force_n, piece, count);
+    tq_player_render(&s->player, piece, count);
     after = tq_surface_now(s);
     if (before || after)
         block->presentation = after ? after : before;
@@ -263,35 +299,39 @@ TQ_INLINE void tq_piece_render(tq_sound *s, tq_block *block, float *out, size_t 
     s->position += count;
 }
 
-/* For PortAudio (PaStreamCallback): 32-bit floats, interleaved; `user` is the tq_sound. */
+/* A block that was called now, interleaved; what the log says of it. */
+static tq_block tq_sound_block(tq_sound *s, double now_s, float *out, size_t frames)
+{
+    tq_block block;
+    TQ_FILL(&block, 0, sizeof block);
+    block.time_s = now_s, block.hand_s = tq_block_time(s, now_s, (double)frames / s->rate_hz);
+    block.position = s->position, block.frames = (uint32_t)frames;
+    tq_hand_take(s, &block);
+    tq_sound_mind(s, now_s);
+    if (s->halted)
+        block.flags |= TQ_NO_HEARTBEAT;
+    TQ_FILL(out, 0, frames * (size_t)s->channels * sizeof *out);
+    while (frames) {
+        size_t count = frames < TQ_PIECE ? frames : TQ_PIECE;
+        tq_piece_render(s, &block, out, count);
+        out += count * (size_t)s->channels;
+        frames -= count;
+    }
+    return block;
+}
+
+/* For PortAudio (PaStreamCallback): 32-bit floats; `user` is the tq_sound. */
 static int tq_sound_callback(const void *in, void *out, unsigned long frames, const void *times,
                              unsigned long flags, void *user)
 {
     tq_sound *s = (tq_sound *)user;
     const double *moments = (const double *)times; /* of input, of the call, of output */
     double latency_s = moments ? moments[2] - moments[1] : 0;
-    tq_block block;
-    float *to = (float *)out;
-    size_t left = frames;
+    tq_block block = tq_sound_block(s, tq_now(), (float *)out, frames);
     (void)in;
-    TQ_FILL(&block, 0, sizeof block);
-    block.time_s = tq_now();
     block.dac_time_s = block.time_s + (latency_s > 0 && latency_s < 10 ? latency_s : 0);
-    block.position = s->position, block.frames = (uint32_t)frames;
-    if (tq_hand_now(s, block.time_s, &block.speed_mm_s, &block.force_n))
-        block.flags |= TQ_STALE;
     if (flags & TQ_UNDERFLOWED)
         block.flags |= TQ_UNDERFLOW;
-    tq_sound_mind(s, block.time_s);
-    if (s->halted)
-        block.flags |= TQ_NO_HEARTBEAT;
-    TQ_FILL(to, 0, frames * (size_t)s->channels * sizeof *to);
-    while (left) {
-        size_t count = left < TQ_PIECE ? left : TQ_PIECE;
-        tq_piece_render(s, &block, to, count);
-        to += count * (size_t)s->channels;
-        left -= count;
-    }
     block.seconds = (float)(tq_now() - block.time_s);
     tq_write_block(s->live, &block);
     return 0;

@@ -24,7 +24,15 @@ from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
 from rig.live.child import Child, ChildLost
-from rig.live.memory import HEARTBEAT_S, NO_HEARTBEAT, UNDERFLOW, Live, Rows, now_s
+from rig.live.memory import (
+    HEARTBEAT_S,
+    NO_HEARTBEAT,
+    OLDEST_READING_S,
+    UNDERFLOW,
+    Live,
+    Rows,
+    now_s,
+)
 
 STALLED_S = 0.5  # without a block: the server is gone
 LOUDEST_MASKING = 0.5
@@ -476,6 +484,7 @@ class SoundOutput:
             update_s=update_s,
             limits=self._limits,
             compensation=self._compensation,
+            hold_s=OLDEST_READING_S,
         )
 
 

@@ -23,10 +23,9 @@ import numpy as np
 from modeling.errors import InputError
 from modeling.rendering.compiled import filled, memory_reals, render_counters
 from rig.live.driven import settings_from_parent, tell
-from rig.live.memory import HEARTBEAT_S, Live, compiled, now_s
+from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live, compiled, now_s
 from rig.sound.devices import check_rate, find_device, portaudio
 
-STALE_S = 0.1
 FADE_S = 5e-3
 LONGEST_END_S = 1.0  # PortAudio hangs where its server has died
 _MILLION = 1_000_000
@@ -58,12 +57,13 @@ class Playing:
         self._lib.tq_sound_start(
             self._sound,
             self._live.address,
+            rate_hz,
             max(1, round(FADE_S * rate_hz)),
             channels,
             settings["vibration_channel"],
             -1 if masking is None else masking,
             settings["fullscale_per_g"],
-            STALE_S,
+            OLDEST_READING_S,
             HEARTBEAT_S,
             settings["masking_key"],
         )

@@ -105,7 +105,8 @@ static void block(size_t count)
     float out[LONGEST_BLOCK];
     size_t n;
     int full = player.level == FADE;
-    tq_player_render(&player, SPEED, FORCE, out, count);
+    tq_player_read(&player, 0, SPEED, FORCE);
+    tq_player_render(&player, out, count);
     for (n = 0; n < count; n++) {
         not_finite += !(out[n] - out[n] == 0);
         step = fmax(step, fabs((double)out[n] - (double)last));
@@ -174,7 +175,7 @@ static void stop(void)
     int n;
     tq_player_want(&player, NULL);
     block(FADE);
-    tq_player_render(&player, SPEED, FORCE, out, FADE);
+    tq_player_render(&player, out, FADE);
     for (n = 0; n < FADE; n++)
         not_silent += out[n] != 0;
 }

@@ -1,17 +1,23 @@
 /* Plays a script and writes what leaves; judges nothing.
 
    player_script play LIMITS FADE BLOCK SAMPLES EVENT...    single precision
-   player_script render LIMITS VOICE GENERATION             double; speeds (double) on standard input
+   player_script render LIMITS VOICE GENERATION             double; for each sample three doubles on
+                                                            standard input: whether the voice starts, how
+                                                            long ago the hand was read (below 0: not now),
+                                                            and its speed
 
    LIMITS are six arguments: peak, mean square, its share, longest, pause, silence. An EVENT is SAMPLE:A
    (or B or C: what is wanted), SAMPLE:a (the same, prepared anew unless it is in use), SAMPLE:-
-   (silence) or SAMPLE:NUMBER (the hand's speed). Blocks end where events are. */
+   (silence) or SAMPLE:NUMBER (the hand's speed). Blocks end where events are, and where the hand is read: at
+   every event, and every BEAT samples. */
 
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 
 #include "player_textures.h"
+
+enum { BEAT = 16 };
 
 static tq_player player;
 static tq_voice voices[TEXTURES];
@@ -57,11 +63,16 @@ static void play(int fade, size_t block, size_t samples, char **events)
         prepare(i, 0);
     tq_player_start(&player, fade);
     for (; n < samples; n += count) {
-        for (; *events && strtoul(*events, NULL, 10) <= n; events++)
+        int reads = n % BEAT == 0;
+        for (; *events && strtoul(*events, NULL, 10) <= n; events++, reads = 1)
             happen(strchr(*events, ':') + 1);
+        if (reads)
+            tq_player_read(&player, 0, speed, FORCE);
         until = *events ? strtoul(*events, NULL, 10) : samples;
+        if (until > n + BEAT - n % BEAT)
+            until = n + BEAT - n % BEAT;
         count = until - n < block ? until - n : block;
-        tq_player_render(&player, speed, FORCE, out, count);
+        tq_player_render(&player, out, count);
         fwrite(out, sizeof *out, count, stdout);
     }
     free(out);
@@ -69,10 +80,15 @@ static void play(int fade, size_t block, size_t samples, char **events)
 
 static void render(int voice, int generation)
 {
-    tq_real hand[2] = {0, FORCE}, out;
+    tq_state *state = &voices[voice].state;
+    tq_real row[3], out;
     prepare(voice, generation);
-    while (fread(hand, sizeof *hand, 1, stdin) == 1) {
-        tq_render(&textures[voice], &voices[voice].state, hand, hand + 1, &out, 1);
+    while (fread(row, sizeof row, 1, stdin) == 1) {
+        if (row[0] > 0)
+            memset(&state->hand, 0, sizeof state->hand);
+        if (row[1] >= 0)
+            tq_read(&textures[voice], state, row[1], row[2], FORCE);
+        tq_render_on(&textures[voice], state, &out, 1);
         fwrite(&out, sizeof out, 1, stdout);
     }
 }

@@ -35,6 +35,7 @@ static inline void fill_textures(void)
         t->signs = zeros, t->slews = slews;
         t->model_rate_hz = t->rate_hz = 5000, t->update_samples = 5;
         t->speed_change = 20, t->force_change = (tq_real)0.2, t->slope_share = (tq_real)0.2;
+        t->hold = 100, t->release = 15;
     }
 }
 

@@ -24,6 +24,7 @@ LANGUAGES = {
     "C++17": ["g++", "-x", "c++", "-std=c++17"],
 }
 NO_LIMITS = (0, 0, 0, 0, 0, 0)
+BEAT = 16  # samples from reading to reading of player_script.c
 FADE = 25
 
 Compile = Callable[..., Path]
@@ -83,6 +84,7 @@ class Model:
     level: int = 0
     generations: dict[str, int] = field(default_factory=lambda: dict.fromkeys("ABC", 0))
     timeline: list[tuple[tuple[str, int] | None, int]] = field(default_factory=list)
+    starts: list[bool] = field(default_factory=list)
 
     def happen(self, what: str) -> None:
         """An event of a script, but the hand's."""
@@ -93,6 +95,7 @@ class Model:
 
     def sample(self) -> None:
         """One more sample."""
+        self.starts.append(self.playing is None)
         if self.playing is None:
             self.playing = self.wanted
         if self.playing is None:
@@ -106,18 +109,21 @@ class Model:
 
 
 def expected(program: Path, events: Events, samples: int, *, fade: int = FADE) -> Array:
-    """A script without limits: every voice by itself, from `tq_render`, times its gain."""
-    model, hand = Model(fade=fade), np.empty(samples)
+    """A script without limits: every voice by itself, from `tq_render_on`, times its gain."""
+    model, hand = Model(fade=fade), np.empty((samples, 3))
     happening = {n: [what for _, what in group] for n, group in groupby(events, lambda e: e[0])}
-    speed = 0.0
+    speed, read = 0.0, 0
     for n in range(samples):
         for what in happening.get(n, []):
             if what[0].isdigit():
                 speed = float(what)
             else:
                 model.happen(what)
-        hand[n] = speed
         model.sample()
+        if n % BEAT == 0 or n in happening:
+            read = n
+        looks = model.starts[n] or read == n
+        hand[n] = model.starts[n], n - read if looks else -1, speed
     out = np.zeros(samples)
     for voice in {voice for voice, _ in model.timeline if voice}:
         where = np.array([sounding == voice for sounding, _ in model.timeline])

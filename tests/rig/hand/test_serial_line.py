@@ -273,7 +273,7 @@ def test_the_clock_finds_the_shortest_delay_and_wraps_around() -> None:
         for t in times
     ]
     error = np.array(found) - (500.0 + times)
-    # 1 ms is the shortest delay; 10 µs a line the clock may be let grow until the next short one.
+    # 1 ms is the shortest delay.
     assert (error[500:] > 0.0009).all()
     assert np.median(error[500:]) < 0.0012
     assert error[500:].max() < 0.002

@@ -12,10 +12,8 @@ from contextlib import suppress
 import numpy as np
 import pytest
 
-from modeling import InputError, Renderer
-from modeling.arrays import Floats
+from modeling import InputError
 from rig.hand import serial_sensor
-from rig.hand.following import Follower
 from rig.hand.loop import HandLoop
 from rig.hand.reader import HandReader
 from rig.hand.sample import ConnectedDevice, DeviceLost
@@ -23,10 +21,9 @@ from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
-from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
-from tests.rig.waiting import is_gone, wait_until
+from tests.rig.waiting import is_gone, said, wait_until
 
 
 @pytest.fixture
@@ -179,53 +176,6 @@ def test_held_up_again_and_again_the_hands_process_blames_no_clock(
     assert all(re.match(late, fault) or "got none for 0.1 s" in fault for fault in told)
 
 
-def stroke_line(number: int, time_s: float) -> bytes:
-    """To and fro at 2 Hz, up to 300 mm/s."""
-    x_um = round(300e3 / (4 * np.pi) * (1 - np.cos(4 * np.pi * time_s)))
-    time_us = round(1e6 * time_s)
-    return encode(SensorLine(number, time_us, (x_um, 0), 2000, contact=True, button=False))
-
-
-def rendered_error_db(times_s: Floats, settings: HandSettings, port: ScriptedPort) -> float:
-    """Canvas by a sensor's lines, which are read as they come, against the hand that it tells of.
-
-    That is the true hand, later by the delay of the tracking filter; the start is left out.
-    """
-    count, rate_hz, done, parts = 5000, 5000, 0, []
-    sensor = SerialSensor(port)  # type: ignore[arg-type]
-    follower = Follower(settings, rest_s=sensor.rest_s)
-    renderer = Renderer(planted_texture("canvas"))
-    for number, time_s in enumerate(times_s.tolist()):
-        port.now_s, port.waits = time_s, stroke_line(number, time_s)
-        now = int(np.ceil(time_s * rate_hz))
-        parts.append(renderer.render_on(now - done))
-        done = now
-        for sample in sensor.read():
-            reading = follower.update(sample)
-            ago = max(0.0, now - reading.time_s * rate_hz)
-            renderer.read(reading.speed_mm_s, reading.force_n, ago=ago)
-    rendered = np.concatenate([*parts, renderer.render_on(max(0, count - done))])[:count]
-    speed = 300 * np.sin(4 * np.pi * (np.arange(count) / rate_hz - settings.filter_delay_s))
-    exact = Renderer(planted_texture("canvas"), update_samples=1)
-    wanted = exact.render(speed, np.full(count, 2.0))
-    settled = slice(count // 5, None)
-    error = (rendered - wanted)[settled]
-    return float(10 * np.log10(np.mean(error**2) / np.mean(wanted[settled] ** 2)))
-
-
-def test_irregular_and_missing_lines_are_within_6_db_of_regular_and_whole_ones(
-    monkeypatch: pytest.MonkeyPatch, board: Board
-) -> None:
-    settings, rng = settings_of(board), np.random.default_rng(0)
-    beat = np.arange(0, 1, 1e-3)
-    jittered, kept = beat + rng.uniform(0, 1e-3, beat.size), rng.uniform(size=beat.size) > 0.05
-    regular, *others = (
-        rendered_error_db(times_s, settings, ScriptedPort(monkeypatch, at_constant_speed))
-        for times_s in (beat, jittered, beat[kept], jittered[kept])
-    )
-    assert max(others) <= regular + 6
-
-
 def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
     board: Board, live: Live
 ) -> None:
@@ -240,7 +190,7 @@ def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
     after = rows[rows["time_s"] > rows["time_s"][0] + 0.6]  # the clock has wrapped around
     assert np.median(after["speed_mm_s"]) == pytest.approx(100, rel=0.02)
     assert set(after["force_n"]) == {1.5}
-    assert set(after["flags"]) == {CONTACT, CONTACT | BUTTON}
+    assert set(said(after)) == {CONTACT, CONTACT | BUTTON}
 
 
 def test_the_firmware_that_a_sensor_states_is_told(board: Board, live: Live) -> None:
@@ -274,7 +224,7 @@ def test_a_speed_is_taken_as_it_is(board: Board, live: Live) -> None:
         assert latest is not None
         assert latest["speed_mm_s"] == -80
         assert latest["force_n"] == 2
-        assert latest["flags"] == CONTACT | FORCE_ASSUMED
+        assert said(latest) == CONTACT | FORCE_ASSUMED
         assert np.isnan(latest["x_mm"])
 
 
@@ -296,7 +246,7 @@ def test_a_force_below_the_least_is_no_contact(board: Board, live: Live) -> None
         wait_until(lambda: live.readings_written > 20)
         latest = live.latest()
         assert latest is not None
-        assert (latest["force_n"], latest["flags"]) == (0, 0)
+        assert (latest["force_n"], said(latest)) == (0, 0)
 
 
 def test_unplugged_it_is_gone_and_said_once(board: Board, live: Live) -> None:

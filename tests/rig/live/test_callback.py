@@ -3,107 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from modeling.rendering.compiled import filled, filled_texture, memory_reals
-from modeling.rendering.lattice import lattice_fields
 from modeling.rendering.limits import Limits
-from modeling.rendering.noise import stream_key
-from modeling.rendering.plan import plan_for
-from rig.live.memory import CONTACT, NO_HEARTBEAT, STALE, Live, Rows, compiled, now_s
-from stimuli.planted.textures import planted_texture
+from rig.live.memory import NO_HEARTBEAT, STALE, Live
 from tests.modeling.rendering.lattices import in_python, planted_ar
-
-RATE_HZ = 48000.0
-FADE = 240
-Array = np.ndarray[Any, np.dtype[Any]]
-
-
-class Callback:
-    """What the sound process prepares, with the callback called here."""
-
-    def __init__(self, live: Live, *, scale: float, masking: int = -1) -> None:
-        module = compiled()
-        self._ffi, self._lib, self.live = module.ffi, module.lib, live
-        self._kept: list[Any] = [self._ffi.new("char[]", self._lib.tq_sound_size())]
-        self._sound = self._ffi.cast("tq_sound *", self._kept[0])
-        self.asked_age_s = 1e6
-        self._lib.tq_sound_start(self._sound, live.address, FADE, 2, 0, masking, scale, 0.1, 1.0, 5)
-
-    def texture(self, number: int, limits: Limits, gain: float = 1.0) -> None:
-        made = planted_texture("MDF")
-        made = replace(made, noise_gains=gain * made.noise_gains, gains=gain * made.gains)
-        fields = plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits).texture(made)
-        texture, arrays = filled_texture(self._ffi, fields, np.float64)
-        memory = self._ffi.new("tq_real[]", memory_reals(self._lib, texture))
-        source = self._ffi.new("tq_surface *")
-        self._kept += [texture, arrays, memory, source]
-        self._lib.tq_surface_start(source, texture, memory, 1, number)
-        self.want(surface=source)
-
-    def lattice(self, number: int, limits: Limits, gain: float = 1.0) -> None:
-        """An all-pole model."""
-        made = planted_ar(gain)
-        fields = lattice_fields(made, plan_for(made.rate_hz, rate_hz=RATE_HZ, limits=limits))
-        texture, arrays = filled(self._ffi, "tq_texture", fields.texture, real=np.float64)
-        lattice, more = filled(self._ffi, "tq_lattice", fields.lattice, real=np.float64)
-        memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(texture, lattice))
-        source = self._ffi.new("tq_surface *")
-        self._kept += [texture, lattice, arrays, more, memory, source]
-        key = int(stream_key(0))
-        self._lib.tq_surface_start_lattice(source, texture, lattice, memory, key, number)
-        self.want(surface=source)
-
-    def signal(self, number: int, samples_g: Array) -> None:
-        samples = samples_g.astype(np.float32)
-        held, source = self._ffi.from_buffer("float[]", samples), self._ffi.new("tq_signal *")
-        self._kept += [samples, held, source]
-        self._lib.tq_signal_start(source, held, samples.size, number)
-        self.want(signal=source)
-
-    def silence(self) -> None:
-        self.want()
-
-    def want(self, *, surface: Any = None, signal: Any = None) -> None:
-        """Asked for so long ago, without more ado, that only heartbeats count."""
-        none = self._ffi.NULL
-        asked_s = now_s() - self.asked_age_s
-        self._lib.tq_sound_want(self._sound, surface or none, signal or none, asked_s)
-
-    def mask(self, level: float) -> None:
-        self._lib.tq_sound_mask(self._sound, round(1e6 * level))
-
-    def play(self, frames: int, *, speed_mm_s: float = 150.0, force_n: float = 1.5) -> Array:
-        """The next samples of the vibration, (frames,), for a hand read just before.
-
-        Whoever drives it has just looked, too.
-        """
-        self.live.heartbeat()
-        self.live.write_reading(
-            now_s(), 0.0, y_mm=0.0, speed_mm_s=speed_mm_s, force_n=force_n, flags=CONTACT
-        )
-        return self.play_on(frames)
-
-    def play_on(self, frames: int) -> Array:
-        """The same for the hand as it was read last."""
-        out = np.full((frames, 2), np.nan, dtype=np.float32)
-        none = self._ffi.NULL
-        into = self._ffi.from_buffer("float[]", out)
-        self._lib.tq_sound_callback(none, into, frames, none, 0, self._sound)
-        self.masked = out[:, 1]
-        return out[:, 0]
-
-    def look(self, age_s: float) -> None:
-        """Write a heartbeat of this age."""
-        self._lib.tq_heartbeat(self.live.address, now_s() - age_s)
-
-    def log(self) -> Rows:
-        return self.live.blocks_since(0)[1]
+from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
 
 
 @pytest.fixture
@@ -184,7 +93,7 @@ def test_a_signal_counts_for_how_long_vibration_may_last(live: Live, count: int)
     callback.signal(1, np.full(count, 0.1))
     first = callback.play(count)
     callback.texture(2, Limits(peak=1.0, duration_s=0.2, pause_s=0.1))
-    played = np.concatenate((first, callback.play(14400)))
+    played = np.concatenate((first, *(callback.play(480) for _ in range(30))))
     assert np.flatnonzero(played)[-1] == 0.2 * RATE_HZ - 1
 
 
@@ -213,7 +122,7 @@ def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None
     callback = Callback(live, scale=1.0)
     callback.lattice(1, Limits(peak=5.0), 0.05)
     before = callback.play(4800)
-    live.write_reading(now_s() - 1, 0.0, y_mm=0.0, speed_mm_s=150.0, force_n=1.5, flags=CONTACT)
+    callback.read(1.0, 150.0, 1.5)
     after = callback.play_on(4800)
     assert np.count_nonzero(before) > 4700
     # An update, 3 ms for the end of contact to the next update, 5 ms of fade, and 37 samples of the
@@ -234,8 +143,9 @@ def moving(callback: Callback, number: int) -> None:
 
 
 def still_loud(callback: Callback, age_s: float) -> Array:
-    """Four blocks of 256 under the hand as read last, with a last heartbeat of this age."""
+    """Four blocks of 256 under a moving hand, with a last heartbeat of this age."""
     callback.look(age_s)
+    callback.read(0.0, 150.0, 1.5)
     return callback.play_on(1024)
 
 
