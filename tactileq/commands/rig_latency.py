@@ -60,7 +60,7 @@ def rig_latency(
         )
     summary = summary_of(latencies, seed=seed)
     parts = parts_of(seen.readings["time_s"], seen.blocks, rate_hz=loaded.sound.rate_hz)
-    _show(summary, parts, loop_s=loop_s, filter_s=loaded.hand.filter_delay_s.value)
+    _show(summary, parts, loop_s=loop_s, stated_s=_stated_delays_s(loaded))
     check_latency(summary, accepted=accept)
     how = "strokes by hand" if hand else "a scripted hand that steps"
     figures = latency_figures(loaded, summary, how=how, accepted=accept, today=date.today())
@@ -121,7 +121,20 @@ def _measured(
     return seen, [None if lag is None else lag + delay_s for lag in lags], loop_s
 
 
-def _show(summary: LatencySummary, parts: list[Part], *, loop_s: float, filter_s: float) -> None:
+def _stated_delays_s(rig: RigFile) -> dict[str, float]:
+    from modeling.rendering.plan import plan_for
+    from rig.calibration.trials import MODEL_RATE_HZ
+
+    plan = plan_for(MODEL_RATE_HZ, rate_hz=rig.sound.rate_hz)
+    return {
+        "filter of the hand": rig.hand.filter_delay_s.value,
+        "interpolation to the card's rate": plan.delay_s,
+    }
+
+
+def _show(
+    summary: LatencySummary, parts: list[Part], *, loop_s: float, stated_s: dict[str, float]
+) -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -131,7 +144,8 @@ def _show(summary: LatencySummary, parts: list[Part], *, loop_s: float, filter_s
     table.add_column("ms")
     table.add_column("median", justify="right")
     table.add_column("95 % within", justify="right")
-    table.add_row("filter of the hand, as stated", f"{1e3 * filter_s:.1f}", "")
+    for name, delay_s in stated_s.items():
+        table.add_row(f"{name}, as stated", f"{1e3 * delay_s:.1f}", "")
     for part in parts:
         table.add_row(part.name, f"{part.median_ms:.1f}", f"{part.p95_ms:.1f}")
     table.add_row("output to record (loop-back)", f"{1e3 * loop_s:.1f}", "")
