@@ -237,13 +237,13 @@ def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) 
     Returns
     -------
     list of Part
-        Age of the reading that a block renders; the block itself, since a step waits up to so
+        Age of the reading that a block extrapolates; the block itself, since a step waits up to so
         long for the next; from there to the card's output, as its driver states it.
     """
     times = np.asarray(reading_times_s, dtype=np.float64)
-    index = np.searchsorted(times, blocks["time_s"], side="right") - 1
+    index = np.searchsorted(times, blocks["hand_s"], side="right") - 1
     known = index >= 0
-    ages = blocks["time_s"][known] - times[index[known]]
+    ages = blocks["hand_s"][known] - times[index[known]]
     parts = {
         "age of the reading in a block": ages,
         "one block": blocks["frames"] / rate_hz,

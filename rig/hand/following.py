@@ -8,7 +8,7 @@ from typing import NamedTuple
 from rig.hand.sample import DeviceLost, Sample
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import TrackingFilter
-from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, REPEATED, SIMULATED, Live
+from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, SIMULATED, Live
 
 
 class Reading(NamedTuple):
@@ -64,11 +64,11 @@ class Follower:
             speed = self._filter.update(sample.time_s, sample.x_mm, sample.y_mm)
         return self._reading(sample, sample.time_s, speed_mm_s=speed)
 
-    def at(self, time_s: float) -> Reading:
+    def at(self, time_s: float) -> Reading | None:
         """The reading at a later moment at which the device has said nothing new.
 
-        Until the device rests it repeats the last one and is marked so: the hand has moved on, and
-        what is rendered extrapolates from the time of the sample.
+        None while the hand is likely to have moved on: what is rendered extrapolates from the last
+        sample. That is while it touches, for half of the time after which the device rests.
         """
         sample = self._sample
         if sample is None:
@@ -77,9 +77,8 @@ class Follower:
         if speed is None:
             speed = self._filter.at(time_s)
         reading = self._reading(sample, time_s, speed_mm_s=speed)
-        if time_s - sample.time_s > self._rest_s:
-            return reading
-        return reading._replace(flags=reading.flags | REPEATED)
+        moves_on = reading.flags & CONTACT and time_s - sample.time_s <= self._rest_s / 2
+        return None if moves_on else reading
 
     def gone(self, time_s: float) -> Reading:
         """The reading without a device: nothing moves, nothing touches."""

@@ -1,4 +1,4 @@
-"""From a device to readings in shared memory: at least 500 per second with any device."""
+"""From a device to readings in shared memory: as the samples come, and every 2 ms at rest."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from rig.hand.following import Follower, Reading
 from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
-from rig.live.memory import REPEATED, Live, now_s
+from rig.live.memory import Live, now_s
 
-BEAT_S = 0.002  # readings are written so often, also at rest
+BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 COUNTS_S = 1.0  # between reports of what was read and lost
 
@@ -53,6 +53,7 @@ class HandLoop:
         self._follower = Follower(settings, rest_s=REST_S)
         self._written = Reading(float("-inf"), 0.0, 0.0, 0.0, 0.0, 0)
         self._sample_s = float("-inf")  # of the last sample that was written
+        self._unwritten: Reading | None = None  # of the last sample, if it was not
         self._beat_s = 0.0
         self._again_s = 0.0
         self._attempts: queue.SimpleQueue[Device | None] = queue.SimpleQueue()
@@ -72,6 +73,7 @@ class HandLoop:
         self._device = device
         self._late = 0
         self._sample_s = float("-inf")
+        self._unwritten = None
         self._follower = Follower(self._settings, rest_s=device.rest_s)
         return device.name
 
@@ -89,7 +91,12 @@ class HandLoop:
             except DeviceLost as lost:
                 self._lose(str(lost))
         if now >= self._beat_s:
-            self._write(self._follower.at(now) if self._device else self._follower.gone(now))
+            self._beat_s = now + BEAT_S
+            reading = self._unwritten or self._follower.at(now)
+            if self._device is None:
+                self._write(self._follower.gone(now))
+            elif reading is not None:
+                self._write(reading)
 
     def close(self) -> None:
         """Write a last reading without contact, and release the device."""
@@ -107,9 +114,11 @@ class HandLoop:
             self._told = ""
             # At once, whenever the last beat was; but of a fast device not every sample is kept.
             is_due = reading.time_s >= self._sample_s + 0.9 * BEAT_S
-            if is_due or reading.flags != self._written.flags & ~REPEATED:
+            if is_due or reading.flags != self._written.flags:
                 self._sample_s = reading.time_s
                 self._write(reading)
+            else:
+                self._unwritten = reading
         if device.firmware != self._firmware:
             self._firmware = device.firmware
             self._tell({"firmware": self._firmware})
@@ -165,6 +174,7 @@ class HandLoop:
 
     def _write(self, reading: Reading) -> None:
         """Write a reading, none earlier than the one before."""
+        self._unwritten = None
         self._written = reading._replace(time_s=max(reading.time_s, self._written.time_s))
         self._written.write(self._live)
         self._beat_s = now_s() + BEAT_S

@@ -153,6 +153,7 @@ class SensorClock:
     DRIFT = 0.005  # that of a ceramic resonator; a crystal's is a hundredth of it
     SPAN_S = 30.0
     SETTLED_S = 1.0
+    MOST = 64  # corners of the hull; usually there are a few
 
     def __init__(self) -> None:
         self._last_us: int | None = None
@@ -183,8 +184,14 @@ class SensorClock:
         while len(hull) > 1 and _is_above(hull[-1], hull[-2], (at_s, later_s)):
             hull.pop()
         hull.append((at_s, later_s))
-        while len(hull) > 2 and hull[1][0] < at_s - self.SPAN_S:
+        while len(hull) > 1 and self._is_of_no_use(at_s):
             hull.popleft()
+
+    def _is_of_no_use(self, at_s: float) -> bool:
+        """Whether the oldest arrival is too old, or of before a step of the sensor's clock."""
+        (t0, later0), (t1, later1) = self._hull[0], self._hull[1]
+        stepped = later1 - later0 < -self.DRIFT * (t1 - t0)
+        return stepped or t1 < at_s - self.SPAN_S or len(self._hull) > self.MOST
 
     def _drift(self) -> float:
         """Seconds by which the sensor's clock falls behind in one of its own."""

@@ -26,13 +26,11 @@
 #define TQ_RING 16384                      /* a power of 2; half a minute of readings or blocks */
 
 /* Flags of a reading. */
-enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16,
-       TQ_REPEATED = 32 };
+enum { TQ_CONTACT = 1, TQ_BUTTON = 2, TQ_FORCE_ASSUMED = 4, TQ_SIMULATED = 8, TQ_GONE = 16 };
 /* Flags of a block. */
 enum { TQ_STALE = 1, TQ_UNDERFLOW = 2, TQ_NO_HEARTBEAT = 4 };
 
-/* A reading of the hand; NaN where nothing measures. A repeated one is that before, for who looks at the
-   hand: the device has said nothing since, and nothing is rendered by it. */
+/* A reading of the hand; NaN where nothing measures. */
 typedef struct {
     double time_s; /* of tq_now */
     double x_mm, y_mm, speed_mm_s, force_n;

@@ -25,7 +25,7 @@ except ImportError:  # no compiler at installation
     _live = None
 
 # Flags of a reading, and of a block.
-CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, REPEATED = 1, 2, 4, 8, 16, 32
+CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE = 1, 2, 4, 8, 16
 STALE, UNDERFLOW, NO_HEARTBEAT = 1, 2, 4
 
 HEARTBEAT_S = 1.0  # the session writes a heartbeat at least this often
@@ -182,7 +182,7 @@ class Live:
         force_n : float
             ≥ 0.
         flags : int
-            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE, REPEATED.
+            Sum of CONTACT, BUTTON, FORCE_ASSUMED, SIMULATED, GONE.
         """
         self._lib.tq_write_reading(self.address, time_s, x_mm, y_mm, speed_mm_s, force_n, flags)
 

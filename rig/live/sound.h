@@ -169,20 +169,20 @@ TQ_INLINE void tq_hand_take(tq_sound *s, tq_block *block)
     size_t count = tq_readings(s->live, from, rows, TQ_FRESH, &first), n;
     for (n = 0; n < count && rows[n].time_s <= block->hand_s; n++) {
         s->readings = first + n + 1;
-        if (rows[n].flags & TQ_REPEATED)
-            continue;
         s->hand = rows[n];
         if (s->hand.flags & TQ_GONE)
-            s->hand.speed_mm_s = s->hand.force_n = 0;
+            continue;
         tq_player_read(&s->player, (tq_real)((block->hand_s - s->hand.time_s) * s->rate_hz),
                        s->hand.speed_mm_s, s->hand.force_n);
     }
     block->readings = s->readings, block->taken = (uint32_t)n;
-    /* A hand that is too old counts as lifted off, as it does in the voices. */
+    /* A hand that is gone, or too old, counts as lifted off. */
     if (s->hand.flags & TQ_GONE || !(block->hand_s - s->hand.time_s <= s->stale_s))
         block->flags |= TQ_STALE;
     else
         block->speed_mm_s = s->hand.speed_mm_s, block->force_n = s->hand.force_n;
+    if (!(block->force_n > 0)) /* nobody needs to say again that there is no contact */
+        tq_player_read(&s->player, 0, 0, 0);
 }
 
 /* Halts what plays where the session has neither asked for it nor looked after it for too long. It stays

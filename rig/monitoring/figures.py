@@ -132,8 +132,8 @@ class Monitor:
 
     def _delays(self) -> dict[str, Any]:
         rows, times = self._recent_blocks, self._recent_readings
-        index = np.searchsorted(times, rows["time_s"], side="right") - 1
-        ages = rows["time_s"][index >= 0] - times[index[index >= 0]] if times.size else times
+        index = np.searchsorted(times, rows["hand_s"], side="right") - 1
+        ages = rows["hand_s"][index >= 0] - times[index[index >= 0]] if times.size else times
         shares = np.concatenate(self._shares)
         self._shares = [shares]
         p50, p999 = np.quantile(shares, [0.5, 0.999]) if shares.size else (np.nan, np.nan)

@@ -484,7 +484,7 @@ class SoundOutput:
             update_s=update_s,
             limits=self._limits,
             compensation=self._compensation,
-            hold_s=OLDEST_READING_S,
+            hold_s=OLDEST_READING_S + self._block_s,
         )
 
 

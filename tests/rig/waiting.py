@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import Any
 
-from rig.live.memory import GONE, REPEATED, Live
+from rig.live.memory import GONE, Live
 
 
 def wait_until(holds: Callable[[], bool], *, seconds: float = 20) -> None:
@@ -21,8 +20,3 @@ def is_gone(live: Live) -> bool:
     """Whether the latest reading says that the hand's device is gone."""
     latest = live.latest()
     return latest is not None and bool(latest["flags"] & GONE)
-
-
-def said(readings: Any) -> Any:
-    """The flags of readings, (n,) or one, but for whether they repeat the one before."""
-    return readings["flags"] - (readings["flags"] & REPEATED)

@@ -115,6 +115,7 @@ def test_above_40_ms_somebody_has_to_accept_it() -> None:
 def test_the_log_of_blocks_says_what_its_parts_are() -> None:
     blocks = np.zeros(100, dtype=BLOCK)
     blocks["time_s"] = 10 + np.arange(100) * 128 / RATE_HZ
+    blocks["hand_s"] = blocks["time_s"]
     blocks["dac_time_s"] = blocks["time_s"] + 0.005
     blocks["frames"] = 128
     readings = 9.999 + np.arange(1000) * 0.002

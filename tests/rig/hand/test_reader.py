@@ -23,7 +23,7 @@ from rig.hand.settings import HandSettings
 from rig.hand.window import Pointer
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
 from tests.refusals import refused
-from tests.rig.waiting import is_gone, said, wait_until
+from tests.rig.waiting import is_gone, wait_until
 
 HOLD = HandSettings(kind="scripted", script="hold", speed_mm_s=120.0, force_n=2.0)
 
@@ -48,7 +48,7 @@ def test_a_held_hand_is_read_with_its_speed_and_force(live: Live) -> None:
     settled = rows[20:]  # 40 ms
     np.testing.assert_allclose(settled["speed_mm_s"], 120, rtol=1e-6)
     assert set(settled["force_n"]) == {2.0}
-    assert set(said(settled)) == {CONTACT | SIMULATED}
+    assert set(settled["flags"]) == {CONTACT | SIMULATED}
     assert (np.diff(rows["time_s"]) >= 0).all()
     assert np.median(np.diff(rows["time_s"])) <= 0.005  # 200 a second or more, by their own clock
     assert abs(rows["time_s"][-1] - now_s()) < 20
@@ -268,11 +268,11 @@ def test_a_window_pushes_pixels_and_force_is_assumed(live: Live) -> None:
             reader.push(1000 * (now_s() - start_s), 0.0, button=True)
             time.sleep(0.005)
         _, rows = live.readings_since(0)
-        touching = rows[said(rows) == CONTACT | BUTTON | FORCE_ASSUMED]
+        touching = rows[rows["flags"] == CONTACT | BUTTON | FORCE_ASSUMED]
         assert np.median(touching["speed_mm_s"][20:]) == pytest.approx(250, rel=0.05)
         assert set(touching["force_n"]) == {1.0}
         reader.push(5000.0, 0.0, down=False)
-        wait_until(lambda: said(live.latest()) == FORCE_ASSUMED)  # type: ignore[index]
+        wait_until(lambda: live.latest()["flags"] == FORCE_ASSUMED)  # type: ignore[index]
         assert live.latest()["force_n"] == 0  # type: ignore[index]
         wait_until(lambda: live.latest()["speed_mm_s"] == 0)  # type: ignore[index]
     assert is_gone(live)

@@ -294,6 +294,21 @@ def test_a_board_that_starts_anew_starts_its_clock_anew() -> None:
     assert clock.time_s(1_000, 23.0) == 23.0
 
 
+@pytest.mark.parametrize("step_us", [1_000_000, 2**32 - 40 * 60_000_000])
+def test_a_clock_that_leaps_forward_is_followed_at_once(step_us: int) -> None:
+    """As after the computer slept, or of a board that starts anew after 40 minutes."""
+    clock, times = SensorClock(), np.arange(0, 20, 0.005)
+    leap = np.where(times >= 10, step_us, 0)
+    late_s = np.random.default_rng(6).uniform(0, 1e-3, times.size)
+    found = [
+        clock.time_s((round(t * 1e6) + int(more)) % 2**32, 50 + t + late)
+        for t, more, late in zip(times, leap, late_s, strict=True)
+    ]
+    error_s = np.array(found) - (50 + times)
+    assert np.abs(error_s[times > 1]).max() < 2e-3
+    assert np.abs(error_s[(times > 3) & (times < 10) | (times > 12)]).max() < 1e-4
+
+
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 2**32 - 1), st.floats(0, 1)), max_size=30))
 def test_no_line_is_older_than_its_arrival(steps: list[tuple[int, float]]) -> None:

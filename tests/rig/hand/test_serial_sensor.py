@@ -23,7 +23,7 @@ from rig.hand.settings import HandSettings
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, GONE, Live
 from tests.refusals import refused
 from tests.rig.hand.board import PERIOD_US, Board, at_constant_speed, stating
-from tests.rig.waiting import is_gone, said, wait_until
+from tests.rig.waiting import is_gone, wait_until
 
 
 @pytest.fixture
@@ -190,7 +190,7 @@ def test_positions_become_speed_and_force_across_the_wrap_of_the_clock(
     after = rows[rows["time_s"] > rows["time_s"][0] + 0.6]  # the clock has wrapped around
     assert np.median(after["speed_mm_s"]) == pytest.approx(100, rel=0.02)
     assert set(after["force_n"]) == {1.5}
-    assert set(said(after)) == {CONTACT, CONTACT | BUTTON}
+    assert set(after["flags"]) == {CONTACT, CONTACT | BUTTON}
 
 
 def test_the_firmware_that_a_sensor_states_is_told(board: Board, live: Live) -> None:
@@ -224,7 +224,7 @@ def test_a_speed_is_taken_as_it_is(board: Board, live: Live) -> None:
         assert latest is not None
         assert latest["speed_mm_s"] == -80
         assert latest["force_n"] == 2
-        assert said(latest) == CONTACT | FORCE_ASSUMED
+        assert latest["flags"] == CONTACT | FORCE_ASSUMED
         assert np.isnan(latest["x_mm"])
 
 
@@ -246,7 +246,7 @@ def test_a_force_below_the_least_is_no_contact(board: Board, live: Live) -> None
         wait_until(lambda: live.readings_written > 20)
         latest = live.latest()
         assert latest is not None
-        assert (latest["force_n"], said(latest)) == (0, 0)
+        assert (latest["force_n"], latest["flags"]) == (0, 0)
 
 
 def test_unplugged_it_is_gone_and_said_once(board: Board, live: Live) -> None:

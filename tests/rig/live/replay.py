@@ -13,16 +13,18 @@ from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import plan_for
 from modeling.rendering.reference.engine import PythonEngine
 from modeling.rendering.reference.lattice import LatticeFilter
-from rig.live.memory import OLDEST_READING_S, REPEATED, Live, Rows
+from rig.live.memory import GONE, OLDEST_READING_S, Live, Rows
 
 PIECE = 256  # samples that the callback renders in one go
 
 
 def engine_of(
-    made: Any, rate_hz: float, *, seed: int, stream: int, limits: Limits
+    made: Any, rate_hz: float, *, block: int, seed: int, stream: int, limits: Limits
 ) -> CompiledEngine | PythonEngine:
     """What renders a model in a rig."""
-    plan = plan_for(made.rate_hz, rate_hz=rate_hz, limits=limits, hold_s=OLDEST_READING_S)
+    plan = plan_for(
+        made.rate_hz, rate_hz=rate_hz, limits=limits, hold_s=OLDEST_READING_S + block / rate_hz
+    )
     key = stream_key(seed, stream)
     if isinstance(made, ARModel):
         return PythonEngine(LatticeFilter(made, plan), plan, key=key)
@@ -41,14 +43,15 @@ class Log:
         first = self._count - self._readings.size
         last = int(block["readings"])
         rows = self._readings[last - int(block["taken"]) - first : last - first]
-        return [
+        hands = [
             (
                 float((block["hand_s"] - row["time_s"]) * self._rate_hz),
                 float(row["speed_mm_s"]),
                 float(row["force_n"]),
             )
-            for row in rows[rows["flags"] & REPEATED == 0]
+            for row in rows[rows["flags"] & GONE == 0]
         ]
+        return [*hands, (0.0, 0.0, 0.0)] if not block["force_n"] > 0 else hands
 
     def played(self, blocks: Rows, number: int, engine: Any) -> np.ndarray[Any, np.dtype[Any]]:
         """A presentation among these blocks (BLOCK), before its fades; readings precede it."""

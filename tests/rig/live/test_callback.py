@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import lfilter
 
 from modeling.rendering.limits import Limits
-from rig.live.memory import NO_HEARTBEAT, STALE, Live
+from rig.live.memory import CONTACT, GONE, NO_HEARTBEAT, STALE, Live
 from tests.modeling.rendering.lattices import in_python, planted_ar
 from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
 
@@ -129,6 +129,20 @@ def test_a_hand_that_is_gone_ends_an_all_pole_model_in_zeros(live: Live) -> None
     # model's 5 kHz that are interpolated.
     assert not after[int((0.001 + 0.004 + 0.005 + 37 / 5000) * RATE_HZ) :].any()
     assert callback.log()["flags"].tolist() == [0, STALE]
+
+
+@pytest.mark.parametrize("flags", [CONTACT, GONE])
+def test_one_reading_without_contact_or_device_ends_in_silence(live: Live, flags: int) -> None:
+    """Nobody says so again: the process that reads the hand has ended, or a pen is lifted."""
+    callback = Callback(live, scale=1.0)
+    callback.texture(1, Limits(peak=5.0))
+    for _ in range(40):
+        callback.play(128)
+    live.write_reading(callback.time_s, 0.0, y_mm=0.0, speed_mm_s=150.0, force_n=0.0, flags=flags)
+    played = np.concatenate([callback.play_on(128) for _ in range(40)])
+    assert played[:128].any()
+    # A block until 3 ms are over, one to the update, 5 ms of fade, and what is interpolated.
+    assert not played[int((0.003 + 0.006 + 0.005 + 37 / 5000) * RATE_HZ) :].any()
 
 
 # --- The heartbeat --------------------------------------------------------------------------------

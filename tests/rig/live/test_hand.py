@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import select
 import tty
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing
 from typing import NamedTuple
 
@@ -16,12 +16,12 @@ import serial
 from modeling import Renderer
 from modeling.arrays import Floats
 from modeling.rendering.limits import Limits
-from rig.hand import serial_sensor
-from rig.hand.following import Follower
+from rig.hand import loop, serial_sensor
+from rig.hand.loop import HandLoop
 from rig.hand.serial_line import SensorLine, encode
 from rig.hand.serial_sensor import SerialSensor
 from rig.hand.settings import HandSettings
-from rig.live.memory import REPEATED, Live
+from rig.live.memory import Live
 from stimuli.planted.textures import planted_texture
 from tests.rig.live.callback import FADE, RATE_HZ, Array, Callback
 from tests.rig.live.replay import Log, engine_of
@@ -56,7 +56,7 @@ class Lines(NamedTuple):
 
 
 class Sensor:
-    """A serial sensor at a pseudo-terminal, whose lines arrive when the test says so."""
+    """A serial sensor at a pseudo-terminal, read by the hand's loop when the test says so."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, live: Live) -> None:
         self._master, slave = os.openpty()
@@ -66,38 +66,39 @@ class Sensor:
         os.close(slave)
         self._now_s = 0.0
         monkeypatch.setattr(serial_sensor, "now_s", lambda: self._now_s)
-        self._live, self._sensor = live, SerialSensor(self._port)
+        monkeypatch.setattr(loop, "now_s", lambda: self._now_s)
+        device = SerialSensor(self._port)
+        monkeypatch.setattr(device, "wait", lambda seconds: None)
         settings = HandSettings.from_dict(
             {"kind": "serial", "device": path, "filter_delay_s": DELAY_S}
         )
-        self._follower = Follower(settings, rest_s=self._sensor.rest_s)
+        self._loop = HandLoop(live, settings, tell=lambda told: None, opening=lambda _: device)
+        self._loop.open()
 
-    def arrive(self, number: int, measured_s: float, at_s: float) -> None:
-        """A line arrives and is read."""
-        self._now_s = at_s
+    def arrive(self, number: int, measured_s: float) -> None:
+        """A line arrives, to be read."""
         x_um = round(1000 * float(stroke_mm(np.asarray(measured_s))))
-        line = encode(
-            SensorLine(
-                number % 2**16,
-                round(1e6 * measured_s),
-                (x_um, 0),
-                round(1000 * FORCE_N),
-                contact=True,
-                button=False,
-            )
+        force_mn = round(1000 * FORCE_N)
+        line = SensorLine(
+            number % 2**16,
+            round(1e6 * measured_s),
+            (x_um, 0),
+            force_mn,
+            contact=True,
+            button=False,
         )
-        os.write(self._master, line)
-        while self._port.in_waiting < len(line):
+        waiting, text = self._port.in_waiting, encode(line)
+        os.write(self._master, text)
+        while self._port.in_waiting < waiting + len(text):
             select.select([self._port], [], [], 1)  # a thread of the kernel passes bytes on
-        for sample in self._sensor.read():
-            self._follower.update(sample).write(self._live)
 
-    def beat(self, at_s: float) -> None:
-        """What the loop writes where no line has come."""
-        self._follower.at(at_s).write(self._live)
+    def step(self, at_s: float) -> None:
+        """The hand's process looks."""
+        self._now_s = at_s
+        self._loop.step()
 
     def close(self) -> None:
-        self._port.close()
+        self._loop.close()
         os.close(self._master)
 
 
@@ -109,15 +110,16 @@ def played(
     start_s = callback.time_s
     count = int(SECONDS * RATE_HZ) // FRAMES
     delays_s = np.zeros(count) if late_s is None else late_s
-    order, parts, done = np.argsort(lines.arrives_s), [], 0
-    for late in delays_s[:count].tolist():
+    parts, done, arrives_s = list[Array](), 0, start_s + lines.arrives_s
+    for late in delays_s.tolist():
         now_s = callback.time_s + late
-        while done < order.size and start_s + lines.arrives_s[order[done]] <= now_s:
-            number = int(order[done])
-            arrives_s = start_s + float(lines.arrives_s[number])
-            sensor.arrive(number, float(lines.measured_s[number]), arrives_s)
-            done += 1
-        sensor.beat(now_s)
+        while done < arrives_s.size and arrives_s[done] <= now_s:
+            at_s = float(arrives_s[done])
+            while done < arrives_s.size and arrives_s[done] == at_s:
+                sensor.arrive(done, float(lines.measured_s[done]))
+                done += 1
+            sensor.step(at_s)
+        sensor.step(now_s)
         callback.look(0.0)
         parts.append(callback.play_on(FRAMES, late_s=late))
     return np.concatenate(parts)
@@ -133,16 +135,16 @@ def error_db(rendered: Array, delay_s: float) -> float:
     return float(10 * np.log10(np.mean(error**2) / np.mean(wanted[settled] ** 2)))
 
 
-def held_error_db(live: Live) -> float:
+def held_error_db(live: Live, later_ms: Iterable[int] = range(6)) -> float:
     """The same for the latest reading, held for each block, at the delay that flatters it most."""
     _, readings = live.readings_since(0)
     _, blocks = live.blocks_since(0)
     blocks = blocks[: int(SECONDS * RATE_HZ) // FRAMES]
-    latest = np.searchsorted(readings["time_s"], blocks["time_s"], side="right") - 1
+    latest = np.maximum(blocks["readings"].astype(int) - 1, 0)
     speeds = np.repeat(readings["speed_mm_s"][latest], FRAMES)
     renderer = Renderer(planted_texture("canvas"), rate_hz=RATE_HZ)
     rendered = renderer.render(speeds, np.full(speeds.size, FORCE_N))
-    return min(error_db(rendered, DELAY_S + late * 1e-3) for late in range(6))
+    return min(error_db(rendered, DELAY_S + late * 1e-3) for late in later_ms)
 
 
 BEAT_S = np.arange(0, SECONDS, 1e-3)
@@ -171,6 +173,17 @@ def all_at_once(rng: np.random.Generator) -> Lines:
     measured_s = measured_s + rng.uniform(0, 1e-3, measured_s.size)
     arrives_s = measured_s + rng.uniform(0, 1e-3, measured_s.size)
     return Lines(measured_s, np.maximum.accumulate(arrives_s))
+
+
+@pytest.mark.parametrize("batch_s", [0.004, 0.016])
+def test_lines_that_arrive_in_batches_keep_their_times(
+    monkeypatch: pytest.MonkeyPatch, live: Live, batch_s: float
+) -> None:
+    """As through an adapter that passes bytes on every 16 ms."""
+    lines = Lines(BEAT_S, np.ceil(BEAT_S / batch_s) * batch_s)
+    with closing(Sensor(monkeypatch, live)) as sensor:
+        rendered = played(Callback(live, scale=1.0), sensor, lines)
+    assert error_db(rendered, DELAY_S) < held_error_db(live, range(0, 20, 2)) - 6
 
 
 def test_irregular_late_and_missing_lines_play_within_6_db_of_regular_and_whole_ones(
@@ -215,10 +228,8 @@ def test_what_was_played_is_rendered_again_from_the_log_bit_by_bit(
         callback = Callback(live, scale=1.0)
         rendered = played(callback, sensor, lines, late_s=calls("by a busy system"))
     _, blocks = live.blocks_since(0)
-    _, readings = live.readings_since(0)
-    assert (readings["flags"] & REPEATED > 0).any()
     made = planted_texture("canvas")
-    engine = engine_of(made, RATE_HZ, seed=0, stream=0, limits=LIMITS)
+    engine = engine_of(made, RATE_HZ, block=0, seed=0, stream=0, limits=LIMITS)
     wanted = Log(live, RATE_HZ).played(blocks, 1, engine)[FADE:].astype(np.float32)
     assert np.abs(wanted).max() > 0.1
     np.testing.assert_array_equal(rendered[FADE:], wanted)

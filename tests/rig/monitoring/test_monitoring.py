@@ -34,6 +34,7 @@ def blocks(count: int, **fields: float) -> Rows:
     rows = np.zeros(count, dtype=BLOCK)
     rows["frames"] = 480
     rows["time_s"] = 100 + np.arange(count) * 0.01
+    rows["hand_s"] = rows["time_s"]
     rows["dac_time_s"] = rows["time_s"] + 0.006
     for name, value in fields.items():
         rows[name] = value

@@ -143,7 +143,7 @@ def played_freely(
     assert not np.any(ours["flags"] & STALE)
     assert np.ptp(ours["speed_mm_s"]) > 300
     assert np.all(np.diff(ours["position"].astype(int)) == block)
-    engine = engine_of(made, RATE_HZ, seed=7, stream=number, limits=LIMITS)
+    engine = engine_of(made, RATE_HZ, block=block, seed=7, stream=number, limits=LIMITS)
     wanted = log.played(rows, number, engine).astype(np.float32) * np.float32(SCALE)
     return captured, wanted
 
