@@ -103,37 +103,6 @@ def written(folder: Path, responses: Responses) -> dict[str, pd.DataFrame]:
     return {path.stem: pd.read_csv(path, sep="\t", dtype=str) for path in files}
 
 
-def test_another_task_changes_no_cell_of_those_before_it(
-    tmp_path, declare, pairs, ratings, choices, anchors, plan
-):
-    declare(CORRECT, RESPONSE_TIME, chance=1 / 7)
-    few = ("canvas", "MDF", "PVC")  # of seven, tables of confusions take long
-    choices = choices[choices["texture"].isin(few) & choices["answer"].isin(few)]
-    before = Responses(
-        {"absolute": ratings, "relative": choices.assign(layout="|".join(few))},
-        simulated_participants=True,
-        simulated_rig=True,
-        anchors=anchors,
-        plan=replace(plan, claims=plan.claims[1:]),
-    )
-    both = replace(
-        before,
-        answers={**before.answers, "pair": pairs},
-        plan=replace(before.plan, claims=(CLAIM, *before.plan.claims)),
-    )
-    old, new = written(tmp_path / "old", before), written(tmp_path / "new", both)
-    assert new.keys() - old.keys() == {"asked_pair", "claims_pair", "correct_rates_pair"}
-    assert {"claims", "claim_tests", "correct_rates", "gee_effects", "buttons"} <= old.keys()
-    for name, table in old.items():
-        others = new[name]
-        for column, own in (("claim", CLAIM.name), ("task", "pair comparison")):
-            if column in others:
-                others = others[others[column] != own]
-        pd.testing.assert_frame_equal(others.reset_index(drop=True), table, obj=name)
-    rows = new["claims"][new["claims"]["claim"] == CLAIM.name]
-    assert set(rows["texture"]) == {ALL_TEXTURES, *pairs["texture"]}
-
-
 def test_shares_of_right_answers_are_those_of_the_answers(declare, alone, pairs):
     declare(CORRECT, chance=1 / 7)
     rates = tables_of(section_of(alone))["correct_rates_pair"].set_index(["model", "texture"])
