@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Floats
 from modeling.errors import InputError
 from modeling.seeds import generator
+from rig.live.memory import reading_ages_s
 
 AIM_MS = 20.0
 # Textures are felt to change at about 40 ms (Okamoto and others 2009).
@@ -241,11 +242,8 @@ def parts_of(reading_times_s: ArrayLike, blocks: np.ndarray, *, rate_hz: float) 
         long for the next; from there to the card's output, as its driver states it.
     """
     times = np.asarray(reading_times_s, dtype=np.float64)
-    index = np.searchsorted(times, blocks["hand_s"], side="right") - 1
-    known = index >= 0
-    ages = blocks["hand_s"][known] - times[index[known]]
     parts = {
-        "age of the reading in a block": ages,
+        "age of the reading in a block": reading_ages_s(times, blocks),
         "one block": blocks["frames"] / rate_hz,
         "block to output, as stated": blocks["dac_time_s"] - blocks["time_s"],
     }

@@ -73,7 +73,6 @@ class HandLoop:
         self._device = device
         self._late = 0
         self._sample_s = float("-inf")
-        self._unwritten = None
         self._follower = Follower(self._settings, rest_s=device.rest_s)
         return device.name
 
@@ -92,11 +91,14 @@ class HandLoop:
                 self._lose(str(lost))
         if now >= self._beat_s:
             self._beat_s = now + BEAT_S
-            reading = self._unwritten or self._follower.at(now)
-            if self._device is None:
-                self._write(self._follower.gone(now))
-            elif reading is not None:
+            reading = self._reading_at(now)
+            if reading is not None:
                 self._write(reading)
+
+    def _reading_at(self, now: float) -> Reading | None:
+        if self._device is None:
+            return self._follower.gone(now)
+        return self._unwritten or self._follower.at(now)
 
     def close(self) -> None:
         """Write a last reading without contact, and release the device."""

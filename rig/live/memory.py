@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from modeling.arrays import Floats
 from modeling.errors import InputError, shown
 from modeling.files.locks import WAIT_S, HeldError, Lock
 
@@ -227,6 +228,26 @@ class Live:
         first = self._ffi.new("uint64_t *")
         taken = copy(self.address, count, self._ffi.from_buffer(pointer, rows), rows.size, first)
         return int(first[0]) + int(taken), rows[:taken].copy()
+
+
+def reading_ages_s(reading_times_s: Floats, blocks: Rows) -> Floats:
+    """How old the latest reading is at the first sample of each block.
+
+    Parameters
+    ----------
+    reading_times_s : (m,) ndarray
+        Rising.
+    blocks : (n,) array of BLOCK
+
+    Returns
+    -------
+    (k,) ndarray
+        Of the k ≤ n blocks that a reading precedes.
+    """
+    index = np.searchsorted(reading_times_s, blocks["hand_s"], side="right") - 1
+    known = index >= 0
+    ages: Floats = blocks["hand_s"][known] - reading_times_s[index[known]]
+    return ages
 
 
 def _made(path: Path, size: int) -> mmap.mmap:

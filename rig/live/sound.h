@@ -165,7 +165,7 @@ TQ_INLINE void tq_hand_take(tq_sound *s, tq_block *block)
 {
     tq_reading rows[TQ_FRESH];
     uint64_t written = tq_readings_written(s->live), first;
-    uint64_t from = written - s->readings < TQ_FRESH ? s->readings : written < TQ_FRESH ? 0 : written - TQ_FRESH;
+    uint64_t from = written - s->readings > TQ_FRESH ? written - TQ_FRESH : s->readings;
     size_t count = tq_readings(s->live, from, rows, TQ_FRESH, &first), n;
     for (n = 0; n < count && rows[n].time_s <= block->hand_s; n++) {
         s->readings = first + n + 1;

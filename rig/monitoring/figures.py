@@ -8,7 +8,17 @@ from typing import Any
 import numpy as np
 
 from modeling.arrays import Floats
-from rig.live.memory import BLOCK, FORCE_ASSUMED, GONE, SIMULATED, STALE, UNDERFLOW, Live, Rows
+from rig.live.memory import (
+    BLOCK,
+    FORCE_ASSUMED,
+    GONE,
+    SIMULATED,
+    STALE,
+    UNDERFLOW,
+    Live,
+    Rows,
+    reading_ages_s,
+)
 
 LEVEL_S = 0.5
 AT_LIMIT = 0.999
@@ -131,9 +141,8 @@ class Monitor:
         return {"rms_g": float(np.sqrt(mean_square)), "peak_g": peak, "limit_g": self._limit_g}
 
     def _delays(self) -> dict[str, Any]:
-        rows, times = self._recent_blocks, self._recent_readings
-        index = np.searchsorted(times, rows["hand_s"], side="right") - 1
-        ages = rows["hand_s"][index >= 0] - times[index[index >= 0]] if times.size else times
+        rows = self._recent_blocks
+        ages = reading_ages_s(self._recent_readings, rows)
         shares = np.concatenate(self._shares)
         self._shares = [shares]
         p50, p999 = np.quantile(shares, [0.5, 0.999]) if shares.size else (np.nan, np.nan)

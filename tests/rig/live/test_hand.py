@@ -215,7 +215,7 @@ def test_blocks_that_are_called_late_move_the_hand_evenly(
         rendered = played(Callback(live, scale=1.0), sensor, lines, late_s=late_s)
     _, rows = live.blocks_since(0)
     ahead_s = float(np.median(rows["hand_s"] - (rows["time_s"] - late_s)))
-    # In time −54 dB; the time of the last of four blocks is known 8 ms ahead.
+    # In time −52 dB; of four at once the last one's hand is extrapolated by 8 ms.
     assert error_db(rendered, DELAY_S - ahead_s) < -45
     assert 0 < ahead_s < late_s.max()
 

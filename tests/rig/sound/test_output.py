@@ -173,7 +173,7 @@ def test_a_minute_leaves_with_the_bits_of_the_renderer(
 
 
 def test_an_all_pole_model_leaves_as_python_filters_it(jack_server: Jack, tmp_path: Path) -> None:
-    """At 48 kHz what the model does at 5 kHz, brought there by SciPy, for the hands of the log."""
+    """At 48 kHz what the engine in Python makes of the readings of the log."""
     block = 1024
     captured, wanted = played_freely(jack_server, tmp_path, planted_ar(), block=block, seconds=20)
     captured, wanted = together(captured, wanted)
