@@ -40,8 +40,8 @@ def half_way_to_neighbours(
     -------
     list of (speed, force)
         In the order of `near`, without what is recorded already but for 5 % of speed and 10 % of
-        force. Speeds (or forces) within 10 % of each other are replaced by their mean, so that
-        scattered conditions have rows and columns that a hand can tell apart.
+        force. The nearest speeds (or forces) are replaced by their mean until all are 10 % apart,
+        so that scattered conditions have rows and columns that a hand can tell apart.
     """
     sides = [(-1, 1) if len(axis) > 1 else (0,) for axis in grid_axes(recorded)]
     middles = [
@@ -70,11 +70,13 @@ def _same(one: Condition, other: Condition) -> bool:
 
 
 def _merged(values: Iterable[float]) -> dict[float, float]:
-    """What each value becomes: the mean of those that are within 10 % above the lowest of them."""
-    groups: list[list[float]] = []
-    for value in sorted(set(values)):
-        if groups and value < groups[-1][0] * (1 + MERGED):
-            groups[-1].append(value)
-        else:
-            groups.append([value])
+    """What each value becomes: the nearest become their mean until all are 10 % apart."""
+    groups = [[value] for value in sorted(set(values))]
+    while len(groups) > 1:
+        means = [sum(group) / len(group) for group in groups]
+        steps = np.divide(means[1:], means[:-1])
+        least = int(np.argmin(steps))
+        if steps[least] >= 1 + MERGED:
+            break
+        groups[least : least + 2] = [groups[least] + groups[least + 1]]
     return {value: sum(group) / len(group) for group in groups for value in group}

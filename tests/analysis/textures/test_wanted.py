@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from analysis.textures.between import chessboard, halfway
@@ -60,6 +60,12 @@ def test_speeds_that_are_all_but_the_same_become_one() -> None:
 
 
 @given(SCATTERED, st.integers(0, 2**31))
+@example(
+    # Groups anchored at their lowest speed would leave means of 276 and 287 mm/s.
+    [(20.0, f) for f in (2.0, 3.0, 1.5, 1.75, 0.5, 0.25, 1.0)]
+    + [(196.0, 2.0), (260.0, 2.5), (261.0, 3.0), (313.0, 2.0), (366.0, 1.0)],
+    7681,
+)
 def test_scattered_conditions_stay_within_the_recorded_range(recorded, seed) -> None:
     near = [recorded[place] for place in np.random.default_rng(seed).permutation(len(recorded))[:3]]
     found = np.array(half_way_to_neighbours(near, recorded)).reshape(-1, 2)
@@ -71,7 +77,7 @@ def test_scattered_conditions_stay_within_the_recorded_range(recorded, seed) -> 
         assert all(abs(speed / v - 1) >= 0.05 or abs(force / f - 1) >= 0.1 for v, f in recorded)
     for axis in found.T:
         steps = np.unique(axis)
-        assert (steps[1:] > 1.04 * steps[:-1]).all()
+        assert (steps[1:] >= 1.1 * steps[:-1]).all()
 
 
 def test_a_lattice_with_middles_is_left_out_by_halves() -> None:
