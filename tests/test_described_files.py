@@ -1,0 +1,153 @@
+"""One sentence for whatever is wrong with a key, for each file that is declared.
+
+What is refused and how it is called follows from the declarations; tests/described.py makes the
+wrong files. Rules between keys are tested where they stand.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+import tomlkit
+
+from modeling import InputError, Scene
+from modeling.scenes.scene import SceneFile
+from stimuli.sets.recipe import Recipe
+from tests.described import Kind, Place, declared, mutations, places
+
+HAND = "time_s,speed_mm_s,force_n\n0,100,1\n1,200,2\n"
+THRESHOLD = "frequency_hz\tacceleration_g\n10\t1\n500\t2\n"
+_SCENE = {"name": "touch", "models": "models", "textures": ["canvas", "PVC"], "margin_db": 3.0}
+SCENE = Kind(
+    name="scene.toml",
+    section=SceneFile,
+    examples=(
+        {
+            "version": 1,
+            "scene": {**_SCENE, "threshold": "own.tsv"},
+            "hand": {"speed_mm_s": [50, 150], "force_n": [0.5, 1.0], "stroke_hz": 1.5},
+            "actuator": {"band_hz": [40, 400], "rate_hz": 5000, "peak_g": 5, "rms_g": 2},
+            "bound": {"gfc30": 0.9, "bands_db": 1.5, "level_db": 0.5},
+            "budget": {"operations": 150, "bytes": 16384},
+        },
+        {
+            "version": 1,
+            "scene": {"name": "touch"},
+            "hand": {"file": "hand.csv"},
+            "budget": {"device": "stm32l432"},
+        },
+        {
+            "version": 1,
+            "scene": {"name": "touch"},
+            "hand": {"place": [{"speed_mm_s": 100, "force_n": 1, "share": 3}]},
+        },
+    ),
+    load=Scene.load,
+    write=tomlkit.dumps,
+    beside={"own.tsv": THRESHOLD, "hand.csv": HAND},
+)
+_SET = {
+    "name": "paper",
+    "rate_hz": [5000, 48000],
+    "seeds": [1, 2],
+    "noise": "frozen",
+    "duration_s": 2.0,
+    "settling_s": 0.25,
+    "vibrator": "vibrator.json",
+}
+RECIPE = Kind(
+    name="set.toml",
+    section=Recipe,
+    examples=(
+        {
+            "version": 1,
+            "set": {**_SET, "format": "pcm24"},
+            "level": {
+                "mode": "loudness",
+                "threshold": "own.tsv",
+                "sensation_level_db": 20.0,
+                "full_scale_g": 4.0,
+            },
+            "model": [{"path": "models", "label": "full"}],
+            "trajectory": [{"speed_mm_s": 150, "force_n": 1.5, "name": "slow"}],
+        },
+        {
+            "version": 1,
+            "set": {"name": "paper"},
+            "level": {"mode": "rms", "rms_db": -20.0},
+            "model": [{"scene": "light.toml"}],
+            "trajectory": [{"file": "hand.csv"}],
+        },
+    ),
+    load=Recipe.load,
+    write=tomlkit.dumps,
+    beside={
+        "own.tsv": THRESHOLD,
+        "hand.csv": HAND,
+        "light.toml": tomlkit.dumps(SCENE.examples[2]),
+    },
+    again=Recipe.to_toml,
+)
+KINDS = [SCENE, RECIPE]
+
+
+def written(kind: Kind, folder: Path, values: dict[str, object] | str) -> Path:
+    for name, text in kind.beside.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    path = folder / kind.name
+    text = values if isinstance(values, str) else kind.write(values)
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def refusal(kind: Kind, folder: Path, values: dict[str, object] | str, *, what: str) -> str:
+    """The sentence about a wrong file, which has the form of all."""
+    path = written(kind, folder, values)
+    try:
+        kind.load(path)
+    except InputError as error:
+        sentence = str(error)
+    else:
+        raise AssertionError(f"expected a refusal of what is {what}, got none")
+    assert str(path) in sentence, what
+    assert re.fullmatch(r"[^\n]*expected [^\n]*, got [^\n]*; [^\n]*\.", sentence), (what, sentence)
+    return sentence.replace(str(folder), "")
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_examples_load_and_have_every_declared_key(kind: Kind, tmp_path: Path) -> None:
+    for example in kind.examples:
+        loaded = kind.load(written(kind, tmp_path, example))
+        if kind.again is not None:
+            again = kind.load(written(kind, tmp_path, kind.again(loaded)))
+            assert again == loaded
+    assert {str(place) for place in places(kind)} == set(declared(kind.section))
+
+
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        pytest.param(kind, place, id=f"{kind.name} {place}")
+        for kind in KINDS
+        for place in places(kind)
+    ],
+)
+def test_a_wrong_key_is_refused_by_name(kind: Kind, place: Place, tmp_path: Path) -> None:
+    example = kind.examples[place.example]
+    for what, values in mutations(place, example):
+        sentence = refusal(kind, tmp_path, values, what=what)
+        assert re.search(rf"\b{place.key.name}\b", sentence.replace("_misspelt", "")), what
+        assert place.where in sentence, (what, sentence)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_a_doubled_key_is_refused(kind: Kind, tmp_path: Path) -> None:
+    for example in kind.examples:
+        lines = kind.write(example).splitlines()
+        for number, line in enumerate(lines):
+            if re.match(r"\s*\"?\w+\"? ?[=:]", line):
+                comma = "" if " = " in line or line.endswith(",") else ","
+                text = "\n".join([*lines[:number], line + comma, *lines[number:]])
+                refusal(kind, tmp_path, text, what=f"doubled: {line}")
