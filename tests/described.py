@@ -126,11 +126,25 @@ def mutations(place: Place, values: Values) -> Iterator[tuple[str, Values]]:
         del place.table(other)[name]
         yield "missing", other
     good = place.table(values)[name]
+    if place.key.always and not _may_be_none(place.key.kind):
+        yield "null", changed(None)
     for wrong in _of_another_type(good, place.key):
         yield f"of another type: {wrong!r}", changed(wrong)
+    for wrong in _no_items(good, place.key) if place.key.shape else []:
+        yield f"with {wrong!r}", changed(_with_first(good, wrong))
     for beyond in _beyond(place.key.kind):
-        listed = isinstance(good, list) and place.key.also is None
-        yield f"out of range: {beyond!r}", changed([beyond, *good[1:]] if listed else beyond)
+        value = beyond if place.key.also is not None else _with_first(good, beyond)
+        yield f"out of range: {beyond!r}", changed(value)
+
+
+def _with_first(good: Any, value: Any) -> Any:
+    """A list or a table of values, or lists of them, with another first one."""
+    if isinstance(good, list):
+        return [_with_first(good[0], value), *good[1:]]
+    if isinstance(good, dict):
+        name = next(iter(good))
+        return {**good, name: _with_first(good[name], value)}
+    return value
 
 
 def _of_another_type(good: Any, key: Key) -> list[Any]:
@@ -146,6 +160,20 @@ def _of_another_type(good: Any, key: Key) -> list[Any]:
     if isinstance(good, list):
         return [{}, "text", [{}]] if key.also is not None else [5, {}, "text", [[{}]]]
     return [5, "text", []]
+
+
+def _may_be_none(kind: inspect.Type) -> bool:
+    kind = kind.type if isinstance(kind, inspect.Metadata) else kind
+    return isinstance(kind, inspect.UnionType) and kind.includes_none
+
+
+def _no_items(good: Any, key: Key) -> list[Any]:
+    """What cannot be in an array."""
+    while isinstance(good, list):
+        good = good[0]
+    if isinstance(good, bool):
+        return [1, "true", None]
+    return ["1", None, [], *([] if key.any_number else [nan, inf])]
 
 
 def _is_choice(kind: inspect.Type) -> bool:
@@ -169,6 +197,8 @@ def _beyond(kind: inspect.Type) -> Iterator[float]:
             yield from _beyond(item)
         case inspect.TupleType(item_types=items):
             yield from _beyond(items[0])
+        case inspect.DictType(value_type=value):
+            yield from _beyond(value)
         case inspect.IntType() | inspect.FloatType():
             if kind.gt is not None:
                 yield kind.gt

@@ -15,6 +15,7 @@ import tomlkit
 from modeling import InputError, Scene
 from modeling.scenes.scene import SceneFile
 from stimuli.sets.recipe import Recipe
+from tests import saved_files
 from tests.described import Kind, Place, declared, mutations, places
 
 HAND = "time_s,speed_mm_s,force_n\n0,100,1\n1,200,2\n"
@@ -90,7 +91,7 @@ RECIPE = Kind(
     },
     again=Recipe.to_toml,
 )
-KINDS = [SCENE, RECIPE]
+KINDS = [SCENE, RECIPE, *saved_files.KINDS]
 
 
 def written(kind: Kind, folder: Path, values: dict[str, object] | str) -> Path:

@@ -76,8 +76,8 @@ def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
         "TaskDescription": manifest.description,
         "StimulusPresentation": {
             "SoftwareName": "tactileq",
-            "SoftwareVersion": manifest.program["versions"].get("tactileq", "not stated"),
-            "OperatingSystem": manifest.program["platform"],
+            "SoftwareVersion": manifest.versions.get("tactileq", "not stated"),
+            "OperatingSystem": manifest.platform,
         },
         **columns,
     }

@@ -82,9 +82,7 @@ def describe_data_set(manifest: SessionManifest) -> dict[str, Any]:
             "StudySHA256": manifest.study_sha256,
             "ModelsSHA256": manifest.models_sha256,
             "StudyDesign": study,
-            "GeneratedBy": [
-                {"Name": "tactileq", "Version": manifest.program["versions"].get("tactileq", "")}
-            ],
+            "GeneratedBy": [{"Name": "tactileq", "Version": manifest.versions.get("tactileq", "")}],
         }
     )
     return described

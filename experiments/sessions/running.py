@@ -135,7 +135,7 @@ def run_session(
                 session=session,
                 slot=person.slot,
                 code=person.code,
-                trials=[trial.to_dict() for trial in plan.trials],
+                trials=tuple(trial.to_dict() for trial in plan.trials),
             )
             files = manifest.files(root)
             if said.resume and files.manifest.exists():
@@ -185,7 +185,7 @@ def _stated(
         "identical": models.equal_models(study.textures, study.models_of(task.name)),
         "rig": rig.stated,
         "description": task.description,
-        "program": program_facts(),
+        **program_facts(),
     }
 
 

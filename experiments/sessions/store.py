@@ -262,7 +262,7 @@ class SessionStore:
             admit(files, manifest, overrides=overrides)
             recorded = [*manifest.overrides]
             recorded += [record for record in overrides.recorded if record not in recorded]
-            final = replace(manifest, overrides=recorded)
+            final = replace(manifest, overrides=tuple(recorded))
             make_folder(files.folder)
             with locked(files.manifest):
                 refuse_begun(files)
@@ -279,7 +279,7 @@ class SessionStore:
 
     @classmethod
     def _begin(cls, files: SessionFiles, manifest: SessionManifest, lock: Lock) -> SessionStore:
-        write_new(files.manifest, manifest.text.encode())
+        write_new(files.manifest, manifest.to_json().encode())
         handle = open_file(files.log, new=True)
         sync_folder(files.folder)
         store = cls(files, manifest, handle=handle, lock=lock)

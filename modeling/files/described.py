@@ -21,19 +21,22 @@ import datetime
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields
-from functools import cache
+from functools import cache, cached_property
 from math import isfinite
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
 
 import msgspec
 import numpy as np
 from msgspec import Meta, inspect
 
+from modeling.arrays import Bools
 from modeling.checks import check_keys
 from modeling.errors import InputError, shown
-from modeling.files.documents import check_version, read_toml
+from modeling.files.documents import check_version, dump_json, read_json_object, read_toml
+from modeling.files.hashes import sha256_of
+from modeling.files.writing import write_text
 
 
 def key(
@@ -47,6 +50,8 @@ def key(
     also: Any = None,
     as_given: bool = False,
     name: str = "",
+    shape: str = "",
+    finite: bool = True,
     **limits: Any,
 ) -> Meta:
     """What is said of a key, or of a type that several keys have, for an annotation.
@@ -70,6 +75,11 @@ def key(
         Whether a whole number stays one where any number may be: 5 is not 5.0 in a text or a hash.
     name : str
         The key, where that is not the field's name.
+    shape : str
+        Of an array, whose numbers the limits are about: what it has along each axis, such as
+        "speeds forces". Arrays of one file that name the same have as many of it.
+    finite : bool
+        Whether numbers have to be finite; others are text in a file: "nan", "inf", "-inf".
     limits
         Those of `msgspec.Meta`: ge, gt, le, lt, min_length, max_length, pattern.
     """
@@ -82,6 +92,8 @@ def key(
         "also": also,
         "as_given": as_given,
         "name": name,
+        "shape": tuple(shape.split()),
+        "any_number": not finite,
     }
     extra = {what: value for what, value in said.items() if value}
     return Meta(description=description or None, extra=extra or None, **limits)
@@ -101,7 +113,8 @@ class Key:
     """One key of a section, as declared.
 
     `field` is its name in Python, `name` that in the file. `section` is the class of the section
-    that it holds, None for a value; `several` says whether it holds a list of sections.
+    that it holds, None for a value; `several` says whether it holds a list of sections, `always`
+    whether it stands in every file even so. `shape` is empty but for arrays.
     """
 
     field: str
@@ -118,22 +131,36 @@ class Key:
     reads: Callable[[Any], Any] = lambda value: value
     also: Any = None
     as_given: bool = False
+    holds: Callable[[Any], bool] | None = None
+    shape: tuple[str, ...] = ()
+    any_number: bool = False
+    always: bool = False
 
     @property
     def required(self) -> bool:
-        """Whether it has no default."""
-        return self.default is MISSING
+        """Whether it stands in every file."""
+        return self.default is MISSING or self.always
 
     @property
     def words(self) -> str:
         """What is expected, in words."""
-        return self.expected or words(self.kind, unit=self.unit)
+        if not self.shape:
+            return self.expected or words(self.kind, unit=self.unit)
+        kind = self.kind
+        while isinstance(kind, inspect.VarTupleType):
+            kind = kind.item_type
+        each = self.expected or f"each {words(kind, unit=self.unit)}"
+        return f"an array of {' × '.join(self.shape)}, {each},"
 
     def checked(self, value: Any, where: str, *, folder: Path | None = None) -> Any:
         """A value as the field holds it; InputError for any other, naming the key and `where`."""
         if self.section is not None:
             return self._sections(value, folder)
+        if self.shape:
+            return self._array(value, where)
         plain_value = _without_numpy(self.reads(value))
+        if self.any_number and plain_value in ("nan", "inf", "-inf"):
+            plain_value = float(plain_value)
         try:
             converted = msgspec.convert(
                 plain_value,
@@ -143,7 +170,7 @@ class Key:
             )
         except (msgspec.ValidationError, OverflowError):
             raise self.refusal(value, where) from None
-        if not _holds(self.kind, converted):
+        if not (self.any_number or _holds(self.kind, converted)):
             raise self.refusal(value, where)
         return plain_value if self.as_given else converted
 
@@ -154,13 +181,36 @@ class Key:
             f"{shown(value)}; {self.advice}."
         )
 
+    def _array(self, value: Any, where: str) -> np.ndarray[Any, Any]:
+        """A read-only copy of numbers, or of true and false, that are within the limits."""
+        kind = self.kind
+        while isinstance(kind, inspect.VarTupleType):
+            kind = kind.item_type
+        numbers = isinstance(kind, inspect.FloatType)
+        try:
+            given = np.asarray(value)
+        except ValueError:  # rows of several lengths
+            raise self.refusal(value, where) from None
+        fits = given.dtype.kind in ("iuf" if numbers else "b") and given.ndim == len(self.shape)
+        if given.size and not fits:
+            raise self.refusal(value, where)
+        array = np.array(given, dtype=np.float64 if numbers else np.bool_)
+        if isinstance(kind, inspect.FloatType):
+            wrong = array[~_within(kind, array)] if not self.any_number else array[:0]
+            if wrong.size:
+                raise self.refusal(wrong.flat[0], where)
+        if self.holds is not None and not self.holds(array):
+            raise self.refusal(value, where)
+        array.setflags(write=False)
+        return array
+
     def _sections(self, value: Any, folder: Path | None) -> Any:
         assert self.section is not None  # or there is no section to read
         if not self.several:
             return _section(self.section, value, folder)
         if not isinstance(value, list | tuple):
-            raise _no_table(self.section.WHERE, value)
-        if self.required and not value:
+            raise _no_table(self.section, value)
+        if self.required and not (value or self.always):
             raise self.missing(self.section.WHERE)
         count = len(value)
         return tuple(
@@ -168,18 +218,26 @@ class Key:
             for number, one in enumerate(value, start=1)
         )
 
-    def missing(self, where: str) -> InputError:
-        """The sentence about a key that has no default and is not there."""
+    def missing(self, where: str, *, advice: str = "") -> InputError:
+        """The sentence about a key that has to be there and is not."""
         if self.section is not None:
             where = self.section.WHERE
-            return InputError(f"expected a table {where}, got none; write {where} and its keys.")
-        return InputError(f"expected {self.name} ({self.words}) under {where}, got none; add it.")
+            advice = advice or f"write {where} and its keys"
+            return InputError(f"expected a table {where}, got none; {advice}.")
+        return InputError(
+            f"expected {self.name} ({self.words}){where and f' under {where}'}, got none; "
+            f"{advice or 'add it'}."
+        )
 
 
 class Section:
     """The base of a section's dataclass: its fields are checked when it is made."""
 
     WHERE: ClassVar[str] = ""  # how messages call it: "[hand]", "[[model]]"
+    # What to do about a section that only programs write. All its keys stand in it, those with a
+    # default, too, but for OPTIONAL, which are left out where they are None or an empty text.
+    ADVICE: ClassVar[str] = ""
+    OPTIONAL: ClassVar[frozenset[str]] = frozenset()
 
     def __post_init__(self) -> None:
         """Check and convert every field; sections with rules of their own extend this."""
@@ -208,11 +266,11 @@ class Section:
         where = where or cls.WHERE
         keys = {one.name: one for one in keys_of(cls)}
         if not isinstance(values, Mapping):
-            raise _no_table(where, values)
-        check_keys(values, tuple(keys), where=where)
+            raise _no_table(cls, values, where=where)
+        check_keys(values, tuple(keys), where=where or "the file")
         for name, one in keys.items():
             if one.required and name not in values:
-                raise one.missing(where)
+                raise one.missing(where, advice=cls.ADVICE)
         given = {name: one for name, one in keys.items() if name in values}
         return cls(
             **{
@@ -222,13 +280,14 @@ class Section:
         )
 
     @classmethod
-    def held(cls, field: str, value: object) -> Any:
+    def of_field(cls, field: str, value: object) -> Any:
         """A value as this field holds it, for a class that shares the field; InputError."""
         return next(one for one in keys_of(cls) if one.field == field).checked(value, cls.WHERE)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, those of a file."""
-        return {one.name: plain(getattr(self, one.field)) for one in keys_of(type(self))}
+        values = {one.name: plain(getattr(self, one.field)) for one in keys_of(type(self))}
+        return {n: v for n, v in values.items() if not (v in (None, "") and n in self.OPTIONAL)}
 
 
 class DescribedFile(Section):
@@ -263,7 +322,7 @@ class DescribedFile(Section):
         check_version(values, cls.VERSION, what=cls.WHAT.partition(" ")[2])
         plain = values.get(head, {})
         if not isinstance(plain, Mapping):
-            raise _no_table(cls.WHERE, plain)
+            raise _no_table(cls, plain)
         check_keys(plain, [k.name for k in keys_of(cls) if k.section is None], where=cls.WHERE)
         given = {name: values[name] for name in tables if name in values}
         return cls.read({**plain, **given}, folder=folder)
@@ -272,6 +331,64 @@ class DescribedFile(Section):
     def tables(cls) -> tuple[str, ...]:
         """The names of its sections, without the one of its plain values."""
         return tuple(one.name for one in keys_of(cls) if one.section is not None)
+
+
+class DescribedJson(Section):
+    """The base of a whole JSON file that programs write, with `format` and `version` at its top.
+
+    Subclasses declare `WHAT` ("a model file"), `FORMAT`, `VERSION` where it is not 1, and `ADVICE`.
+    """
+
+    WHAT: ClassVar[str]
+    FORMAT: ClassVar[str]
+    VERSION: ClassVar[int] = 1
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read such a file.
+
+        Raises
+        ------
+        InputError
+            Naming the file, if it is missing, no JSON or of another format or version, and for
+            unknown, missing and wrong keys.
+        """
+        file = Path(path)
+        values = read_json_object(file, what=cls.WHAT, advice=cls.ADVICE)
+        with naming(file):
+            return cls.read(values)
+
+    @classmethod
+    def read(cls, values: object, *, where: str = "", folder: Path | None = None) -> Self:
+        """A file from its plain values, as `to_dict` gives them; refused as by `load`."""
+        if not isinstance(values, Mapping):
+            raise _no_table(cls, values, where=cls.WHAT)
+        stated = (values.get("format"), values.get("version"))
+        if stated != (cls.FORMAT, cls.VERSION):
+            raise InputError(
+                f"expected the format {cls.FORMAT} of version {cls.VERSION}, got "
+                f"{shown(stated[0])} of version {shown(stated[1])}; give {cls.WHAT} of that "
+                "format, or update tactileq if it is newer."
+            )
+        given = {name: v for name, v in values.items() if name not in ("format", "version")}
+        return super().read(given, where=where, folder=folder)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The plain values of the file."""
+        return {"format": self.FORMAT, "version": self.VERSION, **super().to_dict()}
+
+    def to_json(self) -> str:
+        """The text of the file."""
+        return dump_json(self.to_dict())
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file that `save` writes."""
+        return sha256_of(self.to_json())
+
+    def save(self, path: str | Path) -> None:
+        """Write the file; it is there whole or not at all."""
+        write_text(path, self.to_json())
 
 
 @contextmanager
@@ -293,7 +410,9 @@ def plain(value: Any) -> Any:
         return {name: plain(one) for name, one in value.items()}
     if isinstance(value, Path):
         return value.as_posix()
-    return value
+    if isinstance(value, float) and not isfinite(value):
+        return str(value)
+    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def keys_of(section: type[Section]) -> tuple[Key, ...]:
@@ -305,7 +424,8 @@ def keys_of(section: type[Section]) -> tuple[Key, ...]:
 def _keys_of(section: Any) -> tuple[Key, ...]:
     hints = get_type_hints(section, include_extras=True)
     return tuple(
-        _key(field.name, hints[field.name], default=_default(field)) for field in fields(section)
+        _key(field.name, hints[field.name], default=_default(field), holder=section)
+        for field in fields(section)
     )
 
 
@@ -349,6 +469,19 @@ def _range(kind: inspect.IntType | inspect.FloatType) -> str:
     if low is not None:
         return f"above {_short(low)}" if kind.gt is not None else f"of at least {_short(low)}"
     return "" if kind.le is None else f"of at most {_short(kind.le)}"
+
+
+def _within(kind: inspect.FloatType, values: Any) -> Any:
+    """Which of an array's numbers are finite and within the limits of a type."""
+    good = np.isfinite(values)
+    for limit, compared in (
+        (kind.ge, np.greater_equal),
+        (kind.gt, np.greater),
+        (kind.le, np.less_equal),
+    ):
+        if limit is not None:
+            good &= compared(values, limit)
+    return good
 
 
 def _short(limit: float) -> str:
@@ -401,12 +534,16 @@ def _holds(kind: inspect.Type, value: Any) -> bool:
     return good and (holds is None or holds(value))
 
 
-def _key(name: str, annotation: Any, *, default: Any) -> Key:
+def _key(name: str, annotation: Any, *, default: Any, holder: type[Section]) -> Key:
+    always = bool(holder.ADVICE) and name not in holder.OPTIONAL
+    advice = {"advice": holder.ADVICE} if holder.ADVICE else {}
     section, several = _section_of(annotation)
     said = _said(annotation)
-    said.pop("holds", None)
+    if "shape" in said:
+        annotation = _rows(annotation, len(said["shape"]))
     return Key(
-        **{"name": name, **said},
+        **{"name": name, **advice, **said},
+        always=always,
         field=name,
         annotation=annotation,
         kind=inspect.AnyType() if section else inspect.type_info(annotation),
@@ -414,6 +551,21 @@ def _key(name: str, annotation: Any, *, default: Any) -> Key:
         section=section,
         several=several,
     )
+
+
+def _rows(array: Any, axes: int) -> Any:
+    """The type of an array's plain values."""
+    limits = ("ge", "gt", "le")
+    stated = {
+        limit: value
+        for meta in array.__metadata__
+        for limit in limits
+        if (value := getattr(meta, limit)) is not None
+    }
+    rows: Any = bool if array.__origin__ == Bools else Annotated[float, Meta(**stated)]
+    for _ in range(axes):
+        rows = tuple[rows, ...]
+    return rows
 
 
 def _default(field: Any) -> Any:
@@ -476,7 +628,7 @@ def _path_in(folder: Path | None) -> Callable[[type, Any], Any]:
     return path
 
 
-def _no_table(where: str, value: object) -> InputError:
-    return InputError(
-        f"expected a table {where}, got {shown(value)}; write {where} above its keys."
-    )
+def _no_table(section: type[Section], value: object, *, where: str = "") -> InputError:
+    where = where or section.WHERE
+    advice = section.ADVICE or f"write {where} above its keys"
+    return InputError(f"expected a table {where}, got {shown(value)}; {advice}.")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from modeling.checks import HIGHEST_RATE_HZ, LONGEST_NAME, LOWEST_RATE_HZ
+from modeling.checks import HIGHEST_RATE_HZ, LONGEST_NAME, LOWEST_RATE_HZ, UNITS
 from modeling.files.described import key
 
 
@@ -38,3 +38,12 @@ TextureNames = Annotated[
     ),
 ]
 Rate = Annotated[float, key(unit="Hz", ge=LOWEST_RATE_HZ, le=HIGHEST_RATE_HZ)]
+Unit = Annotated[
+    str,
+    key(
+        "of the accelerations",
+        expected=" or ".join(f'"{unit}"' for unit in UNITS),
+        pattern=f"^({'|'.join(UNITS)})$",
+    ),
+]
+Simulated = Annotated[bool, key("whether what it was made from was simulated")]

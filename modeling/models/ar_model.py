@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.checks import UNITS, check_rate, check_texture_name
-from modeling.errors import InputError, shown
+from modeling.arrays import Bools, Floats, no_marks
+from modeling.checks import check_rate
+from modeling.errors import InputError
+from modeling.files.described import key
+from modeling.files.kinds import Rate, Simulated, TextureName, Unit
 from modeling.files.saved_model import SavedModel
-from modeling.models.grid import Cells, check_axes, within_grid
+from modeling.models.grid import Cells, Forces, Speeds, within_grid
 from modeling.models.line_spectral import (
     check_line_spectral,
     prediction_coefficients,
@@ -84,78 +86,52 @@ class ARFilter:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ARModel(SavedModel):
-    """An all-pole filter of order p in each condition of a grid of S speeds × F forces.
-
-    Parameters
-    ----------
-    texture : str
-        Name of the surface.
-    rate_hz : float
-        The rate at which the filters run and the driving noise has unit variance.
-    speeds_mm_s, forces_n : (S,), (F,) array_like
-        Rising, > 0, one at least.
-    line_spectral_frequencies : (S, F, p) array_like
-        Radians per sample, rising in (0, π); p ≥ 1.
-    gains : (S, F) array_like
-        Standard deviation of the innovation, ≥ 0, in `unit` per unit noise.
-    level_sd_db : (S, F) array_like
-        Standard deviation of the overall level in dB, from the length of the records.
-    unit : {"g", "arbitrary"}
-    simulated : bool
-        True where the recordings behind it were simulated.
-    interpolated : (S, F) array_like of bool, optional
-        Condition without a recording, filled from its neighbours.
-
-    Raises
-    ------
-    InputError
-        For wrong shapes or values out of range.
-    """
+    """An all-pole filter of order p in each condition of a grid of S speeds × F forces."""
 
     FORMAT = "tactileq.ar-model"
 
-    texture: str
-    rate_hz: float
-    speeds_mm_s: Floats
-    forces_n: Floats
-    line_spectral_frequencies: Floats
-    gains: Floats
-    level_sd_db: Floats
-    unit: str = "g"
-    simulated: bool = False
-    interpolated: Bools = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    texture: Annotated[TextureName, key("name of the surface")]
+    rate_hz: Annotated[
+        Rate,
+        key("at which the filters run and the driving noise has unit variance", as_given=True),
+    ]
+    speeds_mm_s: Speeds
+    forces_n: Forces
+    line_spectral_frequencies: Annotated[
+        Floats,
+        key(
+            "rising in (0, π); p ≥ 1",
+            unit="radians per sample",
+            shape="speeds forces order",
+            holds=lambda frequencies: frequencies.size > 0,
+        ),
+    ]
+    gains: Annotated[
+        Floats,
+        key(
+            "standard deviation of the innovation, in `unit` per unit noise",
+            shape="speeds forces",
+            ge=0,
+        ),
+    ]
+    level_sd_db: Annotated[
+        Floats,
+        key(
+            "standard deviation of the overall level, from the length of the records",
+            unit="dB",
+            shape="speeds forces",
+            ge=0,
+        ),
+    ]
+    unit: Unit = "g"
+    simulated: Simulated = False
+    interpolated: Annotated[
+        Bools,
+        key("condition without a recording, filled from its neighbours", shape="speeds forces"),
+    ] = field(default_factory=no_marks)
 
     def __post_init__(self) -> None:
-        check_texture_name(self.texture)
-        check_rate(self.rate_hz)
-        if self.unit not in UNITS or not isinstance(self.simulated, bool):
-            raise InputError(
-                f"{self.texture}: expected a unit among {', '.join(UNITS)} and true or false for "
-                f"simulated, got {shown(self.unit)} and {shown(self.simulated)}; fit the model "
-                "again."
-            )
-        if np.size(self.interpolated) == 0:
-            object.__setattr__(self, "interpolated", np.zeros(np.shape(self.gains), dtype=bool))
-        self._freeze(_ARRAYS, booleans=("interpolated",))
-        check_axes(self.speeds_mm_s, self.forces_n)
-        self._check_arrays()
-
-    def _check_arrays(self) -> None:
-        grid = (self.speeds_mm_s.size, self.forces_n.size)
-        for name in _ARRAYS[2:]:
-            shape = getattr(self, name).shape
-            filters = name == "line_spectral_frequencies"
-            if shape[:2] != grid or len(shape) != 2 + filters or 0 in shape:
-                raise InputError(
-                    f"expected {name} on the model's grid of {grid[0]} speeds × {grid[1]} forces, "
-                    f"got the shape {shape}; fit the model again."
-                )
-        for name in ("gains", "level_sd_db"):
-            values = getattr(self, name)
-            if not (np.isfinite(values).all() and (values >= 0).all()):
-                raise InputError(
-                    f"expected finite {name} of at least 0, got {values.min():g}; fit it again."
-                )
+        super().__post_init__()
         check_line_spectral(self.line_spectral_frequencies, f"the model of {self.texture}")
 
     @property
@@ -196,13 +172,3 @@ class ARModel(SavedModel):
             gain=float(at.gain[0]),
             rate_hz=self.rate_hz,
         )
-
-
-_ARRAYS = (
-    "speeds_mm_s",
-    "forces_n",
-    "line_spectral_frequencies",
-    "gains",
-    "level_sd_db",
-    "interpolated",
-)

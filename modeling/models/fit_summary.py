@@ -3,65 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
+from typing import Annotated
 
-from modeling.checks import is_number
-from modeling.errors import InputError, shown
+from modeling.files.described import Section, key
+
+_Distance = Annotated[float, key(unit="dB", ge=0, as_given=True)]
 
 
 @dataclass(frozen=True)
-class FitSummary:
+class FitSummary(Section):
     """How near a fitted model should be to the truth, and what was found wrong.
 
-    Parameters
-    ----------
-    distance_db : float
-        Expected log-spectral distance from the true spectra at the recordings, ≥ 0
-        (docs/method/fitting.md#expected-distance).
-    blend_defect_db : float
-        The largest distance of a response half-way between nodes from the mean of the logarithms
-        at its nodes, ≥ 0 (docs/method/fitting.md#blends).
-    with_blends_db : float
-        Expected distance at the recordings and between them, ≥ 0.
-    by_layers_db : dict of str to float
-        The same with other numbers of layers that were tried.
-    warnings : tuple of str
-        One sentence each: outliers, refused layers, scattered conditions.
+    docs/method/fitting.md#expected-distance, docs/method/fitting.md#blends
     """
 
-    distance_db: float
-    blend_defect_db: float
-    with_blends_db: float
-    by_layers_db: Mapping[str, float] = field(hash=False)
-    warnings: tuple[str, ...] = ()
+    WHERE = "fit"
+    ADVICE = "fit the model again"
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "warnings", tuple(self.warnings))
-        numbers = [self.distance_db, self.blend_defect_db, self.with_blends_db]
-        mapped = isinstance(self.by_layers_db, Mapping)
-        numbers += self.by_layers_db.values() if mapped else []
-        texts = all(isinstance(warning, str) for warning in self.warnings)
-        if not (mapped and texts and all(is_number(n) and n >= 0 for n in numbers)):
-            raise InputError(
-                "expected distances of at least 0 dB and sentences in fit, got "
-                f"{shown(vars(self))}; fit the model again."
-            )
-
-    @staticmethod
-    def of(value: object) -> FitSummary | None:
-        """From the plain values of a model file; None stays None.
-
-        Raises
-        ------
-        InputError
-            For other fields than these, or values of other kinds.
-        """
-        if value is None or isinstance(value, FitSummary):
-            return value
-        names = {f.name for f in fields(FitSummary)}
-        if not (isinstance(value, Mapping) and set(value) == names):
-            raise InputError(
-                f"expected {', '.join(sorted(names))} in fit, got {shown(value)}; fit the model "
-                "again."
-            )
-        return FitSummary(**value)
+    distance_db: Annotated[
+        _Distance, key("expected log-spectral distance from the true spectra at the recordings")
+    ]
+    blend_defect_db: Annotated[
+        _Distance,
+        key(
+            "the largest distance of a response half-way between nodes from the mean of the "
+            "logarithms at its nodes"
+        ),
+    ]
+    with_blends_db: Annotated[
+        _Distance, key("expected distance at the recordings and between them")
+    ]
+    by_layers_db: Annotated[
+        Mapping[str, _Distance],
+        key("the same with other numbers of layers that were tried", as_given=True),
+    ] = field(hash=False)
+    warnings: Annotated[
+        tuple[str, ...],
+        key("one sentence each: outliers, refused layers, scattered conditions"),
+    ] = ()

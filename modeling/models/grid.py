@@ -6,17 +6,35 @@ docs/method/fitting.md#missing-conditions, docs/method/rendering.md#grid-edges
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Bools, Floats, Integers
 from modeling.errors import GridError, InputError
+from modeling.files.described import key
 from modeling.hand import Hand
 
 Condition = tuple[float, float]
 LEAST_REACH = 0.01  # of log speed or log force, of conditions that are not all the same
 LEAST_WIDTH = 0.02  # of conditions across their longest extent: a hull with less has no area
+
+
+def is_axis(values: Floats) -> bool:
+    """Whether these are rising finite values above 0, one at least."""
+    rising = values.ndim == 1 and values.size >= 1 and bool((np.diff(values) > 0).all())
+    return rising and bool(values[0] > 0 and np.isfinite(values).all())
+
+
+_RISING = "one or more rising values above 0"
+Speeds = Annotated[
+    Floats,
+    key("of the grid", unit="mm/s", shape="speeds", expected=_RISING, holds=is_axis, gt=0),
+]
+Forces = Annotated[
+    Floats, key("of the grid", unit="N", shape="forces", expected=_RISING, holds=is_axis, gt=0)
+]
 
 
 def check_axes(speeds_mm_s: Floats, forces_n: Floats) -> None:
@@ -27,10 +45,9 @@ def check_axes(speeds_mm_s: Floats, forces_n: Floats) -> None:
     InputError
     """
     for name, axis in (("speeds_mm_s", speeds_mm_s), ("forces_n", forces_n)):
-        rising = axis.ndim == 1 and axis.size >= 1 and bool((np.diff(axis) > 0).all())
-        if not rising or not (axis[0] > 0 and np.isfinite(axis).all()):
+        if not is_axis(axis):
             raise InputError(
-                f"expected one or more rising values above 0 in {name}, got "
+                f"expected {_RISING} in {name}, got "
                 f"{axis.tolist()}; give the speeds and forces of the model's grid."
             )
 

@@ -6,23 +6,25 @@ docs/method/regression.md#driven-models
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.checks import UNITS, check_rate, check_texture_name
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError, shown
+from modeling.errors import InputError
+from modeling.files.described import key
+from modeling.files.kinds import Rate, Simulated, TextureName, Unit
 from modeling.files.saved_model import SavedModel
 from modeling.models.compiled_for import CompiledFor
-from modeling.models.grid import check_axes
+from modeling.models.grid import Forces, Speeds
 from modeling.models.parameter_table import Parameters, ParameterTable
-from modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy, check_driver
+from modeling.models.terms import CENTROID, DRIVING_TERMS, DrivenBy
 from modeling.models.texture_model import first_peq
 
 _COEFFICIENTS = ("noise_gain", "frequencies_hz", "bandwidths_hz", "amplitudes", "centroid_hz")
-_ARRAYS = ("speeds_mm_s", "forces_n", "signs", *_COEFFICIENTS)
+_LAYERS = "coefficients layers"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -32,94 +34,53 @@ class RegressedModel(SavedModel):
     With driven_by="conditions" every parameter is β + α1·v + α2·F + α3·v·F (eq. 3), k = 4; with
     "centroid" it is p0 + p1·SC(v), k = 2, and SC(v) = c0 + c1·v. What a reduced model leaves out
     is 0.
-
-    Parameters
-    ----------
-    texture : str
-    rate_hz : float
-        The rate at which the driving noise has unit variance.
-    driven_by : {"conditions", "centroid"}
-    speeds_mm_s, forces_n : (2,) array_like
-        The lowest and the highest of the grid, > 0.
-    noise_gain : (k,) array_like
-        Coefficients of G_w, in `unit` per unit noise.
-    frequencies_hz, bandwidths_hz, amplitudes : (k, m) array_like
-        Coefficients of f and B (Hz) and of |G| (`unit` per unit noise).
-    signs : (m,) array_like
-        Each layer's sign over the whole texture, 1 or −1.
-    centroid_hz : (2,) or (0,) array_like
-        c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing.
-    estimator, unit, simulated
-        As in the `TextureModel` behind it.
-    compiled_for : CompiledFor, optional
-        As in `TextureModel`.
-
-    Raises
-    ------
-    InputError
-        For wrong shapes or values out of range.
     """
 
     FORMAT = "tactileq.regressed-model"
     OPTIONAL = frozenset({"compiled_for"})
 
-    texture: str
-    rate_hz: float
-    driven_by: DrivenBy
-    speeds_mm_s: Floats
-    forces_n: Floats
-    noise_gain: Floats
-    frequencies_hz: Floats
-    bandwidths_hz: Floats
-    amplitudes: Floats
-    signs: Floats
-    centroid_hz: Floats
-    estimator: str
-    unit: str = "g"
-    simulated: bool = False
-    compiled_for: CompiledFor | None = None
+    texture: Annotated[TextureName, key("name of the surface")]
+    rate_hz: Annotated[Rate, key("at which the driving noise has unit variance")]
+    driven_by: Annotated[DrivenBy, key("what predicts the parameters")]
+    speeds_mm_s: Annotated[Speeds, key("the lowest and the highest of the grid", shape="2")]
+    forces_n: Annotated[Forces, key("the lowest and the highest of the grid", shape="2")]
+    noise_gain: Annotated[
+        Floats, key("coefficients of G_w, in `unit` per unit noise", shape="coefficients")
+    ]
+    frequencies_hz: Annotated[Floats, key("coefficients of f", unit="Hz", shape=_LAYERS)]
+    bandwidths_hz: Annotated[Floats, key("coefficients of B", unit="Hz", shape=_LAYERS)]
+    amplitudes: Annotated[
+        Floats, key("coefficients of |G|, in `unit` per unit noise", shape=_LAYERS)
+    ]
+    signs: Annotated[
+        Floats,
+        key(
+            "of each layer over the whole texture",
+            shape="layers",
+            expected="each 1 or −1",
+            holds=lambda signs: bool((abs(signs) == 1).all()),
+        ),
+    ]
+    centroid_hz: Annotated[
+        Floats,
+        key("c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing", shape="c"),
+    ]
+    estimator: Annotated[str, key("of the `TextureModel` behind it")]
+    unit: Unit = "g"
+    simulated: Simulated = False
+    compiled_for: Annotated[CompiledFor | None, key("as in `TextureModel`")] = None
 
     def __post_init__(self) -> None:
-        self._check_kinds()
-        object.__setattr__(self, "compiled_for", CompiledFor.of(self.compiled_for))
-        self._freeze(_ARRAYS)
-        object.__setattr__(self, "rate_hz", float(self.rate_hz))
-        check_axes(self.speeds_mm_s, self.forces_n)
-        self._check_shapes()
-        finite = all(np.isfinite(getattr(self, name)).all() for name in _COEFFICIENTS)
-        if not finite or not np.isin(self.signs, (-1.0, 1.0)).all():
-            raise InputError(
-                "expected finite coefficients and signs of 1 or −1, got others; make the model "
-                "again from its grid."
-            )
-
-    def _check_kinds(self) -> None:
-        check_texture_name(self.texture)
-        check_rate(self.rate_hz)
-        kinds = isinstance(self.simulated, bool) and isinstance(self.estimator, str)
-        if not (kinds and self.unit in UNITS):
-            raise InputError(
-                f"{self.texture}: expected a unit among {', '.join(UNITS)}, true or false for "
-                f"simulated and text for estimator, got {shown(self.unit)}, "
-                f"{shown(self.simulated)} and {shown(self.estimator)}; make the model again."
-            )
-        check_driver(self.driven_by)
-
-    def _check_shapes(self) -> None:
-        k, m = 1 + len(DRIVING_TERMS[self.driven_by]), self.signs.size
-        wanted: dict[str, tuple[int, ...]] = {
-            "speeds_mm_s": (2,),
-            "forces_n": (2,),
-            "noise_gain": (k,),
-            "signs": (m,),
-            **dict.fromkeys(("frequencies_hz", "bandwidths_hz", "amplitudes"), (k, m)),
-            "centroid_hz": (2,) if self.driven_by == CENTROID else (0,),
+        super().__post_init__()
+        wanted = {
+            "noise_gain": 1 + len(DRIVING_TERMS[self.driven_by]),
+            "centroid_hz": 2 if self.driven_by == CENTROID else 0,
         }
-        for name, shape in wanted.items():
-            if getattr(self, name).shape != shape:
+        for name, size in wanted.items():
+            if getattr(self, name).size != size:
                 raise InputError(
-                    f"expected {name} of shape {shape}, got {getattr(self, name).shape}; the "
-                    "arrays of a model share one number of layers and of coefficients."
+                    f"expected {name} of shape ({size},) where {self.driven_by} drive a model, got "
+                    f"{getattr(self, name).shape}; make the model again."
                 )
 
     @property

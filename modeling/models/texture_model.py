@@ -4,20 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from modeling.arrays import Bools, Floats
-from modeling.checks import UNITS, check_rate, check_texture_name, is_number
+from modeling.arrays import Bools, Floats, no_marks
+from modeling.checks import check_rate
 from modeling.equalizer.bands import check_bands, clamp_bands
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError, shown
+from modeling.errors import InputError
+from modeling.files.described import key
+from modeling.files.kinds import Rate, Simulated, TextureName, Unit
 from modeling.files.saved_model import SavedModel
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.fit_summary import FitSummary
-from modeling.models.grid import check_axes
+from modeling.models.grid import Forces, Speeds
 from modeling.models.parameter_table import (
     Parameters,
     ParameterTable,
@@ -27,145 +29,82 @@ from modeling.models.parameter_table import (
 
 Blending = Literal["linear", "logarithmic"]
 BLENDINGS: tuple[Blending, ...] = ("linear", "logarithmic")
+_LAYERS = "speeds forces layers"
 # Above this a layer's level is not identifiable (docs/method/fitting.md#not-identifiable).
 LARGEST_IDENTIFIABLE_SD_DB = 6.0
-
-
-def _no_marks() -> Bools:
-    return np.zeros(0, dtype=bool)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class TextureModel(SavedModel):
     """PEQ parameters of one texture over a rectangular grid of S speeds × F forces, m layers.
 
-    Parameters
-    ----------
-    texture : str
-        Name of the surface.
-    rate_hz : float
-        The rate at which the driving noise has unit variance.
-    speeds_mm_s : (S,) array_like
-        Rising, > 0, S ≥ 1; of one speed alone nothing is known of others.
-    forces_n : (F,) array_like
-        Rising, > 0, F ≥ 1.
-    noise_gains : (S, F) array_like
-        G_w ≥ 0, in `unit` per unit noise.
-    frequencies_hz, bandwidths_hz, gains : (S, F, m) array_like
-        As in `PEQ`; gains are signed.
-    level_sd_db : (S, F, m) array_like
-        Standard deviation of each layer's level in dB, from the estimator (0: known exactly).
-    estimator : str
-        What made the model ("paper", "paper-consistent", "planted", …).
-    unit : {"g", "arbitrary"}
-    simulated : bool
-        True where the recordings behind it were simulated.
-    inherited, unresolved : (S, F, m) array_like of bool, optional
-        Frequency taken over from the reference condition; width or level not resolved (see
-        `modeling.Layers`).
-    interpolated : (S, F) array_like of bool, optional
-        Condition without a recording, filled from its neighbours.
-    blending : {"linear", "logarithmic"}
-        How parameters are read between conditions: linearly over speed and force, or as powers of
-        both (docs/method/rendering.md#blending), for which no layer may change its sign. A file
-        without it means linear.
-    compiled_for : CompiledFor, optional
-        The scene that the model was compiled for, with the bound that it keeps there.
-    simplified_from : str
-        SHA-256 of the full model, where `simplify` dropped layers of it; else empty.
-    fit : FitSummary, optional
-        What the estimator says of its fit; of a model with fewer layers or other nodes it says
-        nothing.
-
-    Raises
-    ------
-    InputError
-        For wrong shapes or values out of range.
+    Of one speed or force alone nothing is known of others. Optional arrays that are empty are
+    unmarked.
     """
 
     FORMAT = "tactileq.texture-model"
     OPTIONAL = frozenset({"blending", "compiled_for", "fit", "simplified_from"})
 
-    texture: str
-    rate_hz: float
-    speeds_mm_s: Floats
-    forces_n: Floats
-    noise_gains: Floats
-    frequencies_hz: Floats
-    bandwidths_hz: Floats
-    gains: Floats
-    level_sd_db: Floats
-    estimator: str
-    unit: str = "g"
-    simulated: bool = False
-    inherited: Bools = field(default_factory=_no_marks)
-    unresolved: Bools = field(default_factory=_no_marks)
-    interpolated: Bools = field(default_factory=_no_marks)
-    blending: Blending = "linear"
-    compiled_for: CompiledFor | None = None
-    simplified_from: str = ""
-    fit: FitSummary | None = None
+    texture: Annotated[TextureName, key("name of the surface")]
+    rate_hz: Annotated[Rate, key("at which the driving noise has unit variance")]
+    speeds_mm_s: Speeds
+    forces_n: Forces
+    noise_gains: Annotated[
+        Floats, key("G_w, in `unit` per unit noise", shape="speeds forces", ge=0)
+    ]
+    frequencies_hz: Annotated[Floats, key("peaks, as in `PEQ`", unit="Hz", shape=_LAYERS)]
+    bandwidths_hz: Annotated[Floats, key("−3 dB widths, as in `PEQ`", unit="Hz", shape=_LAYERS)]
+    gains: Annotated[Floats, key("G, signed, in `unit` per unit noise", shape=_LAYERS)]
+    level_sd_db: Annotated[
+        Floats,
+        key(
+            "standard deviation of each layer's level, from the estimator (0: known exactly)",
+            unit="dB",
+            shape=_LAYERS,
+            ge=0,
+        ),
+    ]
+    estimator: Annotated[
+        str, key('what made the model ("paper", "paper-consistent", "planted", …)')
+    ]
+    unit: Unit = "g"
+    simulated: Simulated = False
+    inherited: Annotated[
+        Bools, key("frequency taken over from the reference condition", shape=_LAYERS)
+    ] = field(default_factory=no_marks)
+    unresolved: Annotated[
+        Bools, key("width or level not resolved (see `modeling.Layers`)", shape=_LAYERS)
+    ] = field(default_factory=no_marks)
+    interpolated: Annotated[
+        Bools,
+        key("condition without a recording, filled from its neighbours", shape="speeds forces"),
+    ] = field(default_factory=no_marks)
+    blending: Annotated[
+        Blending,
+        key(
+            "how parameters are read between conditions: linearly over speed and force, or as "
+            "powers of both (docs/method/rendering.md#blending), for which no layer may change its "
+            "sign"
+        ),
+    ] = "linear"
+    compiled_for: Annotated[
+        CompiledFor | None,
+        key("the scene that the model was compiled for, with the bound that it keeps there"),
+    ] = None
+    simplified_from: Annotated[
+        str, key("SHA-256 of the full model, where `simplify` dropped layers of it; else empty")
+    ] = ""
+    fit: Annotated[
+        FitSummary | None,
+        key(
+            "what the estimator says of its fit; of a model with fewer layers or other nodes it "
+            "says nothing"
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
-        self._check_kinds()
-        object.__setattr__(self, "compiled_for", CompiledFor.of(self.compiled_for))
-        object.__setattr__(self, "fit", FitSummary.of(self.fit))
-        self._freeze(("gains",))
-        shape = np.shape(self.gains)
-        for name in _BOOLEAN_ARRAYS:
-            if np.size(getattr(self, name)) == 0:
-                unmarked = np.zeros(shape[:2] if name == "interpolated" else shape, dtype=bool)
-                object.__setattr__(self, name, unmarked)
-        self._freeze(_ARRAYS, booleans=_BOOLEAN_ARRAYS)
-        self._check_axes()
-        self._check_values()
-        object.__setattr__(self, "rate_hz", float(self.rate_hz))
-
-    def _check_axes(self) -> None:
-        check_axes(self.speeds_mm_s, self.forces_n)
-        grid = (self.speeds_mm_s.size, self.forces_n.size)
-        wanted = grid + np.shape(self.gains)[2:3]
-        for name in _ARRAYS[2:]:
-            shape = grid if name in ("noise_gains", "interpolated") else wanted
-            if getattr(self, name).shape != shape or len(wanted) != 3:
-                raise InputError(
-                    f"expected {name} of shape {shape}, got {getattr(self, name).shape}; "
-                    "the arrays of a model share one grid and one number of layers."
-                )
-
-    def _check_kinds(self) -> None:
-        # A file may hold anything: "false" in quotes would count as true.
-        check_texture_name(self.texture)
-        texts = isinstance(self.estimator, str) and isinstance(self.simplified_from, str)
-        kinds = isinstance(self.simulated, bool) and texts
-        if not (is_number(self.rate_hz) and kinds):
-            raise InputError(
-                f"{self.texture}: expected a number for rate_hz, true or false for simulated and "
-                f"text for estimator and simplified_from, got {shown(self.rate_hz)}, "
-                f"{shown(self.simulated)}, {shown(self.estimator)} and "
-                f"{shown(self.simplified_from)}; fit the model again."
-            )
-
-    def _check_values(self) -> None:
-        check_rate(self.rate_hz)
-        if self.unit not in UNITS:
-            raise InputError(
-                f"expected a unit among {', '.join(UNITS)}, got {shown(self.unit)}; fix."
-            )
-        for name in ("noise_gains", "gains", "level_sd_db"):
-            if not np.isfinite(getattr(self, name)).all():
-                raise InputError(f"expected finite {name}, got NaN or inf; fit the model again.")
-        if (self.noise_gains < 0).any() or (self.level_sd_db < 0).any():
-            raise InputError(
-                "expected noise gains and level deviations of at least 0, got a negative one; "
-                "fit the model again."
-            )
+        super().__post_init__()
         check_bands(self.frequencies_hz, self.bandwidths_hz, self.rate_hz)
-        if self.blending not in BLENDINGS:
-            raise InputError(
-                f"expected a blending among {', '.join(BLENDINGS)}, got {shown(self.blending)}; "
-                "fix it."
-            )
         crossing = (self.gains > 0).any(axis=(0, 1)) & (self.gains < 0).any(axis=(0, 1))
         if self.blending == "logarithmic" and crossing.any():
             raise InputError(
@@ -257,8 +196,6 @@ _LAYER_ARRAYS = (
     "inherited",
     "unresolved",
 )
-_ARRAYS = ("speeds_mm_s", "forces_n", "noise_gains", "interpolated", *_LAYER_ARRAYS)
-_BOOLEAN_ARRAYS = ("inherited", "unresolved", "interpolated")
 
 
 def first_peq(at: Parameters, *, rate_hz: float) -> PEQ:

@@ -105,7 +105,13 @@ def simplify(
     if len(keep) < model.n_layers:
         simplified = replace(simplified, simplified_from=model.sha256)
     return Simplification(
-        simplified, verdicts, criterion, threshold, margin_db, hold_above, model.sha256
+        model=simplified,
+        layers=verdicts,
+        criterion=criterion,
+        threshold=threshold,
+        margin_db=margin_db,
+        hold_above=hold_above,
+        full_sha256=model.sha256,
     )
 
 

@@ -8,13 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
+from modeling.files.described import Section, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_text
 from modeling.files.tables import number, read_table
@@ -35,18 +36,8 @@ def displacement_to_acceleration_g(frequency_hz: ArrayLike, displacement_um: Arr
 
 
 @dataclass(frozen=True, eq=False)
-class Threshold:
+class Threshold(Section):
     """A detection threshold, valid from its first to its last frequency.
-
-    Parameters
-    ----------
-    name : str
-    frequency_hz : (n,) array_like
-        Rising, 1e-6 … 1e6, n ≥ 2.
-    acceleration_g : (n,) array_like
-        Peak acceleration at threshold, 1e-9 … 1e6.
-    source, caveat : str
-        Where the numbers come from and what speaks against them.
 
     Raises
     ------
@@ -54,17 +45,22 @@ class Threshold:
         Naming the first value that cannot be part of a threshold.
     """
 
+    WHERE = "threshold"
+    ADVICE = "correct the table"
+
     name: str
-    frequency_hz: Floats
-    acceleration_g: Floats
-    source: str
-    caveat: str
+    frequency_hz: Annotated[
+        Floats, key("rising, 1e-6 … 1e6", unit="Hz", shape="frequencies", finite=False)
+    ]
+    acceleration_g: Annotated[
+        Floats,
+        key("peak at threshold, 1e-9 … 1e6", unit="g", shape="frequencies", finite=False),
+    ]
+    source: Annotated[str, key("where the numbers come from")]
+    caveat: Annotated[str, key("what speaks against them")]
 
     def __post_init__(self) -> None:
-        for name in ("frequency_hz", "acceleration_g"):
-            value = np.array(getattr(self, name), dtype=np.float64)
-            value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        super().__post_init__()
         wrong = _what_is_wrong(self.frequency_hz, self.acceleration_g)
         if wrong:
             raise InputError(
@@ -97,16 +93,6 @@ class Threshold:
         above = np.asarray(frequency_hz, dtype=np.float64) > self.frequency_hz[-1]
         finite = above & np.isfinite(frequency_hz)
         return np.where(finite, self.acceleration_g[-1], self.at(frequency_hz))
-
-    def to_dict(self) -> dict[str, Any]:
-        """The threshold as plain values; `Threshold(**values)` makes it again."""
-        return {
-            "name": self.name,
-            "frequency_hz": self.frequency_hz.tolist(),
-            "acceleration_g": self.acceleration_g.tolist(),
-            "source": self.source,
-            "caveat": self.caveat,
-        }
 
     @property
     def sha256(self) -> str:

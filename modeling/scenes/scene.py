@@ -415,7 +415,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         for name in ("name", "textures", "margin_db"):
-            held = SceneFile.held(name, getattr(self, name))
+            held = SceneFile.of_field(name, getattr(self, name))
             object.__setattr__(self, name, held)
 
     def to_dict(self) -> dict[str, Any]:

@@ -3,84 +3,54 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from modeling.arrays import Floats
-from modeling.checks import check_rate, is_positive
 from modeling.equalizer.bands import check_bands
 from modeling.equalizer.peq import PEQ
-from modeling.errors import InputError, shown
+from modeling.errors import InputError
+from modeling.files.described import key
+from modeling.files.kinds import Rate, Simulated
 from modeling.files.saved_model import SavedModel
 
-_CURVES = ("curve_hz", "curve_response", "curve_coherence")
-_NUMBERS = ("rate_hz", "frequency_hz", "bandwidth_hz", "height", "flat_gain", "coherence")
+_Positive = Annotated[float, key(gt=0)]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Vibrator(SavedModel):
     """A vibrator as its white-noise test shows it: one resonance above a flat part.
 
-    Parameters
-    ----------
-    rate_hz : float
-        At which it was identified.
-    frequency_hz, bandwidth_hz : float
-        Peak and −3 dB width of the resonance's band H; see `PEQ`.
-    height : float
-        R = 1 + G/G_w > 1: response at the resonance over that of the flat part.
-    flat_gain : float
-        G_w > 0, the response of the flat part, acceleration per drive.
-    coherence : float
-        Median of γ² over the band that was fitted, along a logarithmic axis.
-    lowest_hz, highest_hz : float
-        That band.
-    curve_hz, curve_response, curve_coherence : (n,) array_like
-        What was measured, in steps of 1/48 octave: frequency, |transfer| (acceleration per drive;
-        RMS within a step) and coherence γ² of response and drive, 0…1.
-    simulated : bool
-        True where the test was simulated.
-
-    Raises
-    ------
-    InputError
-        For values out of range, not finite, or curves of different lengths.
+    R is the response at the resonance over that of the flat part, G_w. The curves are what was
+    measured, in steps of 1/48 octave.
     """
 
     FORMAT = "tactileq.vibrator"
+    WHAT = "the file of a vibrator"
+    ADVICE = "identify the vibrator again"
 
-    rate_hz: float
-    frequency_hz: float
-    bandwidth_hz: float
-    height: float
-    flat_gain: float
-    coherence: float
-    lowest_hz: float
-    highest_hz: float
-    curve_hz: Floats
-    curve_response: Floats
-    curve_coherence: Floats
-    simulated: bool = False
+    rate_hz: Annotated[Rate, key("at which it was identified")]
+    frequency_hz: Annotated[_Positive, key("peak of the resonance's band H; see `PEQ`", unit="Hz")]
+    bandwidth_hz: Annotated[_Positive, key("its −3 dB width", unit="Hz")]
+    height: Annotated[_Positive, key("R = 1 + G/G_w > 1")]
+    flat_gain: Annotated[_Positive, key("G_w, acceleration per drive")]
+    coherence: Annotated[
+        _Positive,
+        key("median of γ² over the band that was fitted, along a logarithmic axis"),
+    ]
+    lowest_hz: Annotated[_Positive, key("of that band", unit="Hz")]
+    highest_hz: Annotated[_Positive, key("of that band", unit="Hz")]
+    curve_hz: Annotated[Floats, key("frequencies of the curves", unit="Hz", shape="steps")]
+    curve_response: Annotated[
+        Floats, key("|transfer|, acceleration per drive, RMS within a step", shape="steps")
+    ]
+    curve_coherence: Annotated[Floats, key("γ² of response and drive, 0…1", shape="steps")]
+    simulated: Simulated = False
 
     def __post_init__(self) -> None:
-        for name in (*_NUMBERS, "lowest_hz", "highest_hz"):
-            value = getattr(self, name)
-            _check_positive(name, value)
-            object.__setattr__(self, name, float(value))
-        check_rate(self.rate_hz)
+        super().__post_init__()
         check_height(self.height)
-        self._freeze(_CURVES)
-        curves = np.array([getattr(self, name).size for name in _CURVES])
-        if self.curve_hz.ndim != 1 or curves.min() != curves.max():
-            raise InputError(
-                f"expected three curves of one length, got {curves.tolist()} values; identify the "
-                "vibrator again."
-            )
-        if not isinstance(self.simulated, bool):
-            raise InputError(
-                f"expected true or false for simulated, got {shown(self.simulated)}; identify the "
-                "vibrator again."
-            )
         check_band(self.frequency_hz, self.bandwidth_hz, rate_hz=self.rate_hz)
 
     @property
@@ -92,13 +62,6 @@ class Vibrator(SavedModel):
             bandwidths_hz=np.array([self.bandwidth_hz]),
             gains=np.array([self.flat_gain * (self.height - 1)]),
             rate_hz=self.rate_hz,
-        )
-
-
-def _check_positive(name: str, value: float) -> None:
-    if not is_positive(value):
-        raise InputError(
-            f"expected a finite {name} above 0, got {shown(value)}; identify the vibrator again."
         )
 
 

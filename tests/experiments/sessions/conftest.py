@@ -12,6 +12,7 @@ import pytest
 
 from experiments.sessions.files import SessionFiles
 from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.program import program_facts
 from experiments.sessions.roster import Roster
 from experiments.sessions.store import SessionStore
 from modeling.files.hashes import sha256_of_values
@@ -105,6 +106,7 @@ def a_manifest(
         "identical": {},
         "rig": {},
         "description": f"The task {task}.",
+        **program_facts(),
         "trials": planned(task),
     }
     values |= others
@@ -220,6 +222,7 @@ def _manifest(**changed: Any) -> SessionManifest:
         "identical": {},
         "rig": {"firmware": "1.2", "latency_s": 0.1 + 0.2},
         "description": "Compare a real and a virtual surface",
+        **program_facts(),
         "trials": [
             {"trial": n, "phase": phase, "texture": "canvas", "layout": ["MDF", "PVC"]}
             for n, phase in enumerate(phases, start=1)

@@ -62,13 +62,11 @@ def manifest(subject=1):
         rig={},
         description="Compare",
         trials=[{"trial": n, "phase": phase} for n, phase in enumerate(phases, start=1)],
-        program={
-            "versions": {},
-            "platform": "",
-            "git_revision": "",
-            "git_uncommitted": None,
-            "lock_sha256": "",
-        },
+        versions={},
+        platform="",
+        git_revision="",
+        git_uncommitted=None,
+        lock_sha256="",
     )
 
 

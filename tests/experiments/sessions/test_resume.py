@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from experiments.sessions.log import Log, utc_text
 from experiments.sessions.manifest import SessionManifest
+from experiments.sessions.program import program_facts
 from experiments.sessions.resume import Resumption, resumption
 from experiments.sessions.state import SessionState, state_of
+from modeling.files.hashes import sha256_of_values
 
 ManifestOf = Callable[..., SessionManifest]
 BEGUN = datetime(2026, 11, 22, 9, 0, tzinfo=UTC)
@@ -161,14 +163,14 @@ def test_however_often_it_breaks_off_every_trial_is_asked_once(
         simulated_participant=True,
         simulated_rig=True,
         study={},
-        study_sha256="",
+        study_sha256=sha256_of_values({}),
         plan_sha256="",
         models_sha256={},
         rig={},
         model_sources={},
         identical={},
         description="",
-        program={},
+        **program_facts(),
         trials=[{"trial": n, "phase": "training" if n <= 2 else "main"} for n in NUMBERS],
     )
     told: list[Told | float] = []

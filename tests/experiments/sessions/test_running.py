@@ -140,7 +140,7 @@ def test_the_manifest_is_complete_before_the_first_trial(
     assert manifest.study_sha256 == small.sha256
     assert manifest.study["seed"] == small.seed
     assert manifest.model_sources == {"full": "models", "simplified": "fewer"}
-    assert manifest.program["versions"]["numpy"]
+    assert manifest.versions["numpy"]
     assert len(manifest.plan_sha256) == 64
     assert manifest.rig == {"HandFirmware": "wheel 1.0"}
 

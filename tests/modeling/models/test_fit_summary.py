@@ -7,9 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from modeling import InputError, TextureModel
+from modeling import TextureModel
 from modeling.models.fit_summary import FitSummary
 from stimuli.planted.textures import planted_texture
 
@@ -40,27 +39,3 @@ def test_it_says_nothing_of_a_model_with_fewer_layers() -> None:
     assert model().with_layers([0, 1, 2, 3]).fit == SUMMARY
     assert model().with_layers([0, 1, 3]).fit is None
     assert model().at_rate(10_000.0).fit == SUMMARY
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"distance_db": -0.1},
-        {"blend_defect_db": float("nan")},
-        {"with_blends_db": "0.6"},
-        {"by_layers_db": {"2": -1.0}},
-        {"by_layers_db": [0.7]},
-        {"warnings": [3]},
-    ],
-)
-def test_other_values_are_refused(change: dict[str, object]) -> None:
-    with pytest.raises(InputError, match="distances of at least 0 dB"):
-        replace(SUMMARY, **change)
-
-
-def test_other_fields_are_refused(tmp_path: Path) -> None:
-    values = model().to_dict()
-    values["fit"]["more"] = 1
-    (tmp_path / "PVC.json").write_text(json.dumps(values))
-    with pytest.raises(InputError, match="blend_defect_db"):
-        TextureModel.load(tmp_path / "PVC.json")

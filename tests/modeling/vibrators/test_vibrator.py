@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from contextlib import suppress
 from dataclasses import replace
@@ -425,25 +424,16 @@ def test_a_vibrator_loads_back_equal(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changed", "sentence"),
+    ("changed", "facts"),
     [
-        ({"height": 0.9}, "expected a resonance higher than the flat part"),
-        ({"height": "5"}, "expected a finite height above 0"),
-        ({"frequency_hz": -80.0}, "expected a finite frequency_hz above 0"),
-        ({"bandwidth_hz": 2400.0}, "expected each layer's bandwidth within 0.1…2250 Hz"),
-        ({"curve_hz": [1.0, 2.0]}, "expected three curves of one length"),
-        ({"simulated": "false"}, "expected true or false for simulated"),
-        ({"mood": 1}, "expected the fields of a tactileq.vibrator"),
-        ({"format": "tactileq.texture-model"}, "expected the format tactileq.vibrator"),
-        ({"version": 9}, "expected a model of version 1"),
+        ({"height": 0.9}, "R > 1"),
+        ({"bandwidth_hz": 2400.0}, ["bandwidth", "0.1…2250 Hz"]),
+        ({"curve_hz": [1.0, 2.0]}, ["shape", "steps"]),
     ],
 )
-def test_files_that_hold_no_vibrator_are_refused(tmp_path: Path, changed, sentence) -> None:
-    path = tmp_path / "vibrator.json"
-    one_resonance().save(path)
-    path.write_text(json.dumps({**json.loads(path.read_text()), **changed}))
-    with pytest.raises(InputError, match=sentence):
-        Vibrator.load(path)
+def test_values_that_do_not_fit_are_refused(changed: dict[str, object], facts: object) -> None:
+    with refused(InputError, expected=facts):
+        Vibrator.read(one_resonance().to_dict() | changed)
 
 
 def test_numbers_of_numpy_are_saved_as_numbers(tmp_path: Path) -> None:
