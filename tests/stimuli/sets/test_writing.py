@@ -20,10 +20,11 @@ import pytest
 import soundfile
 
 from modeling import InputError, TextureModel, Threshold, fit_ar, regressed
+from modeling.files.stimulus_table import COLUMNS
 from modeling.perception.sensation_level import sensation_level
 from stimuli.planted.textures import planted_texture, record_texture
 from stimuli.sets import writing
-from stimuli.sets.manifest import COLUMNS, Stimulus
+from stimuli.sets.manifest import Stimulus
 from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.rendering import fade_samples
 from stimuli.sets.writing import write_set
