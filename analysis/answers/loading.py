@@ -505,7 +505,8 @@ def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -
 def _read(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
     """A table of BIDS: numbers as floats, NaN where there is no value."""
     rows = read_table(path, columns, bids=True, advice=_ADVICE)
-    table = pd.DataFrame(rows, columns=None if rows else names(columns), dtype=object)
+    header = dict.fromkeys([*names(columns), *(rows[0] if rows else ())])
+    table = pd.DataFrame(rows, columns=list(header), dtype=object)
     numbers = dict.fromkeys((c.name for c in columns if c.limits is not None), float)
     return table.astype(numbers).fillna(np.nan)
 

@@ -338,8 +338,8 @@ def _place(folder: Path, row: Mapping[str, str]) -> str:
 
 
 def _load_row(folder: Path, row: Mapping[str, str]) -> Recording:
-    path = listed_file(folder, row["file"], index_name=INDEX_NAME)
     told = stated(folder, row)
+    path = listed_file(folder, row["file"], index_name=INDEX_NAME)
     unit, scale_g = told["unit"] or "arbitrary", told["g_per_fullscale"]
     if path.suffix.lower() == ".wav":
         samples, rate_hz = read_wav(path, channel=told["channel"])

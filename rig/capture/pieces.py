@@ -258,9 +258,9 @@ class PieceStore:
                 "stroke there again."
             )
         for where, cells in rows:
-            if cells["texture"] != self.plan.texture:
-                continue
             row: dict[str, Any] = dict(typed(cells, COLUMNS, where))
+            if row["texture"] != self.plan.texture:
+                continue
             if (rate_hz := row["rate_hz"]) != self.plan.rate_hz:
                 raise InputError(
                     f"expected pieces of {self.plan.rate_hz:g} Hz in {self.folder}, got some of "
@@ -389,7 +389,7 @@ def _rows(table: Path) -> list[tuple[str, dict[str, str]]]:
             "table is truncated, restore it from a copy, or remove that line."
         )
     for _, row in rows:
-        _check_name(row["file"])
+        _check_name(row["file"], table)
     return rows
 
 
@@ -417,12 +417,11 @@ def _kept(row: Mapping[str, Any]) -> _Kept:
     )
 
 
-def _check_name(name: str) -> None:
+def _check_name(name: str, table: Path) -> None:
     """Refuse a file that no piece can be in: names are numbers, and lead nowhere else."""
     if not _is_piece(name):
         raise InputError(
-            f"expected a file such as 00001.wav in {PIECES}/{TABLE_NAME}, got {shown(name)}; "
-            "remove the line."
+            f"expected a file such as 00001.wav in {table}, got {shown(name)}; remove the line."
         )
 
 

@@ -54,6 +54,7 @@ def labels_from_table(
     """
     rows: dict[str, tuple[str, dict[str, str]]] = {}
     for where, row in read_cells(table, LABEL_COLUMNS, only=True):
+        typed(row, LABEL_COLUMNS[:1], where)  # others may be filled in later
         if row["file"] in rows:
             raise InputError(
                 f"expected one row for {row['file']} in {table}, got several; remove the wrong one."

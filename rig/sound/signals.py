@@ -28,7 +28,7 @@ _SIGNAL = chosen(
 )
 _WHERE = ("trajectory", "speed_mm_s", "force_n", "gain_db")
 _CONDITION = (*_WHERE, "vibrator_sha256")
-_OF_SURFACES = (*_SIGNAL, *chosen(COLUMNS, "texture", "model", "model_sha256", *_WHERE))
+OF_SURFACES = (*_SIGNAL, *chosen(COLUMNS, "texture", "model", "model_sha256", *_WHERE))
 
 
 def tone_burst(
@@ -119,7 +119,9 @@ def stimuli_of_surfaces(
         If no file has this label, several stand for one texture, or one cannot be used (see
         `stimulus`).
     """
-    rows = read_cells(folder / MANIFEST, _OF_SURFACES)
+    rows = read_cells(folder / MANIFEST, OF_SURFACES)
+    for where, row in rows:
+        typed(row, chosen(OF_SURFACES, "texture", "model"), where)
     labels = sorted({row["model"] for _, row in rows})
     if label not in labels and len(labels) > 1:
         raise InputError(
@@ -150,7 +152,7 @@ def stimuli_of_surfaces(
 def _stimulus(
     folder: Path, row: Mapping[str, str], where: str, *, sources: Mapping[str, Path]
 ) -> Stimulus:
-    typed(row, _OF_SURFACES, where)
+    typed(row, OF_SURFACES, where)
     prepared = _prepared(folder, row, where)
     source = sources.get(row["model_sha256"])
     model = None if source is None else load_model(source)

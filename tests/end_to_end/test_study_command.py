@@ -12,8 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.sessions.traces import PRESENTATION_COLUMNS
 from experiments.study.study import SHIPPED_STUDY, Study
 from modeling import Threshold, simplify
+from modeling.files.columns import Column
+from modeling.files.stimulus_table import COLUMNS
 from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
 from tests.refusals import check_refusal
@@ -193,21 +196,21 @@ def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path, main: M
     simulated = main("simulate", "--study", "two.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr
     tables = [
-        read_table(path, ["model_sha256", "surface", "outside_share"])
+        read_table(path, PRESENTATION_COLUMNS)
         for path in sorted((place / "data").rglob("*_presentations.tsv"))
     ]
     assert len(tables) == 3
     shown = {row["model_sha256"] for rows in tables for row in rows if row["surface"] == "virtual"}
     files = {
         row["sha256"]
-        for row in read_table(place / "set/manifest.tsv", ["sha256", "texture"])
+        for row in read_table(place / "set/manifest.tsv", COLUMNS)
         if row["texture"] in ("canvas", "MDF")
     }
     assert shown == files
     # A signal has no grid of speeds and forces: nobody strokes outside of it, or trains for it.
-    assert {row["outside_share"] for rows in tables for row in rows} == {"n/a"}
+    assert {row["outside_share"] for rows in tables for row in rows} == {None}
     for path in (place / "data").glob("sub-*/ses-*/beh/*_task-absolute_beh.tsv"):
-        phases = [row["phase"] for row in read_table(path, ["phase"])]
+        phases = [row["phase"] for row in read_table(path, [Column("phase")])]
         assert phases == ["training"] + ["main"] * 4
     analyzed = main("analyze", "data", "--out", "results")
     assert analyzed.returncode == 0, analyzed.stderr
