@@ -15,7 +15,7 @@ PYTEST_FLAGS ?=
 # libraries again; .venv/ and the project store theirs, whatever the machine's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test quick bench plant lint lock clean
+.PHONY: install demo test quick bench plant docs-tables lint lock clean
 
 install: .venv/installed
 
@@ -59,6 +59,10 @@ bench: install
 # All of them, or BUG=name, or ROOM=name.
 plant: install
 	nice -n 5 $(BIN)/python tools/plant_bugs/plant.py --bug "$(BUG)" --room "$(ROOM)"
+
+# The tables of docs/ that are generated from declared columns.
+docs-tables: install
+	$(BIN)/python tools/docs_tables.py
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
