@@ -239,6 +239,42 @@ PRESSES = AnswerColumn(
     whole=True,
 )
 
+# Of participants.tsv: the first column, and those behind the answers to a study's questions.
+PARTICIPANT_ID = Column("participant_id", description="Participant", required=True)
+PARTICIPANT_COLUMNS = (
+    Column(
+        "slot",
+        description="Place in the design, which determines the balanced parts of the order",
+        limits=(0, inf),
+        whole=True,
+        optional=True,
+    ),
+    Column(
+        "status",
+        description="Whether the participant continues",
+        levels={"enrolled": "takes part", "dropped": "will not come back"},
+        optional=True,
+    ),
+    Column(
+        "consent_version",
+        description="Version of the consent form that was agreed to",
+        optional=True,
+    ),
+    Column("language", description="Language of the texts", optional=True),
+    Column(
+        "pilot",
+        description="Whether the sessions were a pilot",
+        levels={"true": "a pilot", "false": "data of the study"},
+        optional=True,
+    ),
+    Column(
+        "simulated",
+        description="Whether the participant was simulated",
+        levels={"true": "simulated", "false": "a person"},
+        required=True,
+    ),
+)
+
 # In the order in which a study does them; that order is part of every seed.
 ANSWER_TABLES = {
     "absolute": answer_table(
@@ -374,39 +410,3 @@ ANSWER_TABLES = {
         chance=1 / 2,
     ),
 }
-
-# Of participants.tsv: the first column, and those behind the answers to a study's questions.
-PARTICIPANT_ID = Column("participant_id", description="Participant", required=True)
-PARTICIPANT_COLUMNS = (
-    Column(
-        "slot",
-        description="Place in the design, which determines the balanced parts of the order",
-        limits=(0, inf),
-        whole=True,
-        optional=True,
-    ),
-    Column(
-        "status",
-        description="Whether the participant continues",
-        levels={"enrolled": "takes part", "dropped": "will not come back"},
-        optional=True,
-    ),
-    Column(
-        "consent_version",
-        description="Version of the consent form that was agreed to",
-        optional=True,
-    ),
-    Column("language", description="Language of the texts", optional=True),
-    Column(
-        "pilot",
-        description="Whether the sessions were a pilot",
-        levels={"true": "a pilot", "false": "data of the study"},
-        optional=True,
-    ),
-    Column(
-        "simulated",
-        description="Whether the participant was simulated",
-        levels={"true": "simulated", "false": "a person"},
-        required=True,
-    ),
-)

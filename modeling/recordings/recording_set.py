@@ -334,7 +334,9 @@ def stated(folder: Path, row: Mapping[str, str]) -> dict[str, Any]:
 def _place(folder: Path, row: Mapping[str, str]) -> str:
     index = folder / INDEX_NAME
     name = row["file"]
-    return f"row {name} of {index}" if index.is_file() else f"{Path(name).with_suffix('.json')}"
+    if not index.is_file():
+        return f"{Path(name).with_suffix('.json')}"
+    return f"row {shortened(name)} of {index}"
 
 
 def _load_row(folder: Path, row: Mapping[str, str]) -> Recording:
