@@ -6,13 +6,16 @@ wrong files. Rules between keys are tested where they stand.
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
+import jsonschema
 import pytest
 import tomlkit
 
 from modeling import InputError, Scene
+from modeling.files.describing import schema
 from modeling.scenes.scene import SceneFile
 from stimuli.sets.recipe import Recipe
 from tests.described import Kind, Place, declared, mutations, places
@@ -151,3 +154,20 @@ def test_a_doubled_key_is_refused(kind: Kind, tmp_path: Path) -> None:
                 comma = "" if " = " in line or line.endswith(",") else ","
                 text = "\n".join([*lines[:number], line + comma, *lines[number:]])
                 refusal(kind, tmp_path, text, what=f"doubled: {line}")
+
+
+def _as_json(value: object) -> object:
+    """Values as an editor hands them to a schema: dates are text."""
+    return json.loads(json.dumps(value, default=str))
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_an_editor_finds_what_is_refused(kind: Kind) -> None:
+    """The schema holds for the examples, and finds wrong types, ranges and names of keys."""
+    validator = jsonschema.Draft202012Validator(schema(kind.section))
+    for example in kind.examples:
+        validator.validate(_as_json(example))
+    for place in places(kind):
+        for what, values in mutations(place, kind.examples[place.example]):
+            if "nan" not in what and "inf" not in what:  # which JSON does not have
+                assert not validator.is_valid(_as_json(values)), (str(place), what)

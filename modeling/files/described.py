@@ -127,7 +127,9 @@ class Key:
     @property
     def words(self) -> str:
         """What is expected, in words."""
-        return self.expected or words(self.kind, unit=self.unit)
+        if self.expected or self.also is None:
+            return self.expected or words(self.kind, unit=self.unit)
+        return f"{words(inspect.type_info(self.also), unit=self.unit)}, or {words(self.kind)}"
 
     def checked(self, value: Any, where: str, *, folder: Path | None = None) -> Any:
         """A value as the field holds it; InputError for any other, naming the key and `where`."""
@@ -328,7 +330,7 @@ def words(kind: inspect.Type, *, unit: str = "") -> str:
                 f'"{value}"' if isinstance(value, str) else str(value) for value in values
             )
         case inspect.VarTupleType(item_type=item, min_length=least):
-            return f"a list{' of one or more' * bool(least)}, each {words(item, unit=unit)}"
+            return f"a list{' of one or more' * bool(least)}, each {words(item, unit=unit)},"
         case inspect.TupleType(item_types=items):
             return f"[{', '.join(words(item, unit=unit) for item in items)}]"
         case inspect.DictType(key_type=name, value_type=value):
@@ -353,7 +355,8 @@ def _range(kind: inspect.IntType | inspect.FloatType) -> str:
 
 def _short(limit: float) -> str:
     """A limit without an exponent where it is a whole number that one can read."""
-    return f"{limit:.0f}" if float(limit).is_integer() and abs(limit) < 1e9 else f"{limit:g}"
+    whole = float(limit).is_integer() and abs(limit) < 1e9
+    return f"{limit:.0f}" if whole else f"{limit:g}".replace("e+", "e")
 
 
 _PLAIN = {

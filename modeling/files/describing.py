@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import msgspec
@@ -25,6 +26,11 @@ def schema(file: type[Section]) -> dict[str, Any]:
             required = ["version", *required]
     about = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return {**about, **_object(file, properties, required)}
+
+
+def schema_text(file: type[Section]) -> str:
+    """The text of the schema's file."""
+    return json.dumps(schema(file), indent=2, ensure_ascii=False) + "\n"
 
 
 def key_tables(file: type[Section]) -> str:
@@ -61,7 +67,7 @@ def _default(one: Key) -> str:
     if one.required:
         return "required"
     value = plain(one.default)
-    return "" if value in (None, [], {}, "") else f"`{msgspec.json.encode(value).decode()}`"
+    return "" if value in (None, [], {}, "") else f"`{json.dumps(value, ensure_ascii=False)}`"
 
 
 def _properties(section: type[Section]) -> tuple[dict[str, Any], list[str]]:
