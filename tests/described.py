@@ -60,9 +60,10 @@ class Place:
     way: tuple[str | int, ...]
     where: str
     key: Key
+    section: type[Section]
 
     def __str__(self) -> str:
-        return f"{self.where} {self.key.name}"
+        return f"{self.section.WHERE} {self.key.name}"
 
     def table(self, values: Values) -> Values:
         """The table of the key."""
@@ -92,20 +93,26 @@ def declared(section: type[Section]) -> Iterator[str]:
 
 
 def _places(
-    section: type[Section], values: Values, number: int, way: tuple[str | int, ...] = ()
+    section: type[Section],
+    values: Values,
+    number: int,
+    way: tuple[str | int, ...] = (),
+    where: str = "",
 ) -> Iterator[Place]:
     head = section.WHERE.strip("[]") if issubclass(section, DescribedFile) else ""
+    where = where or section.WHERE
     for key in keys_of(section):
         if key.section is None:
             own = (*way, head) if head else way
-            place = Place(number, own, section.WHERE, key)
+            place = Place(number, own, where, key, section)
             if key.name in place.table(values):
                 yield place
-        elif key.name in Place(number, way, "", key).table(values):
-            below = Place(number, way, "", key).table(values)[key.name]
-            steps = [(key.name, 0)] if key.several and below else [(key.name,)]
-            for step in steps:
-                yield from _places(key.section, values, number, (*way, *step))
+            continue
+        tables = Place(number, way, where, key, section).table(values)
+        for name in (name for name in key.names if name in tables):
+            step = (name, 0) if key.several and tables[name] else (name,)
+            called = f"[{name}]" if key.tables else ""
+            yield from _places(key.section, values, number, (*way, *step), called)
 
 
 def mutations(place: Place, values: Values) -> Iterator[tuple[str, Values]]:

@@ -14,6 +14,7 @@ import jsonschema
 import pytest
 import tomlkit
 
+from experiments.study.study import Study
 from modeling import InputError, Scene
 from modeling.files.describing import schema
 from modeling.scenes.scene import SceneFile
@@ -93,7 +94,73 @@ RECIPE = Kind(
     },
     again=Recipe.to_toml,
 )
-KINDS = [SCENE, RECIPE]
+_TEXTURES = {"textures": ["canvas", "PVC", "MDF"], "trays": {"canvas": "A", "PVC": "B", "MDF": "C"}}
+_CLAIM = {"name": "alike", "models": ["full", "simplified"], "test": "equivalence"}
+STUDY = Kind(
+    name="study.toml",
+    section=Study,
+    examples=(
+        {
+            "name": "three surfaces",
+            "seed": 7,
+            **_TEXTURES,
+            "models": {"full": "models", "simplified": "simplified"},
+            "languages": ["en", "ja"],
+            "longest_gap_min": 20,
+            "masking": "pink noise",
+            "surface_visible": "no",
+            "data_license": "CC0",
+            "calibration_days": 30,
+            "measured_force": True,
+            "consent": {"version": "2026-11"},
+            "questions": [
+                {
+                    "name": "craft",
+                    "levels": ["no", "yes"],
+                    "text": {"en": "Any craft?", "ja": "手仕事は?"},
+                    "levels_text": {"ja": ["いいえ", "はい"]},
+                },
+            ],
+            "plan": {
+                "exclusions": ["Who slept."],
+                "highest_share_at_ends": 0.3,
+                "rule": "model",
+                "few": 0.2,
+                "claims": [
+                    {**_CLAIM, "task": "oddity", "measure": "correct", "bounds": [-0.1, 0.2]}
+                ],
+            },
+            "absolute": {
+                "participants": 9,
+                "schedule": "interleaved",
+                "anchors": {"canvas": "PVC"},
+            },
+            "oddity": {
+                "participants": 8,
+                "schedule": "interleaved",
+                "repeats": 6,
+                "models": ["full", "simplified"],
+                "training_trials": 2,
+                "most_training_trials": 4,
+                "break_after": 20,
+                "feel_all": True,
+                "catch": {"MDF": "PVC"},
+                "catch_trials": 4,
+            },
+        },
+        {
+            "name": "least",
+            "seed": 0,
+            **_TEXTURES,
+            "questions": [{"name": "age", "least": 18, "most": 99}],
+        },
+    ),
+    load=Study.load,
+    write=tomlkit.dumps,
+    beside={},
+    again=Study.to_dict,
+)
+KINDS = [SCENE, RECIPE, STUDY]
 
 
 def written(kind: Kind, folder: Path, values: dict[str, object] | str) -> Path:

@@ -18,7 +18,7 @@ docs/where.md#a-key-of-a-file
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
@@ -47,6 +47,7 @@ def key(
     also: Any = None,
     as_given: bool = False,
     name: str = "",
+    tables: Sequence[str] = (),
     **limits: Any,
 ) -> Meta:
     """What is said of a key, or of a type that several keys have, for an annotation.
@@ -61,7 +62,8 @@ def key(
     advice : str
         What to do about a wrong value: the end of the sentence.
     holds : callable, optional
-        Whether a value of the type is good, where the limits cannot say it.
+        Whether a value of the type is good, where the limits cannot say it; in a class no lambda
+        that uses names of the module, which its annotation does not see.
     reads : callable, optional
         Makes a value of the type from what a file may say instead, and leaves all else as it is.
     also : type, optional
@@ -70,6 +72,8 @@ def key(
         Whether a whole number stays one where any number may be: 5 is not 5.0 in a text or a hash.
     name : str
         The key, where that is not the field's name.
+    tables : sequence of str
+        Of a mapping to sections: their names, by which they stand beside the other keys.
     limits
         Those of `msgspec.Meta`: ge, gt, le, lt, min_length, max_length, pattern.
     """
@@ -82,6 +86,7 @@ def key(
         "also": also,
         "as_given": as_given,
         "name": name,
+        "tables": tuple(tables),
     }
     extra = {what: value for what, value in said.items() if value}
     return Meta(description=description or None, extra=extra or None, **limits)
@@ -101,7 +106,8 @@ class Key:
     """One key of a section, as declared.
 
     `field` is its name in Python, `name` that in the file. `section` is the class of the section
-    that it holds, None for a value; `several` says whether it holds a list of sections.
+    that it holds, None for a value; `several` says whether it holds a list of sections, `tables`
+    the keys that each of a mapping of sections has of its own.
     """
 
     field: str
@@ -118,6 +124,18 @@ class Key:
     reads: Callable[[Any], Any] = lambda value: value
     also: Any = None
     as_given: bool = False
+    tables: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What stands in a file: its name, or those of its tables."""
+        return self.tables or (self.name,)
+
+    def stated(self, values: Mapping[str, Any]) -> Any:
+        """What a file states of it; KeyError where it states nothing."""
+        if not self.tables:
+            return values[self.name]
+        return {name: values[name] for name in self.tables if name in values}
 
     @property
     def required(self) -> bool:
@@ -158,6 +176,12 @@ class Key:
 
     def _sections(self, value: Any, folder: Path | None) -> Any:
         assert self.section is not None  # or there is no section to read
+        if self.tables:
+            check_keys(value, self.tables, where=self.name)
+            return {
+                name: _section(self.section, one, folder, where=f"[{name}]")
+                for name, one in value.items()
+            }
         if not self.several:
             return _section(self.section, value, folder)
         if not isinstance(value, list | tuple):
@@ -166,8 +190,8 @@ class Key:
             raise self.missing(self.section.WHERE)
         count = len(value)
         return tuple(
-            _section(self.section, one, folder, number=number if count > 1 else 0)
-            for number, one in enumerate(value, start=1)
+            _section(self.section, one, folder, where=_numbered(self.section.WHERE, place, count))
+            for place, one in enumerate(value, start=1)
         )
 
     def missing(self, where: str) -> InputError:
@@ -175,7 +199,10 @@ class Key:
         if self.section is not None:
             where = self.section.WHERE
             return InputError(f"expected a table {where}, got none; write {where} and its keys.")
-        return InputError(f"expected {self.name} ({self.words}) under {where}, got none; add it.")
+        return InputError(
+            f"expected {self.name} ({self.words}) {f'under {where}' if where else 'at the top'}, "
+            "got none; add it."
+        )
 
 
 class Section:
@@ -208,19 +235,16 @@ class Section:
             For what is no table, and for unknown, missing and wrong keys.
         """
         where = where or cls.WHERE
-        keys = {one.name: one for one in keys_of(cls)}
+        keys = keys_of(cls)
         if not isinstance(values, Mapping):
             raise _no_table(where, values)
-        check_keys(values, tuple(keys), where=where)
-        for name, one in keys.items():
-            if one.required and name not in values:
+        check_keys(values, [name for one in keys for name in one.names], where=where or "the file")
+        for one in keys:
+            if one.required and one.name not in values:
                 raise one.missing(where)
-        given = {name: one for name, one in keys.items() if name in values}
+        given = [one for one in keys if any(name in values for name in one.names)]
         return cls(
-            **{
-                one.field: one.checked(values[name], where, folder=folder)
-                for name, one in given.items()
-            }
+            **{one.field: one.checked(one.stated(values), where, folder=folder) for one in given}
         )
 
     @classmethod
@@ -230,17 +254,22 @@ class Section:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, those of a file."""
-        return {one.name: plain(getattr(self, one.field)) for one in keys_of(type(self))}
+        values: dict[str, Any] = {}
+        for one in keys_of(type(self)):
+            value = plain(getattr(self, one.field))
+            values |= value if one.tables else {one.name: value}
+        return values
 
 
 class DescribedFile(Section):
     """The base of a whole TOML file: its values stand under `WHERE`, its sections in tables.
 
-    Subclasses declare `WHAT` ("a scene"), `VERSION`, and `WHERE`.
+    Subclasses declare `WHAT` ("a scene"), and `VERSION` and `WHERE` unless the file states no
+    version and has its values at the top.
     """
 
     WHAT: ClassVar[str]
-    VERSION: ClassVar[int]
+    VERSION: ClassVar[int] = 0
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -261,6 +290,8 @@ class DescribedFile(Section):
     def from_tables(cls, values: Mapping[str, Any], *, folder: Path | None = None) -> Self:
         """A file from its tables, `version` among them; refused as by `load`."""
         head, tables = cls.WHERE.strip("[]"), cls.tables()
+        if not head and not cls.VERSION:
+            return cls.read(values, folder=folder)
         check_keys(values, ("version", head, *tables), where=cls.WHAT)
         check_version(values, cls.VERSION, what=cls.WHAT.partition(" ")[2])
         plain = values.get(head, {})
@@ -273,7 +304,7 @@ class DescribedFile(Section):
     @classmethod
     def tables(cls) -> tuple[str, ...]:
         """The names of its sections, without the one of its plain values."""
-        return tuple(one.name for one in keys_of(cls) if one.section is not None)
+        return tuple(name for k in keys_of(cls) if k.section is not None for name in k.names)
 
 
 @contextmanager
@@ -443,6 +474,8 @@ def _section_of(annotation: Any) -> tuple[type[Section] | None, bool]:
         annotation = annotation.__origin__
     if get_origin(annotation) in (Union, UnionType):
         annotation = next(one for one in get_args(annotation) if one is not NoneType)
+    if get_origin(annotation) is Mapping:
+        return _section_of(get_args(annotation)[1])
     if get_origin(annotation) is tuple:
         item, _ = _section_of(get_args(annotation)[0])
         return item, item is not None
@@ -458,11 +491,12 @@ def _without_numpy(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _section(kind: type[Section], value: Any, folder: Path | None, *, number: int = 0) -> Section:
-    if isinstance(value, kind):
-        return value
-    where = f"{kind.WHERE} number {number}" if number else kind.WHERE
-    return kind.read(value, where=where, folder=folder)
+def _section(kind: type[Section], value: Any, folder: Path | None, *, where: str = "") -> Section:
+    return value if isinstance(value, kind) else kind.read(value, where=where, folder=folder)
+
+
+def _numbered(where: str, place: int, count: int) -> str:
+    return f"{where} number {place}" if count > 1 else where
 
 
 def _path_in(folder: Path | None) -> Callable[[type, Any], Any]:

@@ -72,7 +72,8 @@ def _default(one: Key) -> str:
 
 def _properties(section: type[Section]) -> tuple[dict[str, Any], list[str]]:
     keys = keys_of(section)
-    return {one.name: _of_key(one) for one in keys}, [one.name for one in keys if one.required]
+    properties = {name: _of_key(one) for one in keys for name in one.names}
+    return properties, [one.name for one in keys if one.required]
 
 
 def _object(
