@@ -39,8 +39,7 @@ class Question(Section):
         str,
         key(
             "a column of participants.tsv",
-            expected="lower-case letters, digits and underscores, and another name than "
-            f"{', '.join(TAKEN)},",
+            expected=f"lower-case letters, digits and underscores (and none of {', '.join(TAKEN)})",
             advice="rename it",
             pattern="^[a-z][a-z0-9_]*$",
             holds=_is_free,
@@ -54,7 +53,7 @@ class Question(Section):
         tuple[Label, ...],
         key(
             f"of a choice, two to {MOST_LEVELS}, as the data name them",
-            expected="a list of levels, each once and printable text in one line,",
+            expected="a list of different levels, printable text in one line",
             holds=is_different,
             advice='write ["…", "…"]',
         ),
@@ -70,7 +69,7 @@ class Question(Section):
         dict[str, Annotated[tuple[Label, ...], key(holds=is_different)]],
         key(
             "how the levels are shown, by language, in their order",
-            expected="a table of lists, each of different printable texts in one line,",
+            expected="a table of lists of different printable texts in one line",
             advice='write levels_text.ja = ["…", "…"]',
         ),
     ] = field(default_factory=dict)

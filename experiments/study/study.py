@@ -1,6 +1,6 @@
 """The study file: textures, trays, models, participants, schedules and circumstances.
 
-docs/method/protocols.md
+docs/study-file.md lists its keys; docs/method/protocols.md says what becomes of them.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def _is_version(text: str) -> bool:
     return text == "" or is_label(text)
 
 
-def _has_different(trays: Mapping[str, str]) -> bool:
-    return is_different(list(trays.values()))
+def _are_trays(trays: Mapping[str, str]) -> bool:
+    return is_different(list(trays.values())) and not set("".join(trays.values())) & set('"\\')
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,13 +77,21 @@ class Study(DescribedFile):
 
     WHAT: ClassVar[str] = "a study file"
     name: Annotated[Label, key("title of the study")]
-    seed: Annotated[int, key("of all orders and shuffles", ge=0, le=2**63 - 1)]
+    seed: Annotated[
+        int,
+        key(
+            "of all orders and shuffles",
+            expected="a whole number from 0 to 2⁶³ − 1",
+            ge=0,
+            le=2**63 - 1,
+        ),
+    ]
     textures: Annotated[
         tuple[ListedLabel, ...],
         key(
             "names of the surfaces",
             expected=f"a list of 2 to {MOST_TEXTURES} different textures, printable text in one "
-            'line without | " \\',
+            "line without bars, quotes and backslashes",
             advice='write ["…", "…"]',
             holds=is_different,
             min_length=2,
@@ -91,19 +99,19 @@ class Study(DescribedFile):
         ),
     ]
     trays: Annotated[
-        dict[str, ListedLabel],
+        dict[str, Label],
         key(
             "the tray of each texture's sample; no label reveals anything to participants",
             expected="a table of texture = label of its tray, all different and printable text in "
-            'one line without | " \\',
-            holds=_has_different,
+            "one line without quotes and backslashes",
+            holds=_are_trays,
         ),
     ]
     models: Annotated[
         dict[ListedLabel, Label],
         key(
             "named sets of models, relative to the file, the reference first",
-            expected=f"a table of 2 to {MOST_MODELS} sets of models, name = folder or file,",
+            expected=f"a table of 2 to {MOST_MODELS} sets of models (name = folder or file)",
             min_length=2,
             max_length=MOST_MODELS,
         ),

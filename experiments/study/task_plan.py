@@ -38,7 +38,7 @@ class TaskPlan(Section):
 
     WHERE: ClassVar[str] = "[TASK]"
     participants: Annotated[
-        int, key("by day a multiple of the number of models, half of each order", ge=1, le=9999)
+        int, key("by day a multiple of the number of models, for balance", ge=1, le=9999)
     ]
     schedule: Annotated[
         Literal["by-day", "interleaved"],
@@ -58,7 +58,7 @@ class TaskPlan(Section):
         tuple[Label, ...],
         key(
             "the sets that are compared; without it the first two of [models]",
-            expected="a list of two models or more, each once,",
+            expected="a list of two models or more, all different",
             advice='write ["full", "simplified"]',
             holds=_can_be_compared,
         ),

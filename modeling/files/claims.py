@@ -47,7 +47,7 @@ class Claim(Section):
         tuple[float, float],
         key(
             "the smallest differences that matter: points of the scale, or proportions correct",
-            expected="two bounds, below and above 0,",
+            expected="two bounds, below and above 0",
             advice="give the smallest differences that matter",
             holds=lambda bounds: bounds[0] < 0 < bounds[1],
         ),
@@ -85,7 +85,7 @@ class Plan(Section):
         tuple[Label, ...],
         key(
             "a sentence for each reason to leave a participant or an answer out",
-            expected="a list of sentences in one line,",
+            expected="a list of sentences in one line",
             advice='write ["…"]',
         ),
     ] = ()

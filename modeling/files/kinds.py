@@ -51,5 +51,10 @@ TextureNames = Annotated[
 Rate = Annotated[float, key(unit="Hz", ge=LOWEST_RATE_HZ, le=HIGHEST_RATE_HZ)]
 Label = Annotated[str, key(expected=_LABEL, holds=is_label, advice="rename it")]
 ListedLabel = Annotated[
-    str, key(expected=f'{_LABEL} and none of | " \\', holds=is_listed_label, advice="rename it")
+    str,
+    key(
+        expected=f"{_LABEL}, nor bars, quotes and backslashes",
+        holds=is_listed_label,
+        advice="rename it",
+    ),
 ]

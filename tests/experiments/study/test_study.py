@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 
@@ -14,6 +14,8 @@ from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
 from modeling.files.claims import Claim, Plan
+from modeling.files.described import Section, key
+from modeling.files.describing import key_tables, schema
 from tests.refusals import refused
 
 
@@ -111,6 +113,37 @@ def test_the_hash_of_the_plan_is_of_the_study_and_of_the_models() -> None:
     assert found != plan_sha256(study, {"canvas": {"full": "0a", "AR": "1c"}})
 
 
+@dataclass(frozen=True, kw_only=True)
+class PaidPlan(TaskPlan):
+    """A task with one more key."""
+
+    reward: Annotated[float, key("for taking part", unit="EUR", ge=0, le=99)] = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaidStudy(Study):
+    """A study with one more key."""
+
+    deposit: Annotated[float, key("for the key", unit="EUR", ge=0, le=50)] = 5.0
+
+
+@pytest.mark.parametrize(
+    ("paid", "name", "most", "where"),
+    [(PaidStudy, "deposit", 50, ""), (PaidPlan, "reward", 99, "[absolute]")],
+)
+def test_a_key_costs_one_line(paid: type[Section], name: str, most: int, where: str) -> None:
+    """Reading, refusing, saving, the schema and the documentation follow from the declaration."""
+    plain = Study.load().to_dict()
+    values = plain if paid is PaidStudy else plain["absolute"]
+    read = paid.read({**values, name: 2}, where=where)
+    assert read.to_dict() == {**values, name: 2.0}
+    with refused(InputError, names=[name, *where.split()], expected=f"{most} EUR", got=most + 1):
+        paid.read({**values, name: most + 1}, where=where)
+    described = schema(paid)["properties"][name]
+    assert (described["minimum"], described["maximum"]) == (0, most)
+    assert f"| `{name}` | a number from 0 to {most} EUR |" in key_tables(paid)
+
+
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
     study = Study.load(
         edited(tmp_path, "participants = 24\nschedule", "participants = 8\nschedule")
@@ -185,7 +218,7 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('["en", "ja"]', '["English"]', "such as en or ja for languages"),
         ('["en", "ja"]', '["en", "en"]', "different languages"),
         ('name = "sex"', 'name = "Sex"', "for name under"),
-        ('name = "sex"', 'name = "code"', "another name than .* got 'code'"),
+        ('name = "sex"', 'name = "code"', "and none of .* got 'code'"),
         ('name = "sex"', 'name = "age"', "different questions"),
         ('name = "sex"', 'name = "mood"', "expected the question mood in en, ja"),
         ('name = "sex"', 'name = "mood"\ntext.en = "Mood?"', "got none in ja"),
@@ -225,6 +258,7 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('"PVC", ', '"PVC", "PVC", ', "for textures, got"),
         ('PVC = "F"', 'PVC = "E"', "for trays, got"),
         ('PVC = "F"', 'PVC = "F\\tG"', "for trays, got"),
+        ('PVC = "F"', "PVC = 'F\"G'", "for trays, got"),
         ('"canvas", ', '"can|vas", ', "for textures, got"),
         ('"canvas", ', '"can\\nvas", ', "for textures, got"),
         ("[relative]", "[[relative]]", r"expected a table \[relative\]"),
