@@ -154,7 +154,7 @@ def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
 
     live.write_reading(0.0, 0.0, y_mm=0.0, speed_mm_s=0.0, force_n=0.0, flags=0)
     reader._closing = Closing()  # type: ignore[assignment]
-    reader._process = Process()  # type: ignore[assignment]
+    reader._child = Process()  # type: ignore[assignment]
     reader._alive_s = 0.0
     monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
     reader._watch()
