@@ -14,7 +14,7 @@ import pytest
 
 from rig.live.child import Child
 from rig.live.messages import Done
-from rig.monitoring.bare_thread import Look, Wake, WakeUps
+from rig.monitoring.bare_thread import Look, WakeUps
 
 REPEATS = 2
 PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
@@ -44,7 +44,7 @@ class BareProcess:
 
     def _misses(self) -> int:
         if self._child is None:
-            self._child = Child("rig.monitoring.bare_thread", Wake(PERIOD_S))
+            self._child = Child("rig.monitoring.bare_thread", PERIOD_S)
             self._child.ready(Done, within_s=ANSWER_S)
         return self._child.ask(Look(), WakeUps, within_s=ANSWER_S).misses
 

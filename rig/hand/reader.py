@@ -39,7 +39,7 @@ class HandReader:
         self._settings = settings
         self._window = WindowHand(live, settings) if settings.kind == "window" else None
         self._child: Child | None = None
-        self._lock = threading.Lock()  # of the process and the faults
+        self._lock = threading.Lock()  # of the faults
         self._faults: deque[str] = deque(maxlen=_MOST_FAULTS)
         self._counts: dict[str, int] = {}
         self._closing = threading.Event()
@@ -86,10 +86,8 @@ class HandReader:
         if self._window is not None:
             self._window.close()
         self._closing.set()
-        with self._lock:
-            child = self._child
-        if child is not None:
-            child.close()
+        if self._child is not None:
+            self._child.close()
         for thread in self._threads:
             thread.join()
         self._threads = []
@@ -108,8 +106,7 @@ class HandReader:
         dropped because they were read more than 0.1 s after they were measured). Of a tablet or
         mouse: frames, dropped (by the kernel). They restart where the device was opened again.
         """
-        with self._lock:
-            return dict(self._counts)
+        return dict(self._counts)
 
     def firmware(self) -> str:
         """The version that the device states; empty where it states none.
@@ -118,8 +115,7 @@ class HandReader:
         """
         if self._settings.kind == "serial":
             self._has_firmware.wait(max(0.0, self._ready_s + FIRMWARE_S - now_s()))
-        with self._lock:
-            return self._firmware
+        return self._firmware
 
     def push(self, x: float, y: float, *, down: bool = True, button: bool = False) -> None:
         """Where the window's pointer is now; for kind "window" only.
@@ -141,16 +137,13 @@ class HandReader:
 
     def unplug(self, unplugged: bool = True) -> None:
         """Have the process act as if the device were unplugged, or plugged in again; for tests."""
-        with self._lock:
-            child = self._child
-        if child is not None:
-            child.tell(Unplug(unplugged))
+        if self._child is not None:
+            self._child.tell(Unplug(unplugged))
 
     @property
     def pid(self) -> int | None:
         """Number of the process that reads; None where there is none."""
-        with self._lock:
-            return self._child.pid if self._child is not None else None
+        return self._child.pid if self._child is not None else None
 
     def __enter__(self) -> HandReader:
         self.open()
@@ -161,9 +154,7 @@ class HandReader:
 
     def _start(self, *, patient: bool) -> Child:
         settings = ReadHand(live=str(self._live.path), settings=self._settings, patient=patient)
-        child = Child("rig.hand.process", settings)
-        with self._lock:
-            self._child = child
+        self._child = child = Child("rig.hand.process", settings)
         if self._closing.is_set():  # closed in between
             child.close()
         return child
@@ -196,11 +187,9 @@ class HandReader:
                 case Fault(told):
                     self._add_fault(told)
                 case Counts(counts):
-                    with self._lock:
-                        self._counts = counts
+                    self._counts = counts
                 case Firmware(version):
-                    with self._lock:
-                        self._firmware = version
+                    self._firmware = version
                     self._has_firmware.set()
 
     def _watch(self) -> None:
@@ -214,8 +203,7 @@ class HandReader:
             last_s = max(
                 self._alive_s, held_up_s, float("-inf") if latest is None else latest["time_s"]
             )
-            with self._lock:
-                child = self._child
+            child = self._child
             if child is not None and now_s() - last_s > SILENT_S:
                 self._alive_s = float("inf")
                 self._add_fault(

@@ -54,9 +54,8 @@ def _started(module: str, complaints: IO[bytes]) -> subprocess.Popen[bytes]:
 def _last_line(complaints: IO[bytes]) -> str:
     """The last line that a process wrote to its standard error, in brackets; empty for none."""
     complaints.seek(0)
-    lines = complaints.read().decode(errors="replace").split("\n")
-    last = [line.strip() for line in lines if line.strip()][-1:]
-    return f" ({last[0]})" if last else ""
+    text = complaints.read().decode(errors="replace").strip()
+    return f" ({text.splitlines()[-1].strip()})" if text else ""
 
 
 class Child:
@@ -77,7 +76,7 @@ class Child:
         assert self._process.stdin is not None
         assert self._process.stdout is not None
         self._stdin, self._stdout = self._process.stdin, self._process.stdout
-        self._heard: queue.Queue[bytes | InputError | None] = queue.Queue()
+        self._heard: queue.Queue[bytes | None] = queue.Queue()
         threading.Thread(target=self._listen, daemon=True).start()
         with suppress(OSError):  # `ready` says why
             send(self._stdin, settings)
@@ -138,8 +137,6 @@ class Child:
             self._heard.put(None)  # for who asks next
             raise ChildLost(f"it has ended {self.end()}")
         try:
-            if isinstance(heard, InputError):
-                raise heard
             message = decoded(heard, kinds | Refused)
         except InputError as error:
             self.kill(f" ({error})")
@@ -182,11 +179,7 @@ class Child:
 
     def _listen(self) -> None:
         """Pass its messages on; None is its end."""
-        try:
+        with suppress(ValueError, OSError):  # closed by `kill`
             for data in received(self._stdout):
                 self._heard.put(data)
-        except InputError as error:
-            self._heard.put(error)
-        except (ValueError, OSError):  # closed by `kill`
-            pass
         self._heard.put(None)

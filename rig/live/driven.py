@@ -6,7 +6,6 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, TypeVar
 
 from modeling.errors import InputError
@@ -26,17 +25,15 @@ class Parent:
         if sys.platform != "win32":
             # A stopped process cannot fade; a card may repeat indefinitely what it got last.
             signal.signal(signal.SIGTSTP, signal.SIG_IGN)
-        # Unbuffered, unlike sys.stdin, whose lock a thread would hold when the interpreter ends.
-        self._received = received(os.fdopen(0, "rb", buffering=0, closefd=False))
+        # Not sys.stdin, whose lock a thread would still hold when the interpreter ends.
+        self._received = received(os.fdopen(0, "rb", closefd=False))
         self._answers = os.fdopen(os.dup(1), "wb")
         os.dup2(2, 1)  # what libraries print is no message
 
     def __enter__(self) -> Parent:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _: TracebackType | None
-    ) -> bool:
+    def __exit__(self, kind: object, error: object, trace: object) -> bool:
         if isinstance(error, InputError):
             self.tell(Refused(str(error)))
         return isinstance(error, InputError | BrokenPipeError)

@@ -6,6 +6,7 @@ Each process declares its own beside it. docs/method/live.md#messages
 from __future__ import annotations
 
 from collections.abc import Iterator
+from operator import methodcaller
 from typing import IO, Any
 
 import msgspec
@@ -32,26 +33,21 @@ class Refused(Message, frozen=True):
 
 def send(pipe: IO[bytes], message: object) -> None:
     """Write a message, in one piece."""
-    data = msgspec.msgpack.encode(message)
+    data = msgspec.msgpack.encode(message, enc_hook=methodcaller("item"))  # numbers of NumPy
     pipe.write(len(data).to_bytes(_LENGTH) + data)
     pipe.flush()
 
 
 def received(pipe: IO[bytes]) -> Iterator[bytes]:
-    """Messages as they come, to be decoded, until the pipe ends; one that is cut off is left out.
+    """Messages as they come, until the pipe ends; one that is cut off is left out.
 
-    Raises
-    ------
-    InputError
-        If something else is written into it; nothing more can be read from it then.
+    They are to be decoded, which refuses what something else wrote into the pipe.
     """
-    while len(head := _read(pipe, _LENGTH)) == _LENGTH:
+    while len(head := pipe.read(_LENGTH)) == _LENGTH:
         length = int.from_bytes(head)
-        if length > _LONGEST:
-            raise _no_message(f"{bytes(head)!r}")
-        if len(data := _read(pipe, length)) < length:
-            return
-        yield bytes(data)
+        data = head if length > _LONGEST else pipe.read(length)
+        if data is head or len(data) == length:
+            yield data
 
 
 def decoded(data: bytes, kinds: Any) -> Any:
@@ -59,19 +55,7 @@ def decoded(data: bytes, kinds: Any) -> Any:
     try:
         return msgspec.msgpack.decode(data, type=kinds)
     except (msgspec.DecodeError, ValueError) as error:
-        raise _no_message(str(error)) from None
-
-
-def _read(pipe: IO[bytes], size: int) -> bytearray:
-    """So many bytes, fewer where the pipe ends."""
-    data = bytearray()
-    while len(data) < size and (piece := pipe.read(size - len(data))):
-        data += piece
-    return data
-
-
-def _no_message(got: str) -> InputError:
-    return InputError(
-        f"expected a message that this process of a rig knows, got another ({got}); start all "
-        "processes from one installation."
-    )
+        raise InputError(
+            f"expected a message that this process of a rig knows, got another ({error}); start "
+            "all processes from one installation."
+        ) from None

@@ -1,6 +1,7 @@
 """A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread`.
 
 Its misses are due to the machine; they are shown beside those of the audio callback.
+It is started with its period in seconds.
 """
 
 from __future__ import annotations
@@ -17,12 +18,6 @@ class WakeUps(Message, frozen=True):
 
     periods: int
     misses: int
-
-
-class Wake(Message, frozen=True):
-    """What it is started with: its period."""
-
-    period_s: float
 
 
 class Look(Message, frozen=True):
@@ -62,7 +57,7 @@ class BareThread:
 def main() -> None:
     """Wake up until the parent is gone."""
     with Parent() as parent:
-        thread = BareThread(parent.settings(Wake).period_s)
+        thread = BareThread(parent.settings(float))
         threading.Thread(target=thread.run, daemon=True).start()
         parent.tell(Done())
         parent.serve(Look, lambda _: WakeUps(thread.periods, thread.misses))

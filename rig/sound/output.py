@@ -413,14 +413,15 @@ class SoundOutput:
 
     # --- The process ------------------------------------------------------------------------
 
-    def _start(self) -> None:
+    def _start(self) -> Child:
+        child = Child("rig.sound.process", self._settings)
         try:
-            self._child = Child("rig.sound.process", self._settings)
-            self._latency_s = self._child.ready(Playing).latency_s
-            self._last_block_s = now_s()
+            self._latency_s = child.ready(Playing).latency_s
+            self._child, self._last_block_s = child, now_s()
             self._wait(lambda rows: rows["frames"] > 0)
             if self._masking:
-                self._child.ask(Mask(self._masking), Done)
+                child.ask(Mask(self._masking), Done)
+            return child
         except ChildLost as lost:
             self.close()
             raise SoundLost(
@@ -428,30 +429,15 @@ class SoundOutput:
                 "(tactileq rig check)."
             ) from None
 
-    def _asked(self, wanted: PlaySurface | PlaySignal) -> None:
-        """Ask the process, a new one where it is lost."""
-        if self._child is None:
-            self._start()
-        assert self._child is not None
-        try:
-            self._child.ask(wanted, Done)
-        except ChildLost as lost:
-            self._lose(str(lost))
-            self._start()
-            assert self._child is not None
-            self._child.ask(wanted, Done)
-
     def _begin(self, number: int, wanted: PlaySurface | PlaySignal) -> Presented:
         """Ask for something and wait for its first sample; once more where the process is lost."""
-        for last in (False, True):
+        for _ in range(2):
             try:
-                self._asked(wanted)
+                (self._child or self._start()).ask(wanted, Done)
                 row = self._wait(lambda rows: rows["presentation"] == number)
                 return Presented(presentation=number, time_s=float(row["dac_time_s"]))
             except ChildLost as lost:
                 self._lose(str(lost))
-                if last:
-                    break
             except InputError as error:  # of a new process: the device has changed
                 raise SoundLost(str(error)) from None
         raise SoundLost(

@@ -62,7 +62,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     from rig.live.child import Child
     from rig.live.memory import Live
     from rig.live.messages import Done
-    from rig.monitoring.bare_thread import Look, Wake, WakeUps
+    from rig.monitoring.bare_thread import Look, WakeUps
     from rig.monitoring.figures import Monitor
 
     rate_hz, period_s = rig.sound.rate_hz, rig.sound.block / rig.sound.rate_hz
@@ -72,7 +72,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
         opened_sound(rig, live) as sound,
     ):
         monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
-        bare = Child("rig.monitoring.bare_thread", Wake(period_s))
+        bare = Child("rig.monitoring.bare_thread", period_s)
         bare.ready(Done)
         if model is not None:
             sound.play(model)

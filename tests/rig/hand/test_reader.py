@@ -22,6 +22,7 @@ from rig.hand.sample import Sample
 from rig.hand.settings import HandSettings
 from rig.hand.window import Pointer
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
+from rig.sound.messages import Silence
 from tests.refusals import refused
 from tests.rig.waiting import is_gone, wait_until
 
@@ -106,6 +107,20 @@ def test_unplugged_it_is_gone_with_one_fault_and_comes_back(live: Live) -> None:
         reader.unplug(False)
         wait_until(lambda: moves(live))
         assert reader.faults() == ()
+
+
+def test_a_request_that_it_does_not_know_is_a_fault_and_it_reads_on(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first = reader.pid
+        assert reader._child is not None
+        reader._child.tell(Silence())
+        told = list[str]()
+        wait_until(lambda: bool(told.extend(reader.faults()) or told))
+        assert ["Silence" in fault for fault in told] == [True]
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 100)
+        assert reader.pid == first
 
 
 def test_killed_it_is_gone_at_once_and_started_again(live: Live) -> None:

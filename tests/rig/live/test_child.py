@@ -122,7 +122,7 @@ def test_one_that_answers_what_was_not_asked_for_is_killed() -> None:
 
 def test_one_that_writes_what_is_no_message_is_killed() -> None:
     process = started()
-    with refused(ChildLost, names=["expected", "what"]):
+    with refused(ChildLost, names=["expected", "another"]):
         process.ask(Say("write"), Say)
     assert not process.runs
 
