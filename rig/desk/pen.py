@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import numpy as np
 
 from modeling import InputError
 from rig.desk.messages import Begin, End, Listening, Take, Taken
 from rig.desk.parts import input_settings
 from rig.interface import Acceleration
-from rig.live.child import Child, ChildLost
+from rig.live.child import Child, ChildLost, Reply
 from rig.live.messages import Done, Message
 from rig.setup.sections import AccelerometerSection
 
 TAKE_S = 30.0
-Reply = TypeVar("Reply", bound=Message)
 
 
 class Pen:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import threading
+from contextlib import suppress
 
 from modeling.errors import InputError
 from rig.hand.loop import HandLoop
@@ -52,10 +53,9 @@ def _listen(parent: Parent, loop: HandLoop, parent_gone: threading.Event) -> Non
         loop.unplugged = wanted.unplugged
         return Done()
 
-    try:
+    with suppress(OSError):
         parent.serve(Unplug, unplug)
-    finally:
-        parent_gone.set()
+    parent_gone.set()
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
-from rig.live.child import Child, ChildLost
+from rig.live.child import Child, ChildLost, Reply
 from rig.live.memory import (
     HEARTBEAT_S,
     NO_HEARTBEAT,
@@ -311,15 +311,10 @@ class SoundOutput:
 
         None of a signal, where nothing was begun, or where its process is gone.
         """
-        if self._child is None:
+        told = self._told(Count(self._presentation), Corrected)
+        if told is None or told.counters is None:
             return None
-        number = self._presentation
-        try:
-            counters = self._child.ask(Count(number), Corrected).counters
-        except ChildLost as lost:
-            self._lose(str(lost))
-            return None
-        return None if counters is None else Counted(presentation=number, counters=counters)
+        return Counted(presentation=self._presentation, counters=told.counters)
 
     def masking(self, level: float) -> None:
         """White noise on the masking channel from now on.
@@ -345,12 +340,7 @@ class SoundOutput:
                 "rig file."
             )
         self._masking = level
-        if self._child is None:
-            return
-        try:
-            self._child.ask(Mask(level), Done)
-        except ChildLost as lost:
-            self._lose(str(lost))  # the next process begins with this level
+        self._told(Mask(level), Done)  # if it is lost, the next process begins with this level
 
     # --- Health -----------------------------------------------------------------------------
 
@@ -428,6 +418,14 @@ class SoundOutput:
                 f"expected a sound process that plays, got: {lost}; check the sound device "
                 "(tactileq rig check)."
             ) from None
+
+    def _told(self, request: Count | Mask, kind: type[Reply]) -> Reply | None:
+        """The process' answer; None where there is no process, or it is lost."""
+        try:
+            return None if self._child is None else self._child.ask(request, kind)
+        except ChildLost as lost:
+            self._lose(str(lost))
+            return None
 
     def _begin(self, number: int, wanted: PlaySurface | PlaySignal) -> Presented:
         """Ask for something and wait for its first sample; once more where the process is lost."""

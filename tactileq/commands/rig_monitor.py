@@ -137,9 +137,8 @@ def _table(now: Snapshot, bare: WakeUps, faults: Sequence[str]) -> Table:
     table.add_row("level", f"{now.rms_g:8.4f} g RMS  {now.peak_g:6.3f} g peak  {bar}")
     table.add_row("at the limit", f"{now.limited_blocks} of {now.blocks} blocks")
     table.add_row("without hand", f"{now.stale_blocks} of {now.blocks} blocks")
-    table.add_row(
-        "missed", f"{now.misses} of {now.blocks} blocks; a bare thread {_bare(bare)} wake-ups"
-    )
+    missed = f"{now.misses} of {now.blocks} blocks; a bare thread {bare.misses} of {bare.periods}"
+    table.add_row("missed", f"{missed} wake-ups")
     table.add_row("callback", _callback(now))
     table.add_row(
         "delay", f"reading {now.reading_ms:.1f} ms old, output {now.output_ms:.1f} ms, as stated"
@@ -153,10 +152,6 @@ def _limited(counters: RenderCounters) -> int:
     return counters.limited_peak + counters.limited_rms + counters.limited_duration
 
 
-def _bare(bare: WakeUps) -> str:
-    return f"{bare.misses} of {bare.periods}"
-
-
 def _callback(now: Snapshot) -> str:
     return (
         f"takes {now.share_p50:.1%} of a block (median), {now.share_p999:.1%} in 99.9 % of blocks"
@@ -166,6 +161,6 @@ def _callback(now: Snapshot) -> str:
 def _summary(now: Snapshot, bare: WakeUps, seconds: float, *, limited: int) -> str:
     return (
         f"{seconds:.0f} s: {now.misses} of {now.blocks} blocks missed (a bare thread "
-        f"{_bare(bare)} wake-ups), {now.stale_blocks} without a fresh hand, {limited} samples at a "
-        f"limit; the callback {_callback(now)}"
+        f"{bare.misses} of {bare.periods} wake-ups), {now.stale_blocks} without a fresh hand, "
+        f"{limited} samples at a limit; the callback {_callback(now)}"
     )
