@@ -89,7 +89,7 @@ def declared(section: type[Section]) -> Iterator[str]:
 
 def _declared(where: str, keys: tuple[Key, ...]) -> Iterator[str]:
     for key in keys:
-        if key.section is None or key.quantity is not None:
+        if not key.is_table:
             yield f"{where} {key.name}"
         yield from _declared(key.within(where), key.keys)
 
@@ -97,7 +97,7 @@ def _declared(where: str, keys: tuple[Key, ...]) -> Iterator[str]:
 def _places(section: type[Section], values: Values, number: int) -> Iterator[Place]:
     head = section.WHERE.strip("[]") if issubclass(section, DescribedFile) else ""
     for key in keys_of(section):
-        way = (head,) if head and key.section is None else ()
+        way = (head,) if head and not key.is_table else ()
         yield from _within(Place(number, way, section.WHERE, key), values)
 
 
@@ -106,7 +106,7 @@ def _within(place: Place, values: Values) -> Iterator[Place]:
     key, table = place.key, place.table(values)
     if key.name not in table:
         return
-    if key.section is None or key.quantity is not None:
+    if not key.is_table:
         yield place
     step = (key.name, 0) if key.several and table[key.name] else (key.name,)
     for below in key.keys:

@@ -155,6 +155,11 @@ class Key:
         name = "" if self.section is None else self.section.QUANTITY
         return next((one for one in self.keys if one.field == name), None)
 
+    @property
+    def is_table(self) -> bool:
+        """Whether it holds sections, which are tables of their own, and no quantity."""
+        return self.section is not None and self.quantity is None
+
     def within(self, where: str) -> str:
         """How messages call its section, which stands in a section that they call `where`."""
         own = "" if self.section is None else self.section.WHERE
@@ -210,8 +215,8 @@ class Key:
 
     def missing(self, where: str) -> InputError:
         """The sentence about a key that has no default and is not there."""
-        if self.section is not None and self.quantity is None:
-            where = self.section.WHERE
+        if self.is_table:
+            where = self.within(where)
             return InputError(f"expected a table {where}, got none; write {where} and its keys.")
         return InputError(f"expected {self.name} ({self.words}) under {where}, got none; add it.")
 
@@ -296,14 +301,14 @@ class DescribedFile(Section):
         plain = values.get(head, {})
         if not isinstance(plain, Mapping):
             raise _no_table(cls.WHERE, plain)
-        check_keys(plain, [k.name for k in keys_of(cls) if k.section is None], where=cls.WHERE)
+        check_keys(plain, [k.name for k in keys_of(cls) if not k.is_table], where=cls.WHERE)
         given = {name: values[name] for name in tables if name in values}
         return cls.read({**plain, **given}, folder=folder)
 
     @classmethod
     def tables(cls) -> tuple[str, ...]:
         """The names of its sections, without the one of its plain values."""
-        return tuple(one.name for one in keys_of(cls) if one.section is not None)
+        return tuple(one.name for one in keys_of(cls) if one.is_table)
 
 
 @contextmanager
@@ -469,7 +474,10 @@ def _key(name: str, annotation: Any, *, default: Any) -> Key:
     keys = () if section is None else keys_of(section)
     if section is not None and section.QUANTITY:
         keys = _keys_held(section, annotation)
-        said = {"description": said["description"], "advice": f"write {name} = {_example(keys)}"}
+        said = {
+            "description": said.get("description", ""),
+            "advice": f"write {name} = {_example(keys)}",
+        }
     return Key(
         **{"name": name, **said},
         field=name,
@@ -484,10 +492,7 @@ def _key(name: str, annotation: Any, *, default: Any) -> Key:
 
 def _example(keys: tuple[Key, ...]) -> str:
     """A table in one line: { value = …, unit = "V" }."""
-    is_known = [isinstance(one.kind, inspect.LiteralType) for one in keys]
-    pairs = [
-        f"{one.name} = {one.words if k else '…'}" for one, k in zip(keys, is_known, strict=True)
-    ]
+    pairs = [f"{one.name} = {one.words if one.name == 'unit' else '…'}" for one in keys]
     return f"{{ {', '.join(pairs)} }}"
 
 

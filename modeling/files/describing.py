@@ -35,16 +35,10 @@ def schema_text(file: type[Section]) -> str:
 
 def key_tables(file: type[Section]) -> str:
     """The keys of a file in Markdown, a table for each of its sections."""
-    parts = [_key_table(file)] if any(map(_is_value, keys_of(file))) else []
-    parts += [
-        key_tables(one.section) for one in keys_of(file) if one.section and not _is_value(one)
-    ]
+    keys = keys_of(file)
+    parts = [] if all(one.is_table for one in keys) else [_key_table(file)]
+    parts += [key_tables(one.section) for one in keys if one.section and one.is_table]
     return "\n\n".join(parts)
-
-
-def _is_value(one: Key) -> bool:
-    """Whether a key stands in the table of its section, and has no table of its own."""
-    return one.section is None or one.quantity is not None
 
 
 def _key_table(section: type[Section]) -> str:
@@ -57,7 +51,7 @@ def _key_table(section: type[Section]) -> str:
         "| --- | --- | --- | --- |",
     ]
     for one in keys_of(section):
-        if _is_value(one):
+        if not one.is_table:
             cells = (f"`{one.name}`", one.words, _default(one), one.description)
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)

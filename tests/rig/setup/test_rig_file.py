@@ -115,6 +115,9 @@ def test_a_scripted_hand_and_a_card_that_is_none_make_the_rig_a_simulated_one(tm
 def test_the_hash_follows_the_values_and_the_vibrator_but_no_comment(tmp_path):
     first = RigFile.load(SHIPPED_RIG_FILE).sha256
     assert RigFile.load(written(tmp_path, TABLET + "# a comment\n")).sha256 == first
+    schema, _, rest = TABLET.partition("\n")
+    assert schema.startswith("#:schema ")
+    assert RigFile.load(written(tmp_path, rest)).sha256 == first
     assert RigFile.load(changed(tmp_path, "block = 128", "block = 256")).sha256 != first
     named = changed(tmp_path, '# file = "vibrator.json"', 'file = "vibrator.json"')
     hashes = set()
