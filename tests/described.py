@@ -84,28 +84,34 @@ def places(kind: Kind) -> Iterator[Place]:
 
 def declared(section: type[Section]) -> Iterator[str]:
     """Every key that is declared, as `Place` names it."""
-    for key in keys_of(section):
-        if key.section is None:
-            yield f"{section.WHERE} {key.name}"
-        else:
-            yield from declared(key.section)
+    yield from _declared(section.WHERE, keys_of(section))
 
 
-def _places(
-    section: type[Section], values: Values, number: int, way: tuple[str | int, ...] = ()
-) -> Iterator[Place]:
+def _declared(where: str, keys: tuple[Key, ...]) -> Iterator[str]:
+    for key in keys:
+        if not key.is_table:
+            yield f"{where} {key.name}"
+        yield from _declared(key.within(where), key.keys)
+
+
+def _places(section: type[Section], values: Values, number: int) -> Iterator[Place]:
     head = section.WHERE.strip("[]") if issubclass(section, DescribedFile) else ""
     for key in keys_of(section):
-        if key.section is None:
-            own = (*way, head) if head else way
-            place = Place(number, own, section.WHERE, key)
-            if key.name in place.table(values):
-                yield place
-        elif key.name in Place(number, way, "", key).table(values):
-            below = Place(number, way, "", key).table(values)[key.name]
-            steps = [(key.name, 0)] if key.several and below else [(key.name,)]
-            for step in steps:
-                yield from _places(key.section, values, number, (*way, *step))
+        way = (head,) if head and not key.is_table else ()
+        yield from _within(Place(number, way, section.WHERE, key), values)
+
+
+def _within(place: Place, values: Values) -> Iterator[Place]:
+    """A key that stands in an example, and those of the section that it holds."""
+    key, table = place.key, place.table(values)
+    if key.name not in table:
+        return
+    if not key.is_table:
+        yield place
+    step = (key.name, 0) if key.several and table[key.name] else (key.name,)
+    for below in key.keys:
+        inner = Place(place.example, (*place.way, *step), key.within(place.where), below)
+        yield from _within(inner, values)
 
 
 def mutations(place: Place, values: Values) -> Iterator[tuple[str, Values]]:

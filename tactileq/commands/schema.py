@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 DECLARED = {
     "scene": "modeling.scenes.scene:SceneFile",
     "recipe": "stimuli.sets.recipe:Recipe",
+    "rig": "rig.setup.rig_file:RigFile",
 }
 
 
