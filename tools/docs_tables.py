@@ -15,10 +15,11 @@ from modeling.files.describing import key_tables, schema_text
 from tactileq.commands.schema import declared
 
 ROOT = Path(__file__).parents[1]
-PAGES = ("docs/scene-file.md", "docs/recipe-file.md", "docs/study-file.md")
+PAGES = ("docs/scene-file.md", "docs/recipe-file.md", "docs/rig-file.md", "docs/study-file.md")
 SCHEMAS = {
     "modeling/scenes/shipped/scene.schema.json": "scene",
     "docs/recipe.schema.json": "recipe",
+    "rig/setup/rig.schema.json": "rig",
     "experiments/study/study.schema.json": "study",
 }
 _MADE = {"keys": lambda name: key_tables(declared(name))}

@@ -25,7 +25,17 @@ from functools import cache
 from math import isfinite
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Self,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import msgspec
 import numpy as np
@@ -92,6 +102,10 @@ def key(
     return Meta(description=description or None, extra=extra or None, **limits)
 
 
+# In an annotation: the field is no key but stands beside those of the file, such as its path.
+BESIDE = "beside"
+
+
 class NameOrFile(str):
     """The name of something that is shipped or, where it has a suffix, a file."""
 
@@ -107,7 +121,8 @@ class Key:
 
     `field` is its name in Python, `name` that in the file. `section` is the class of the section
     that it holds, None for a value; `several` says whether it holds a list of sections, `tables`
-    the keys that each of a mapping of sections has of its own.
+    the keys that each of a mapping of sections has of its own, and `keys` are those of the section
+    as they are here.
     """
 
     field: str
@@ -117,6 +132,7 @@ class Key:
     default: Any
     section: type[Section] | None
     several: bool
+    keys: tuple[Key, ...] = ()
     description: str = ""
     unit: str = ""
     expected: str = ""
@@ -145,12 +161,32 @@ class Key:
     @property
     def words(self) -> str:
         """What is expected, in words."""
+        if self.quantity is not None and self.section is not None:
+            return f"a {self.section.__name__.lower()}: {self.quantity.words}"
         if self.expected or self.also is None:
             return self.expected or words(self.kind, unit=self.unit)
         return f"{words(inspect.type_info(self.also), unit=self.unit)}, or {words(self.kind)}"
 
+    @property
+    def quantity(self) -> Key | None:
+        """The key of its section of which the unit and the limits of this one are."""
+        name = "" if self.section is None else self.section.QUANTITY
+        return next((one for one in self.keys if one.field == name), None)
+
+    @property
+    def is_table(self) -> bool:
+        """Whether it holds sections, which are tables of their own, and no quantity."""
+        return self.section is not None and self.quantity is None
+
+    def within(self, where: str) -> str:
+        """How messages call its section, which stands in a section that they call `where`."""
+        own = "" if self.section is None else self.section.WHERE
+        return own or f"{where.removesuffix(']')}.{self.name}]"
+
     def checked(self, value: Any, where: str, *, folder: Path | None = None) -> Any:
         """A value as the field holds it; InputError for any other, naming the key and `where`."""
+        if self.quantity is not None:
+            return self._with_quantity(value, where, folder)
         if self.section is not None:
             return self._sections(value, folder)
         plain_value = _without_numpy(self.reads(value))
@@ -174,6 +210,13 @@ class Key:
             f"{shown(value)}; {self.advice}."
         )
 
+    def _with_quantity(self, value: Any, where: str, folder: Path | None) -> Any:
+        assert self.section is not None  # or there is no quantity
+        values = plain(value)
+        if not isinstance(values, Mapping):
+            raise self.refusal(value, where)
+        return self.section(**_held(self.keys, values, self.within(where), folder=folder))
+
     def _sections(self, value: Any, folder: Path | None) -> Any:
         assert self.section is not None  # or there is no section to read
         if self.tables:
@@ -196,8 +239,8 @@ class Key:
 
     def missing(self, where: str) -> InputError:
         """The sentence about a key that has no default and is not there."""
-        if self.section is not None:
-            where = self.section.WHERE
+        if self.is_table:
+            where = self.within(where)
             return InputError(f"expected a table {where}, got none; write {where} and its keys.")
         return InputError(
             f"expected {self.name} ({self.words}) {f'under {where}' if where else 'at the top'}, "
@@ -209,6 +252,9 @@ class Section:
     """The base of a section's dataclass: its fields are checked when it is made."""
 
     WHERE: ClassVar[str] = ""  # how messages call it: "[hand]", "[[model]]"
+    # The field to which unit and limits of a key apply that holds such a section, in which then
+    # `unit` is that unit.
+    QUANTITY: ClassVar[str] = ""
 
     def __post_init__(self) -> None:
         """Check and convert every field; sections with rules of their own extend this."""
@@ -235,17 +281,9 @@ class Section:
             For what is no table, and for unknown, missing and wrong keys.
         """
         where = where or cls.WHERE
-        keys = keys_of(cls)
         if not isinstance(values, Mapping):
             raise _no_table(where, values)
-        check_keys(values, [name for one in keys for name in one.names], where=where or "the file")
-        for one in keys:
-            if one.required and one.name not in values:
-                raise one.missing(where)
-        given = [one for one in keys if any(name in values for name in one.names)]
-        return cls(
-            **{one.field: one.checked(one.stated(values), where, folder=folder) for one in given}
-        )
+        return cls(**_held(keys_of(cls), values, where, folder=folder))
 
     @classmethod
     def held(cls, field: str, value: object) -> Any:
@@ -292,19 +330,19 @@ class DescribedFile(Section):
         head, tables = cls.WHERE.strip("[]"), cls.tables()
         if not head and not cls.VERSION:
             return cls.read(values, folder=folder)
-        check_keys(values, ("version", head, *tables), where=cls.WHAT)
+        check_keys(values, ("version", *filter(None, (head, *tables))), where=cls.WHAT)
         check_version(values, cls.VERSION, what=cls.WHAT.partition(" ")[2])
         plain = values.get(head, {})
         if not isinstance(plain, Mapping):
             raise _no_table(cls.WHERE, plain)
-        check_keys(plain, [k.name for k in keys_of(cls) if k.section is None], where=cls.WHERE)
+        check_keys(plain, [k.name for k in keys_of(cls) if not k.is_table], where=cls.WHERE)
         given = {name: values[name] for name in tables if name in values}
         return cls.read({**plain, **given}, folder=folder)
 
     @classmethod
     def tables(cls) -> tuple[str, ...]:
         """The names of its sections, without the one of its plain values."""
-        return tuple(name for k in keys_of(cls) if k.section is not None for name in k.names)
+        return tuple(name for one in keys_of(cls) if one.is_table for name in one.names)
 
 
 @contextmanager
@@ -336,10 +374,35 @@ def keys_of(section: type[Section]) -> tuple[Key, ...]:
 
 @cache
 def _keys_of(section: Any) -> tuple[Key, ...]:
+    return _keys(section, get_type_hints(section, include_extras=True))
+
+
+def _keys_held(section: Any, holder: Any) -> tuple[Key, ...]:
+    """The keys of a section with a quantity, of which its holder's annotation says more."""
     hints = get_type_hints(section, include_extras=True)
+    hints[section.QUANTITY] = Annotated[hints[section.QUANTITY], *_metas(holder)]
+    hints["unit"] = Annotated[Literal[_said(holder)["unit"]], *_metas(hints["unit"])]
+    return _keys(section, hints)
+
+
+def _keys(section: Any, hints: dict[str, Any]) -> tuple[Key, ...]:
     return tuple(
-        _key(field.name, hints[field.name], default=_default(field)) for field in fields(section)
+        _key(field.name, hints[field.name], default=_default(field))
+        for field in fields(section)
+        if BESIDE not in getattr(hints[field.name], "__metadata__", ())
     )
+
+
+def _held(
+    keys: tuple[Key, ...], values: Mapping[str, Any], where: str, *, folder: Path | None
+) -> dict[str, Any]:
+    """The fields of a section from its table; refused as by `Section.read`."""
+    check_keys(values, [name for one in keys for name in one.names], where=where or "the file")
+    for one in keys:
+        if one.required and one.name not in values:
+            raise one.missing(where)
+    given = [one for one in keys if any(name in values for name in one.names)]
+    return {one.field: one.checked(one.stated(values), where, folder=folder) for one in given}
 
 
 def words(kind: inspect.Type, *, unit: str = "") -> str:
@@ -439,6 +502,13 @@ def _key(name: str, annotation: Any, *, default: Any) -> Key:
     section, several = _section_of(annotation)
     said = _said(annotation)
     said.pop("holds", None)
+    keys = () if section is None else keys_of(section)
+    if section is not None and section.QUANTITY:
+        keys = _keys_held(section, annotation)
+        said = {
+            "description": said.get("description", ""),
+            "advice": f"write {name} = {_example(keys)}",
+        }
     return Key(
         **{"name": name, **said},
         field=name,
@@ -447,7 +517,14 @@ def _key(name: str, annotation: Any, *, default: Any) -> Key:
         default=default,
         section=section,
         several=several,
+        keys=keys,
     )
+
+
+def _example(keys: tuple[Key, ...]) -> str:
+    """A table in one line: { value = …, unit = "V" }."""
+    pairs = [f"{one.name} = {one.words if one.name == 'unit' else '…'}" for one in keys]
+    return f"{{ {', '.join(pairs)} }}"
 
 
 def _default(field: Any) -> Any:
@@ -457,10 +534,7 @@ def _default(field: Any) -> Any:
 def _said(annotation: Any) -> dict[str, Any]:
     """All that `key` says of a type and, in a union with None, of its other member."""
     said: dict[str, Any] = {}
-    if get_origin(annotation) in (Union, UnionType):
-        for member in get_args(annotation):
-            said |= _said(member)
-    for meta in getattr(annotation, "__metadata__", ()):
+    for meta in _metas(annotation):
         said |= {
             **(meta.extra or {}),
             **({"description": meta.description} if meta.description else {}),
@@ -468,12 +542,19 @@ def _said(annotation: Any) -> dict[str, Any]:
     return said
 
 
+def _metas(annotation: Any) -> Iterator[Meta]:
+    if get_origin(annotation) in (Union, UnionType):
+        for member in get_args(annotation):
+            yield from _metas(member)
+    yield from getattr(annotation, "__metadata__", ())
+
+
 def _section_of(annotation: Any) -> tuple[type[Section] | None, bool]:
     """The class of the sections that a key holds, and whether it is a list of them."""
     if hasattr(annotation, "__metadata__"):
         annotation = annotation.__origin__
     if get_origin(annotation) in (Union, UnionType):
-        annotation = next(one for one in get_args(annotation) if one is not NoneType)
+        return _section_of(next(one for one in get_args(annotation) if one is not NoneType))
     if get_origin(annotation) is Mapping:
         return _section_of(get_args(annotation)[1])
     if get_origin(annotation) is tuple:

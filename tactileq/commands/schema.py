@@ -17,6 +17,7 @@ DECLARED = {
     "scene": "modeling.scenes.scene:SceneFile",
     "recipe": "stimuli.sets.recipe:Recipe",
     "study": "experiments.study.study:Study",
+    "rig": "rig.setup.rig_file:RigFile",
 }
 
 

@@ -114,23 +114,28 @@ def _of_models(
     from experiments.study.design import fisher_yates
     from experiments.study.study import Study
     from modeling.seeds import generator
-    from rig.setup.editing import as_toml
 
-    full, simplified = (as_toml(os.path.relpath(folder, beside)) for folder in folders)
+    full, simplified = (_as_toml(os.path.relpath(folder, beside)) for folder in folders)
     trays = fisher_yates(ascii_uppercase[: len(textures)], generator(seed))
     pairs = zip(textures, trays, strict=True)
-    lines = [f"{as_toml(name)} = {as_toml(tray)}" for name, tray in pairs]
+    lines = [f"{_as_toml(name)} = {_as_toml(tray)}" for name, tray in pairs]
     changes = {
-        r"(?m)^textures = .*$": f"textures = {as_toml(list(textures))}",
+        r"(?m)^textures = .*$": f"textures = {_as_toml(list(textures))}",
         r"(?m)^full = .*$": f"full = {full}",
         r"(?m)^simplified = .*$": f"simplified = {simplified}",
         r"(?ms)^\[trays\]\n.*?\Z": "\n".join(["[trays]", *lines, ""]),
     }
     named = {name for pair in Study.load().tasks["absolute"].anchors.items() for name in pair}
     if not named <= set(textures):
-        first, second = map(as_toml, textures[:2])
+        first, second = map(_as_toml, textures[:2])
         for key in ("anchors", "catch"):
             changes[rf"(?m)^(# )?{key} = .*$"] = f"# {key} = {{{first} = {second}}}"
     for pattern, replacement in changes.items():
         text = re.sub(pattern, replacement.replace("\\", r"\\"), text)
     return text
+
+
+def _as_toml(value: object) -> str:
+    import tomlkit
+
+    return tomlkit.item(value).as_string()

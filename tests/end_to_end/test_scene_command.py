@@ -195,7 +195,7 @@ EDITS = {
         "[300, 100]",
         "the lowest speed_mm_s under [hand] before the highest, got 300 before 100",
     ),
-    "two hands": (HAND, f'{HAND[:-1]}, file = "h.csv"}}', "expected a table [hand], got none"),
+    "two hands": (HAND, f'{HAND[:-1]}, file = "h.csv"}}', "expected one hand under [hand]"),
     "too small a budget": (
         HAND,
         f"{HAND}\nbudget.bytes = 16",

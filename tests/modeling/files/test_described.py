@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.described import DescribedFile, NameOrFile, Section, key, keys_of
+from modeling.files.described import BESIDE, DescribedFile, NameOrFile, Section, key, keys_of
 from modeling.files.describing import key_tables, schema
 from modeling.files.kinds import Name, TextureNames
 from tests.refusals import refused
@@ -172,6 +172,63 @@ def test_a_key_costs_one_line() -> None:
     described = schema(Longer)["properties"]["machine"]["properties"]["length_mm"]
     assert (described["minimum"], described["maximum"], described["default"]) == (1, 9, 5.0)
     assert "| `length_mm` | a number from 1 to 9 mm | `5.0` | its length |" in key_tables(Longer)
+
+
+@dataclass(frozen=True)
+class Quantity(Section):
+    """A number with its unit."""
+
+    QUANTITY: ClassVar[str] = "value"
+    value: Annotated[float, key("how much")]
+    unit: Annotated[str, key("its unit")]
+
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bench(DescribedFile):
+    """A file with a quantity."""
+
+    WHAT: ClassVar[str] = "a bench"
+    WHERE: ClassVar[str] = "[bench]"
+    VERSION: ClassVar[int] = 1
+    mass: Annotated[Quantity, key("mass", unit="g", ge=0, le=9)]
+    speed: Annotated[Quantity, key("speed", unit="m/s", gt=0)] | None = field(
+        default=Quantity(5, "m/s")
+    )
+    path: Annotated[Path, BESIDE] = Path()
+
+
+def test_a_quantity_has_unit_and_limits_of_the_key_that_holds_it() -> None:
+    made = Bench.from_tables({"version": 1, "bench": {"mass": {"value": 3, "unit": "g"}}})
+    assert made == Bench(mass=Quantity(3.0, "g"))
+    assert Bench.read(made.to_dict()) == made
+    heavy, long = Quantity(10, "g"), {"value": 1, "unit": "m"}
+    for wrong, names, expected in (
+        (heavy, ["value", "[bench.mass]"], "a number from 0 to 9 g"),
+        (heavy.to_dict(), ["value", "[bench.mass]"], "a number from 0 to 9 g"),
+        (long, ["unit", "[bench.mass]"], '"g"'),
+        ({"value": 1}, ["unit", "[bench.mass]"], '"g"'),
+        (3.0, ["mass", "[bench]"], "a quantity: a number from 0 to 9 g"),
+    ):
+        with refused(InputError, names=names, expected=expected):
+            Bench.read({"mass": wrong})
+    with refused(InputError, names=["value", "[bench.mass]"], expected="9 g", got="10.0"):
+        Bench(mass=heavy)
+
+
+def test_a_quantity_is_one_row_of_the_table_and_narrow_in_the_schema() -> None:
+    assert "| `mass` | a quantity: a number from 0 to 9 g | required | mass |" in key_tables(Bench)
+    assert "| `5 m/s` | speed |" in key_tables(Bench)
+    described = schema(Bench)["properties"]["bench"]["properties"]["mass"]["properties"]
+    assert (described["value"]["maximum"], described["unit"]["enum"]) == (9, ["g"])
+
+
+def test_what_stands_beside_is_no_key() -> None:
+    assert [one.name for one in keys_of(Bench)] == ["mass", "speed"]
+    made = Bench(mass=Quantity(3, "g"), path=Path("a.toml"))
+    assert (made.path, set(made.to_dict())) == (Path("a.toml"), {"mass", "speed"})
 
 
 def test_a_schema_holds_sections_and_what_is_required() -> None:
