@@ -4,6 +4,7 @@
 # make bench   time the modeling and its rivals
 # make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install set up .venv/ from requirements.lock (demo and test begin with it)
+# make docs-tables   renew the tables of keys in docs/ and the JSON Schemas
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
 SHELL := /bin/sh
@@ -15,7 +16,7 @@ PYTEST_FLAGS ?=
 # libraries again; .venv/ and the project store theirs, whatever the machine's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test quick bench plant docs-tables lint lock clean
+.PHONY: install demo test quick bench plant lint lock docs-tables clean
 
 install: .venv/installed
 
@@ -60,7 +61,6 @@ bench: install
 plant: install
 	nice -n 5 $(BIN)/python tools/plant_bugs/plant.py --bug "$(BUG)" --room "$(ROOM)"
 
-# The tables of docs/ that are generated from declared columns.
 docs-tables: install
 	$(BIN)/python tools/docs_tables.py
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import json
-import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -40,11 +38,6 @@ from rig.sound.signals import OF_SURFACES, stimuli_of_surfaces
 
 Load = Callable[[Path], object]
 ROOT = Path(__file__).parents[1]
-_SPEC = importlib.util.spec_from_file_location("docs_tables", ROOT / "tools/docs_tables.py")
-assert _SPEC is not None
-assert _SPEC.loader is not None
-docs_tables = importlib.util.module_from_spec(_SPEC)
-_SPEC.loader.exec_module(docs_tables)
 PLAN = Plan("oak", StrokeGrid((80.0, 160.0), (0.6,)), 2000.0)
 
 
@@ -282,13 +275,6 @@ def test_a_column_is_added_by_declaring_it(tmp_path: Path) -> None:
     assert sidecar(columns)["damping"] == {"Description": "Of the pen", "Units": "dB"}
     assert "| `damping` | Of the pen | dB | a number from 0 to 60, or n/a" in markdown(columns)
     assert replace(own, unit="").heading == "damping"
-
-
-@pytest.mark.parametrize("page", docs_tables.PAGES)
-def test_pages_of_the_documentation_are_current(page: str) -> None:
-    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-    assert docs_tables.current(page) == text, "run make docs-tables"
-    assert set(docs_tables.PAGES[page]) == set(re.findall("<!-- table: (\\S+) -->", text))
 
 
 def test_a_manifest_is_read_by_columns_that_it_has() -> None:

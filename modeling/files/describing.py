@@ -1,0 +1,111 @@
+"""What follows from a declared file for readers and editors: its JSON Schema and tables of keys."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import msgspec
+
+from modeling.files.described import DescribedFile, Key, Section, keys_of, plain
+
+
+def schema(file: type[Section]) -> dict[str, Any]:
+    """The JSON Schema (2020-12) of a file, for editors that complete and check what one types."""
+    properties, required = _properties(keys_of(file))
+    if issubclass(file, DescribedFile):
+        head = file.WHERE.strip("[]")
+        if head:  # the plain keys stand in a section of their own
+            tables = {name: properties.pop(name) for name in file.tables()}
+            needed = [name for name in required if name in properties]
+            section = _object(file, properties, needed)
+            properties = {head: section, **tables}
+            required = [head] * bool(needed) + [name for name in required if name in tables]
+        if file.VERSION:
+            properties = {"version": {"const": file.VERSION}, **properties}
+            required = ["version", *required]
+    about = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    return {**about, **_object(file, properties, required)}
+
+
+def schema_text(file: type[Section]) -> str:
+    """The text of the schema's file."""
+    return json.dumps(schema(file), indent=2, ensure_ascii=False) + "\n"
+
+
+def key_tables(file: type[Section]) -> str:
+    """The keys of a file in Markdown, a table for each of its sections."""
+    keys = keys_of(file)
+    parts = [] if all(one.is_table for one in keys) else [_key_table(file)]
+    parts += [key_tables(one.section) for one in keys if one.section and one.is_table]
+    return "\n\n".join(parts)
+
+
+def _key_table(section: type[Section]) -> str:
+    lines = [
+        f"### `{section.WHERE}`" if section.WHERE else "### At the top",
+        "",
+        _summary(section),
+        "",
+        "| Key | Holds | Default | Meaning |",
+        "| --- | --- | --- | --- |",
+    ]
+    for one in keys_of(section):
+        if not one.is_table:
+            cells = (f"`{one.name}`", one.words, _default(one), one.description)
+            lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _summary(section: type[Section]) -> str:
+    """The first paragraph of its docstring."""
+    return " ".join((section.__doc__ or "").split("\n\n")[0].split())
+
+
+def _default(one: Key) -> str:
+    if one.required:
+        return "required"
+    if one.quantity is not None and one.default is not None:
+        return f"`{one.default}`"
+    value = plain(one.default)
+    return "" if value in (None, [], {}, "") else f"`{json.dumps(value, ensure_ascii=False)}`"
+
+
+def _properties(keys: tuple[Key, ...]) -> tuple[dict[str, Any], list[str]]:
+    properties = {name: _of_key(one) for one in keys for name in one.names}
+    return properties, [one.name for one in keys if one.required]
+
+
+def _object(
+    section: type[Section], properties: dict[str, Any], required: list[str]
+) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "description": _summary(section),
+        "properties": properties,
+        "required": required,
+        "additionalProperties": False,
+    }
+
+
+def _of_key(one: Key) -> dict[str, Any]:
+    about = {"description": f"{one.description} ({one.words})".strip()}
+    if not one.required and (value := plain(one.default)) not in (None, (), {}):
+        about["default"] = value
+    if one.section is not None:
+        table = _object(one.section, *_properties(one.keys))
+        if one.quantity is not None:
+            return table | about
+        return about | ({"type": "array", "items": table} if one.several else table)
+    either = [_value(one.annotation)] + ([] if one.also is None else [_value(one.also)])
+    return {**(either[0] if len(either) == 1 else {"anyOf": either}), **about}
+
+
+def _value(annotation: Any) -> dict[str, Any]:
+    """The schema of a value, without its null: TOML has none, a key is left out."""
+    found: dict[str, Any] = msgspec.json.schema(
+        annotation, schema_hook=lambda kind: {"type": "string"}
+    )
+    if "anyOf" in found:
+        found["anyOf"] = [one for one in found["anyOf"] if one != {"type": "null"}]
+    return found
