@@ -181,7 +181,7 @@ class Key:
     def within(self, where: str) -> str:
         """How messages call its section, which stands in a section that they call `where`."""
         own = "" if self.section is None else self.section.WHERE
-        return own or f"{where.removesuffix(']')}.{self.name}]"
+        return own or (f"{where.removesuffix(']')}.{self.name}]" if where else self.name)
 
     def checked(self, value: Any, where: str, *, folder: Path | None = None) -> Any:
         """A value as the field holds it; InputError for any other, naming the key and `where`."""
@@ -261,7 +261,8 @@ class Section:
         for one in keys_of(type(self)):
             value = getattr(self, one.field)
             if value is not one.default:
-                object.__setattr__(self, one.field, one.checked(value, self.WHERE))
+                # Without the section's name: what `read` lets through is good, the rest are options.
+                object.__setattr__(self, one.field, one.checked(value, ""))
 
     @classmethod
     def read(cls, values: object, *, where: str = "", folder: Path | None = None) -> Self:

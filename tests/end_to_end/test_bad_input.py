@@ -288,7 +288,7 @@ def test_a_byte_order_mark_is_read(main, tmp_path: Path) -> None:
         ),
         ("import hatt M.xml --rate 1e-300", [1, "1000 Hz"], 1e-300),
         ("import hatt M.xml --duration 1e300", ["10000 s", "1000 Hz"], "1e+300 s"),
-        ("stimuli m.json --rate 1e12", ["rate_hz", 1, 768000], 1000000000000),
+        ("stimuli m.json --rate 1e12", ["rate_hz", 1, "768000 Hz"], 1e12),
         ("export c m.json --rate 1e12", "768000 Hz", "1e+12"),
     ],
 )
