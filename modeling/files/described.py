@@ -261,7 +261,7 @@ class Section:
         for one in keys_of(type(self)):
             value = getattr(self, one.field)
             if value is not one.default:
-                # Without the section's name: what `read` lets through is good, the rest are options.
+                # Not where: what `read` lets through is good, and options have no section.
                 object.__setattr__(self, one.field, one.checked(value, ""))
 
     @classmethod

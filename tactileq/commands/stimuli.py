@@ -99,7 +99,7 @@ def recipe_from(
     tell_passed_over(others)
     if not models:
         raise ValueError(
-            f"expected at least one model, got none among {', '.join(map(str, named))}; give models."
+            f"expected at least one model, got none in {', '.join(map(str, named))}; give one."
         )
     return Recipe(
         name=Path(os.path.realpath(out)).name,
