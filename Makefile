@@ -4,6 +4,7 @@
 # make bench   time the modeling and its rivals
 # make plant   plant 40 bugs, one at a time, and see which ones the tests catch
 # make install set up .venv/ from requirements.lock (demo and test begin with it)
+# make docs-tables   renew the tables of keys in docs/ and the JSON Schemas
 # make lock    renew requirements.lock from pyproject.toml (needs uv)
 
 SHELL := /bin/sh
@@ -15,7 +16,7 @@ PYTEST_FLAGS ?=
 # libraries again; .venv/ and the project store theirs, whatever the machine's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: install demo test quick bench plant lint lock clean
+.PHONY: install demo test quick bench plant lint lock docs-tables clean
 
 install: .venv/installed
 
@@ -59,6 +60,9 @@ bench: install
 # All of them, or BUG=name, or ROOM=name.
 plant: install
 	nice -n 5 $(BIN)/python tools/plant_bugs/plant.py --bug "$(BUG)" --room "$(ROOM)"
+
+docs-tables: install
+	$(BIN)/python tools/docs_tables.py
 
 lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock

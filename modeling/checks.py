@@ -50,11 +50,11 @@ def is_positive(value: object) -> TypeGuard[float]:
         return False
 
 
-def check_rate(rate_hz: object, *, what: str = "a rate") -> None:
+def check_rate(rate_hz: object) -> None:
     """Refuse what cannot be a sampling rate: anything but a number from 1 Hz to 10 MHz."""
     if not (is_number(rate_hz) and LOWEST_RATE_HZ <= rate_hz <= HIGHEST_RATE_HZ):
         raise InputError(
-            f"expected {what} from {LOWEST_RATE_HZ:.0f} to {HIGHEST_RATE_HZ:.0f} Hz, got "
+            f"expected a rate from {LOWEST_RATE_HZ:.0f} to {HIGHEST_RATE_HZ:.0f} Hz, got "
             f"{shown(rate_hz)}; give the rate in Hz."
         )
 

@@ -35,6 +35,7 @@ COMMANDS = {
     "export": "exports",
     "bench": "bench",
     "stability": "stability",
+    "schema": "schema",
 }
 
 app = typer.Typer(

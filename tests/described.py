@@ -54,15 +54,17 @@ class Kind:
 
 @dataclass(frozen=True)
 class Place:
-    """A key of an example: the tables on the way to it, and its declaration."""
+    """A key of an example: the tables on the way to it, how messages and its class call the last
+    one, and its declaration."""
 
     example: int
     way: tuple[str | int, ...]
     where: str
     key: Key
+    declared: str
 
     def __str__(self) -> str:
-        return f"{self.where} {self.key.name}"
+        return f"{self.declared} {self.key.name}"
 
     def table(self, values: Values) -> Values:
         """The table of the key."""
@@ -84,28 +86,37 @@ def places(kind: Kind) -> Iterator[Place]:
 
 def declared(section: type[Section]) -> Iterator[str]:
     """Every key that is declared, as `Place` names it."""
-    for key in keys_of(section):
-        if key.section is None:
-            yield f"{section.WHERE} {key.name}"
-        else:
-            yield from declared(key.section)
+    yield from _declared(section.WHERE, keys_of(section))
 
 
-def _places(
-    section: type[Section], values: Values, number: int, way: tuple[str | int, ...] = ()
-) -> Iterator[Place]:
+def _declared(where: str, keys: tuple[Key, ...]) -> Iterator[str]:
+    for key in keys:
+        if not key.is_table:
+            yield f"{where} {key.name}"
+        yield from _declared(key.within(where), key.keys)
+
+
+def _places(section: type[Section], values: Values, number: int) -> Iterator[Place]:
     head = section.WHERE.strip("[]") if issubclass(section, DescribedFile) else ""
     for key in keys_of(section):
-        if key.section is None:
-            own = (*way, head) if head else way
-            place = Place(number, own, section.WHERE, key)
-            if key.name in place.table(values):
-                yield place
-        elif key.name in Place(number, way, "", key).table(values):
-            below = Place(number, way, "", key).table(values)[key.name]
-            steps = [(key.name, 0)] if key.several and below else [(key.name,)]
-            for step in steps:
-                yield from _places(key.section, values, number, (*way, *step))
+        way = (head,) if head and not key.is_table else ()
+        place = Place(number, way, section.WHERE, key, section.WHERE)
+        yield from _within(place, values)
+
+
+def _within(place: Place, values: Values) -> Iterator[Place]:
+    """A key that stands in an example, and those of the sections that it holds."""
+    key, table = place.key, place.table(values)
+    for name in (name for name in key.names if name in table):
+        if not key.is_table:
+            yield place
+        step = (name, 0) if key.several and table[name] else (name,)
+        called = key.within(place.declared)
+        where = f"[{name}]" if key.tables else key.within(place.where)
+        for below in key.keys:
+            yield from _within(
+                Place(place.example, (*place.way, *step), where, below, called), values
+            )
 
 
 def mutations(place: Place, values: Values) -> Iterator[tuple[str, Values]]:

@@ -13,6 +13,8 @@ from collections.abc import Iterable
 import pytest
 
 from rig.live.child import Child
+from rig.live.messages import Done
+from rig.monitoring.bare_thread import Look, WakeUps
 
 REPEATS = 2
 PERIOD_S = 128 / 48000  # a block of the audio server, which is as short of time
@@ -42,8 +44,9 @@ class BareProcess:
 
     def _misses(self) -> int:
         if self._child is None:
-            self._child = Child("rig.monitoring.bare_thread", {"period_s": PERIOD_S})
-        return int(self._child.ask({}, within_s=ANSWER_S)["misses"])
+            self._child = Child("rig.monitoring.bare_thread", PERIOD_S)
+            self._child.ready(Done, within_s=ANSWER_S)
+        return self._child.ask(Look(), WakeUps, within_s=ANSWER_S).misses
 
 
 def needs_time(item: pytest.Item) -> bool:

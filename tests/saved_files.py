@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from experiments.sessions.manifest import SessionManifest
-from modeling.files.described import DescribedJson
+from modeling.files.described_json import DescribedJson
 from modeling.models.ar_model import ARModel
 from modeling.models.regressed_model import RegressedModel
 from modeling.models.texture_model import TextureModel

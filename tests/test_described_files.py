@@ -6,14 +6,21 @@ wrong files. Rules between keys are tested where they stand.
 
 from __future__ import annotations
 
+import datetime
+import json
 import re
 from pathlib import Path
 
+import jsonschema
 import pytest
 import tomlkit
 
+from experiments.study.study import Study
 from modeling import InputError, Scene
+from modeling.files.describing import schema
 from modeling.scenes.scene import SceneFile
+from rig.setup.rig_file import RigFile
+from stimuli.planted.vibrators import planted_vibrator
 from stimuli.sets.recipe import Recipe
 from tests import saved_files
 from tests.described import Kind, Place, declared, mutations, places
@@ -91,7 +98,147 @@ RECIPE = Kind(
     },
     again=Recipe.to_toml,
 )
-KINDS = [SCENE, RECIPE, *saved_files.KINDS]
+
+
+def figure(value: float, unit: str) -> dict[str, object]:
+    return {"value": value, "unit": unit, "assumed": True, "source": "a guess"}
+
+
+DAY = datetime.date(2026, 11, 22)
+RIG = Kind(
+    name="rig.toml",
+    section=RigFile,
+    examples=(
+        {
+            "version": 1,
+            "rig": {"name": "desk rig", "serials": ["V1", "C1"]},
+            "sound": {
+                "device": "USB",
+                "rate_hz": 48000,
+                "block": 64,
+                "channels": 4,
+                "vibration_channel": 2,
+                "masking_channel": 3,
+                "masking_level": 0.25,
+                "fullscale_v": figure(4, "V"),
+                "simulated": True,
+            },
+            "vibrator": {
+                "file": "vibrator.json",
+                "g_per_volt": figure(1.5, "g/V"),
+                "measured_on": DAY,
+            },
+            "limits": {
+                "peak_g": figure(3, "g"),
+                "rms_g": figure(1, "g"),
+                "rms_window_s": figure(1, "s"),
+                "duration_s": figure(60, "s"),
+                "pause_s": figure(0.1, "s"),
+            },
+            "hand": {
+                "kind": "mouse",
+                "device": "/dev/input/event7",
+                "counts_per_mm": figure(40, "counts/mm"),
+                "filter_delay_s": figure(0.01, "s"),
+                "assumed_force_n": figure(1, "N"),
+                "pressure_curve": {
+                    "points": [[0, 0], [1, 4.5]],
+                    "unit": "N",
+                    "assumed": False,
+                    "source": "weights",
+                },
+                "contact_n": figure(0, "N"),
+                "baud": 9600,
+                "grab": True,
+                "script": "hold",
+            },
+            "accelerometer": {
+                "device": "USB",
+                "channel": 2,
+                "rate_hz": 44100,
+                "g_per_fullscale": figure(50, "g"),
+                "noise_floor_g": figure(0.002, "g"),
+            },
+            "latency": {
+                "median_ms": figure(12, "ms"),
+                "p95_ms": figure(15, "ms"),
+                "measured_on": DAY,
+            },
+            "calibration": {"date": DAY, "rig": "desk rig", "serials": ["V1"]},
+            "real_surface": {"hand_measured": True},
+        },
+    ),
+    load=RigFile.load,
+    write=tomlkit.dumps,
+    beside={"vibrator.json": planted_vibrator().to_json()},
+)
+_TEXTURES = {"textures": ["canvas", "PVC", "MDF"], "trays": {"canvas": "A", "PVC": "B", "MDF": "C"}}
+_CLAIM = {"name": "alike", "models": ["full", "simplified"], "test": "equivalence"}
+STUDY = Kind(
+    name="study.toml",
+    section=Study,
+    examples=(
+        {
+            "name": "three surfaces",
+            "seed": 7,
+            **_TEXTURES,
+            "models": {"full": "models", "simplified": "simplified"},
+            "languages": ["en", "ja"],
+            "longest_gap_min": 20,
+            "masking": "pink noise",
+            "surface_visible": "no",
+            "data_license": "CC0",
+            "calibration_days": 30,
+            "measured_force": True,
+            "consent": {"version": "2026-11"},
+            "questions": [
+                {
+                    "name": "craft",
+                    "levels": ["no", "yes"],
+                    "text": {"en": "Any craft?", "ja": "手仕事は?"},
+                    "levels_text": {"ja": ["いいえ", "はい"]},
+                },
+            ],
+            "plan": {
+                "exclusions": ["Who slept."],
+                "highest_share_at_ends": 0.3,
+                "rule": "model",
+                "few": 0.2,
+                "claims": [
+                    {**_CLAIM, "task": "oddity", "measure": "correct", "bounds": [-0.1, 0.2]}
+                ],
+            },
+            "absolute": {
+                "participants": 9,
+                "schedule": "interleaved",
+                "anchors": {"canvas": "PVC"},
+            },
+            "oddity": {
+                "participants": 8,
+                "schedule": "interleaved",
+                "repeats": 6,
+                "models": ["full", "simplified"],
+                "training_trials": 2,
+                "most_training_trials": 4,
+                "break_after": 20,
+                "feel_all": True,
+                "catch": {"MDF": "PVC"},
+                "catch_trials": 4,
+            },
+        },
+        {
+            "name": "least",
+            "seed": 0,
+            **_TEXTURES,
+            "questions": [{"name": "age", "least": 18, "most": 99}],
+        },
+    ),
+    load=Study.load,
+    write=tomlkit.dumps,
+    beside={},
+    again=Study.to_dict,
+)
+KINDS = [SCENE, RECIPE, RIG, STUDY, *saved_files.KINDS]
 
 
 def written(kind: Kind, folder: Path, values: dict[str, object] | str) -> Path:
@@ -152,3 +299,21 @@ def test_a_doubled_key_is_refused(kind: Kind, tmp_path: Path) -> None:
                 comma = "" if " = " in line or line.endswith(",") else ","
                 text = "\n".join([*lines[:number], line + comma, *lines[number:]])
                 refusal(kind, tmp_path, text, what=f"doubled: {line}")
+
+
+def _as_json(value: object) -> object:
+    """Values as an editor hands them to a schema: dates are text."""
+    return json.loads(json.dumps(value, default=str))
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+def test_an_editor_finds_what_is_refused(kind: Kind) -> None:
+    """The schema holds for the examples, and finds wrong types, ranges and names of keys."""
+    validator = jsonschema.Draft202012Validator(schema(kind.section))
+    for example in kind.examples:
+        validator.validate(_as_json(example))
+    for place in places(kind):
+        for what, values in mutations(place, kind.examples[place.example]):
+            same = _as_json(values) == _as_json(kind.examples[place.example])  # a date in quotes
+            if not same and "nan" not in what and "inf" not in what:  # which JSON does not have
+                assert not validator.is_valid(_as_json(values)), (str(place), what)

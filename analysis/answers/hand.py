@@ -15,10 +15,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from analysis.columns import MODEL, TEXTURE, Column, names
+from analysis.columns import MODEL, TEXTURE
 from modeling import InputError
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import Column, names
 from modeling.files.documents import read_json_object
 from modeling.files.reading import read_bytes
 

@@ -19,15 +19,19 @@ from analysis.answers.order import (
 )
 from analysis.answers.plan import AnalysisPlan, plan_from
 from analysis.answers.responses import PlannedTask, Responses, stands_apart
-from analysis.columns import shortened_hash
 from analysis.labels import MODELS
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from modeling.files.answer_tables import (
+    ANSWER_TABLES,
+    PARTICIPANT_COLUMNS,
+    PARTICIPANT_ID,
+    AnswerColumn,
+)
+from modeling.files.columns import Column, names, shortened_hash
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_values
-from modeling.files.reading import read_text
-from modeling.files.tables import check_named_once, csv_cells, unguarded
+from modeling.files.tables import read_table
 
 _SIMULATED = ("Simulated", "SimulatedParticipant", "SimulatedRig")
 _RESTS_ON = ("StudySHA256", "ModelsSHA256")
@@ -35,7 +39,7 @@ _RESTS_ON = ("StudySHA256", "ModelsSHA256")
 _MAY_DIFFER = {"StudySHA256": "study", "ModelsSHA256": "models", "Pilot": "pilot"}
 # Times to the millisecond: two participants do not have so many equal ones by chance.
 FEWEST_TIMES = 3
-_DERIVE = "delete it, and tactileq study status makes it again from the session's log"
+_ADVICE = "correct it, or delete the file, which tactileq study status makes again from the log"
 
 
 def load_responses(data_folder: str | Path, *, leaving_out: Collection[str] = ()) -> Responses:
@@ -237,11 +241,9 @@ def _dropped_out(path: Path, *, simulated: bool) -> frozenset[str]:
     """Participants who dropped out, from the list of participants, which is checked."""
     if not path.is_file():
         raise InputError(f"expected {path}, which is not there; restore the list of participants.")
-    table = _read_lines(path)
-    _require_columns(table, ("participant_id", "simulated"), path=path)
+    table = _read(path, (PARTICIPANT_ID, *PARTICIPANT_COLUMNS))
     _check_simulated(table, simulated, path=path)
-    status = table.get("status", pd.Series(index=table.index, dtype=str))
-    return frozenset(table["participant_id"][status == "dropped"])
+    return frozenset(table["participant_id"][table["status"] == "dropped"])
 
 
 def _models(description: Mapping[str, object], folder: Path) -> dict[str, dict[str, str]]:
@@ -309,7 +311,7 @@ def _load_session(
         )
     what = f"{participant} {task} {session}"
     sidecar = _checked_sidecar(path.with_suffix(".json"), origin, what, warnings=warnings)
-    table = _read_lines(path)
+    table = _read(path, ANSWER_TABLES[task].columns)
     _check_session(table, task, path=path, simulated=bool(origin["Simulated"]))
     _check_known(table, gathered, path=path)
     gathered.check_once(table, what, path=path)
@@ -432,26 +434,12 @@ def _unanswered(folder: Path, task: str, *, gathered: _Gathered) -> list[str]:
 
 
 def _check_session(table: pd.DataFrame, task: str, *, path: Path, simulated: bool) -> None:
-    """Refuse what cannot be an answer; turn the columns of numbers into numbers."""
-    columns = [c for c in ANSWER_TABLES[task].columns if not c.optional or c.name in table]
-    _require_columns(table, tuple(column.name for column in columns), path=path)
-    for column in columns:
-        found = table[column.name]
-        if column.required:
-            expected = f"a value in column {column.name}"
-            _refuse(found.isna(), found, expected=expected, path=path)
-        if column.limits is not None:
-            table[column.name] = _number_column(found, column.limits, path=path)
-        elif column.levels:
-            known = found.isin(list(column.levels)) | found.isna()
-            expected = f"{' or '.join(column.levels)} in column {column.name}"
-            _refuse(~known, found, expected=expected, path=path)
+    """Refuse what each cell may be, but all of them together cannot."""
+    columns = {column.name: column for column in ANSWER_TABLES[task].columns}
     _check_simulated(table, simulated, path=path)
-    neither = ~table["valid"].isin([0.0, 1.0])
-    _refuse(neither, table["valid"], expected="1 or 0 in column valid", path=path)
     twice = table.duplicated("trial")
     _refuse(twice, table["trial"], expected="every trial once", path=path)
-    _check_choices(table, {column.name: column for column in columns}, path=path)
+    _check_choices(table, columns, path=path)
 
 
 def _check_known(table: pd.DataFrame, gathered: _Gathered, *, path: Path) -> None:
@@ -466,15 +454,6 @@ def _check_known(table: pd.DataFrame, gathered: _Gathered, *, path: Path) -> Non
             other = ~table[column].isin(list(known)) & table[column].notna()
             expected = f"{' or '.join(known)}, the study's {what}, in column {column}"
             _refuse(other, table[column], expected=expected, path=path)
-
-
-def _number_column(column: pd.Series, limits: tuple[float, float], *, path: Path) -> pd.Series:
-    low, high = limits
-    values = pd.to_numeric(column, errors="coerce").astype(float)
-    wrong = column.notna() & ~(np.isfinite(values) & (values >= low) & (values <= high))
-    wanted = f"from {low:g} to {high:g}" if np.isfinite(high) else f"of at least {low:g}"
-    _refuse(wrong, column, expected=f"a number {wanted} in column {column.name}", path=path)
-    return values
 
 
 def _check_choices(table: pd.DataFrame, columns: Mapping[str, AnswerColumn], *, path: Path) -> None:
@@ -523,32 +502,13 @@ def _refuse(wrong: pd.Series, column: pd.Series, *, expected: str, path: Path) -
         )
 
 
-def _require_columns(table: pd.DataFrame, columns: tuple[str, ...], *, path: Path) -> None:
-    missing = [column for column in dict.fromkeys(columns) if column not in table]
-    if missing:
-        raise InputError(
-            f"expected the column{'s' * (len(missing) > 1)} {', '.join(missing)} in {path}, "
-            f"but the first line does not name {'them' if len(missing) > 1 else 'it'}; restore "
-            f"the first line."
-        )
-
-
-def _read_lines(path: Path) -> pd.DataFrame:
-    """All lines as text; n/a becomes missing."""
-    # Not splitlines(): that would also break cells at characters that may stand in them.
-    header, *lines = read_text(path, "a table").removesuffix("\n").split("\n")
-    names = csv_cells(header, f"line 1 of {path}", delimiter="\t")
-    check_named_once(names, path)
-    rows = []
-    for number, line in enumerate(lines, start=2):
-        cells = csv_cells(line, f"line {number} of {path}", delimiter="\t")
-        if len(cells) != len(names):
-            raise InputError(
-                f"expected {len(names)} values in line {number} of {path}, but found {len(cells)}; "
-                f"{_DERIVE}."
-            )
-        rows.append(list(map(unguarded, cells)))
-    return pd.DataFrame(rows, columns=names, dtype=object).replace("n/a", np.nan)
+def _read(path: Path, columns: Sequence[Column]) -> pd.DataFrame:
+    """A table of BIDS: numbers as floats, NaN where there is no value."""
+    rows = read_table(path, columns, bids=True, advice=_ADVICE)
+    header = dict.fromkeys([*names(columns), *(rows[0] if rows else ())])
+    table = pd.DataFrame(rows, columns=list(header), dtype=object)
+    numbers = dict.fromkeys((c.name for c in columns if c.limits is not None), float)
+    return table.astype(numbers).fillna(np.nan)
 
 
 def _split(

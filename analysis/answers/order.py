@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.columns import shortened_hash
 from modeling import InputError
+from modeling.files.columns import shortened_hash
 from modeling.files.hashes import sha256_of
 from modeling.files.reading import read_text
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from modeling import InputError
-from modeling.checks import is_number
-from modeling.errors import shown
-from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.claims import FEW, Plan
+from modeling.files.described import naming
 
 EQUIVALENCE, DIFFERENCE = "equivalence", "difference"
 MODEL_RULE, TESTS_RULE = "model", "tests"
-LARGEST_FEW = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,12 +66,10 @@ class AnalysisPlan:
     highest_share_at_ends: float = 0.2
     sha256: tuple[str, ...] = ()
     rule: str = TESTS_RULE
-    few: float = 0.15
+    few: float = FEW
 
 
-def plan_from(
-    values: Mapping[str, Any], *, path: Path, sha256: tuple[str, ...] = ()
-) -> AnalysisPlan:
+def plan_from(values: object, *, path: Path, sha256: tuple[str, ...] = ()) -> AnalysisPlan:
     """The plan of a study's values, as a manifest holds them.
 
     Parameters
@@ -93,48 +86,7 @@ def plan_from(
     InputError
         For claims, a rule or a share that are not such as a study file can state.
     """
-    try:
-        claims = tuple(_claim(one) for one in values.get("claims", ()))
-        return AnalysisPlan(
-            claims=claims,
-            exclusions=tuple(map(str, values.get("exclusions", ()))),
-            highest_share_at_ends=float(values.get("highest_share_at_ends", 0.2)),
-            sha256=sha256,
-            rule=_rule(values.get("rule", TESTS_RULE)),
-            few=_few(values.get("few", 0.15)),
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise InputError(
-            f"expected the claims of a study's [plan] in {path}, got something else ({error}); "
-            "restore the file."
-        ) from None
-
-
-def _rule(value: object) -> str:
-    if value not in (MODEL_RULE, TESTS_RULE):
-        raise ValueError(f"rule {shown(value)}")
-    return str(value)
-
-
-def _few(value: object) -> float:
-    if not (is_number(value) and 0 <= value <= LARGEST_FEW):
-        raise ValueError(f"few {shown(value)}")
-    return float(value)
-
-
-def _claim(values: Mapping[str, Any]) -> Claim:
-    reference, other = map(str, values["models"])
-    low, high = map(float, values["bounds"])
-    task, measure, test = (str(values[name]) for name in ("task", "measure", "test"))
-    if not low < 0 < high or test not in (EQUIVALENCE, DIFFERENCE):
-        raise ValueError(f"bounds {low:g} and {high:g}, test {test}")
-    if measure not in ANSWER_TABLES[task].measures:
-        raise ValueError(f"measure {measure}")
-    return Claim(
-        name=str(values["name"]),
-        task=task,
-        measure=measure,
-        models=(reference, other),
-        bounds=(low, high),
-        test=test,
-    )
+    with naming(path):
+        stated = Plan.read(values)
+    claims = tuple(Claim(**vars(claim)) for claim in stated.claims)
+    return AnalysisPlan(**{**vars(stated), "claims": claims, "sha256": sha256})

@@ -16,9 +16,10 @@ import pandas as pd
 
 from analysis.benches.chart.rival_costs import coefficients_cost
 from analysis.benches.coefficients import CoefficientTable, tabled_predictor
-from analysis.columns import SIMULATED, Column, names
+from analysis.columns import SIMULATED
 from analysis.textures.between import RIVAL_ORDER, Truth
 from modeling import ARModel, CompiledScene, Scene, TextureModel, fit_texture
+from modeling.files.columns import Column, names
 from modeling.fitting.autoregressive import fit_ar
 from modeling.rendering.cost import Cost
 from modeling.scenes.compiled import CompiledTexture

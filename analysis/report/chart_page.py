@@ -19,7 +19,6 @@ from analysis.benches.chart.summary import (
     default_rows,
 )
 from analysis.benches.chart.surfaces import KINDS, counted_kind
-from analysis.columns import names, without
 from analysis.figures.chart import STYLES, figure_chart
 from analysis.figures.saving import png_of, warn_of_missing_fonts
 from analysis.report.findings import table_bytes
@@ -34,6 +33,7 @@ from analysis.report.page import (
     table_html,
 )
 from analysis.report.sections import Section
+from modeling.files.columns import names, without
 
 COSTS = (
     ("operations", "operations per sample at 5 kHz"),

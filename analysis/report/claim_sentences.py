@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from analysis.columns import p_value
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, unit_of
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.people_sentences import (
@@ -27,6 +26,7 @@ from analysis.statistics.claims import (
 )
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import p_value
 
 NO_TEST = "no test"
 _JOINTLY = "all textures jointly equivalent (largest p of TOST below .05)"

@@ -8,11 +8,11 @@ import numpy as np
 
 from analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
 from analysis.answers.responses import Responses
-from analysis.columns import shortened_hash
 from analysis.labels import MEASURES, TASKS
 from analysis.report.model_sentences import decided_by_tests, model_methods
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, incomplete
 from modeling.errors import counted
+from modeling.files.columns import shortened_hash
 
 MOST_NAMED = 12
 

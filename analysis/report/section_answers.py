@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.columns import Columns, chosen, names, without
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
@@ -29,6 +28,7 @@ from analysis.statistics.verdicts import (
     planted_verdicts,
 )
 from modeling.errors import counted
+from modeling.files.columns import Columns, chosen, names, without
 from modeling.files.writing import file_stem
 
 TESTS_SHOWN = chosen(

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.columns import MODEL, TEXTURE, Column, P, names, p_value
+from analysis.columns import MODEL, TEXTURE, P
 from analysis.figures.confusions import figure_confusion, figure_similarities
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Item, Picture, Table
@@ -32,6 +32,7 @@ from analysis.statistics.similarity_choice import (
     SimilarityChoice,
     similarity_choice,
 )
+from modeling.files.columns import Column, names, p_value
 
 ALPHA = 0.05
 INFORMATION_COLUMNS = (

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.columns import without
 from analysis.figures.hand import figure_hand
 from analysis.labels import TASKS
 from analysis.report.outcomes import Outcome, Weight
@@ -25,6 +24,7 @@ from analysis.statistics.hand import (
     hand_means,
     hand_tests,
 )
+from modeling.files.columns import without
 
 ALPHA = 0.05
 TESTS_SHOWN = without(HAND_TEST_COLUMNS, "se_reference", "se_other")

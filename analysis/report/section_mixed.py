@@ -12,7 +12,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.columns import Column, names, p_value
 from analysis.labels import SCALES
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Table
@@ -23,6 +22,7 @@ from analysis.statistics.gee import GEE, GEE_COLUMNS, gee_effects
 from analysis.statistics.mixed import MIXED_COLUMNS, mixed_effects
 from analysis.statistics.verdicts import ClaimFound, answers_about
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from modeling.files.columns import Column, names, p_value
 
 CLAIM = Column("claim", is_name=True)
 CLAIM_MIXED_COLUMNS = (CLAIM, *MIXED_COLUMNS)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.columns import chosen, without
 from analysis.figures.layers_over_speed import figure_layers_over_speed
 from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
@@ -26,6 +25,7 @@ from analysis.textures.results import (
     simplification_table,
 )
 from modeling.errors import counted
+from modeling.files.columns import chosen, without
 from modeling.files.writing import file_stem
 
 GFC_SHOWN = without(GFC_COLUMNS, "conditions", "gfc30_deficit")

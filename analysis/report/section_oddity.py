@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.columns import TEXTURE, Column, names
+from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
 from analysis.report.claim_sentences import NO_TEST
 from analysis.report.outcomes import Outcome, Weight
@@ -20,6 +20,7 @@ from analysis.report.sections import Section
 from analysis.statistics.dprime import d_primes, oddity_d_prime
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import Column, names
 
 ODDITY_COLUMNS = (
     Column("claim", is_name=True),

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.columns import chosen
 from analysis.figures.regression import figure_centroid
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.sections import Section
@@ -28,6 +27,7 @@ from analysis.textures.regressions import (
 )
 from analysis.textures.results import TextureResult
 from modeling import TextureModel
+from modeling.files.columns import chosen
 
 REGRESSIONS_SHOWN = chosen(
     REGRESSION_COLUMNS,

@@ -9,13 +9,13 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.columns import Column, names
 from analysis.figures.people import figure_people
 from analysis.report.claim_sentences import overall_row
 from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.people_sentences import verdict_of_doubled
 from analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound
+from modeling.files.columns import Column, names
 from modeling.files.writing import file_stem
 
 PRIORS_COLUMNS = (

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.columns import without
 from analysis.labels import ALL_LAYERS
 from analysis.report.page import Fold, Item, Table
 from analysis.report.sections import Section
@@ -19,6 +18,7 @@ from analysis.textures.recovery import (
     planted_truth_table,
 )
 from analysis.textures.results import TextureResult, reference_condition
+from modeling.files.columns import without
 from stimuli.planted.textures import TEXTURES
 
 

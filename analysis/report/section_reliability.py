@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.columns import Column, names
 from analysis.labels import SCALES, TASKS
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Item, Table
@@ -29,6 +28,7 @@ from analysis.statistics.reliability import (
     within_participant_sd,
 )
 from modeling.errors import counted
+from modeling.files.columns import Column, names
 
 # Exploring two or more surfaces takes longer.
 FASTEST_S = 2.0

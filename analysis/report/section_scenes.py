@@ -15,7 +15,6 @@ from analysis.benches.scenes import (
     Surface,
     comparison_table,
 )
-from analysis.columns import Column, chosen
 from analysis.figures.scenes import figure_tradeoff
 from analysis.labels import ALL_TEXTURES
 from analysis.report.outcomes import Outcome
@@ -29,6 +28,7 @@ from analysis.textures.scenes import (
     steps_table,
 )
 from modeling import CompiledScene
+from modeling.files.columns import Column, chosen
 
 SCENE = Column("scene", is_name=True)
 SCENE_TEXTURE_COLUMNS = (SCENE, *BEFORE_AFTER_COLUMNS)

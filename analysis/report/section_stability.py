@@ -19,7 +19,6 @@ from analysis.benches.atlas.tables import (
     edge_table,
     margin_table,
 )
-from analysis.columns import chosen, names, without
 from analysis.figures.atlas import figure_atlas
 from analysis.figures.saving import png_of, svg_of, warn_of_missing_fonts
 from analysis.report.findings import table_bytes
@@ -40,6 +39,7 @@ from analysis.report.section_provenance import PROVENANCE_COLUMNS, unfolded
 from analysis.report.sections import Section
 from analysis.report.sentences import described
 from modeling.errors import counted
+from modeling.files.columns import chosen, names, without
 
 BANNER = "SIMULATED: every run uses simulated signals, hand movements, recordings and answers."
 UNEXPLAINED = (

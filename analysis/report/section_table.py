@@ -10,7 +10,6 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from analysis.answers.imported import Imported
-from analysis.columns import p_value
 from analysis.figures.confusions import plot_confusion
 from analysis.figures.factorial import figure_factorial
 from analysis.report.outcomes import Outcome, Weight
@@ -32,6 +31,7 @@ from analysis.statistics.factorial import (
     repeated_measures_anova,
 )
 from modeling.errors import counted
+from modeling.files.columns import p_value
 
 WORDS = {"correct": "accuracy", "value": "mean"}
 LABELS = {"correct": "accuracy (share of right answers, 0–1)", "value": "mean (unit of the table)"}

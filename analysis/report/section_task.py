@@ -11,7 +11,6 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
-from analysis.columns import Column, chosen, names
 from analysis.labels import TASKS, sentence_case
 from analysis.report.outcomes import Outcome
 from analysis.report.page import Item, Table
@@ -21,6 +20,7 @@ from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS
 from analysis.statistics.rates import correct_rates
 from analysis.statistics.verdicts import ClaimFound, chance_of, has_rates, models_of
+from modeling.files.columns import Column, chosen, names
 
 # Tasks with a chapter of their own; thresholds are reported by tactileq threshold.
 WITH_CHAPTER = ("absolute", "relative", "oddity", "threshold")

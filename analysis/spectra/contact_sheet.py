@@ -10,8 +10,9 @@ import pandas as pd
 
 from modeling.arrays import Bools, Floats
 from modeling.files.folders import listed_file
+from modeling.files.stimulus_table import MANIFEST
 from modeling.files.tables import unguarded
-from stimuli.sets.manifest import COMPENSATED, MANIFEST
+from stimuli.sets.manifest import COMPENSATED
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.rendering import steady_part
 from stimuli.sets.sources import RECIPE

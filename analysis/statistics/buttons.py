@@ -11,8 +11,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.columns import Column, names
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 
 Whole = NDArray[np.intp]
 REDRAWN = 9999

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
-from analysis.columns import TEXTURE, Column, P, chosen, names
+from analysis.columns import TEXTURE, P
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
 from analysis.statistics.equivalence import (
     ALL_BUT,
@@ -39,6 +39,7 @@ from analysis.statistics.paired import (
 )
 from analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
 from modeling.arrays import Floats
+from modeling.files.columns import Column, chosen, names
 
 WITHHELD = "equivalence withheld"
 BOUNDS_WITHHELD = "different, bounds withheld"

@@ -12,12 +12,13 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.columns import TEXTURE, Column, P, names
+from analysis.columns import TEXTURE, P
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.design import complete_participants, design
 from analysis.statistics.mixed import t_of
 from analysis.statistics.paired import sign_flips_p, without_rounding_noise
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 
 GEE, SIGN_FLIPS = "GEE", "sign flips"
 GEE_COLUMNS = (

@@ -11,9 +11,10 @@ import numpy as np
 import pandas as pd
 
 from analysis.answers.hand import MEASURES
-from analysis.columns import Column, P, names
+from analysis.columns import P
 from analysis.statistics.draws import generators
 from analysis.statistics.paired import paired_test
+from modeling.files.columns import Column, names
 
 _CELL = ["task", "measure", "participant_id"]
 

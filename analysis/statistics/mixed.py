@@ -14,10 +14,11 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import stats
 
-from analysis.columns import Column, P, names
+from analysis.columns import P
 from analysis.statistics.design import MODEL, complete_participants, design
 from analysis.statistics.paired import CONFIDENCE, paired_test
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 
 MOST_SIMPLEX_STEPS = 1000
 LEAST_VARIANCE = 0.01  # of the noise's: where the search begins

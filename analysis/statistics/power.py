@@ -14,7 +14,7 @@ import pandas as pd
 
 from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.answers.responses import Responses
-from analysis.columns import TEXTURE, Column, names
+from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.claims import (
     BOUNDS_WITHHELD,
@@ -50,6 +50,7 @@ from analysis.statistics.participants.verdict import PeopleJudged, judged_by_siz
 from analysis.statistics.validation import clopper_pearson
 from analysis.statistics.verdicts import claim_shares, claim_standing, claim_values, people_data
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 
 TARGET = 0.8  # usual power to plan for
 EVERY_TEXTURE = "every texture"

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.columns import MODEL, TEXTURE, Column, P, names
+from analysis.columns import MODEL, TEXTURE, P
 from analysis.labels import ALL_TEXTURES
 from analysis.statistics.paired import (
     CONFIDENCE,
@@ -24,6 +24,7 @@ from analysis.statistics.paired import (
 )
 from modeling import InputError
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 
 BOOTSTRAP_RESAMPLES = 5000
 UNKNOWN_CHANCE = "chance not declared"

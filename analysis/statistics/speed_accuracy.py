@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from analysis.columns import MODEL, TEXTURE, Column, P, names
+from analysis.columns import MODEL, TEXTURE, P
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.mixed import mixed_effects
 from analysis.statistics.paired import (
@@ -23,6 +23,7 @@ from analysis.statistics.paired import (
 from modeling import InputError
 from modeling.arrays import Floats
 from modeling.errors import counted
+from modeling.files.columns import Column, names
 
 MEASURES = {
     "time_s": "response time (s, geometric mean)",

@@ -15,7 +15,6 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
-from analysis.columns import Column, names
 from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
 from analysis.statistics.gee import fit_gee
 from analysis.statistics.information import information_bits, transferred_information
@@ -24,6 +23,7 @@ from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flip
 from analysis.statistics.rates import bootstrap_intervals
 from modeling.arrays import Floats
 from modeling.checks import check_whole
+from modeling.files.columns import Column, names
 from modeling.seeds import generator, number_of
 
 SIZES = (8, 20, 36)  # participants

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.columns import Column, names
 from analysis.statistics.claims import EQUALITY, SHOWN, Standing
 from analysis.statistics.equivalence import (
     ALL_BUT,
@@ -45,6 +44,7 @@ from analysis.statistics.validation_people import (
 from analysis.statistics.validation_people_held_out import HELD_OUT
 from modeling.arrays import Bools, Floats
 from modeling.checks import check_whole
+from modeling.files.columns import Column, names
 from modeling.participants.choices import ODDITY, ChoiceStudies, forced_choice
 from modeling.participants.ratings import RatingStudies
 from modeling.seeds import generator, number_of

@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.columns import Column, names
 from analysis.statistics.participants.choices import ChoiceSampler, population_effects
 from analysis.statistics.participants.ratings import RatingSampler
 from modeling.arrays import Bools, Floats
 from modeling.checks import check_whole
+from modeling.files.columns import Column, names
 from modeling.participants.choices import (
     ODDITY,
     ChoicePriors,

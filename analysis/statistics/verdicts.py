@@ -14,7 +14,7 @@ from scipy import stats
 
 from analysis.answers.plan import DIFFERENCE, MODEL_RULE, AnalysisPlan, Claim
 from analysis.answers.responses import Responses, setup_of
-from analysis.columns import TEXTURE, Column, names
+from analysis.columns import TEXTURE
 from analysis.labels import MEASURES, MODELS, SCALES, TASKS
 from analysis.statistics.claims import (
     CONTROL,
@@ -47,6 +47,7 @@ from analysis.statistics.participants.verdict import FEWEST, PeopleFound, people
 from modeling import InputError
 from modeling.arrays import Floats
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from modeling.files.columns import Column, names
 from modeling.participants.choices import (
     ODDITY,
     DecisionModel,

@@ -14,11 +14,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from analysis.columns import CONDITIONS, ESTIMATOR, TEXTURE, Column
+from analysis.columns import CONDITIONS, ESTIMATOR, TEXTURE
 from analysis.textures.results import TextureResult
 from modeling import GridError, Recording, Spectrum, TextureModel, similarity
 from modeling.arrays import Floats
 from modeling.estimation.likelihood import is_silent
+from modeling.files.columns import Column
 from modeling.fitting.autoregressive import fit_ar_spectra
 from modeling.fitting.conditions import spectra_by_condition
 from modeling.fitting.spectral_field import fit_field_to_spectra

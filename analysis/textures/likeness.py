@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.columns import CONDITIONS, MODEL, TEXTURE, Column
+from analysis.columns import CONDITIONS, MODEL, TEXTURE
 from modeling import InputError, RecordingSet, RegressedModel, TextureModel, similarity
+from modeling.files.columns import Column
 from modeling.fitting.conditions import recording_spectra
 from modeling.models.grid import Condition
 

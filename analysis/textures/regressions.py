@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from analysis.columns import CONDITIONS, SIMULATED, TEXTURE, Column, P
+from analysis.columns import CONDITIONS, SIMULATED, TEXTURE, P
 from analysis.labels import ALL_TEXTURES, significance_mark
 from analysis.textures.likeness import MEASURE_COLUMNS, ConditionTarget, likeness_table
 from modeling import RegressedModel, TextureModel, regressed
 from modeling.arrays import Floats
+from modeling.files.columns import Column
 from modeling.models.own_peaks import own_peaks
 from modeling.models.terms import FORCE, SPEED, SPEED_FORCE, TERMS, DrivenBy
 from modeling.regression.centroid import (

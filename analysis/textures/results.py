@@ -8,9 +8,10 @@ from dataclasses import asdict, dataclass, field, fields
 import numpy as np
 import pandas as pd
 
-from analysis.columns import LAYER, SIMULATED, TEXTURE, Column
+from analysis.columns import LAYER, SIMULATED, TEXTURE
 from modeling import InputError, LayerVerdict, RecordingSet, Simplification, Spectrum, TextureModel
 from modeling.errors import shown
+from modeling.files.columns import Column
 from modeling.fitting.conditions import recording_spectra
 
 

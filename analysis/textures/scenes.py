@@ -8,9 +8,10 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.columns import SIMULATED, TEXTURE, Column, names
+from analysis.columns import SIMULATED, TEXTURE
 from analysis.labels import ALL_TEXTURES
 from modeling import CompiledScene
+from modeling.files.columns import Column, names
 from modeling.scenes.compiled import CompiledTexture
 from modeling.scenes.cost import stored_numbers
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import datetime
-from typing import Any
+from math import inf
 
 from experiments.sessions.log import OWN_FIELDS, Event
 from experiments.sessions.traces import PRESENTATION_COLUMNS
+from modeling.files.answer_tables import ENDS
+from modeling.files.columns import Column, names, without
 
 # Two records of one presentation: the log's when a press was seen, and the rig's (s).
 SAME_START_S = 1e-3
@@ -35,50 +37,82 @@ _MEANINGS = {
     "pen": "Acceleration at the pen was stored",
     "ended": "This start of the session ended",
 }
-_OWN: dict[str, dict[str, Any]] = {
-    "onset": {"Description": "Since the session began", "Units": "s"},
-    "duration": {
-        "Description": "From the first to the last sample of a presentation; n/a for events "
-        "without duration",
-        "Units": "s",
-    },
-    "trial_type": {"Description": "What happened"},
-    "run": {"Description": "In which start of the session, from 1"},
-    "trial": {"Description": "Number of the trial; n/a outside trials"},
-    "phase": {"Description": "Part of the session that was announced"},
-    "tray": {"Description": "Tray of the sample"},
-    "surface": {
-        "Description": "What was presented",
-        "Levels": {"real": "the mounted real surface", "virtual": "a virtual surface"},
-    },
-    "button": {"Description": "Button of the virtual surface, from 1"},
-    "scale": {"Description": "Which slider"},
-    "value": {"Description": "Where it was released, 0 to 100", "Units": "arbitrary"},
-    "status": {
-        "Description": "How this start of the session ended",
-        "Levels": {
+_OWN = (
+    Column(
+        "onset",
+        unit="s",
+        description="Since the session began",
+        limits=(-inf, inf),
+        required=True,
+    ),
+    Column(
+        "duration",
+        unit="s",
+        description="From the first to the last sample of a presentation; n/a for events without "
+        "duration",
+        limits=(-inf, inf),
+    ),
+    Column("trial_type", description="What happened", required=True),
+    Column(
+        "run",
+        description="In which start of the session, from 1",
+        limits=(1, inf),
+        whole=True,
+        required=True,
+    ),
+    Column(
+        "trial",
+        description="Number of the trial; n/a outside trials",
+        limits=(0, inf),
+        whole=True,
+    ),
+    Column("phase", description="Part of the session that was announced"),
+    Column("tray", description="Tray of the sample"),
+    Column(
+        "surface",
+        description="What was presented",
+        levels={"real": "the mounted real surface", "virtual": "a virtual surface"},
+    ),
+    Column(
+        "button",
+        description="Button of the virtual surface, from 1",
+        limits=(1, inf),
+        whole=True,
+    ),
+    Column("scale", description="Which slider"),
+    Column(
+        "value",
+        unit="arbitrary",
+        description="Where it was released, 0 to 100",
+        limits=ENDS,
+    ),
+    Column(
+        "status",
+        description="How this start of the session ended",
+        levels={
             "complete": "all trials were answered",
             "aborted": "somebody ended it",
             "crashed": "the program failed",
         },
-    },
-    "by": {"Description": "Who or what ended it"},
-    "told": {"Description": "What was reported: a fault, a reason, an advice"},
-    "invalidates": {
-        "Description": "Whether the participant cannot have felt what was planned",
-        "Levels": {"true": "the trial is not valid", "false": "nothing follows"},
-    },
-    "start_s": {
-        "Description": "When the first sample was output, on the rig's clock",
-        "Units": "s",
-    },
-}
-_FROM_PRESENTATIONS = {
-    name: described
-    for name, described in PRESENTATION_COLUMNS.items()
-    if name not in ("run", "trial", "surface", "start_s", "end_s", "faults")
-}
-COLUMNS: dict[str, dict[str, Any]] = {**_OWN, **_FROM_PRESENTATIONS}
+    ),
+    Column("by", description="Who or what ended it"),
+    Column("told", description="What was reported: a fault, a reason, an advice"),
+    Column(
+        "invalidates",
+        description="Whether the participant cannot have felt what was planned",
+        levels={"true": "the trial is not valid", "false": "nothing follows"},
+    ),
+    Column(
+        "start_s",
+        unit="s",
+        description="When the first sample was output, on the rig's clock",
+        limits=(-inf, inf),
+    ),
+)
+_FROM_PRESENTATIONS = without(
+    PRESENTATION_COLUMNS, "run", "trial", "surface", "start_s", "end_s", "faults"
+)
+COLUMNS = (*_OWN, *_FROM_PRESENTATIONS)
 # Answers are in their own tables, the participants' in participants.tsv.
 _ELSEWHERE = ("answers", "row", "manifest_sha256", "overrides", "changed", "cut")
 
@@ -137,7 +171,8 @@ def _moment(event: Event) -> datetime:
 
 def _row(event: Event, onset: float, of_trial: list[Mapping[str, str]]) -> dict[str, object]:
     kept = {k: v for k, v in event.items() if k not in (*_ELSEWHERE, *OWN_FIELDS)}
-    kept = {name: value for name, value in kept.items() if name in _OWN and value is not None}
+    own = names(_OWN)
+    kept = {name: value for name, value in kept.items() if name in own and value is not None}
     index = event.get("index")
     return {
         **kept,
@@ -162,7 +197,7 @@ def _presentation(event: Event, of_trial: list[Mapping[str, str]]) -> dict[str, 
         same_start = abs(float(row["start_s"]) - start_s) < SAME_START_S
         if same_start and row["surface"] == event.get("surface"):
             of_trial.pop(place)
-            found: dict[str, object] = {name: row[name] for name in _FROM_PRESENTATIONS}
+            found: dict[str, object] = {name: row[name] for name in names(_FROM_PRESENTATIONS)}
             duration_s = float(row["end_s"]) - float(row["start_s"])
             return {**found, "duration": round(duration_s, 6)}
     return {}

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
+from math import inf
 from pathlib import Path
 from typing import Any
 
 from experiments.sessions.bids_tables import json_bytes, table_bytes
 from experiments.sessions.held import Held
-from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.answer_tables import ANSWER_TABLES, PARTICIPANT_COLUMNS, PARTICIPANT_ID
+from modeling.files.columns import Column, sidecar
 
 STATUS_LEVELS = {
     "complete": "all trials were answered",
@@ -20,41 +22,26 @@ STATUS_LEVELS = {
     "crashed": "the program was killed or failed; it can be resumed",
     "running": "it was running when this table was written",
 }
-_SESSION_COLUMNS: dict[str, dict[str, Any]] = {
-    "session_id": {"Description": "Session (day)"},
-    "day": {
-        "Description": "Whole days since the participant's first session; the dates themselves are "
+SESSION_COLUMNS = (
+    Column("session_id", description="Session (day)", required=True),
+    Column(
+        "day",
+        unit="day",
+        description="Whole days since the participant's first session; the dates themselves are "
         "left out, since they may identify the person",
-        "Units": "day",
-    },
-    **{
-        task: {
-            "Description": f"State of the session of the task {task} stands",
-            "Levels": STATUS_LEVELS,
-        }
+        limits=(0, inf),
+        whole=True,
+        required=True,
+    ),
+    *(
+        Column(
+            task,
+            description=f"State of the session of the task {task} stands",
+            levels=STATUS_LEVELS,
+        )
         for task in ANSWER_TABLES
-    },
-}
-_FIRST = {"participant_id": {"Description": "Participant"}}
-_LAST: dict[str, dict[str, Any]] = {
-    "slot": {
-        "Description": "Place in the design, which determines the balanced parts of the order"
-    },
-    "status": {
-        "Description": "Whether the participant continues",
-        "Levels": {"enrolled": "takes part", "dropped": "will not come back"},
-    },
-    "consent_version": {"Description": "Version of the consent form that was agreed to"},
-    "language": {"Description": "Language of the texts"},
-    "pilot": {
-        "Description": "Whether the sessions were a pilot",
-        "Levels": {"true": "a pilot", "false": "data of the study"},
-    },
-    "simulated": {
-        "Description": "Whether the participant was simulated",
-        "Levels": {"true": "simulated", "false": "a person"},
-    },
-}
+    ),
+)
 
 
 def people_files(
@@ -83,7 +70,7 @@ def people_files(
     by_person: dict[str, list[Held]] = {}
     for held in sessions:
         by_person.setdefault(held.files.participant, []).append(held)
-    columns = _FIRST | _questions(sessions) | _LAST
+    columns = (PARTICIPANT_ID, *_questions(sessions), *PARTICIPANT_COLUMNS)
     table = root / "participants.tsv"
     header, *lines = table_bytes(
         columns, (_person(name, of_one, roster) for name, of_one in by_person.items())
@@ -95,12 +82,12 @@ def people_files(
     if first == header or not there.keys() & set(rows_kept):
         made |= {name: there[name] for name in rows_kept if name in there}
         files[table] = header + b"".join(made[name] for name in sorted(made))
-        files[table.with_suffix(".json")] = json_bytes(columns)
+        files[table.with_suffix(".json")] = json_bytes(sidecar(columns))
     for name, of_one in by_person.items():
         if name not in kept:
             own = root / name / f"{name}_sessions.tsv"
-            files[own] = table_bytes(_SESSION_COLUMNS, _session_rows(of_one))
-            files[own.with_suffix(".json")] = json_bytes(_SESSION_COLUMNS)
+            files[own] = table_bytes(SESSION_COLUMNS, _session_rows(of_one))
+            files[own.with_suffix(".json")] = json_bytes(sidecar(SESSION_COLUMNS))
     return files
 
 
@@ -112,21 +99,21 @@ def _rows_there(table: Path) -> tuple[bytes, dict[str, bytes]]:
     return header, {row.split(b"\t", 1)[0].decode("utf-8", "replace"): row for row in rows}
 
 
-def _questions(sessions: Iterable[Held]) -> dict[str, dict[str, Any]]:
+def _questions(sessions: Iterable[Held]) -> Iterable[Column]:
     """The columns of what was asked, in the order of the study."""
-    columns: dict[str, dict[str, Any]] = {}
+    columns: dict[str, Column] = {}
     for held in sessions:
         for question in held.manifest.study.get("questions", ()):
             name, levels = question["name"], question.get("levels", ())
-            wording = question.get("text", {})
-            described: dict[str, Any] = {"Description": wording.get("en", name.replace("_", " "))}
-            if levels:
-                english = question.get("levels_text", {}).get("en", levels)
-                described["Levels"] = dict(zip(levels, english, strict=True))
-            if name == "age":
-                described["Units"] = "year"
-            columns.setdefault(name, described)
-    return columns
+            english = question.get("levels_text", {}).get("en", levels)
+            column = Column(
+                name,
+                unit="year" if name == "age" else "",
+                description=question.get("text", {}).get("en", name.replace("_", " ")),
+                levels=dict(zip(levels, english, strict=True)) if levels else {},
+            )
+            columns.setdefault(name, column)
+    return columns.values()
 
 
 def _person(

@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 import io
 from collections.abc import Sequence
-from typing import Any
+from math import inf
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.sessions.log import Event
 from modeling.arrays import Floats
+from modeling.files.columns import Column
 from rig.interface import SURFACES
 
 RATE_HZ = 250.0
@@ -26,35 +27,44 @@ LONGEST_GAP_S = 0.02
 _LONGEST_PAUSE_S = 3600.0
 _MOST_ROWS_PER_READING = 50
 
-COLUMNS: dict[str, dict[str, Any]] = {
-    "speed_mm_s": {
-        "Description": "Tangential speed, its sign the direction; linear between two readings; "
-        "n/a where nothing measured it and between trials",
-        "Units": "mm/s",
-    },
-    "force_n": {
-        "Description": "Normal force; linear between two readings; n/a where nothing measured it "
-        "and between trials",
-        "Units": "N",
-    },
-    "surface": {
-        "Description": "Surface presented at the last reading",
-        "Levels": {
+COLUMNS = (
+    Column(
+        "speed_mm_s",
+        unit="mm/s",
+        description="Tangential speed, its sign the direction; linear between two readings; n/a "
+        "where nothing measured it and between trials",
+        limits=(-inf, inf),
+    ),
+    Column(
+        "force_n",
+        unit="N",
+        description="Normal force; linear between two readings; n/a where nothing measured it and "
+        "between trials",
+        limits=(-inf, inf),
+    ),
+    Column(
+        "surface",
+        description="Surface presented at the last reading",
+        levels={
             str(SURFACES.index("none")): "nothing",
             str(SURFACES.index("real")): "the mounted real surface",
             str(SURFACES.index("virtual")): "a virtual surface",
         },
-    },
-    "force_assumed": {
-        "Description": "Whether the force of the last reading was not measured but assumed",
-        "Levels": {"1": "assumed", "0": "measured, or n/a"},
-    },
-    "trial": {"Description": "Number of the trial"},
-    "presentation": {
-        "Description": "Number of the presentation since the rig was opened, as in the events; 0 "
-        "where nothing was presented"
-    },
-}
+    ),
+    Column(
+        "force_assumed",
+        description="Whether the force of the last reading was not measured but assumed",
+        levels={"1": "assumed", "0": "measured, or n/a"},
+    ),
+    Column("trial", description="Number of the trial", limits=(0, inf), whole=True),
+    Column(
+        "presentation",
+        description="Number of the presentation since the rig was opened, as in the events; 0 "
+        "where nothing was presented",
+        limits=(0, inf),
+        whole=True,
+    ),
+)
 
 
 def by_run(hand: pd.DataFrame) -> dict[int, pd.DataFrame]:

@@ -20,6 +20,8 @@ from experiments.sessions.trace_rows import TraceRows, hand_rows, presentation_r
 from experiments.sessions.traces import HAND_COLUMNS
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerColumn
+from modeling.files.columns import names
+from modeling.files.columns import sidecar as sidecar_of
 from modeling.files.documents import read_json_object
 from modeling.files.hashes import sha256_of_paths
 
@@ -48,15 +50,14 @@ def session_files(held: Held) -> tuple[Made, tuple[str, ...]]:
             "DerivedFrom": sources,
             **({"Damaged": damaged} if damaged else {}),
             "Files": {path.name: hashlib.sha256(data).hexdigest() for path, data in made.items()},
-            **{column.name: column.sidecar() for column in _columns(held)},
+            **sidecar_of(_columns(held)),
         }
     )
     return made, (*lost_rows, *lost_readings)
 
 
 def _answers(held: Held) -> Made:
-    names = [column.name for column in _columns(held)]
-    return {held.files.answers: table_bytes(names, held.state.rows)}
+    return {held.files.answers: table_bytes(_columns(held), held.state.rows)}
 
 
 def _columns(held: Held) -> list[AnswerColumn]:
@@ -68,8 +69,8 @@ def _columns(held: Held) -> list[AnswerColumn]:
 def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
     rows = bids_events.event_rows(held.state.events, presentations)
     table = held.files.beh / f"{held.files.stem}_events.tsv"
-    columns = {name: dict(told) for name, told in bids_events.COLUMNS.items()}
-    columns["trial_type"]["Levels"] = bids_events.trial_types(rows)
+    described = sidecar_of(bids_events.COLUMNS)
+    described["trial_type"]["Levels"] = bids_events.trial_types(rows)
     manifest = held.manifest
     sidecar = {
         "TaskName": manifest.task,
@@ -79,9 +80,12 @@ def _events(held: Held, presentations: list[dict[str, str]]) -> Made:
             "SoftwareVersion": manifest.versions.get("tactileq", "not stated"),
             "OperatingSystem": manifest.platform,
         },
-        **columns,
+        **described,
     }
-    return {table: table_bytes(columns, rows), table.with_suffix(".json"): json_bytes(sidecar)}
+    return {
+        table: table_bytes(bids_events.COLUMNS, rows),
+        table.with_suffix(".json"): json_bytes(sidecar),
+    }
 
 
 def _hand(held: Held, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
@@ -104,11 +108,11 @@ def _hand(held: Held, runs: set[int]) -> tuple[Made, tuple[str, ...]]:
             {
                 "SamplingFrequency": bids_physio.RATE_HZ,
                 "StartTime": start_s,
-                "Columns": list(bids_physio.COLUMNS),
+                "Columns": names(bids_physio.COLUMNS),
                 "TaskName": held.manifest.task,
                 "PhysioType": "generic",
                 **_simulated(held.manifest),
-                **bids_physio.COLUMNS,
+                **sidecar_of(bids_physio.COLUMNS),
             }
         )
         regular = bids_physio.at_regular_times(readings)
@@ -121,7 +125,7 @@ def _readings(found: TraceRows) -> Any:
     import pandas as pd
 
     text = io.BytesIO(b"\n".join(found.rows))
-    hand = pd.read_csv(text, sep="\t", header=None, names=list(HAND_COLUMNS))
+    hand = pd.read_csv(text, sep="\t", header=None, names=names(HAND_COLUMNS))
     return hand.set_axis(list(found.lines), axis=0)
 
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from modeling.files.columns import Column, names
 from modeling.files.tables import guarded
 
 MISSING = "n/a"
@@ -42,14 +43,14 @@ def _text(value: object) -> str:
     return str(value)
 
 
-def table_bytes(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> bytes:
+def table_bytes(columns: Sequence[Column], rows: Iterable[Mapping[str, object]]) -> bytes:
     """A table with a header; what a row does not have is n/a."""
-    names = tuple(columns)
-    lines = ["\t".join(names)]
+    header = names(columns)
+    lines = ["\t".join(header)]
     # Most rows have few of the columns, as those of events do.
     for row in rows:
         cells = {name: cell(value) for name, value in row.items()}
-        lines.append("\t".join(cells.get(name, MISSING) for name in names))
+        lines.append("\t".join(cells.get(name, MISSING) for name in header))
     return ("\n".join(lines) + "\n").encode("utf-8")
 
 

@@ -17,7 +17,6 @@ from experiments.sessions.log import Event
 from experiments.sessions.manifest import SessionManifest
 from experiments.sessions.state import SessionState, session_state
 from modeling import InputError
-from modeling.checks import is_whole
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.reading import read_bytes
@@ -121,11 +120,6 @@ def _check_rows(events: Iterable[Event], files: SessionFiles) -> None:
 def _wrong_in(row: Mapping[str, Any], task: str) -> str:
     """The first invalid value of an answer; empty where there is none."""
     for column in ANSWER_TABLES[task].columns:
-        value = row.get(column.name)
-        whole = column.name not in _WHOLE or value is None or is_whole(value)
-        if not (whole and column.holds(value)):
+        if not column.holds(value := row.get(column.name)):
             return f"{column.name} = {shown(value)}"
     return ""
-
-
-_WHOLE = ("trial", "run", "valid", "repeats")

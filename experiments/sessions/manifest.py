@@ -14,7 +14,8 @@ from typing import Annotated, Any
 from experiments.sessions.files import SessionFiles
 from experiments.sessions.log import plain
 from modeling.errors import InputError, shown
-from modeling.files.described import DescribedJson, key
+from modeling.files.described import key
+from modeling.files.described_json import DescribedJson
 from modeling.files.hashes import sha256_of_values
 
 _FromOne = Annotated[int, key(ge=1)]

@@ -201,9 +201,9 @@ def _intake(study: Study, root: Path, person: Person) -> Intake:
     """What to ask first; of who gave this consent before, only whether the code is theirs."""
     logs = (root / "sourcedata" / f"sub-{person.subject:02d}").glob("ses-*/*_log.jsonl")
     return Intake(
-        consent=study.consent,
+        consent=study.consent.version,
         code=person.code,
-        known=any(_welcomes(log, study.consent) for log in logs),
+        known=any(_welcomes(log, study.consent.version) for log in logs),
         questions=study.questions,
     )
 

@@ -38,6 +38,7 @@ from experiments.sessions.traces import (
 from experiments.sessions.writer import LogWriter, StoreError, store_error
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.columns import Column, sidecar
 from modeling.files.documents import dump_json
 from modeling.files.locks import HeldError, Lock
 from modeling.files.places import locked
@@ -413,10 +414,10 @@ class SessionStore:
         finally:
             self._lock.release()
 
-    def _table(self, name: str, columns: Mapping[str, Mapping[str, Any]]) -> GrowingTable:
-        described = dump_json(dict(columns))
+    def _table(self, name: str, columns: Sequence[Column]) -> GrowingTable:
+        described = dump_json(sidecar(columns))
         self.files.named(f"{name}.json").write_text(described, encoding="utf-8")
-        table = GrowingTable(self.files.named(f"{name}.tsv"), tuple(columns))
+        table = GrowingTable(self.files.named(f"{name}.tsv"), columns)
         self._tables.append(table)
         return table
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from experiments.sessions.files import open_file, write_all
 from experiments.sessions.writer import store_error
 from modeling import InputError
 from modeling.errors import shown
+from modeling.files.columns import Column, names
 from modeling.files.tables import guarded
 
 MISSING = "n/a"
@@ -26,7 +27,7 @@ class GrowingTable:
     ----------
     path : Path
         Where a table is there, as another run of the session left it, rows follow its whole ones.
-    columns : tuple of str
+    columns : sequence of Column
 
     Raises
     ------
@@ -36,9 +37,9 @@ class GrowingTable:
         If the disk does not take the header.
     """
 
-    def __init__(self, path: Path, columns: tuple[str, ...]) -> None:
+    def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self.path = path
-        self._columns = columns
+        self._columns = names(columns)
         self._handle = open_file(path, new=False)
         try:
             self._begin()

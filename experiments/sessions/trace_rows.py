@@ -10,22 +10,13 @@ from pathlib import Path
 from experiments.sessions.traces import HAND_COLUMNS, PRESENTATION_COLUMNS
 from modeling import InputError
 from modeling.errors import counted
+from modeling.files.columns import Column, Columns, names
 from modeling.files.reading import read_bytes
 from modeling.files.tables import unguarded
-from rig.interface import SURFACES
 
 _WHOLE = r"\d{1,9}"
 # As `tables.cell` writes them: ten digits; no more than a floating-point number can have.
 _NUMBER = r"-?\d{1,20}(?:\.\d{1,20})?(?:e-\d{1,3}|e\+\d{1,2})?"
-_CELLS = {
-    **dict.fromkeys(("run", "trial", "presentation"), rf"({_WHOLE})"),
-    "time_s": _NUMBER,
-    "start_s": _NUMBER,
-    "end_s": _NUMBER,
-    "surface": "|".join(SURFACES),
-    "force_assumed": "[01]",
-    **dict.fromkeys(("texture", "model_sha256", "faults"), r"[^\t]*"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,19 +40,20 @@ class TraceRows:
 
 def hand_rows(path: Path, *, runs: Collection[int]) -> TraceRows:
     """The readings of the hand in these starts of the session; none where there is no file."""
-    return _rows(path, tuple(HAND_COLUMNS), runs=runs)
+    return _rows(path, HAND_COLUMNS, runs=runs)
 
 
 def presentation_rows(
     path: Path, *, runs: Collection[int]
 ) -> tuple[list[dict[str, str]], tuple[str, ...]]:
     """The presentations in these starts of the session as text, and what is damaged."""
-    found = _rows(path, tuple(PRESENTATION_COLUMNS), runs=runs)
+    found = _rows(path, PRESENTATION_COLUMNS, runs=runs)
     cells = (map(unguarded, row.decode("utf-8", "replace").split("\t")) for row in found.rows)
-    return [dict(zip(PRESENTATION_COLUMNS, row, strict=True)) for row in cells], found.damaged
+    header = names(PRESENTATION_COLUMNS)
+    return [dict(zip(header, row, strict=True)) for row in cells], found.damaged
 
 
-def _rows(path: Path, columns: tuple[str, ...], *, runs: Collection[int]) -> TraceRows:
+def _rows(path: Path, columns: Columns, *, runs: Collection[int]) -> TraceRows:
     if not path.is_file():
         return TraceRows()
     try:
@@ -73,9 +65,9 @@ def _rows(path: Path, columns: tuple[str, ...], *, runs: Collection[int]) -> Tra
     if not lines:
         return TraceRows()
     header, *others = lines
-    if header != "\t".join(columns).encode():
+    if header != "\t".join(names(columns)).encode():
         return TraceRows(damaged=(f"line 1 of {path.name}, without which no other can be read",))
-    row = re.compile("\t".join(f"(?:{_cell(name)})" for name in columns).encode())
+    row = re.compile("\t".join(f"(?:{_cell(column)})" for column in columns).encode())
     known = {str(run).encode() for run in runs}
     fits = [(found := row.fullmatch(line)) is not None and found[1] in known for line in others]
     numbers = range(2, len(others) + 2)
@@ -87,8 +79,13 @@ def _rows(path: Path, columns: tuple[str, ...], *, runs: Collection[int]) -> Tra
     )
 
 
-def _cell(name: str) -> str:
-    return _CELLS.get(name, rf"{_NUMBER}|n/a")
+def _cell(column: Column) -> str:
+    """What its cells look like; a table of readings is too long to read them one by one."""
+    if column.limits is None:
+        return "|".join(map(re.escape, column.levels)) or r"[^\t]*"
+    if column.whole:
+        return rf"({_WHOLE})"
+    return _NUMBER if column.required else rf"{_NUMBER}|n/a"
 
 
 def _told(lines: Sequence[int], path: Path) -> str:

@@ -5,44 +5,69 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Mapping, Sequence
 from math import inf
-from typing import Any
 
 import numpy as np
 
 from experiments.sessions.strokes import Outside, outside_grid
 from modeling import InputError
+from modeling.files.columns import Column
 from rig.interface import SURFACES, Acceleration, Fault, HandRows, PresentationRecord
 
 _CLOCK = "seconds since the rig was opened"
-_RUN = {
-    "run": {
-        "Description": "In which start of the session, from 1; a trial that was interrupted in one "
-        "is presented again in a later one, which has its answer"
-    },
-}
-HAND_COLUMNS: dict[str, dict[str, Any]] = {
-    **_RUN,
-    "trial": {"Description": "Number of the trial"},
-    "presentation": {"Description": "Number of the presentation; 0 where nothing was presented"},
-    "time_s": {"Description": f"Time of the reading, {_CLOCK}", "Units": "s"},
-    "speed_mm_s": {
-        "Description": "Tangential speed, its sign the direction; n/a where nothing measures it",
-        "Units": "mm/s",
-    },
-    "force_n": {"Description": "Normal force; n/a where nothing measures it", "Units": "N"},
-    "surface": {
-        "Description": "What was presented",
-        "Levels": {
+_NUMBER = (-inf, inf)
+
+
+def _counted(name: str, description: str) -> Column:
+    """A whole number that every row has."""
+    return Column(name, description=description, limits=(0, 999_999_999), whole=True, required=True)
+
+
+_RUN = _counted(
+    "run",
+    "In which start of the session, from 1; a trial that was interrupted in one is presented again "
+    "in a later one, which has its answer",
+)
+_TRIAL = _counted("trial", "Number of the trial")
+HAND_COLUMNS = (
+    _RUN,
+    _TRIAL,
+    _counted("presentation", "Number of the presentation; 0 where nothing was presented"),
+    Column(
+        "time_s",
+        unit="s",
+        description=f"Time of the reading, {_CLOCK}",
+        limits=_NUMBER,
+        required=True,
+    ),
+    Column(
+        "speed_mm_s",
+        unit="mm/s",
+        description="Tangential speed, its sign the direction; n/a where nothing measures it",
+        limits=_NUMBER,
+    ),
+    Column(
+        "force_n",
+        unit="N",
+        description="Normal force; n/a where nothing measures it",
+        limits=_NUMBER,
+    ),
+    Column(
+        "surface",
+        description="What was presented",
+        levels={
             "none": "nothing",
             "real": "the mounted real surface",
             "virtual": "a virtual surface",
         },
-    },
-    "force_assumed": {
-        "Description": "Whether the force was not measured but assumed",
-        "Levels": {"1": "assumed", "0": "measured, or n/a"},
-    },
-}
+        required=True,
+    ),
+    Column(
+        "force_assumed",
+        description="Whether the force was not measured but assumed",
+        levels={"1": "assumed", "0": "measured, or n/a"},
+        required=True,
+    ),
+)
 _OUTSIDE = {
     "outside_share": "outside the model's grid of speeds and forces",
     "too_slow_share": "slower than its slowest condition",
@@ -59,30 +84,54 @@ _COUNTERS = {
     "limited_rms": "Samples affected by the RMS limit",
     "limited_duration": "Samples muted by the duration limit",
 }
-PRESENTATION_COLUMNS: dict[str, dict[str, Any]] = {
-    **_RUN,
-    "trial": {"Description": "Number of the trial"},
-    "presentation": {"Description": "Number of the presentation, since the rig was opened"},
-    "surface": {"Description": "real or virtual"},
-    "texture": {"Description": "Of the real surface, or of the model"},
-    "model_sha256": {
-        "Description": "Of the model, or of the file of a stimulus set; n/a of a real surface"
-    },
-    "start_s": {"Description": f"When its first sample was output, {_CLOCK}", "Units": "s"},
-    "end_s": {"Description": f"When its last sample was output, {_CLOCK}", "Units": "s"},
-    **{
-        name: {"Description": f"Share of the time with a moving hand on the surface, {what}"}
+PRESENTATION_COLUMNS = (
+    _RUN,
+    _TRIAL,
+    _counted("presentation", "Number of the presentation, since the rig was opened"),
+    Column(
+        "surface", description="real or virtual", levels=dict.fromkeys(SURFACES, ""), required=True
+    ),
+    Column("texture", description="Of the real surface, or of the model"),
+    Column(
+        "model_sha256",
+        description="Of the model, or of the file of a stimulus set; n/a of a real surface",
+    ),
+    Column(
+        "start_s",
+        unit="s",
+        description=f"When its first sample was output, {_CLOCK}",
+        limits=_NUMBER,
+        required=True,
+    ),
+    Column(
+        "end_s",
+        unit="s",
+        description=f"When its last sample was output, {_CLOCK}",
+        limits=_NUMBER,
+        required=True,
+    ),
+    *(
+        Column(
+            name,
+            description=f"Share of the time with a moving hand on the surface, {what}",
+            limits=_NUMBER,
+        )
         for name, what in _OUTSIDE.items()
-    },
-    **{name: {"Description": what} for name, what in _COUNTERS.items()},
-    "played_s": {"Description": "Duration of the vibration that was played", "Units": "s"},
-    "dose_g2_s": {"Description": "Its square over time, unweighted", "Units": "g²·s"},
-    "rms_g": {"Description": "Its RMS", "Units": "g"},
-    "peak_g": {"Description": "Its largest absolute value", "Units": "g"},
-    "misses": {"Description": "Blocks that the sound card missed"},
-    "stale_blocks": {"Description": "Blocks for which the hand was not read in time"},
-    "faults": {"Description": "Faults until the next presentation, separated by |"},
-}
+    ),
+    *(Column(name, description=what, limits=_NUMBER) for name, what in _COUNTERS.items()),
+    *(
+        Column(name, unit=unit, description=what, limits=_NUMBER)
+        for name, unit, what in (
+            ("played_s", "s", "Duration of the vibration that was played"),
+            ("dose_g2_s", "g²·s", "Its square over time, unweighted"),
+            ("rms_g", "g", "Its RMS"),
+            ("peak_g", "g", "Its largest absolute value"),
+            ("misses", "", "Blocks that the sound card missed"),
+            ("stale_blocks", "", "Blocks for which the hand was not read in time"),
+        )
+    ),
+    Column("faults", description="Faults until the next presentation, separated by |"),
+)
 
 
 def hand_lines(trial: int, rows: HandRows, *, run: int) -> Iterator[str]:

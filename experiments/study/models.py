@@ -11,13 +11,13 @@ from typing import NoReturn
 from experiments.study.study import Study
 from modeling import InputError, TextureModel
 from modeling.checks import check_keys
+from modeling.files.stimulus_table import MANIFEST as STIMULI
 from modeling.models.compiled_for import CompiledFor
 from modeling.models.loading import load_any_models
 from modeling.models.loading import made_from as model_made_from
 from modeling.scenes.compiled import FILE as SCENE
 from modeling.scenes.loading import scene_files, scene_models
 from rig.interface import Presentable, Stimulus
-from rig.sound.signals import MANIFEST as STIMULI
 from rig.sound.signals import stimuli_of_surfaces
 
 # What may continue where a reason is given: a word for what, and the sentence that refuses it.

@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from math import ceil, floor
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
-from experiments.study.tables import (
-    as_list,
-    as_table,
-    require_different,
-    require_keys,
-    require_label,
-)
 from modeling import InputError
-from modeling.checks import check_keys, is_number
 from modeling.errors import shown
+from modeling.files.described import Section, key
+from modeling.files.kinds import Label, is_different, is_line
 
 # Those whose wording the language files of the console hold.
 SHIPPED = ("age", "sex", "handedness")
@@ -28,22 +20,13 @@ MOST_DIGITS = 6
 TAKEN = ("participant_id", "code", "slot", "language", "pilot", "simulated", "status")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Question:
-    """One question: for a number, or for one of several levels.
+def _is_free(name: str) -> bool:
+    return is_line(name) and name not in TAKEN
 
-    Parameters
-    ----------
-    name : str
-        Small letters, digits and underscores; a column of participants.tsv.
-    least, most : float, optional
-        Of a whole number, 0 … 999 999; both or neither.
-    levels : tuple of str
-        Of a choice, 2 … 18, as the data name them; empty for a number.
-    text : mapping of language to str
-        The wording; empty for age, sex and handedness, whose wording is shipped.
-    levels_text : mapping of language to tuple of str
-        How the levels are shown, in their order; where they are not given, as the data name them.
+
+@dataclass(frozen=True, kw_only=True)
+class Question(Section):
+    """A question that each participant is asked once: for a number, or for one of several levels.
 
     Raises
     ------
@@ -51,39 +34,53 @@ class Question:
         For a question that is neither for a number nor for a choice, or cannot be named so.
     """
 
-    name: str
-    least: float | None = None
-    most: float | None = None
-    levels: tuple[str, ...] = ()
-    text: Mapping[str, str] = field(default_factory=dict)
-    levels_text: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    WHERE: ClassVar[str] = "[[questions]]"
+    name: Annotated[
+        str,
+        key(
+            "a column of participants.tsv",
+            expected=f"lower-case letters, digits and underscores (and none of {', '.join(TAKEN)})",
+            advice="rename it",
+            pattern="^[a-z][a-z0-9_]*$",
+            holds=_is_free,
+        ),
+    ]
+    least: Annotated[float, key("least number, beside most", as_given=True)] | None = None
+    most: (
+        Annotated[float, key("largest number, a whole one as all answers", as_given=True)] | None
+    ) = None
+    levels: Annotated[
+        tuple[Label, ...],
+        key(
+            f"of a choice, two to {MOST_LEVELS}, as the data name them",
+            expected="a list of different levels, printable text in one line",
+            holds=is_different,
+            advice='write ["…", "…"]',
+        ),
+    ] = ()
+    text: Annotated[
+        dict[str, Label],
+        key(
+            f"the wording by language; of {', '.join(SHIPPED)} it is shipped",
+            advice='text.en = "…"',
+        ),
+    ] = field(default_factory=dict)
+    levels_text: Annotated[
+        dict[str, Annotated[tuple[Label, ...], key(holds=is_different)]],
+        key(
+            "how the levels are shown, by language, in their order",
+            expected="a table of lists of different printable texts in one line",
+            advice='write levels_text.ja = ["…", "…"]',
+        ),
+    ] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "levels", tuple(self.levels))
-        object.__setattr__(self, "text", dict(self.text))
-        shown_as = {language: tuple(words) for language, words in self.levels_text.items()}
-        object.__setattr__(self, "levels_text", shown_as)
-        if not (isinstance(self.name, str) and re.fullmatch("[a-z][a-z0-9_]*", self.name)):
-            raise InputError(
-                "expected a name of lower-case letters, digits and underscores for a question, got "
-                f"{shown(self.name)}; rename it."
-            )
-        if self.name in TAKEN:
-            raise InputError(
-                f"expected a question of another name than {', '.join(TAKEN)}, got {self.name}; "
-                "rename it."
-            )
-        self._check_answers()
-
-    def _check_answers(self) -> None:
-        for level in self.levels:
-            require_label(f"a level of the question {self.name}", level)
-        require_different(f"levels of the question {self.name}", self.levels)
+        super().__post_init__()
         ends = [end for end in (self.least, self.most) if end is not None]
         if self.levels:
             good = len(self.levels) > 1 and not ends
         else:
-            good = len(ends) == 2 and all(map(is_number, ends)) and ends[0] < ends[1]
+            good = len(ends) == 2 and ends[0] < ends[1]
         if not good:
             raise InputError(
                 f"expected least and most, or two levels or more, for the question {self.name}, "
@@ -103,14 +100,11 @@ class Question:
                 "for a number with least and most."
             )
         for language, words in self.levels_text.items():
-            where = f"levels_text.{language} of the question {self.name}"
-            for word in words:
-                require_label(where, word)
-            require_different(where, words)
             if len(words) != len(self.levels):
                 raise InputError(
-                    f"expected {len(self.levels)} texts in {where}, one for each level, got "
-                    f"{len(words)}; give them in the order of levels."
+                    f"expected {len(self.levels)} texts in levels_text.{language} of the question "
+                    f"{self.name}, one for each level, got {len(words)}; give them in the order of "
+                    "levels."
                 )
 
     def _check_range(self, least: float, most: float) -> None:
@@ -152,46 +146,6 @@ class Question:
             )
 
     def to_dict(self) -> dict[str, Any]:
-        """The question as plain values, as in a study file."""
-        values = {
-            "name": self.name,
-            "least": self.least,
-            "most": self.most,
-            "levels": list(self.levels),
-            "text": dict(self.text),
-            "levels_text": {name: list(words) for name, words in self.levels_text.items()},
-        }
+        """The question as plain values, as in a study file: what it says."""
+        values = super().to_dict()
         return {name: value for name, value in values.items() if value not in (None, [], {})}
-
-    @staticmethod
-    def from_dict(values: object) -> Question:
-        """A question from its table in a study file.
-
-        Raises
-        ------
-        InputError
-            For unknown or missing keys, or values of other kinds.
-        """
-        table = as_table(values, where="[[questions]]", example="[[questions]] above its keys")
-        check_keys(table, tuple(f.name for f in fields(Question)), where="[[questions]]")
-        require_keys(table, ("name",), where="[[questions]]")
-        name = shown(table["name"])
-        if "levels" in table:
-            table["levels"] = as_list(
-                table["levels"], where=f"levels of {name}", example='levels = ["…", "…"]'
-            )
-        text = as_table(table.get("text", {}), where=f"text of {name}", example='text.en = "…"')
-        for language, words in text.items():
-            require_label(f"text.{language} of {name}", words)
-        levels_text = as_table(
-            table.get("levels_text", {}),
-            where=f"levels_text of {name}",
-            example='levels_text.ja = ["…", "…"]',
-        )
-        for language, words in levels_text.items():
-            levels_text[language] = as_list(
-                words,
-                where=f"levels_text.{language} of {name}",
-                example=f'levels_text.{language} = ["…", "…"]',
-            )
-        return Question(**{**table, "text": text, "levels_text": levels_text})

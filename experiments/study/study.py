@@ -1,33 +1,31 @@
 """The study file: textures, trays, models, participants, schedules and circumstances.
 
-docs/method/protocols.md
+docs/study-file.md lists its keys; docs/method/protocols.md says what becomes of them.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
 
-from experiments.study.plan import Plan
 from experiments.study.questions import Question
-from experiments.study.tables import (
-    as_list,
-    as_table,
-    require_bool,
-    require_different,
-    require_keys,
-    require_label,
+from experiments.study.task_plan import (
+    PAPER_PLANS,
+    REPEATS,
+    TaskPlan,
+    check_plan,
+    with_catch_trials,
 )
-from experiments.study.task_plan import PAPER_PLANS, TaskPlan, check_plan, with_catch_trials
 from modeling import InputError
-from modeling.checks import check_keys, check_number, check_whole
+from modeling.checks import check_keys
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
-from modeling.files.documents import as_text, read_toml
+from modeling.files.claims import Claim, Plan
+from modeling.files.described import DescribedFile, Section, key
 from modeling.files.hashes import sha256_of_values
+from modeling.files.kinds import Label, ListedLabel, is_different, is_label, is_line
 
 # Their order is part of every seed: new ones go to the end.
 TASKS = tuple(dict.fromkeys(("absolute", "relative", "oddity", "threshold", *ANSWER_TABLES)))
@@ -35,48 +33,41 @@ MOST_TEXTURES = 12
 MOST_MODELS = 6
 CALIBRATION_DAYS = 90.0
 LONGEST_GAP_MIN = 30.0
+# Fewer people say too little about the spread between people, on which the model's rule rests.
+FEWEST_OF_MODEL = 8
 TWO_MODELS = {"full": "models", "simplified": "simplified"}
 SHIPPED_STUDY = Path(__file__).with_name("study.toml")
 
+Language = Annotated[str, key(pattern="^[a-z]{2,3}$", holds=is_line)]
+
+
+def _is_version(text: str) -> bool:
+    return text == "" or is_label(text)
+
+
+def _are_trays(trays: Mapping[str, str]) -> bool:
+    return is_different(list(trays.values())) and not set("".join(trays.values())) & set('"\\')
+
 
 @dataclass(frozen=True, kw_only=True)
-class Study:
-    """Everything that fixes the order of all trials, and what is stated about the circumstances.
+class Consent(Section):
+    """The page of consent, which is shown first."""
 
-    Parameters
-    ----------
-    name : str
-    seed : int
-        ≥ 0; the order of every session follows from it, the task, the subject, the session and the
-        slot.
-    textures : tuple of str
-        2 … 12 different names.
-    trays : dict of str
-        For each texture the label of the tray that holds its sample; all different.
-    tasks : mapping of task to TaskPlan
-        Those of the paper (absolute, relative) are planned as there where they are not named.
-    models : mapping of set to path
-        Two or more named sets of models, relative to the study file; the first is the reference.
-    languages : tuple of str
-        Codes such as en; the first is the default.
-    consent : str
-        Version of the page of consent; empty for none.
-    questions : tuple of Question
-        What a participant is asked once.
-    plan : Plan
-        Claims and exclusions.
-    longest_gap_min : float
-        A session that continues after a longer gap begins with training again, minutes.
-    masking : str
-        How the sound of the device was masked.
-    surface_visible : str
-        What the participant saw of the surface.
-    data_license : str
-        Licence of the data, for the description of the data set.
-    calibration_days : float
-        How old the calibration of a rig may be, above 0.
-    measured_force : bool
-        Whether the rig must measure force: a mouse, of which it is assumed, is refused then.
+    WHERE: ClassVar[str] = "[consent]"
+    version: Annotated[
+        str,
+        key(
+            "of the page; without it there is none",
+            expected="printable text in one line",
+            advice="put it in quotes",
+            holds=_is_version,
+        ),
+    ] = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Study(DescribedFile):
+    """Everything that fixes the order of all trials, and what is stated about the circumstances.
 
     Raises
     ------
@@ -84,50 +75,92 @@ class Study:
         For values out of range, and for names that a table could not hold.
     """
 
-    name: str
-    seed: int
-    textures: tuple[str, ...]
-    trays: Mapping[str, str]
-    tasks: Mapping[str, TaskPlan] = field(default_factory=dict)
-    models: Mapping[str, str] = field(default_factory=lambda: dict(TWO_MODELS))
-    languages: tuple[str, ...] = ("en",)
-    consent: str = ""
-    questions: tuple[Question, ...] = ()
-    plan: Plan = field(default_factory=Plan)
-    longest_gap_min: float = LONGEST_GAP_MIN
-    masking: str = "not stated"
-    surface_visible: str = "not stated"
-    data_license: str = "not stated"
-    calibration_days: float = CALIBRATION_DAYS
-    measured_force: bool = False
+    WHAT: ClassVar[str] = "a study file"
+    name: Annotated[Label, key("title of the study")]
+    seed: Annotated[
+        int,
+        key(
+            "of all orders and shuffles",
+            expected="a whole number from 0 to 2⁶³ − 1",
+            ge=0,
+            le=2**63 - 1,
+        ),
+    ]
+    textures: Annotated[
+        tuple[ListedLabel, ...],
+        key(
+            "names of the surfaces",
+            expected=f"a list of 2 to {MOST_TEXTURES} different textures, printable text in one "
+            "line without bars, quotes and backslashes",
+            advice='write ["…", "…"]',
+            holds=is_different,
+            min_length=2,
+            max_length=MOST_TEXTURES,
+        ),
+    ]
+    trays: Annotated[
+        dict[str, Label],
+        key(
+            "the tray of each texture's sample; no label reveals anything to participants",
+            expected="a table of texture = label of its tray, all different and printable text in "
+            "one line without quotes and backslashes",
+            holds=_are_trays,
+        ),
+    ]
+    models: Annotated[
+        dict[ListedLabel, Label],
+        key(
+            "named sets of models, relative to the file, the reference first",
+            expected=f"a table of 2 to {MOST_MODELS} sets of models (name = folder or file)",
+            min_length=2,
+            max_length=MOST_MODELS,
+        ),
+    ] = field(default_factory=TWO_MODELS.copy)
+    languages: Annotated[
+        tuple[Language, ...],
+        key(
+            "of all pages; the first is the default",
+            expected="a list of different languages such as en or ja",
+            advice='write ["en"]',
+            holds=is_different,
+            min_length=1,
+        ),
+    ] = ("en",)
+    consent: Annotated[Consent, key("the page of consent")] = Consent()
+    questions: Annotated[tuple[Question, ...], key("what each participant is asked once")] = ()
+    plan: Annotated[Plan, key("what is fixed before the first answer")] = field(
+        default_factory=Plan
+    )
+    longest_gap_min: Annotated[
+        float,
+        key(
+            "a session that continues after a longer gap begins with training again",
+            unit="min",
+            ge=0,
+            le=10_080,
+        ),
+    ] = LONGEST_GAP_MIN
+    masking: Annotated[Label, key("how the sound of the device is masked")] = "not stated"
+    surface_visible: Annotated[Label, key("what participants see of the surface")] = "not stated"
+    data_license: Annotated[Label, key("licence of the data")] = "not stated"
+    calibration_days: Annotated[
+        float, key("how old a rig's calibration may be", unit="days", ge=1, le=3650)
+    ] = CALIBRATION_DAYS
+    measured_force: Annotated[
+        bool, key("refuses a rig whose force is assumed, such as a mouse")
+    ] = False
+    tasks: Annotated[
+        Mapping[str, TaskPlan],
+        key("those of the paper are planned as there where they are not named", tables=TASKS),
+    ] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name in ("textures", "languages", "questions"):
-            object.__setattr__(self, name, tuple(getattr(self, name)))
-        for name in ("trays", "models"):
-            object.__setattr__(self, name, dict(getattr(self, name)))
-        check_whole("seed", self.seed, low=0, high=2**63)
-        check_number("calibration_days", self.calibration_days, low=1.0, high=3650.0)
-        check_number("longest_gap_min", self.longest_gap_min, high=10_080.0)
-        for name in ("calibration_days", "longest_gap_min"):
-            object.__setattr__(self, name, float(getattr(self, name)))
-        require_bool("measured_force", self.measured_force)
-        self._check_texts()
+        super().__post_init__()
         self._check_trays()
-        self._check_models()
         self._check_questions()
         self._plan_tasks()
-        self.plan.check(self.tasks)
-
-    def _check_texts(self) -> None:
-        for name in ("name", "masking", "surface_visible", "data_license"):
-            require_label(name, getattr(self, name))
-        if self.consent:
-            require_label("the version of the consent", self.consent)
-        for texture in self.textures:
-            require_label("texture", texture, forbidden='|"\\')
-        check_whole("number of textures", len(self.textures), low=2, high=MOST_TEXTURES)
-        require_different("textures", self.textures)
+        for claim in self.plan.claims:
+            self._check_claim(claim)
 
     def _check_trays(self) -> None:
         if set(self.trays) != set(self.textures):
@@ -135,41 +168,22 @@ class Study:
                 f"expected one tray for each of {', '.join(self.textures)}, got trays for "
                 f"{', '.join(self.trays) or 'none'}; give each texture its tray under [trays]."
             )
-        for tray in self.trays.values():
-            require_label("tray", tray, forbidden='"\\')
-        require_different("trays", tuple(self.trays.values()))
-
-    def _check_models(self) -> None:
-        for name, path in self.models.items():
-            require_label("a set of models", name, forbidden='|"\\')
-            require_label(f"the place of the models {name}", path)
-        check_whole("number of sets of models", len(self.models), low=2, high=MOST_MODELS)
 
     def _check_questions(self) -> None:
-        for language in self.languages:
-            if not (isinstance(language, str) and re.fullmatch("[a-z]{2,3}", language)):
-                raise InputError(
-                    f"expected languages such as en or ja, got {shown(language)}; correct it."
-                )
-        if not self.languages:
-            raise InputError('expected one language at least, got none; write languages = ["en"].')
-        require_different("languages", self.languages)
-        require_different("questions", [question.name for question in self.questions])
+        names = [question.name for question in self.questions]
+        if not is_different(names):
+            raise InputError(
+                f"expected different questions, got {', '.join(names)}; name each of them once."
+            )
         for question in self.questions:
             question.require_texts(self.languages)
 
     def _plan_tasks(self) -> None:
         """Put the tasks in order, name the models of each, and refuse what cannot be planned."""
         planned = {**PAPER_PLANS, **self.tasks}
-        check_keys(planned, TASKS, where="the tasks")
         in_order = {}
         for task in (task for task in TASKS if task in planned):
             plan = planned[task]
-            if not isinstance(plan, TaskPlan):
-                raise InputError(
-                    f"expected a TaskPlan for {task}, got {shown(plan)}; give participants and "
-                    "schedule."
-                )
             named = plan.models or tuple(self.models)[:2]
             check_keys(named, tuple(self.models), where=f"the models of [{task}]")
             models = tuple(name for name in self.models if name in named)
@@ -180,6 +194,27 @@ class Study:
                 )
             check_plan(task, in_order[task], textures=self.textures)
         object.__setattr__(self, "tasks", in_order)
+
+    def _check_claim(self, claim: Claim) -> None:
+        """Refuse a claim about a task or models that are not planned, or about too few people."""
+        if claim.task not in self.tasks:
+            raise InputError(
+                f"expected a planned task ({', '.join(self.tasks)}) in the claim {claim.name}, got "
+                f"{shown(claim.task)}; plan it, or correct the claim."
+            )
+        plan = self.tasks[claim.task]
+        unknown = [name for name in claim.models if name not in plan.models]
+        if unknown:
+            raise InputError(
+                f"expected models of [{claim.task}] ({', '.join(plan.models)}) in the claim "
+                f"{claim.name}, got {shown(unknown[0])}; correct it."
+            )
+        if self.plan.rule == "model" and plan.participants < FEWEST_OF_MODEL:
+            raise InputError(
+                f"expected {FEWEST_OF_MODEL} participants or more in [{claim.task}] for the rule "
+                f'"model" of the claim {claim.name}, got {plan.participants}; plan '
+                f'{FEWEST_OF_MODEL} or more, or write rule = "tests" in [plan] and leave few out.'
+            )
 
     def plan_of(self, task: str) -> TaskPlan:
         """Participants, schedule, models and repeats of one task.
@@ -217,60 +252,28 @@ class Study:
         plan = self.plan_of(task)
         return len(plan.models) if plan.schedule == "by-day" else 1
 
-    def to_dict(self) -> dict[str, Any]:
-        """The study as plain values, as in a study file; `Study.from_dict` makes it again."""
-        plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "tasks"}
-        return {
-            **plain,
-            "textures": list(self.textures),
-            "trays": dict(self.trays),
-            "models": dict(self.models),
-            "languages": list(self.languages),
-            "consent": {"version": self.consent},
-            "questions": [question.to_dict() for question in self.questions],
-            "plan": self.plan.to_dict(),
-            **{task: plan.to_dict() for task, plan in self.tasks.items()},
-        }
-
     @property
     def sha256(self) -> str:
         """SHA-256 of its values, by which files name the study that they are based on."""
         return sha256_of_values(self.to_dict())
 
-    @staticmethod
-    def from_dict(values: Mapping[str, Any]) -> Study:
-        """A study from plain values, as in a study file.
-
-        Raises
-        ------
-        InputError
-            For unknown or missing keys, or values out of range.
-        """
-        settings = dict(values)
-        check_keys(settings, _STUDY_KEYS, where="the study")
-        require_keys(settings, ("name", "seed", "textures", "trays"), where="the study")
-        tasks = {
-            name: TaskPlan.from_dict(name, settings.pop(name)) for name in TASKS if name in settings
+    @classmethod
+    def from_tables(cls, values: Mapping[str, Any], *, folder: Path | None = None) -> Self:
+        """A study from plain values, as in a study file; repeats are the usual ones of a task."""
+        usual = {
+            task: {"repeats": repeats, **values[task]}
+            for task, repeats in REPEATS.items()
+            if isinstance(values.get(task), Mapping)
         }
-        for name, example in (("trays", "texture = tray"), ("models", "name = folder")):
-            if name in settings:
-                settings[name] = as_table(
-                    settings[name], where=f"[{name}] of {example}", example="one line for each"
-                )
-        for name, example in (("textures", '["…", "…"]'), ("languages", '["en"]')):
-            if name in settings:
-                settings[name] = as_list(settings[name], where=name, example=f"{name} = {example}")
-        if "questions" in settings:
-            asked = as_list(settings["questions"], where="questions", example="[[questions]]")
-            settings["questions"] = tuple(map(Question.from_dict, asked))
-        if "consent" in settings:
-            settings["consent"] = _version(settings["consent"])
-        if "plan" in settings:
-            settings["plan"] = Plan.from_dict(settings["plan"])
-        return Study(**settings, tasks=tasks)
+        return super().from_tables({**values, **usual}, folder=folder)
 
-    @staticmethod
-    def load(path: str | Path | None = None) -> Study:
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Self:
+        """The study that `to_dict` gave; refused as by `load`."""
+        return cls.from_tables(values)
+
+    @classmethod
+    def load(cls, path: str | Path | None = None) -> Self:
         """Read a study file (TOML); without a path the shipped one with the paper's textures.
 
         Raises
@@ -278,23 +281,7 @@ class Study:
         InputError
             If the file is missing, is not TOML, or holds unknown keys or values out of range.
         """
-        file = SHIPPED_STUDY if path is None else Path(path)
-        values = read_toml(file, "a study file")
-        try:
-            return Study.from_dict(values)
-        except InputError as error:
-            raise InputError(f"{file}: {error}") from None
-
-
-_STUDY_KEYS = tuple(
-    key for f in fields(Study) for key in (TASKS if f.name == "tasks" else (f.name,))
-)
-
-
-def _version(values: object) -> str:
-    table = as_table(values, where="[consent]", example='version = "…" under [consent]')
-    check_keys(table, ("version",), where="[consent]")
-    return as_text(table.get("version", ""), "version in [consent]")
+        return super().load(SHIPPED_STUDY if path is None else path)
 
 
 def plan_sha256(study: Study, models_sha256: Mapping[str, Mapping[str, str]]) -> str:

@@ -3,24 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, ClassVar, Literal
 
-from experiments.study.tables import (
-    as_list,
-    as_table,
-    require_bool,
-    require_different,
-    require_keys,
-    require_label,
-)
 from modeling import InputError
-from modeling.checks import check_keys, check_whole
 from modeling.errors import shown
 from modeling.files.answer_tables import ANSWER_TABLES
-
-Schedule = Literal["by-day", "interleaved"]
-SCHEDULES: tuple[Schedule, ...] = ("by-day", "interleaved")
+from modeling.files.described import Section, key
+from modeling.files.kinds import Label, is_different
 
 # The usual repeats of a task whose table does not say; 1 in any other.
 REPEATS = {"relative": 3, "oddity": 6, "threshold": 60}
@@ -30,40 +20,15 @@ CATCH_TRIALS = 6
 MOST_CATCH_TRIALS = 100
 
 
+def _can_be_compared(names: tuple[str, ...]) -> bool:
+    return len(names) != 1 and is_different(names)
+
+
 @dataclass(frozen=True, kw_only=True)
-class TaskPlan:
-    """How many people do a task, and how its trials are spread over their days.
+class TaskPlan(Section):
+    """How many people do a task, how often, and on which days: a table of the task's name.
 
     docs/method/protocols.md#schedule
-
-    Parameters
-    ----------
-    participants : int
-        At least 1; by day a multiple of the number of models, so that their order is
-        counterbalanced exactly.
-    schedule : {"by-day", "interleaved"}
-        Either each model on a day of its own (one session per model), or all mixed in one session.
-    repeats : int
-        How often each texture comes with each model, ≥ 1. In a task whose every trial holds both
-        models: trials of each texture; in the threshold task: trials of each frequency.
-    models : tuple of str
-        The sets of models that are compared, two at least; empty for the first two of the study.
-    training_trials, most_training_trials : int
-        Trials for practice: the fewest, and the most where strokes stay outside the grid; 0 for as
-        many as the fewest.
-    break_after : int
-        Trials between two breaks; 0 for none.
-    anchors : mapping of texture to texture
-        Real surfaces that are presented beside the virtual one of another texture, said to
-        correspond (docs/method/protocols.md#anchors); once in each session.
-    feel_all : bool
-        Whether all virtual surfaces of a trial have to be felt before an answer.
-    catch : mapping of texture to texture
-        Of the odd-one-out task: surfaces with one that everybody can tell from it, the odd one of
-        a catch trial and the other two in either way (docs/method/protocols.md#catch-trials).
-    catch_trials : int, optional
-        Main trials of a session that are catch trials, 0 … 100; without it as many as the study's
-        rule of verdicts asks for.
 
     Raises
     ------
@@ -71,48 +36,79 @@ class TaskPlan:
         For any other value.
     """
 
-    participants: int
-    schedule: Schedule
-    repeats: int = 1
-    models: tuple[str, ...] = ()
-    training_trials: int = 2
-    most_training_trials: int = 0
-    break_after: int = 0
-    anchors: Mapping[str, str] = field(default_factory=dict)
-    feel_all: bool = False
-    catch: Mapping[str, str] = field(default_factory=dict)
-    catch_trials: int | None = None
+    WHERE: ClassVar[str] = "[TASK]"
+    participants: Annotated[
+        int, key("by day a multiple of the number of models, for balance", ge=1, le=9999)
+    ]
+    schedule: Annotated[
+        Literal["by-day", "interleaved"],
+        key("each model on a day of its own, or all mixed in one session"),
+    ]
+    repeats: Annotated[
+        int,
+        key(
+            "of each texture with each model; trials of each texture where a trial holds both, of "
+            "each frequency in [threshold] "
+            f"({', '.join(f'{count} in [{task}]' for task, count in REPEATS.items())})",
+            ge=1,
+            le=100,
+        ),
+    ] = 1
+    models: Annotated[
+        tuple[Label, ...],
+        key(
+            "the sets that are compared; without it the first two of [models]",
+            expected="a list of two models or more, all different",
+            advice='write ["full", "simplified"]',
+            holds=_can_be_compared,
+        ),
+    ] = ()
+    training_trials: Annotated[
+        int, key("for practice, at least", ge=0, le=MOST_TRAINING_TRIALS)
+    ] = 2
+    most_training_trials: Annotated[
+        int,
+        key(
+            "for practice while strokes stay outside the grid; 0 for training_trials",
+            ge=0,
+            le=MOST_TRAINING_TRIALS,
+        ),
+    ] = 0
+    break_after: Annotated[int, key("trials between two breaks; 0 for none", ge=0, le=10_000)] = 0
+    anchors: Annotated[
+        dict[str, str],
+        key(
+            "[absolute]: real surfaces that come beside the virtual one of another texture, once "
+            "in each session",
+            advice='write {canvas = "PVC"}',
+        ),
+    ] = field(default_factory=dict)
+    feel_all: Annotated[bool, key("no answer before all virtual surfaces of a trial were felt")] = (
+        False
+    )
+    catch: Annotated[
+        dict[str, str],
+        key(
+            "[oddity]: surfaces with one that everybody can tell from it, of which catch trials "
+            "are made; without it the anchors",
+            advice='write {canvas = "PVC"}',
+        ),
+    ] = field(default_factory=dict)
+    catch_trials: (
+        Annotated[
+            int,
+            key(
+                "[oddity]: main trials of a session that are catch trials; without it "
+                f'{CATCH_TRIALS} under rule = "model"',
+                ge=0,
+                le=MOST_CATCH_TRIALS,
+            ),
+        ]
+        | None
+    ) = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "models", tuple(self.models))
-        for name in ("anchors", "catch"):
-            object.__setattr__(self, name, dict(getattr(self, name)))
-        self._check_numbers()
-        if self.schedule not in SCHEDULES:
-            raise InputError(
-                f"expected a schedule of {' or '.join(SCHEDULES)}, got {shown(self.schedule)}; "
-                "choose one of the two."
-            )
-        require_bool("feel_all", self.feel_all)
-        for name in self.models:
-            require_label("a set of models", name)
-        require_different("models", self.models)
-        if len(self.models) == 1:
-            raise InputError(
-                f"expected two models or more to compare, got {self.models[0]} alone; name "
-                "another one beside it."
-            )
-
-    def _check_numbers(self) -> None:
-        check_whole("participants", self.participants, low=1, high=9999)
-        check_whole("repeats", self.repeats, low=1, high=100)
-        check_whole("break_after", self.break_after, low=0, high=10_000)
-        check_whole("training_trials", self.training_trials, low=0, high=MOST_TRAINING_TRIALS)
-        check_whole(
-            "most_training_trials", self.most_training_trials, low=0, high=MOST_TRAINING_TRIALS
-        )
-        if self.catch_trials is not None:
-            check_whole("catch_trials", self.catch_trials, low=0, high=MOST_CATCH_TRIALS)
+        super().__post_init__()
         most = self.most_training_trials or self.training_trials
         if most < self.training_trials:
             raise InputError(
@@ -123,34 +119,9 @@ class TaskPlan:
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, as in a study file; of catch trials only what it says."""
-        values = {**asdict(self), "models": list(self.models)}
         unsaid: dict[str, object] = {"catch": {}, "catch_trials": None}
+        values = super().to_dict()
         return {name: value for name, value in values.items() if unsaid.get(name, ()) != value}
-
-    @staticmethod
-    def from_dict(task: str, values: object) -> TaskPlan:
-        """A plan from the table of a task in a study file.
-
-        Raises
-        ------
-        InputError
-            For unknown or missing keys, or values out of range.
-        """
-        table = as_table(values, where=f"[{task}]", example=f"[{task}] above its keys")
-        check_keys(table, tuple(f.name for f in fields(TaskPlan)), where=f"[{task}]")
-        require_keys(table, ("participants", "schedule"), where=f"[{task}]")
-        table = {"repeats": REPEATS.get(task, 1), **table}
-        example = '["full", "simplified"]'
-        table["models"] = as_list(
-            table.get("models", ()), where=f"models in [{task}]", example=f"models = {example}"
-        )
-        for name in ("anchors", "catch"):
-            table[name] = as_table(
-                table.get(name, {}),
-                where=f"{name} in [{task}]",
-                example=f'{name} = {{canvas = "PVC"}}',
-            )
-        return TaskPlan(**table)
 
 
 PAPER_PLANS = {
@@ -172,7 +143,7 @@ def with_catch_trials(plan: TaskPlan, *, rule: str, anchors: Mapping[str, str]) 
     """
     if plan.catch_trials is not None or not (plan.catch or rule == "model"):
         return plan
-    return replace(plan, catch=plan.catch or anchors, catch_trials=CATCH_TRIALS)
+    return replace(plan, catch=dict(plan.catch or anchors), catch_trials=CATCH_TRIALS)
 
 
 def check_plan(task: str, plan: TaskPlan, *, textures: tuple[str, ...]) -> None:

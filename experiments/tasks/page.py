@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from experiments.study.models import ModelSets
-from experiments.study.plan import RATINGS, Claim, Plan
 from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import task_named
@@ -17,6 +16,7 @@ from experiments.tasks.durations import (
 )
 from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.claims import RATINGS, Claim, Plan
 
 TESTED = {
     "equivalence": "two one-sided t-tests of the differences within persons (TOST)",
@@ -243,7 +243,8 @@ def _circumstances(study: Study) -> Iterator[str]:
     yield f"- Languages: {', '.join(study.languages)}."
     if study.questions:
         yield f"- Questions to each participant: {', '.join(q.name for q in study.questions)}."
-    yield f"- Consent: {f'page of version {study.consent}' if study.consent else 'no page'}."
+    version = study.consent.version
+    yield f"- Consent: {f'page of version {version}' if version else 'no page'}."
 
 
 def _listed(names: Sequence[str]) -> str:

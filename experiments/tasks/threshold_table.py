@@ -16,13 +16,31 @@ from experiments.tasks.threshold import DURATION_S
 from experiments.tasks.threshold_posterior import Estimate, answers_of, estimate
 from modeling import InputError
 from modeling.errors import counted
-from modeling.files.tables import read_table, table_text
+from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import Column, chosen
+from modeling.files.tables import Row, read_table, table_text
+from modeling.perception.thresholds import COLUMNS as THRESHOLD_COLUMNS
 
-READ = ("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid")
-TOLD = ("pilot", "simulated")
+READ = chosen(
+    ANSWER_TABLES["threshold"].columns,
+    *("phase", "frequency_hz", "amplitude_g", "highest_g", "correct", "valid"),
+    *("pilot", "simulated"),
+)
 COLUMNS = (
-    *("frequency_hz", "acceleration_g", "low_g", "high_g", "level_db", "sd_db"),
-    *("slope", "lapse_rate", "trials", "people", "note"),
+    *chosen(THRESHOLD_COLUMNS, "frequency_hz", "acceleration_g"),
+    Column("low_g", unit="g", description="Lower end of its 95 % interval; n/a of a bound"),
+    Column("high_g", unit="g", description="Upper end of its 95 % interval; n/a of a bound"),
+    Column("level_db", unit="dB re 1 g", description="The threshold as a level, mean over people"),
+    Column(
+        "sd_db",
+        unit="dB",
+        description="Standard deviation between people; of one person, of the posterior",
+    ),
+    Column("slope", description="Slope of the psychometric function (Weibull's), mean"),
+    Column("lapse_rate", description="Share of answers that do not depend on amplitude, mean"),
+    Column("trials", description="Number of answers"),
+    Column("people", description="Number of participants"),
+    Column("note", description="Where the threshold is only a bound; else n/a"),
 )
 BEYOND = {
     "above": "above the highest amplitude: a lower bound",
@@ -97,10 +115,10 @@ def read_answers(data_folder: str | Path, *, subject: int | None = None) -> Answ
     """
     folder = Path(data_folder)
     files = answer_files(folder, subject=subject)
-    rows: dict[str, list[dict[str, str]]] = {}
+    rows: dict[str, list[Row]] = {}
     simulated = set()
     for file in files:
-        for row in read_table(file, (*READ, *TOLD)):
+        for row in read_table(file, READ, bids=True):
             if row["pilot"] != "true":
                 rows.setdefault(file.parts[-4], []).append(row)
                 simulated.add(row["simulated"])
@@ -205,21 +223,21 @@ def threshold_text(means: Sequence[MeanThreshold], *, people: int, simulated: bo
     return notes + table_text(COLUMNS, [_cells(one) for one in means])
 
 
-def _cells(one: MeanThreshold) -> list[str]:
-    low_g, high_g = ("n/a", "n/a") if one.interval_db is None else map(_g, one.interval_db)
-    return [
-        f"{one.frequency_hz:g}",
-        _g(one.level_db),
-        low_g,
-        high_g,
-        f"{one.level_db:.2f}",
-        f"{one.sd_db:.2f}",
-        f"{one.slope:.2f}",
-        f"{one.lapse_rate:.3f}",
-        str(one.trials),
-        str(one.people),
-        one.note or "n/a",
-    ]
+def _cells(one: MeanThreshold) -> dict[str, object]:
+    low_g, high_g = (None, None) if one.interval_db is None else map(_g, one.interval_db)
+    return {
+        "frequency_hz": f"{one.frequency_hz:g}",
+        "acceleration_g": _g(one.level_db),
+        "low_g": low_g,
+        "high_g": high_g,
+        "level_db": f"{one.level_db:.2f}",
+        "sd_db": f"{one.sd_db:.2f}",
+        "slope": f"{one.slope:.2f}",
+        "lapse_rate": f"{one.lapse_rate:.3f}",
+        "trials": one.trials,
+        "people": one.people,
+        "note": one.note or None,
+    }
 
 
 def _g(level_db: float) -> str:

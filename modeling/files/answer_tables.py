@@ -1,4 +1,4 @@
-"""The tables of answers, declared once: experiments write them, analysis reads and checks them.
+"""The tables of answers and of participants: experiments write them, analysis reads them.
 
 A task exists once its table stands in `ANSWER_TABLES`; what is presented and asked in it is in
 `experiments.tasks`, in a module of the task's name. What the report says of it follows from the
@@ -7,71 +7,35 @@ table (docs/own-protocol.md).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from math import inf, isnan, nan
-from typing import Any
 
-from modeling.checks import is_number
+from modeling.files.columns import Column
 
 ENDS = (0.0, 100.0)  # of every scale that people rate on
 
 
 @dataclass(frozen=True, kw_only=True)
-class AnswerColumn:
-    """One column of a table of answers.
+class AnswerColumn(Column):
+    """One column of a table of answers; text without `limits`.
+
+    One that is `optional` is not stored where no row of a session has it.
 
     Parameters
     ----------
-    name, description : str
-    levels : mapping of value to its meaning
-        The only values that a column of text may hold; any text without it.
-    limits : (float, float), optional
-        Least and largest value of a column of numbers; text without it.
-    unit : str
-    required : bool
-        Whether every row has a value.
     right : str
         Of a column `answer` beside one that is called `correct`: the column that holds the right
         answer.
     scale : str
         Of a column of ratings, whose `limits` are then `ENDS`: the similarity of what is rated.
-    optional : bool
-        Whether a session whose rows do not have it is stored without the column, as sessions of
-        earlier versions are.
     """
 
-    name: str
-    description: str
-    levels: Mapping[str, str] = field(default_factory=dict)
-    limits: tuple[float, float] | None = None
-    unit: str = ""
-    required: bool = False
     right: str = "texture"
     scale: str = ""
-    optional: bool = False
 
     def __post_init__(self) -> None:
         if self.scale and self.limits != ENDS:
             raise ValueError(f"expected the limits {ENDS} of the scale {self.name}; correct them.")
-
-    def holds(self, value: object) -> bool:
-        """Whether this may stand in the column; None where nothing was answered."""
-        if value is None or value == "":
-            return not self.required
-        if self.limits is not None:
-            return is_number(value) and self.limits[0] <= value <= self.limits[1]
-        text = str(value).lower() if isinstance(value, bool) else str(value)
-        return not self.levels or text in self.levels
-
-    def sidecar(self) -> dict[str, Any]:
-        """The column as a BIDS sidecar describes it."""
-        described: dict[str, Any] = {"Description": self.description}
-        if self.levels:
-            described["Levels"] = dict(self.levels)
-        if self.unit:
-            described["Units"] = self.unit
-        return described
 
 
 YES_NO = {"1": "yes", "0": "no"}
@@ -196,6 +160,7 @@ def _with_common_columns(
             description="Number in the session: for a planned trial its own, training included; "
             "for any other trial the next free number",
             limits=(0, inf),
+            whole=True,
             required=True,
         ),
         AnswerColumn(
@@ -217,6 +182,7 @@ def _with_common_columns(
             description="In which start of the session it was answered: 1, and one more each time "
             "that the session was resumed",
             limits=(1, inf),
+            whole=True,
             required=True,
         ),
         AnswerColumn(
@@ -224,6 +190,7 @@ def _with_common_columns(
             description="Whether the rig presented what was planned",
             levels={"1": "it did", "0": "it failed in this trial; the log says how"},
             limits=(0, 1),
+            whole=True,
             required=True,
         ),
         AnswerColumn(
@@ -231,6 +198,7 @@ def _with_common_columns(
             description="Number of the planned trial that was presented once more, since it was "
             "not valid, or since training began again; n/a for a planned trial itself",
             limits=(1, inf),
+            whole=True,
         ),
         AnswerColumn(
             name="pilot",
@@ -262,11 +230,49 @@ CORRECT = AnswerColumn(
     description="Whether the answer is correct",
     levels=YES_NO,
     limits=(0, 1),
+    whole=True,
 )
 PRESSES = AnswerColumn(
     name="presses",
     description="Presentations of a virtual surface, repeated ones included",
     limits=(0, inf),
+    whole=True,
+)
+
+# Of participants.tsv: the first column, and those behind the answers to a study's questions.
+PARTICIPANT_ID = Column("participant_id", description="Participant", required=True)
+PARTICIPANT_COLUMNS = (
+    Column(
+        "slot",
+        description="Place in the design, which determines the balanced parts of the order",
+        limits=(0, inf),
+        whole=True,
+        optional=True,
+    ),
+    Column(
+        "status",
+        description="Whether the participant continues",
+        levels={"enrolled": "takes part", "dropped": "will not come back"},
+        optional=True,
+    ),
+    Column(
+        "consent_version",
+        description="Version of the consent form that was agreed to",
+        optional=True,
+    ),
+    Column("language", description="Language of the texts", optional=True),
+    Column(
+        "pilot",
+        description="Whether the sessions were a pilot",
+        levels={"true": "a pilot", "false": "data of the study"},
+        optional=True,
+    ),
+    Column(
+        "simulated",
+        description="Whether the participant was simulated",
+        levels={"true": "simulated", "false": "a person"},
+        required=True,
+    ),
 )
 
 # In the order in which a study does them; that order is part of every seed.
@@ -301,6 +307,7 @@ ANSWER_TABLES = {
             name="toggles",
             description="Changes between the real and the virtual surface",
             limits=(0, inf),
+            whole=True,
         ),
         RESPONSE_TIME,
         title="absolute evaluation",
@@ -331,12 +338,14 @@ ANSWER_TABLES = {
             name="odd_position",
             description="Button of the odd one, from 1",
             limits=(1, 3),
+            whole=True,
             required=True,
         ),
         AnswerColumn(
             name="answer",
             description="Button that was chosen, from 1",
             limits=(1, 3),
+            whole=True,
             right="odd_position",
         ),
         CORRECT,
@@ -382,12 +391,14 @@ ANSWER_TABLES = {
             name="interval",
             description="Interval that held the sinusoid; the other one was silent",
             limits=(1, 2),
+            whole=True,
             required=True,
         ),
         AnswerColumn(
             name="answer",
             description="Interval that was chosen",
             limits=(1, 2),
+            whole=True,
             right="interval",
         ),
         CORRECT,

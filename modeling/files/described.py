@@ -18,14 +18,24 @@ docs/where.md#a-key-of-a-file
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, dataclass, fields
-from functools import cache, cached_property
+from functools import cache
 from math import isfinite
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, ClassVar, Self, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Literal,
+    Self,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 import msgspec
 import numpy as np
@@ -34,9 +44,7 @@ from msgspec import Meta, inspect
 from modeling.arrays import Bools
 from modeling.checks import check_keys
 from modeling.errors import InputError, shown
-from modeling.files.documents import check_version, dump_json, read_json_object, read_toml
-from modeling.files.hashes import sha256_of
-from modeling.files.writing import write_text
+from modeling.files.documents import check_version, read_toml
 
 
 def key(
@@ -50,6 +58,7 @@ def key(
     also: Any = None,
     as_given: bool = False,
     name: str = "",
+    tables: Sequence[str] = (),
     shape: str = "",
     finite: bool = True,
     **limits: Any,
@@ -66,7 +75,8 @@ def key(
     advice : str
         What to do about a wrong value: the end of the sentence.
     holds : callable, optional
-        Whether a value of the type is good, where the limits cannot say it.
+        Whether a value of the type is good, where the limits cannot say it; in a class no lambda
+        that uses names of the module, which its annotation does not see.
     reads : callable, optional
         Makes a value of the type from what a file may say instead, and leaves all else as it is.
     also : type, optional
@@ -75,9 +85,11 @@ def key(
         Whether a whole number stays one where any number may be: 5 is not 5.0 in a text or a hash.
     name : str
         The key, where that is not the field's name.
+    tables : sequence of str
+        Of a mapping to sections: their names, by which they stand beside the other keys.
     shape : str
         Of an array, whose numbers the limits are about: what it has along each axis, such as
-        "speeds forces". Arrays of one file that name the same have as many of it.
+        "speeds forces".
     finite : bool
         Whether numbers have to be finite; others are text in a file: "nan", "inf", "-inf".
     limits
@@ -92,11 +104,16 @@ def key(
         "also": also,
         "as_given": as_given,
         "name": name,
+        "tables": tuple(tables),
         "shape": tuple(shape.split()),
         "any_number": not finite,
     }
     extra = {what: value for what, value in said.items() if value}
     return Meta(description=description or None, extra=extra or None, **limits)
+
+
+# In an annotation: the field is no key but stands beside those of the file, such as its path.
+BESIDE = "beside"
 
 
 class NameOrFile(str):
@@ -113,8 +130,10 @@ class Key:
     """One key of a section, as declared.
 
     `field` is its name in Python, `name` that in the file. `section` is the class of the section
-    that it holds, None for a value; `several` says whether it holds a list of sections, `always`
-    whether it stands in every file even so. `shape` is empty but for arrays.
+    that it holds, None for a value; `several` says whether it holds a list of sections, `tables`
+    the keys that each of a mapping of sections has of its own, and `keys` are those of the section
+    as they are here. `always` says that it stands in every file even with a default; `shape` is
+    empty but for arrays.
     """
 
     field: str
@@ -124,6 +143,7 @@ class Key:
     default: Any
     section: type[Section] | None
     several: bool
+    keys: tuple[Key, ...] = ()
     description: str = ""
     unit: str = ""
     expected: str = ""
@@ -131,10 +151,22 @@ class Key:
     reads: Callable[[Any], Any] = lambda value: value
     also: Any = None
     as_given: bool = False
+    tables: tuple[str, ...] = ()
     holds: Callable[[Any], bool] | None = None
     shape: tuple[str, ...] = ()
     any_number: bool = False
     always: bool = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What stands in a file: its name, or those of its tables."""
+        return self.tables or (self.name,)
+
+    def stated(self, values: Mapping[str, Any]) -> Any:
+        """What a file states of it; KeyError where it states nothing."""
+        if not self.tables:
+            return values[self.name]
+        return {name: values[name] for name in self.tables if name in values}
 
     @property
     def required(self) -> bool:
@@ -144,16 +176,35 @@ class Key:
     @property
     def words(self) -> str:
         """What is expected, in words."""
-        if not self.shape:
+        if self.quantity is not None and self.section is not None:
+            return f"a {self.section.__name__.lower()}: {self.quantity.words}"
+        if self.shape:
+            each = self.expected or f"each {words(item_of(self.kind), unit=self.unit)}"
+            return f"an array of {' × '.join(self.shape)}, {each},"
+        if self.expected or self.also is None:
             return self.expected or words(self.kind, unit=self.unit)
-        kind = self.kind
-        while isinstance(kind, inspect.VarTupleType):
-            kind = kind.item_type
-        each = self.expected or f"each {words(kind, unit=self.unit)}"
-        return f"an array of {' × '.join(self.shape)}, {each},"
+        return f"{words(inspect.type_info(self.also), unit=self.unit)}, or {words(self.kind)}"
+
+    @property
+    def quantity(self) -> Key | None:
+        """The key of its section of which the unit and the limits of this one are."""
+        name = "" if self.section is None else self.section.QUANTITY
+        return next((one for one in self.keys if one.field == name), None)
+
+    @property
+    def is_table(self) -> bool:
+        """Whether it holds sections, which are tables of their own, and no quantity."""
+        return self.section is not None and self.quantity is None
+
+    def within(self, where: str) -> str:
+        """How messages call its section, which stands in a section that they call `where`."""
+        own = "" if self.section is None else self.section.WHERE
+        return own or (f"{where.removesuffix(']')}.{self.name}]" if where else self.name)
 
     def checked(self, value: Any, where: str, *, folder: Path | None = None) -> Any:
         """A value as the field holds it; InputError for any other, naming the key and `where`."""
+        if self.quantity is not None:
+            return self._with_quantity(value, where, folder)
         if self.section is not None:
             return self._sections(value, folder)
         if self.shape:
@@ -183,9 +234,7 @@ class Key:
 
     def _array(self, value: Any, where: str) -> np.ndarray[Any, Any]:
         """A read-only copy of numbers, or of true and false, that are within the limits."""
-        kind = self.kind
-        while isinstance(kind, inspect.VarTupleType):
-            kind = kind.item_type
+        kind = item_of(self.kind)
         numbers = isinstance(kind, inspect.FloatType)
         try:
             given = np.asarray(value)
@@ -195,8 +244,8 @@ class Key:
         if given.size and not fits:
             raise self.refusal(value, where)
         array = np.array(given, dtype=np.float64 if numbers else np.bool_)
-        if isinstance(kind, inspect.FloatType):
-            wrong = array[~_within(kind, array)] if not self.any_number else array[:0]
+        if isinstance(kind, inspect.FloatType) and not self.any_number:
+            wrong = array[~_within(kind, array)]
             if wrong.size:
                 raise self.refusal(wrong.flat[0], where)
         if self.holds is not None and not self.holds(array):
@@ -204,29 +253,42 @@ class Key:
         array.setflags(write=False)
         return array
 
+    def _with_quantity(self, value: Any, where: str, folder: Path | None) -> Any:
+        assert self.section is not None  # or there is no quantity
+        values = plain(value)
+        if not isinstance(values, Mapping):
+            raise self.refusal(value, where)
+        return self.section(**_held(self.keys, values, self.within(where), folder=folder))
+
     def _sections(self, value: Any, folder: Path | None) -> Any:
         assert self.section is not None  # or there is no section to read
+        if self.tables:
+            check_keys(value, self.tables, where=self.name)
+            return {
+                name: _section(self.section, one, folder, where=f"[{name}]")
+                for name, one in value.items()
+            }
         if not self.several:
             return _section(self.section, value, folder)
         if not isinstance(value, list | tuple):
-            raise _no_table(self.section, value)
+            raise no_table(self.section, value)
         if self.required and not (value or self.always):
             raise self.missing(self.section.WHERE)
         count = len(value)
         return tuple(
-            _section(self.section, one, folder, number=number if count > 1 else 0)
-            for number, one in enumerate(value, start=1)
+            _section(self.section, one, folder, where=_numbered(self.section.WHERE, place, count))
+            for place, one in enumerate(value, start=1)
         )
 
     def missing(self, where: str, *, advice: str = "") -> InputError:
         """The sentence about a key that has to be there and is not."""
-        if self.section is not None:
-            where = self.section.WHERE
+        if self.is_table:
+            where = self.within(where)
             advice = advice or f"write {where} and its keys"
             return InputError(f"expected a table {where}, got none; {advice}.")
         return InputError(
-            f"expected {self.name} ({self.words}){where and f' under {where}'}, got none; "
-            f"{advice or 'add it'}."
+            f"expected {self.name} ({self.words}) {f'under {where}' if where else 'at the top'}, "
+            f"got none; {advice or 'add it'}."
         )
 
 
@@ -234,6 +296,9 @@ class Section:
     """The base of a section's dataclass: its fields are checked when it is made."""
 
     WHERE: ClassVar[str] = ""  # how messages call it: "[hand]", "[[model]]"
+    # The field to which unit and limits of a key apply that holds such a section, in which then
+    # `unit` is that unit.
+    QUANTITY: ClassVar[str] = ""
     # What to do about a section that only programs write. All its keys stand in it, those with a
     # default, too, but for OPTIONAL, which are left out where they are None or an empty text.
     ADVICE: ClassVar[str] = ""
@@ -244,7 +309,8 @@ class Section:
         for one in keys_of(type(self)):
             value = getattr(self, one.field)
             if value is not one.default:
-                object.__setattr__(self, one.field, one.checked(value, self.WHERE))
+                # Not where: what `read` lets through is good, and options have no section.
+                object.__setattr__(self, one.field, one.checked(value, ""))
 
     @classmethod
     def read(cls, values: object, *, where: str = "", folder: Path | None = None) -> Self:
@@ -264,20 +330,9 @@ class Section:
             For what is no table, and for unknown, missing and wrong keys.
         """
         where = where or cls.WHERE
-        keys = {one.name: one for one in keys_of(cls)}
         if not isinstance(values, Mapping):
-            raise _no_table(cls, values, where=where)
-        check_keys(values, tuple(keys), where=where or "the file")
-        for name, one in keys.items():
-            if one.required and name not in values:
-                raise one.missing(where, advice=cls.ADVICE)
-        given = {name: one for name, one in keys.items() if name in values}
-        return cls(
-            **{
-                one.field: one.checked(values[name], where, folder=folder)
-                for name, one in given.items()
-            }
-        )
+            raise no_table(cls, values, where=where)
+        return cls(**_held(keys_of(cls), values, where, folder=folder, advice=cls.ADVICE))
 
     @classmethod
     def of_field(cls, field: str, value: object) -> Any:
@@ -286,18 +341,24 @@ class Section:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, those of a file."""
-        values = {one.name: plain(getattr(self, one.field)) for one in keys_of(type(self))}
-        return {n: v for n, v in values.items() if not (v in (None, "") and n in self.OPTIONAL)}
+        values: dict[str, Any] = {}
+        for one in keys_of(type(self)):
+            value = plain(getattr(self, one.field))
+            if value in (None, "") and one.name in self.OPTIONAL:
+                continue
+            values |= value if one.tables else {one.name: value}
+        return values
 
 
 class DescribedFile(Section):
     """The base of a whole TOML file: its values stand under `WHERE`, its sections in tables.
 
-    Subclasses declare `WHAT` ("a scene"), `VERSION`, and `WHERE`.
+    Subclasses declare `WHAT` ("a scene"), and `VERSION` and `WHERE` unless the file states no
+    version and has its values at the top.
     """
 
     WHAT: ClassVar[str]
-    VERSION: ClassVar[int]
+    VERSION: ClassVar[int] = 0
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -318,77 +379,21 @@ class DescribedFile(Section):
     def from_tables(cls, values: Mapping[str, Any], *, folder: Path | None = None) -> Self:
         """A file from its tables, `version` among them; refused as by `load`."""
         head, tables = cls.WHERE.strip("[]"), cls.tables()
-        check_keys(values, ("version", head, *tables), where=cls.WHAT)
+        if not head and not cls.VERSION:
+            return cls.read(values, folder=folder)
+        check_keys(values, ("version", *filter(None, (head, *tables))), where=cls.WHAT)
         check_version(values, cls.VERSION, what=cls.WHAT.partition(" ")[2])
         plain = values.get(head, {})
         if not isinstance(plain, Mapping):
-            raise _no_table(cls, plain)
-        check_keys(plain, [k.name for k in keys_of(cls) if k.section is None], where=cls.WHERE)
+            raise no_table(cls, plain)
+        check_keys(plain, [k.name for k in keys_of(cls) if not k.is_table], where=cls.WHERE)
         given = {name: values[name] for name in tables if name in values}
         return cls.read({**plain, **given}, folder=folder)
 
     @classmethod
     def tables(cls) -> tuple[str, ...]:
         """The names of its sections, without the one of its plain values."""
-        return tuple(one.name for one in keys_of(cls) if one.section is not None)
-
-
-class DescribedJson(Section):
-    """The base of a whole JSON file that programs write, with `format` and `version` at its top.
-
-    Subclasses declare `WHAT` ("a model file"), `FORMAT`, `VERSION` where it is not 1, and `ADVICE`.
-    """
-
-    WHAT: ClassVar[str]
-    FORMAT: ClassVar[str]
-    VERSION: ClassVar[int] = 1
-
-    @classmethod
-    def load(cls, path: str | Path) -> Self:
-        """Read such a file.
-
-        Raises
-        ------
-        InputError
-            Naming the file, if it is missing, no JSON or of another format or version, and for
-            unknown, missing and wrong keys.
-        """
-        file = Path(path)
-        values = read_json_object(file, what=cls.WHAT, advice=cls.ADVICE)
-        with naming(file):
-            return cls.read(values)
-
-    @classmethod
-    def read(cls, values: object, *, where: str = "", folder: Path | None = None) -> Self:
-        """A file from its plain values, as `to_dict` gives them; refused as by `load`."""
-        if not isinstance(values, Mapping):
-            raise _no_table(cls, values, where=cls.WHAT)
-        stated = (values.get("format"), values.get("version"))
-        if stated != (cls.FORMAT, cls.VERSION):
-            raise InputError(
-                f"expected the format {cls.FORMAT} of version {cls.VERSION}, got "
-                f"{shown(stated[0])} of version {shown(stated[1])}; give {cls.WHAT} of that "
-                "format, or update tactileq if it is newer."
-            )
-        given = {name: v for name, v in values.items() if name not in ("format", "version")}
-        return super().read(given, where=where, folder=folder)
-
-    def to_dict(self) -> dict[str, Any]:
-        """The plain values of the file."""
-        return {"format": self.FORMAT, "version": self.VERSION, **super().to_dict()}
-
-    def to_json(self) -> str:
-        """The text of the file."""
-        return dump_json(self.to_dict())
-
-    @cached_property
-    def sha256(self) -> str:
-        """SHA-256 of the file that `save` writes."""
-        return sha256_of(self.to_json())
-
-    def save(self, path: str | Path) -> None:
-        """Write the file; it is there whole or not at all."""
-        write_text(path, self.to_json())
+        return tuple(name for one in keys_of(cls) if one.is_table for name in one.names)
 
 
 @contextmanager
@@ -422,11 +427,40 @@ def keys_of(section: type[Section]) -> tuple[Key, ...]:
 
 @cache
 def _keys_of(section: Any) -> tuple[Key, ...]:
+    return _keys(section, get_type_hints(section, include_extras=True))
+
+
+def _keys_held(section: Any, holder: Any) -> tuple[Key, ...]:
+    """The keys of a section with a quantity, of which its holder's annotation says more."""
     hints = get_type_hints(section, include_extras=True)
+    hints[section.QUANTITY] = Annotated[hints[section.QUANTITY], *_metas(holder)]
+    hints["unit"] = Annotated[Literal[_said(holder)["unit"]], *_metas(hints["unit"])]
+    return _keys(section, hints)
+
+
+def _keys(section: Any, hints: dict[str, Any]) -> tuple[Key, ...]:
     return tuple(
         _key(field.name, hints[field.name], default=_default(field), holder=section)
         for field in fields(section)
+        if BESIDE not in getattr(hints[field.name], "__metadata__", ())
     )
+
+
+def _held(
+    keys: tuple[Key, ...],
+    values: Mapping[str, Any],
+    where: str,
+    *,
+    folder: Path | None,
+    advice: str = "",
+) -> dict[str, Any]:
+    """The fields of a section from its table; refused as by `Section.read`."""
+    check_keys(values, [name for one in keys for name in one.names], where=where or "the file")
+    for one in keys:
+        if one.required and one.name not in values:
+            raise one.missing(where, advice=advice)
+    given = [one for one in keys if any(name in values for name in one.names)]
+    return {one.field: one.checked(one.stated(values), where, folder=folder) for one in given}
 
 
 def words(kind: inspect.Type, *, unit: str = "") -> str:
@@ -448,7 +482,7 @@ def words(kind: inspect.Type, *, unit: str = "") -> str:
                 f'"{value}"' if isinstance(value, str) else str(value) for value in values
             )
         case inspect.VarTupleType(item_type=item, min_length=least):
-            return f"a list{' of one or more' * bool(least)}, each {words(item, unit=unit)}"
+            return f"a list{' of one or more' * bool(least)}, each {words(item, unit=unit)},"
         case inspect.TupleType(item_types=items):
             return f"[{', '.join(words(item, unit=unit) for item in items)}]"
         case inspect.DictType(key_type=name, value_type=value):
@@ -484,9 +518,17 @@ def _within(kind: inspect.FloatType, values: Any) -> Any:
     return good
 
 
+def item_of(kind: inspect.Type) -> inspect.Type:
+    """The type of the values of an array."""
+    while isinstance(kind, inspect.VarTupleType):
+        kind = kind.item_type
+    return kind
+
+
 def _short(limit: float) -> str:
     """A limit without an exponent where it is a whole number that one can read."""
-    return f"{limit:.0f}" if float(limit).is_integer() and abs(limit) < 1e9 else f"{limit:g}"
+    whole = float(limit).is_integer() and abs(limit) < 1e9
+    return f"{limit:.0f}" if whole else f"{limit:g}".replace("e+", "e")
 
 
 _PLAIN = {
@@ -541,6 +583,13 @@ def _key(name: str, annotation: Any, *, default: Any, holder: type[Section]) -> 
     said = _said(annotation)
     if "shape" in said:
         annotation = _rows(annotation, len(said["shape"]))
+    keys = () if section is None else keys_of(section)
+    if section is not None and section.QUANTITY:
+        keys = _keys_held(section, annotation)
+        said = {
+            "description": said.get("description", ""),
+            "advice": f"write {name} = {_example(keys)}",
+        }
     return Key(
         **{"name": name, **advice, **said},
         always=always,
@@ -550,7 +599,14 @@ def _key(name: str, annotation: Any, *, default: Any, holder: type[Section]) -> 
         default=default,
         section=section,
         several=several,
+        keys=keys,
     )
+
+
+def _example(keys: tuple[Key, ...]) -> str:
+    """A table in one line: { value = …, unit = "V" }."""
+    pairs = [f"{one.name} = {one.words if one.name == 'unit' else '…'}" for one in keys]
+    return f"{{ {', '.join(pairs)} }}"
 
 
 def _rows(array: Any, axes: int) -> Any:
@@ -575,10 +631,7 @@ def _default(field: Any) -> Any:
 def _said(annotation: Any) -> dict[str, Any]:
     """All that `key` says of a type and, in a union with None, of its other member."""
     said: dict[str, Any] = {}
-    if get_origin(annotation) in (Union, UnionType):
-        for member in get_args(annotation):
-            said |= _said(member)
-    for meta in getattr(annotation, "__metadata__", ()):
+    for meta in _metas(annotation):
         said |= {
             **(meta.extra or {}),
             **({"description": meta.description} if meta.description else {}),
@@ -586,12 +639,21 @@ def _said(annotation: Any) -> dict[str, Any]:
     return said
 
 
+def _metas(annotation: Any) -> Iterator[Meta]:
+    if get_origin(annotation) in (Union, UnionType):
+        for member in get_args(annotation):
+            yield from _metas(member)
+    yield from getattr(annotation, "__metadata__", ())
+
+
 def _section_of(annotation: Any) -> tuple[type[Section] | None, bool]:
     """The class of the sections that a key holds, and whether it is a list of them."""
     if hasattr(annotation, "__metadata__"):
         annotation = annotation.__origin__
     if get_origin(annotation) in (Union, UnionType):
-        annotation = next(one for one in get_args(annotation) if one is not NoneType)
+        return _section_of(next(one for one in get_args(annotation) if one is not NoneType))
+    if get_origin(annotation) is Mapping:
+        return _section_of(get_args(annotation)[1])
     if get_origin(annotation) is tuple:
         item, _ = _section_of(get_args(annotation)[0])
         return item, item is not None
@@ -607,11 +669,12 @@ def _without_numpy(value: Any) -> Any:
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
-def _section(kind: type[Section], value: Any, folder: Path | None, *, number: int = 0) -> Section:
-    if isinstance(value, kind):
-        return value
-    where = f"{kind.WHERE} number {number}" if number else kind.WHERE
-    return kind.read(value, where=where, folder=folder)
+def _section(kind: type[Section], value: Any, folder: Path | None, *, where: str = "") -> Section:
+    return value if isinstance(value, kind) else kind.read(value, where=where, folder=folder)
+
+
+def _numbered(where: str, place: int, count: int) -> str:
+    return f"{where} number {place}" if count > 1 else where
 
 
 def _path_in(folder: Path | None) -> Callable[[type, Any], Any]:
@@ -628,7 +691,7 @@ def _path_in(folder: Path | None) -> Callable[[type, Any], Any]:
     return path
 
 
-def _no_table(section: type[Section], value: object, *, where: str = "") -> InputError:
+def no_table(section: type[Section], value: object, *, where: str = "") -> InputError:
     where = where or section.WHERE
     advice = section.ADVICE or f"write {where} above its keys"
     return InputError(f"expected a table {where}, got {shown(value)}; {advice}.")

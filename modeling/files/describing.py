@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any
 
 import msgspec
@@ -11,7 +12,7 @@ from modeling.files.described import DescribedFile, Key, Section, keys_of, plain
 
 def schema(file: type[Section]) -> dict[str, Any]:
     """The JSON Schema (2020-12) of a file, for editors that complete and check what one types."""
-    properties, required = _properties(file)
+    properties, required = _properties(keys_of(file))
     if issubclass(file, DescribedFile):
         head = file.WHERE.strip("[]")
         if head:  # the plain keys stand in a section of their own
@@ -27,12 +28,16 @@ def schema(file: type[Section]) -> dict[str, Any]:
     return {**about, **_object(file, properties, required)}
 
 
+def schema_text(file: type[Section]) -> str:
+    """The text of the schema's file."""
+    return json.dumps(schema(file), indent=2, ensure_ascii=False) + "\n"
+
+
 def key_tables(file: type[Section]) -> str:
     """The keys of a file in Markdown, a table for each of its sections."""
-    parts = [_key_table(file)]
-    for one in keys_of(file):
-        if one.section is not None:
-            parts.append(key_tables(one.section))
+    keys = keys_of(file)
+    parts = [] if all(one.is_table for one in keys) else [_key_table(file)]
+    parts += [key_tables(one.section) for one in keys if one.section and one.is_table]
     return "\n\n".join(parts)
 
 
@@ -46,7 +51,7 @@ def _key_table(section: type[Section]) -> str:
         "| --- | --- | --- | --- |",
     ]
     for one in keys_of(section):
-        if one.section is None:
+        if not one.is_table:
             cells = (f"`{one.name}`", one.words, _default(one), one.description)
             lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -60,13 +65,15 @@ def _summary(section: type[Section]) -> str:
 def _default(one: Key) -> str:
     if one.required:
         return "required"
+    if one.quantity is not None and one.default is not None:
+        return f"`{one.default}`"
     value = plain(one.default)
-    return "" if value in (None, [], {}, "") else f"`{msgspec.json.encode(value).decode()}`"
+    return "" if value in (None, [], {}, "") else f"`{json.dumps(value, ensure_ascii=False)}`"
 
 
-def _properties(section: type[Section]) -> tuple[dict[str, Any], list[str]]:
-    keys = keys_of(section)
-    return {one.name: _of_key(one) for one in keys}, [one.name for one in keys if one.required]
+def _properties(keys: tuple[Key, ...]) -> tuple[dict[str, Any], list[str]]:
+    properties = {name: _of_key(one) for one in keys for name in one.names}
+    return properties, [one.name for one in keys if one.required]
 
 
 def _object(
@@ -86,7 +93,9 @@ def _of_key(one: Key) -> dict[str, Any]:
     if not one.required and (value := plain(one.default)) not in (None, (), {}):
         about["default"] = value
     if one.section is not None:
-        table = _object(one.section, *_properties(one.section))
+        table = _object(one.section, *_properties(one.keys))
+        if one.quantity is not None:
+            return table | about
         return about | ({"type": "array", "items": table} if one.several else table)
     either = [_value(one.annotation)] + ([] if one.also is None else [_value(one.also)])
     return {**(either[0] if len(either) == 1 else {"anyOf": either}), **about}

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from sys import float_info
 from typing import Any
 
-from modeling.checks import check_keys
 from modeling.errors import InputError, shortened, shown
 from modeling.files.reading import read_text
 
@@ -114,17 +113,6 @@ def _rows(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], list | dict):
         return "[\n    " + ",\n    ".join(map(encode, value)) + "\n  ]"
     return encode(value)
-
-
-def toml_section(values: Mapping[str, Any], name: str, known: Sequence[str]) -> dict[str, Any]:
-    """A copy of the table [name], empty where there is none; other keys than these are refused."""
-    table = values.get(name, {})
-    if not isinstance(table, Mapping):
-        raise InputError(
-            f"expected a table [{name}], got {shown(table)}; write [{name}] above its keys."
-        )
-    check_keys(table, known, where=f"[{name}]")
-    return dict(table)
 
 
 def check_version(values: Mapping[str, Any], version: int, *, what: str) -> None:

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from modeling.errors import InputError, shown
+from modeling.files.columns import Column
 from modeling.files.places import (
     behind_links,
     clear_unfinished,
@@ -20,7 +21,7 @@ from modeling.files.places import (
 )
 from modeling.files.reading import check_file
 from modeling.files.syncing import sync_folder, sync_tree
-from modeling.files.tables import read_table
+from modeling.files.tables import read_cells
 
 Contents = Mapping[str, tuple[int, ...]]
 
@@ -222,7 +223,7 @@ def check_replaceable(
         return seen
     own = {index_name, "provenance.json", *beside}
     if (target / index_name).is_file():
-        listed = {row["file"] for row in read_table(target / index_name, ("file",))}
+        listed = {row["file"] for _, row in read_cells(target / index_name, [Column("file")])}
         # A folder of that name is none of the set's files, and may hold anything.
         own |= {name for name in listed if not (target / name).is_dir()}
     foreign = sorted({name for name in seen if "/" not in name} - own)

@@ -14,11 +14,22 @@ def is_line(text: str) -> bool:
     return bool(text.strip()) and text.isprintable()
 
 
+def is_label(text: str) -> bool:
+    """Whether a table of answers can hold this: printable, no spaces around it, not n/a."""
+    return is_line(text) and text.strip() == text and text != "n/a"
+
+
+def is_listed_label(text: str) -> bool:
+    """Whether lists in a table of answers can hold this label, too."""
+    return is_label(text) and not set(text) & set('|"\\')
+
+
 def is_different(values: Sequence[object]) -> bool:
     """Whether no value stands twice in a list."""
     return all(value not in values[:place] for place, value in enumerate(values))
 
 
+_LABEL = "printable text without tabs, line ends or spaces around it"
 Name = Annotated[str, key(expected="printable text in one line", holds=is_line, advice="rename it")]
 TextureName = Annotated[
     str,
@@ -47,3 +58,12 @@ Unit = Annotated[
     ),
 ]
 Simulated = Annotated[bool, key("whether what it was made from was simulated")]
+Label = Annotated[str, key(expected=_LABEL, holds=is_label, advice="rename it")]
+ListedLabel = Annotated[
+    str,
+    key(
+        expected=f"{_LABEL}, nor bars, quotes and backslashes",
+        holds=is_listed_label,
+        advice="rename it",
+    ),
+]

@@ -7,7 +7,8 @@ from dataclasses import MISSING
 import numpy as np
 
 from modeling.errors import InputError
-from modeling.files.described import DescribedJson, keys_of
+from modeling.files.described import keys_of
+from modeling.files.described_json import DescribedJson
 
 
 class SavedModel(DescribedJson):

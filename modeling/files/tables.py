@@ -1,19 +1,22 @@
-"""Small tab-separated tables, and numbers in their cells."""
+"""Tables as text: one reader of their declared columns, one writer of TSV, numbers in cells."""
 
 from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 
 from modeling.errors import InputError, shortened, shown
+from modeling.files.columns import Column, Value, names
 from modeling.files.reading import read_text
 from modeling.files.writing import write_text
 
 # A spreadsheet would calculate what begins so, whatever it names.
 _FORMULA = re.compile(r"'*[=+@]")
+
+Row = dict[str, Value]
 
 
 def guarded(cell: str) -> str:
@@ -26,85 +29,181 @@ def unguarded(cell: str) -> str:
     return cell[1:] if cell.startswith("'") and _FORMULA.match(cell) else cell
 
 
-def write_table(path: str | Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+# --- Written ---------------------------------------------------------------------------------
+
+
+def write_table(
+    path: str | Path, columns: Sequence[Column], rows: Iterable[Mapping[str, object]]
+) -> None:
     """Write a TSV with a header line; cells must not hold tabs or line ends."""
     write_text(path, table_text(columns, rows))
 
 
-def table_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """The text of a TSV, as `write_table` writes it; see `guarded`."""
-    lines = ["\t".join(columns)]
+def table_text(
+    columns: Sequence[Column], rows: Iterable[Mapping[str, object]], *, missing: str = "n/a"
+) -> str:
+    """The text of a TSV, as `write_table` writes it: true or false, all digits of a number.
+
+    Parameters
+    ----------
+    columns : sequence of Column
+    rows : iterable of mapping
+        The values by column; `guarded`.
+    missing : str
+        What stands where a row has none.
+    """
+    lines = ["\t".join(names(columns))]
     for row in rows:
-        cells = [guarded(str(cell)) for cell in row]
+        cells = [_cell(row.get(column.name), missing) for column in columns]
         if any(c in cell for cell in cells for c in "\t\r\n"):
             raise InputError(f"expected cells without tabs and line ends, got {cells}; rename.")
         lines.append("\t".join(cells))
     return "\n".join(lines) + "\n"
 
 
-def read_table(path: str | Path, required: Sequence[str]) -> list[dict[str, str]]:
-    """Rows of a TSV as dictionaries by column name; lines that begin with # are comments.
+def _cell(value: object, missing: str) -> str:
+    if value is None:
+        return missing
+    return str(value).lower() if isinstance(value, bool) else guarded(str(value))
+
+
+# --- Read ------------------------------------------------------------------------------------
+
+
+def read_table(
+    path: str | Path,
+    columns: Sequence[Column],
+    *,
+    what: str = "a table",
+    delimiter: str = "\t",
+    bids: bool = False,
+    only: bool = False,
+    advice: str = "correct it",
+) -> list[Row]:
+    """Rows of a table by column name: numbers, text, None where there is no value.
+
+    Columns that are not declared stay text.
+
+    Parameters
+    ----------
+    path : str or Path
+    columns : sequence of Column
+        An optional one that the table does not have is None in each row.
+    what : str
+        What the file is, for messages.
+    delimiter : str
+        A comma: of a CSV, in which cells may be quoted.
+    bids : bool
+        Cells may be quoted as in CSV, and every line is a row; else lines that are empty or begin
+        with # are none.
+    only : bool
+        Whether columns that are not declared are refused; else those that are nearly an optional
+        one that is not there, which would be ignored silently.
+    advice : str
+        What to do about a damaged row.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is empty, lacks a required column, names one twice, or a row
-        has another number of cells than the header.
+        If the file cannot be read, is empty, lacks a column, names one twice or a misspelt one, or
+        a row has another number of cells than the header, or a cell that its column does not hold.
     """
+    return [
+        typed(cells, columns, where, advice=advice)
+        for where, cells in read_cells(
+            path,
+            columns,
+            what=what,
+            delimiter=delimiter,
+            bids=bids,
+            only=only,
+            advice=advice,
+        )
+    ]
+
+
+def typed(
+    cells: Mapping[str, str], columns: Sequence[Column], where: str, *, advice: str = "correct it"
+) -> Row:
+    """The values of a row's cells; InputError, naming column and `where`, for one that is none."""
+    row: Row = {name: cell if cell != "n/a" else None for name, cell in cells.items()}
+    for column in columns:
+        given = column.name in cells or not column.optional
+        text = cells.get(column.name, "")
+        row[column.name] = column.read(text, where, advice=advice) if given else None
+    return row
+
+
+def read_cells(
+    path: str | Path,
+    columns: Sequence[Column],
+    *,
+    what: str = "a table",
+    delimiter: str = "\t",
+    bids: bool = False,
+    only: bool = False,
+    advice: str = "correct it",
+) -> list[tuple[str, dict[str, str]]]:
+    """As `read_table`, but each row is text, with its place: where rows are checked one by one."""
     source = Path(path)
-    text = read_text(source, "a table")
-    # Not splitlines(): that would also break cells at characters that `write_table` allows.
-    lines = [line for line in text.split("\n") if line.strip() and not line.startswith("#")]
+    text = read_text(source, what)
     if not text:
-        raise InputError(
-            f"expected a table in {source}, got an empty file; restore it from a copy."
-        )
-    header = lines[0].split("\t") if lines else []
-    missing = [name for name in required if name not in header]
-    if missing:
-        several = "what is missing" if len(missing) > 3 else ", ".join(missing)
-        raise InputError(
-            f"expected the columns {', '.join(required)} in {source}, got "
-            f"{shortened(', '.join(header)) or 'an empty file'}; add {several} (tab-separated)."
-        )
-    check_named_once(header, source)
-    rows = []
-    for line in lines[1:]:
-        cells = line.split("\t")
+        raise InputError(f"expected {what} in {source}, got an empty file; restore it from a copy.")
+    # Not splitlines(): that would also break cells at characters that may stand in them.
+    lines = [
+        (f"line {number} of {source}", line)
+        for number, line in enumerate(text.removesuffix("\n").split("\n"), start=1)
+        if bids or (line.strip() and not line.startswith("#"))
+    ]
+    split = csv_cells if bids or delimiter == "," else _plain_cells
+    split_lines = [(where, split(line, where, delimiter=delimiter)) for where, line in lines]
+    header = split_lines[0][1] if split_lines else []
+    _check_header(header, columns, source, delimiter=delimiter, only=only)
+    for where, cells in split_lines[1:]:
         if len(cells) != len(header):
             raise InputError(
-                f"expected {len(header)} cells in each row of {source}, got {len(cells)} in "
-                f"{shown(line)}; the table is damaged or not tab-separated."
+                f"expected {len(header)} cells in {where}, got {len(cells)}; {advice}, since the "
+                f"table is damaged or not separated by {_SEPARATORS[delimiter]}."
             )
-        rows.append(dict(zip(header, map(unguarded, cells), strict=True)))
-    return rows
+    return [
+        (where, dict(zip(header, map(unguarded, cells), strict=True)))
+        for where, cells in split_lines[1:]
+    ]
 
 
-def check_columns(names: Iterable[str], known: Sequence[str], table: str | Path) -> None:
-    """Refuse a column that is not known: a misspelt one would be ignored silently.
+def _plain_cells(line: str, _: str, *, delimiter: str) -> list[str]:
+    return line.split(delimiter)
 
-    Raises
-    ------
-    InputError
-        Naming the column, the nearest known one, and all that are known.
-    """
-    for name in names:
-        if name in known:
-            continue
-        near = get_close_matches(name, known, n=1)
-        advice = f"rename it to {near[0]!r} or remove it" if near else "remove it"
+
+_SEPARATORS = {"\t": "tabs", ",": "commas"}
+
+
+def _check_header(
+    header: Sequence[str], columns: Sequence[Column], source: Path, *, delimiter: str, only: bool
+) -> None:
+    """Refuse columns that are missing, doubled, or not known: those would be ignored silently."""
+    missing = [c.name for c in columns if c.name not in header and not c.optional]
+    if missing:
+        several = "what is missing" if len(missing) > 3 else ", ".join(missing)
+        needed = ", ".join(c.name for c in columns if not c.optional)
         raise InputError(
-            f"expected columns among {', '.join(known)} in {table}, got {shown(name)}; {advice}."
+            f"expected the columns {needed} in {source}, got "
+            f"{shortened(', '.join(header)) or 'an empty file'}; add {several} (separated by "
+            f"{_SEPARATORS[delimiter]})."
         )
-
-
-def check_named_once(header: Sequence[str], source: Path) -> None:
-    """Refuse a table with two columns of one name."""
-    twice = [name for name in header if header.count(name) > 1]
-    if twice:
-        raise InputError(
-            f"expected each column once in {source}, got {shown(twice[0])} twice; rename one."
-        )
+    for name in header:
+        if header.count(name) > 1:
+            raise InputError(
+                f"expected each column once in {source}, got {shown(name)} twice; rename one."
+            )
+        absent = [c.name for c in columns if c.name not in header]
+        near = get_close_matches(name, absent, n=1, cutoff=0.6 if only else 0.7)
+        if name not in names(columns) and (only or near):
+            advice = f"rename it to {near[0]!r} or remove it" if near else "remove it"
+            raise InputError(
+                f"expected columns among {', '.join(names(columns))} in {source}, got "
+                f"{shown(name)}; {advice}."
+            )
 
 
 def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
@@ -133,36 +232,3 @@ def csv_cells(line: str, where: str, *, delimiter: str = ",") -> list[str]:
             f"expected quotes only around whole cells in {where}, got {shown(line)}; close or "
             "remove the quote."
         ) from None
-
-
-def is_number(text: str) -> bool:
-    """Whether a text reads as a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def number(text: str, name: str) -> float:
-    """A number from a table's cell.
-
-    Raises
-    ------
-    InputError
-        Naming `name`, where the cell is empty or no number.
-    """
-    if not is_number(text):
-        got = shown(text) if text.strip() else "nothing"
-        raise InputError(f"expected a number for {name}, got {got}; fill it in.")
-    return float(text)
-
-
-def whole_number(text: str, name: str) -> int:
-    """A whole number of at least 1 from a table's cell; InputError naming `name` otherwise."""
-    value = number(text, name)
-    if not (value.is_integer() and value >= 1):
-        raise InputError(
-            f"expected a whole number for {name}, at least 1, got {shortened(text)}; correct it."
-        )
-    return int(value)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib import resources
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -15,16 +16,42 @@ from numpy.typing import ArrayLike
 
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
+from modeling.files.columns import ABOVE_0, Column, chosen
 from modeling.files.described import Section, key
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_text
-from modeling.files.tables import number, read_table
+from modeling.files.tables import read_cells, typed
 
 STANDARD_GRAVITY_M_S2 = 9.80665
 SHIPPED = ("codec", "pen-hold", "mobile")
 # Beyond anybody's threshold on both sides; within, levels in decibels and pictures stay finite.
 FREQUENCIES_HZ = (1e-6, 1e6)
 LEVELS_G = (1e-9, 1e6)
+COLUMNS = (
+    Column(
+        "frequency_hz",
+        unit="Hz",
+        description="Frequency of the sinusoid, rising",
+        limits=FREQUENCIES_HZ,
+        required=True,
+    ),
+    Column(
+        "acceleration_g",
+        unit="g",
+        description="Peak acceleration at threshold; without displacement_um",
+        limits=LEVELS_G,
+        required=True,
+        optional=True,
+    ),
+    Column(
+        "displacement_um",
+        unit="µm",
+        description="Peak displacement at threshold; without acceleration_g",
+        limits=(ABOVE_0, inf),
+        required=True,
+        optional=True,
+    ),
+)
 LEVEL_COLUMNS = ("acceleration_g", "displacement_um")
 
 
@@ -111,21 +138,20 @@ class Threshold(Section):
             For a missing file, missing or doubled columns or values that are no thresholds.
         """
         source = Path(path)
-        rows = read_table(source, ("frequency_hz",))
-        columns = [name for name in LEVEL_COLUMNS if name in (rows or [{}])[0]]
+        rows = read_cells(source, COLUMNS[:1])
+        columns = [name for name in LEVEL_COLUMNS if rows and name in rows[0][1]]
         if len(columns) != 1:
             got = "both" if columns else ("neither" if rows else "no rows")
             raise InputError(
                 f"expected one column, {' or '.join(LEVEL_COLUMNS)}, with values in {source}, got "
                 f"{got}; a threshold needs one level (peak) for each frequency."
             )
-        column = columns[0]
-        cells = [
-            [number(row[name], f"{name} in {source.name}") for row in rows]
-            for name in ("frequency_hz", column)
-        ]
-        frequency, level = (np.array(values) for values in cells)
-        if column == "displacement_um":
+        used = chosen(COLUMNS, "frequency_hz", *columns)
+        values = [typed(cells, used, where) for where, cells in rows]
+        frequency, level = (
+            np.array([row[column.name] for row in values], dtype=np.float64) for column in used
+        )
+        if columns == ["displacement_um"]:
             level = displacement_to_acceleration_g(frequency, level)
         notes = _notes(source)
         return Threshold(

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 from modeling.errors import InputError
-from modeling.files.described import DescribedJson, Section, key
+from modeling.files.described import Section, key
+from modeling.files.described_json import DescribedJson
 from modeling.files.hashes import sha256_of_values
 from modeling.models.texture_model import TextureModel
 from modeling.perception.thresholds import Threshold

@@ -10,21 +10,21 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from modeling.errors import InputError
+from modeling.files.columns import Column
 from modeling.files.folders import check_replaceable, replace_folder
 from modeling.files.places import behind_links, is_hidden, locked, unfinished_folder
 from modeling.files.reading import reason_of
 from modeling.files.syncing import sync_file, sync_folder
-from modeling.files.tables import number, read_table, table_text, whole_number
+from modeling.files.tables import read_cells, table_text
 from modeling.files.writing import write_files, write_text
 from modeling.recordings.recording import Recording
 from modeling.recordings.recording_set import (
-    INDEX_COLUMNS,
     INDEX_NAME,
-    WAV_COLUMNS,
     RecordingSet,
     check_rounding,
-    index_cells,
+    index_row,
     listed,
+    stated,
     write_samples,
 )
 
@@ -70,7 +70,7 @@ class Staged:
     folder: Path
     recordings: RecordingSet
     files: tuple[Path, ...]
-    rows: tuple[dict[str, str], ...]
+    rows: tuple[dict[str, object], ...]
 
     def add(self, beside: Mapping[str, bytes]) -> int:
         """Add them to the folder's; one that is not there yet is made.
@@ -105,7 +105,7 @@ class Staged:
     def _move(self, folder: Path, beside: Mapping[str, bytes]) -> int:
         index = folder / INDEX_NAME
         known = listed(folder) if index.is_file() else []
-        _check_conditions(known, self.recordings)
+        _check_conditions(folder, known, self.recordings)
         _remove_unfinished(folder)
         names = _new_names(folder, known, self.files)
         write_text(folder / UNFINISHED_NAME, "\n".join(names) + "\n")
@@ -144,7 +144,7 @@ def staged(
     with ExitStack() as stack:
         with _told(target):
             if there := (target / INDEX_NAME).is_file():
-                _check_conditions(listed(target), recordings)
+                _check_conditions(target, listed(target), recordings)
             else:
                 _check_new(target)
             place = target / INDEX_NAME if there else behind_links(target)
@@ -184,17 +184,14 @@ def _told(target: Path) -> Iterator[None]:
         ) from None
 
 
-def _check_conditions(known: Iterable[dict[str, str]], recordings: RecordingSet) -> None:
+def _check_conditions(
+    folder: Path, known: Iterable[dict[str, str]], recordings: RecordingSet
+) -> None:
     """Refuse a second recording of a condition, or of one that differs by rounding only, by the
     index; no samples are read."""
     taken = {
-        (
-            row["texture"],
-            number(row["speed_mm_s"], f"speed_mm_s of {row['file']}"),
-            number(row["force_n"], f"force_n of {row['file']}"),
-            whole_number(row.get("repeat") or "1", f"repeat of {row['file']}"),
-        )
-        for row in known
+        (row["texture"], row["speed_mm_s"], row["force_n"], row["repeat"] or 1)
+        for row in (stated(folder, cells) for cells in known)
     }
     for recording in recordings:
         if (recording.texture, *recording.condition, recording.repeat) in taken:
@@ -214,7 +211,7 @@ def _remove_unfinished(folder: Path) -> None:
     # Without the index nobody knows which files are recordings.
     if not (note.is_file() and index.is_file()):
         return
-    listed_names = {row["file"] for row in read_table(index, ("file",))}
+    listed_names = {row["file"] for _, row in read_cells(index, [Column("file")])}
     for name in note.read_text(encoding="utf-8").split("\n"):
         if _OWN_NAME.fullmatch(name) and name not in listed_names:
             (folder / name).unlink(missing_ok=True)
@@ -228,22 +225,21 @@ def _new_names(folder: Path, known: Iterable[dict[str, str]], files: Iterable[Pa
     return [f"{place:04d}{file.suffix}" for place, file in enumerate(files, start=last + 1)]
 
 
-def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[str, str]:
+def _write(path: Path, recording: Recording, source: WavSource | None) -> dict[str, object]:
     """Write a recording's file, forced to disk; its row of the index."""
-    cells = (path.name, *index_cells(recording))
-    row = dict(zip(INDEX_COLUMNS, cells, strict=True))
+    row = {"file": path.name, **index_row(recording)}
     if source is None:
         write_samples(path, recording)
         sync_file(path)
         return row
     shutil.copyfile(source.path, path)
     sync_file(path)
-    scale = "" if source.g_per_fullscale is None else repr(source.g_per_fullscale)
-    return row | dict(zip(WAV_COLUMNS, (scale, str(source.channel)), strict=True))
+    return row | {"g_per_fullscale": source.g_per_fullscale, "channel": source.channel}
 
 
-def _index_text(index: Path, added: Sequence[dict[str, str]]) -> str:
+def _index_text(index: Path, added: Sequence[dict[str, object]]) -> str:
     """The rows that were there, as they were, and the new ones; columns are those of both."""
-    rows = [*(read_table(index, ()) if index.is_file() else ()), *added]
-    columns = list(dict.fromkeys(name for row in rows for name in row))
-    return table_text(columns, [[row.get(name, "") for name in columns] for row in rows])
+    there = read_cells(index, ()) if index.is_file() else ()
+    rows: list[Mapping[str, object]] = [*(row for _, row in there), *added]
+    columns = [Column(name) for name in dict.fromkeys(name for row in rows for name in row)]
+    return table_text(columns, rows, missing="")

@@ -3,45 +3,98 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from itertools import islice
-from math import isclose
+from math import inf, isclose, nan
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from modeling.arrays import Floats
+from modeling.checks import (
+    HIGHEST_FORCE_N,
+    HIGHEST_RATE_HZ,
+    HIGHEST_SPEED_MM_S,
+    LOWEST_RATE_HZ,
+)
 from modeling.errors import InputError, counted, shortened, shown
+from modeling.files.columns import ABOVE_0, Column, chosen, number_in
 from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.reading import read_text
-from modeling.files.tables import (
-    check_columns,
-    is_number,
-    number,
-    read_table,
-    whole_number,
-    write_table,
-)
-from modeling.files.wav import full_scale, read_wav
-from modeling.recordings.recording import Recording, check_condition
+from modeling.files.tables import read_cells, typed, write_table
+from modeling.files.wav import read_wav
+from modeling.recordings.recording import Recording
 
 INDEX_NAME = "recordings.tsv"
 INDEX_COLUMNS = (
-    "file",
-    "texture",
-    "speed_mm_s",
-    "force_n",
-    "rate_hz",
-    "unit",
-    "repeat",
-    "simulated",
-    "samples",
-    "clipped_share",
+    Column("file", description="Name of the CSV or WAV file in the folder", required=True),
+    Column("texture", description="Name of the surface; where empty, that of the folder"),
+    Column(
+        "speed_mm_s",
+        unit="mm/s",
+        description="Tangential speed of the hand",
+        limits=(0, HIGHEST_SPEED_MM_S),
+        required=True,
+    ),
+    Column(
+        "force_n", unit="N", description="Normal force", limits=(0, HIGHEST_FORCE_N), required=True
+    ),
+    Column(
+        "rate_hz",
+        unit="Hz",
+        description="Sampling rate; a CSV file needs it, a WAV file states its own",
+        limits=(LOWEST_RATE_HZ, HIGHEST_RATE_HZ),
+        optional=True,
+    ),
+    Column(
+        "unit", description="g, or arbitrary where nobody calibrated, as without it", optional=True
+    ),
+    Column(
+        "repeat",
+        description="Which recording of its condition, from 1, as without it",
+        limits=(1, inf),
+        whole=True,
+        optional=True,
+    ),
+    Column(
+        "simulated",
+        description="Whether it was simulated",
+        levels={"true": "simulated", "false": "recorded, as without it"},
+        optional=True,
+    ),
+    Column(
+        "samples",
+        description="How many there are, by which a truncated file is found",
+        limits=(1, inf),
+        whole=True,
+        optional=True,
+    ),
+    Column(
+        "clipped_share",
+        description="Share of clipped samples; without it they are counted",
+        limits=(0, 1),
+        nan=True,
+        optional=True,
+    ),
 )
 # What the index says of WAV files beside that; empty for CSV files.
-WAV_COLUMNS = ("g_per_fullscale", "channel")
+WAV_COLUMNS = (
+    Column(
+        "g_per_fullscale",
+        unit="g",
+        description="Acceleration of a full-scale sample; the unit is then g",
+        limits=(ABOVE_0, inf),
+        optional=True,
+    ),
+    Column(
+        "channel",
+        description="Of a file with several channels, from 1",
+        limits=(1, inf),
+        whole=True,
+        optional=True,
+    ),
+)
 KNOWN_COLUMNS = INDEX_COLUMNS + WAV_COLUMNS
 # Speeds, or forces, whose relative difference is smaller are the same but for rounding.
 ROUNDING = 1e-6
@@ -127,7 +180,7 @@ class RecordingSet:
             for number, recording in enumerate(self.recordings, start=1):
                 name = f"{number:04d}.csv"
                 write_samples(fresh / name, recording)
-                rows.append((name, *index_cells(recording)))
+                rows.append({"file": name, **index_row(recording)})
             write_table(fresh / INDEX_NAME, INDEX_COLUMNS, rows)
 
     @staticmethod
@@ -214,8 +267,8 @@ def listed(folder: Path) -> list[dict[str, str]]:
             f"expected a folder of recordings, got {folder}; give a folder that holds {INDEX_NAME}."
         )
     if (folder / INDEX_NAME).is_file():
-        rows = read_table(folder / INDEX_NAME, ("file", "texture", "speed_mm_s", "force_n"))
-        _check_index(rows, folder / INDEX_NAME)
+        rows = [row for _, row in read_cells(folder / INDEX_NAME, KNOWN_COLUMNS)]
+        _check_files(rows, folder / INDEX_NAME)
     elif not (rows := [_sidecar_row(path) for path in _sidecar_files(folder)]):
         raise InputError(
             f"expected {INDEX_NAME} (or WAV files with JSON sidecars) in {folder}, got neither; "
@@ -224,14 +277,8 @@ def listed(folder: Path) -> list[dict[str, str]]:
     return [{**row, "texture": row.get("texture") or folder.name} for row in rows]
 
 
-def _check_index(rows: Sequence[Mapping[str, str]], index: Path) -> None:
-    """Refuse a column that is nearly one of ours, and a file that stands for two recordings.
-
-    Columns of somebody's own are let be.
-    """
-    columns = rows[0] if rows else ()
-    near = [name for name in columns if get_close_matches(name, KNOWN_COLUMNS, cutoff=0.7)]
-    check_columns(near, KNOWN_COLUMNS, index)
+def _check_files(rows: Sequence[Mapping[str, str]], index: Path) -> None:
+    """Refuse a file that stands for two recordings."""
     files = [(row["file"], row.get("channel", "")) for row in rows]
     for place, (name, channel) in enumerate(files):
         if (name, channel) in files[:place]:
@@ -245,19 +292,19 @@ def _sidecar_files(folder: Path) -> list[Path]:
     return sorted(p for p in folder.glob("*.wav") if p.with_suffix(".json").is_file())
 
 
-def index_cells(recording: Recording) -> tuple[str, ...]:
-    """What the index says of a recording, in the order of `INDEX_COLUMNS` after `file`."""
-    return (
-        recording.texture,
-        repr(recording.speed_mm_s),
-        repr(recording.force_n),
-        repr(recording.rate_hz),
-        recording.unit,
-        str(recording.repeat),
-        str(recording.simulated).lower(),
-        str(recording.samples.size),
-        repr(recording.clipped_share),
-    )
+def index_row(recording: Recording) -> dict[str, object]:
+    """What the index says of a recording beside its file."""
+    return {
+        "texture": recording.texture,
+        "speed_mm_s": recording.speed_mm_s,
+        "force_n": recording.force_n,
+        "rate_hz": recording.rate_hz,
+        "unit": recording.unit,
+        "repeat": recording.repeat,
+        "simulated": bool(recording.simulated),
+        "samples": recording.samples.size,
+        "clipped_share": recording.clipped_share,
+    }
 
 
 def write_samples(path: Path, recording: Recording) -> None:
@@ -278,65 +325,54 @@ def _sidecar_row(path: Path) -> dict[str, str]:
     return {**given, "file": path.name}
 
 
-def _load_row(folder: Path, row: dict[str, str]) -> Recording:
+def stated(folder: Path, row: Mapping[str, str]) -> dict[str, Any]:
+    """What a row of `listed` says; InputError, with table or sidecar, row and column, for a cell
+    that cannot stand there."""
+    return {**typed(row, KNOWN_COLUMNS, _place(folder, row)), "texture": row["texture"]}
+
+
+def _place(folder: Path, row: Mapping[str, str]) -> str:
+    index = folder / INDEX_NAME
+    name = row["file"]
+    if not index.is_file():
+        return f"{Path(name).with_suffix('.json')}"
+    return f"row {shortened(name)} of {index}"
+
+
+def _load_row(folder: Path, row: Mapping[str, str]) -> Recording:
+    told = stated(folder, row)
     path = listed_file(folder, row["file"], index_name=INDEX_NAME)
-    condition = _declared_condition(folder, row)
-    unit = row.get("unit") or "arbitrary"
+    unit, scale_g = told["unit"] or "arbitrary", told["g_per_fullscale"]
     if path.suffix.lower() == ".wav":
-        channel = row.get("channel")
-        samples, rate_hz = read_wav(
-            path, channel=whole_number(channel, f"channel of {path.name}") if channel else None
-        )
-        if row.get("g_per_fullscale"):
-            scale_g = number(row["g_per_fullscale"], f"g_per_fullscale of {path.name}")
-            samples = samples * full_scale(scale_g, path.name)
-            unit = "g"
+        samples, rate_hz = read_wav(path, channel=told["channel"])
+        if scale_g is not None:
+            samples, unit = samples * scale_g, "g"
     else:
         samples = _read_samples(path)
-        rate_hz = number(row.get("rate_hz", ""), f"rate_hz of {path.name}")
+        if (rate_hz := told["rate_hz"]) is None:
+            (column,) = chosen(INDEX_COLUMNS, "rate_hz")
+            raise column.refusal("", _place(folder, row))
     try:
         recording = Recording(
             samples,
             rate_hz,
-            *condition,
-            row["texture"],
+            told["speed_mm_s"],
+            told["force_n"],
+            told["texture"],
             unit=unit,
-            simulated=_flag(row.get("simulated") or "false", f"simulated of {path.name}"),
-            repeat=whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
-            clipped_share=number(
-                row.get("clipped_share") or "nan", f"clipped_share of {path.name}"
-            ),
+            simulated=told["simulated"] == "true",
+            repeat=told["repeat"] or 1,
+            clipped_share=nan if told["clipped_share"] is None else told["clipped_share"],
         )
     except InputError as error:
         raise InputError(f"{path.name}: {error}") from None
-    expected = row.get("samples")
-    if expected and samples.size != number(expected, f"samples of {path.name}"):
+    expected = told["samples"]
+    if expected is not None and samples.size != expected:
         raise InputError(
-            f"expected {shortened(expected)} samples in {path.name}, got {samples.size}; the file "
-            "is truncated or was changed, copy or record it again."
+            f"expected {expected} samples in {path.name}, got {samples.size}; the file is "
+            "truncated or was changed, copy or record it again."
         )
     return recording
-
-
-def _declared_condition(folder: Path, row: Mapping[str, str]) -> tuple[float, float]:
-    """Speed and force of a row; errors name the table, or the sidecar, the row and the column."""
-    name = row["file"]
-    index = folder / INDEX_NAME
-    where = f"row {name} of {index}" if index.is_file() else f"{Path(name).with_suffix('.json')}"
-    try:
-        speed = number(row.get("speed_mm_s", ""), f"speed_mm_s of {name}")
-        force = number(row.get("force_n", ""), f"force_n of {name}")
-        check_condition(speed, force)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    return speed, force
-
-
-def _flag(text: str, name: str) -> bool:
-    # A typing error must not turn simulated data into measured ones.
-    if text.lower() not in ("true", "false"):
-        raise InputError(f"expected true or false for {name}, got {shown(text)}; correct it.")
-    return text.lower() == "true"
 
 
 def _read_samples(path: Path) -> Floats:
@@ -345,7 +381,7 @@ def _read_samples(path: Path) -> Floats:
     lines = text.split("\n")
     if len(lines) < 2 or not text.strip():
         raise InputError(f"expected a header and samples in {path}, got an empty file; re-record.")
-    if is_number(lines[0]):
+    if number_in(lines[0]) is not None:
         raise InputError(
             f"expected a header such as acceleration_g as the first line of {path}, got the number "
             f"{shortened(lines[0])}; add one, or the first sample would be lost."
@@ -358,7 +394,7 @@ def _read_samples(path: Path) -> Floats:
     try:
         return np.array(list(map(float, lines[1:-1])))
     except ValueError:
-        other = next(line for line in lines[1:-1] if not is_number(line))
+        other = next(line for line in lines[1:-1] if number_in(line) is None)
         raise InputError(
             f"expected one number per line in {path}, got {shown(other)}; import files of another "
             "layout with tactileq import csv."

@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 
 import numpy as np
 
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
-from modeling.files.reading import read_text
-from modeling.files.tables import check_named_once, csv_cells, number
+from modeling.files.columns import Column, names
+from modeling.files.tables import read_table
 from modeling.hand import Hand
 
 LONGEST_S = 3600.0
-COLUMNS = ("time_s", "speed_mm_s", "force_n")
+COLUMNS = (
+    Column("time_s", unit="s", description="Rising", limits=(-inf, inf), nan=True, required=True),
+    Column(
+        "speed_mm_s",
+        unit="mm/s",
+        description="Tangential speed, its sign the direction; nan: lift-off",
+        limits=(-inf, inf),
+        nan=True,
+        required=True,
+    ),
+    Column(
+        "force_n",
+        unit="N",
+        description="Normal force; nan: lift-off",
+        limits=(-inf, inf),
+        nan=True,
+        required=True,
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +61,10 @@ class Trajectory:
     force_n: Floats
 
     def __post_init__(self) -> None:
-        for column in COLUMNS:
-            value = np.array(getattr(self, column), dtype=np.float64)
+        for name in names(COLUMNS):
+            value = np.array(getattr(self, name), dtype=np.float64)
             value.setflags(write=False)
-            object.__setattr__(self, column, value)
+            object.__setattr__(self, name, value)
         wrong = self._what_is_wrong()
         if wrong:
             raise InputError(
@@ -108,26 +127,8 @@ def load_trajectory(path: str | Path, *, name: str) -> Trajectory:
     InputError
         For a missing file, missing columns, cells that are no numbers, or times that do not rise.
     """
-    source = Path(path)
-    lines = [line for line in read_text(source, "a trajectory (CSV)").split("\n") if line.strip()]
-    header = csv_cells(lines[0], f"line 1 of {source}") if lines else []
-    missing = [column for column in COLUMNS if column not in header]
-    if missing:
-        raise InputError(
-            f"expected the columns {', '.join(COLUMNS)} in {source}, got no "
-            f"{', '.join(missing)}; name them in the first line, separated by commas."
-        )
-    check_named_once(header, source)
-    rows = [_row(line, header, f"line {n} of {source}") for n, line in enumerate(lines[1:], 2)]
-    time_s, speed_mm_s, force_n = np.array(rows, dtype=np.float64).reshape(-1, 3).T
+    rows = read_table(path, COLUMNS, what="a trajectory (CSV)", delimiter=",")
+    time_s, speed_mm_s, force_n = (
+        np.array([row[column] for row in rows], dtype=np.float64) for column in names(COLUMNS)
+    )
     return Trajectory(name, time_s, speed_mm_s, force_n)
-
-
-def _row(line: str, header: list[str], where: str) -> list[float]:
-    cells = csv_cells(line, where)
-    if len(cells) != len(header):
-        raise InputError(
-            f"expected {len(header)} values in {where}, got {len(cells)}; correct the line."
-        )
-    row = dict(zip(header, cells, strict=True))
-    return [number(row[column], f"{column} in {where}") for column in COLUMNS]

@@ -5,12 +5,41 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib import resources
+from math import inf
+from pathlib import Path
+from typing import Any
 
 from modeling.checks import check_rate
 from modeling.errors import InputError, shown
-from modeling.files.tables import number, read_table, whole_number
+from modeling.files.columns import ABOVE_0, Column
+from modeling.files.tables import read_table
 
-_COLUMNS = ("name", "core", "clock_hz", "memory_bytes", "cycles_per_operation", "source")
+COLUMNS = (
+    Column("name", description="By which scenes name it", required=True),
+    Column("core", description="Its processor, with a floating-point unit", required=True),
+    Column(
+        "clock_hz",
+        unit="Hz",
+        description="The highest clock of the data sheet",
+        limits=(ABOVE_0, inf),
+        required=True,
+    ),
+    Column(
+        "memory_bytes",
+        unit="B",
+        description="RAM; constants may stay in its flash memory",
+        limits=(1, inf),
+        whole=True,
+        required=True,
+    ),
+    Column(
+        "cycles_per_operation",
+        description="Cycles of a floating-point operation, all else included",
+        limits=(ABOVE_0, inf),
+        required=True,
+    ),
+    Column("source", description="The data sheet", required=True),
+)
 
 
 @dataclass(frozen=True)
@@ -68,15 +97,10 @@ class MicroController:
 def _shipped() -> dict[str, MicroController]:
     folder = resources.files("modeling.scenes") / "shipped"
     with resources.as_file(folder / "microcontrollers.tsv") as path:
-        rows = read_table(path, _COLUMNS)
-    return {
-        row["name"]: MicroController(
-            name=row["name"],
-            core=row["core"],
-            clock_hz=number(row["clock_hz"], "clock_hz"),
-            memory_bytes=whole_number(row["memory_bytes"], "memory_bytes"),
-            cycles_per_operation=number(row["cycles_per_operation"], "cycles_per_operation"),
-            source=row["source"],
-        )
-        for row in rows
-    }
+        return load_microcontrollers(path)
+
+
+def load_microcontrollers(path: Path) -> dict[str, MicroController]:
+    """Micro-controllers by name, from a TSV with `COLUMNS`."""
+    rows: list[dict[str, Any]] = [dict(row) for row in read_table(path, COLUMNS)]
+    return {row["name"]: MicroController(**{c.name: row[c.name] for c in COLUMNS}) for row in rows}

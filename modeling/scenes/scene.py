@@ -69,7 +69,7 @@ ForceRange = Annotated[
 ]
 StrokeRate = Annotated[
     float,
-    key("strokes back and forth per second", unit="Hz", ge=0, le=FASTEST_STROKES_HZ),
+    key("strokes back and forth per second (2)", unit="Hz", ge=0, le=FASTEST_STROKES_HZ),
 ]
 
 
@@ -89,7 +89,7 @@ class HandRange(Section):
     def __post_init__(self) -> None:
         super().__post_init__()
         for name in ("speed_mm_s", "force_n"):
-            _check_order(name, getattr(self, name))
+            _check_order(f"{name} under [hand]", getattr(self, name))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,7 +267,7 @@ class Actuator(Section):
         super().__post_init__()
         if self.band_hz is None:
             return
-        _check_order("band_hz", self.band_hz)
+        _check_order("band_hz under [actuator]", self.band_hz)
         if self.band_hz[0] == self.band_hz[1]:
             raise InputError(
                 f"expected a band_hz from a lower to a higher frequency, got {self.band_hz[0]:g} "

@@ -10,7 +10,8 @@ import re
 import tempfile
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -20,16 +21,23 @@ from modeling import Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.checks import check_duration, check_texture_name
 from modeling.errors import InputError, shown
+from modeling.files.columns import Column, chosen, names
 from modeling.files.folders import folder_behind
 from modeling.files.places import clear_unfinished, locked
 from modeling.files.provenance import PROVENANCE_NAME, provenance_text
 from modeling.files.reading import read_text
-from modeling.files.tables import number, read_table, table_text, whole_number, write_table
+from modeling.files.tables import read_cells, table_text, typed, write_table
 from modeling.files.wav import read_wav
 from modeling.files.writing import write_files
 from modeling.models.grid import Condition
 from modeling.recordings.appending import WavSource, append
-from modeling.recordings.recording_set import INDEX_COLUMNS, INDEX_NAME, listed, load_usable
+from modeling.recordings.recording_set import (
+    INDEX_COLUMNS,
+    INDEX_NAME,
+    listed,
+    load_usable,
+    stated,
+)
 from rig.capture.coverage import Coverage
 from rig.capture.cutting import SHORTEST_S, Piece
 from rig.capture.grid import StrokeGrid
@@ -38,11 +46,35 @@ from rig.capture.joining import joined, joined_samples
 PIECES = "pieces"
 TABLE_NAME = "pieces.tsv"
 COLUMNS = (
-    *("file", "texture", "speed_mm_s", "force_n", "repeat", "rate_hz", "samples"),
-    *("mean_speed_mm_s", "speed_sd_mm_s", "mean_force_n", "force_sd_n"),
-    *("simulated", "force_assumed"),
+    Column("file", description="Name of the WAV file in the folder", required=True),
+    Column("texture", description="Name of the surface", required=True),
+    *chosen(INDEX_COLUMNS, "speed_mm_s", "force_n"),
+    *(
+        replace(column, optional=False, required=True)
+        for column in chosen(INDEX_COLUMNS, "repeat", "rate_hz", "samples")
+    ),
+    *(
+        Column(name, unit=unit, description=told, limits=(-inf, inf), nan=True, optional=True)
+        for name, unit, told in (
+            ("mean_speed_mm_s", "mm/s", "Mean speed of the hand"),
+            ("speed_sd_mm_s", "mm/s", "Standard deviation of its speed"),
+            ("mean_force_n", "N", "Mean force"),
+            ("force_sd_n", "N", "Standard deviation of the force"),
+        )
+    ),
+    Column(
+        "simulated",
+        description="Whether the hand or the input was simulated",
+        levels={"true": "simulated", "false": "recorded"},
+        required=True,
+    ),
+    Column(
+        "force_assumed",
+        description="Whether the force was not measured but assumed",
+        levels={"true": "assumed", "false": "measured"},
+        optional=True,
+    ),
 )
-_NEEDED = ("file", "texture", "speed_mm_s", "force_n", "repeat", "rate_hz", "samples", "simulated")
 
 
 @dataclass(frozen=True)
@@ -166,10 +198,10 @@ class PieceStore:
             return False
         self._begin_index()
         with locked(self.folder / PIECES / TABLE_NAME) as table:
-            rows = _rows(table)
+            rows: list[Mapping[str, object]] = [row for _, row in _rows(table)]
             file = _new_name(table.parent, rows)
             rows.append(self._row(file, piece))
-            text = table_text(COLUMNS, [[row.get(name, "") for name in COLUMNS] for row in rows])
+            text = table_text(COLUMNS, rows, missing="")
             # The table last, once the piece is on disk for good.
             write_files(
                 {
@@ -216,7 +248,7 @@ class PieceStore:
     def _read(self) -> None:
         table = self.folder / PIECES / TABLE_NAME
         rows = _rows(table)
-        listed_files = {row["file"] for row in rows}
+        listed_files = {row["file"] for _, row in rows}
         # A run that was killed may have ended between its last piece and the table.
         lost = _files(table.parent) - listed_files
         if lost - ({_name_after(listed_files)} if rows else set()):
@@ -225,17 +257,17 @@ class PieceStore:
                 f"{min(lost)}, of unknown speed and force; restore the table from a copy, or "
                 "stroke there again."
             )
-        for row in rows:
+        for where, cells in rows:
+            row: dict[str, Any] = dict(typed(cells, COLUMNS, where))
             if row["texture"] != self.plan.texture:
                 continue
-            rate_hz = number(row["rate_hz"], f"rate_hz of {row['file']}")
-            if rate_hz != self.plan.rate_hz:
+            if (rate_hz := row["rate_hz"]) != self.plan.rate_hz:
                 raise InputError(
                     f"expected pieces of {self.plan.rate_hz:g} Hz in {self.folder}, got some of "
                     f"{rate_hz:g} Hz; go on at that rate (--rate {rate_hz:g}), or choose another "
                     "folder."
                 )
-            if whole_number(row["repeat"], f"repeat of {row['file']}") == self.plan.repeat:
+            if row["repeat"] == self.plan.repeat:
                 self._keep_whole(_kept(row))
         self._recorded = self._listed_conditions()
         if self._recorded:
@@ -265,10 +297,12 @@ class PieceStore:
             return set()
         return {
             _condition(row)
-            for row in listed(self.folder)
-            if row["texture"] == self.plan.texture
-            and whole_number(row.get("repeat") or "1", f"repeat of {row['file']}")
-            == self.plan.repeat
+            for row in (
+                stated(self.folder, cells)
+                for cells in listed(self.folder)
+                if cells["texture"] == self.plan.texture
+            )
+            if (row["repeat"] or 1) == self.plan.repeat
         }
 
     def _unusable_recordings(self) -> tuple[str, ...]:
@@ -319,15 +353,15 @@ class PieceStore:
         pieces = [self._samples(one) for one in chosen]
         return joined(pieces, self.plan.rate_hz)[: self.plan.wanted_samples]
 
-    def _row(self, name: str, piece: Piece) -> dict[str, str]:
+    def _row(self, name: str, piece: Piece) -> dict[str, object]:
         values = (
-            *(name, self.plan.texture, *map(repr, piece.condition), self.plan.repeat),
-            *(repr(self.plan.rate_hz), piece.samples_g.size),
+            *(name, self.plan.texture, *piece.condition, self.plan.repeat),
+            *(self.plan.rate_hz, piece.samples_g.size),
             *(f"{piece.mean_speed_mm_s:.4g}", f"{piece.speed_sd_mm_s:.4g}"),
             *(f"{piece.mean_force_n:.4g}", f"{piece.force_sd_n:.4g}"),
-            *(_word(piece.simulated or self.plan.simulated), _word(piece.force_assumed)),
+            *(bool(piece.simulated or self.plan.simulated), bool(piece.force_assumed)),
         )
-        return dict(zip(COLUMNS, map(str, values), strict=True))
+        return dict(zip(names(COLUMNS), values, strict=True))
 
 
 def _check_folder(folder: Path) -> None:
@@ -344,23 +378,24 @@ def _check_folder(folder: Path) -> None:
         )
 
 
-def _rows(table: Path) -> list[dict[str, str]]:
+def _rows(table: Path) -> list[tuple[str, dict[str, str]]]:
+    """The rows as text, each with its place; numbers stay as they were written."""
     if not table.is_file():
         return []
-    rows = read_table(table, _NEEDED)
+    rows = read_cells(table, COLUMNS)
     if last := read_text(table, "a table").rpartition("\n")[2]:
         raise InputError(
             f"expected {table} to end with a whole line, got {shown(last)} at its end; the "
             "table is truncated, restore it from a copy, or remove that line."
         )
-    for row in rows:
-        _check_name(row["file"])
+    for _, row in rows:
+        _check_name(row["file"], table)
     return rows
 
 
-def _new_name(folder: Path, rows: Sequence[Mapping[str, str]]) -> str:
+def _new_name(folder: Path, rows: Sequence[Mapping[str, object]]) -> str:
     """A name that neither the table nor a file has, since a file that is not listed may be data."""
-    return _name_after({row["file"] for row in rows} | _files(folder))
+    return _name_after({str(row["file"]) for row in rows} | _files(folder))
 
 
 def _name_after(names: Iterable[str]) -> str:
@@ -373,21 +408,20 @@ def _files(folder: Path) -> set[str]:
     return {path.name for path in folder.glob("*.wav") if _is_piece(path.name)}
 
 
-def _kept(row: Mapping[str, str]) -> _Kept:
+def _kept(row: Mapping[str, Any]) -> _Kept:
     return _Kept(
         row["file"],
         _condition(row),
-        whole_number(row["samples"], f"samples of {row['file']}"),
+        row["samples"],
         simulated=row["simulated"] != "false",
     )
 
 
-def _check_name(name: str) -> None:
+def _check_name(name: str, table: Path) -> None:
     """Refuse a file that no piece can be in: names are numbers, and lead nowhere else."""
     if not _is_piece(name):
         raise InputError(
-            f"expected a file such as 00001.wav in {PIECES}/{TABLE_NAME}, got {shown(name)}; "
-            "remove the line."
+            f"expected a file such as 00001.wav in {table}, got {shown(name)}; remove the line."
         )
 
 
@@ -395,13 +429,8 @@ def _is_piece(name: str) -> bool:
     return re.fullmatch(r"[0-9]{1,9}\.wav", name) is not None
 
 
-def _condition(row: Mapping[str, str]) -> Condition:
-    speed, force = (number(row[n], f"{n} of {row['file']}") for n in ("speed_mm_s", "force_n"))
-    return speed, force
-
-
-def _word(value: bool) -> str:
-    return str(value).lower()
+def _condition(row: Mapping[str, Any]) -> Condition:
+    return row["speed_mm_s"], row["force_n"]
 
 
 def _wav(samples: Floats, rate_hz: float) -> bytes:

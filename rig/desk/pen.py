@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
-from contextlib import ExitStack
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 
 from modeling import InputError
+from rig.desk.messages import Begin, End, Listening, Take, Taken
 from rig.desk.parts import input_settings
 from rig.interface import Acceleration
-from rig.live.child import Child, ChildLost
+from rig.live.child import Child, ChildLost, Reply
+from rig.live.messages import Done, Message
 from rig.setup.sections import AccelerometerSection
 
 TAKE_S = 30.0
@@ -30,10 +26,8 @@ class Pen:
 
     def __init__(self, section: AccelerometerSection) -> None:
         self._section = section
-        self._stack = ExitStack()
         self._child: Child | None = None
         self._rate_hz = 0.0
-        self._folder = Path()
         self.lost = ""
 
     def __enter__(self) -> Pen:
@@ -44,52 +38,50 @@ class Pen:
         InputError
             For a device, channel or rate that there is not.
         """
-        with ExitStack() as stack:
-            self._folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            settings = {"input": asdict(input_settings(self._section)), "folder": str(self._folder)}
-            try:
-                self._child = Child("rig.desk.pen_process", settings)
-            except ChildLost as lost:
-                raise InputError(
-                    f"expected the accelerometer's process to start, got: {lost}; check its device "
-                    "(tactileq rig check)."
-                ) from None
-            stack.callback(self._child.close)
-            self._rate_hz = float(self._child.ready["rate_hz"])
-            self._stack = stack.pop_all()
+        self._child = Child("rig.desk.pen_process", input_settings(self._section))
+        try:
+            self._rate_hz = self._child.ready(Listening).rate_hz
+        except ChildLost as lost:
+            raise InputError(
+                f"expected the accelerometer's process to start, got: {lost}; check its device "
+                "(tactileq rig check)."
+            ) from None
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        if self._child is not None:
+            self._child.close()
 
     def begin(self, start_s: float) -> None:
         """Keep what is measured from this moment on (by `now_s`)."""
-        self._ask({"do": "begin", "start_s": start_s})
+        self._ask(Begin(start_s), Done)
 
     def end(self) -> None:
         """Keep no more."""
-        self._ask({"do": "end"})
+        self._ask(End(), Done)
 
     def take(self, opened_s: float) -> tuple[Acceleration, ...]:
         """What was kept since the last call, on the clock of a rig that was opened then."""
-        reply = self._ask({"do": "take"})
-        if not reply.get("runs", False):
-            self.lost = self.lost or "its sound server or its device is gone"
+        taken = self._ask(Take(), Taken)
+        if taken is None:
+            return ()
+        if not taken.runs:
+            self.lost = "its sound server or its device is gone"
         return tuple(
             Acceleration(
-                start_s=piece["start_s"] - opened_s,
+                start_s=piece.start_s - opened_s,
                 rate_hz=self._rate_hz,
-                samples_g=np.load(piece["file"]).astype(np.float64),
+                samples_g=np.frombuffer(piece.samples_g, dtype=np.float32).astype(np.float64),
             )
-            for piece in reply.get("pieces", ())
+            for piece in taken.pieces
         )
 
-    def _ask(self, wanted: dict[str, Any]) -> dict[str, Any]:
+    def _ask(self, request: Message, kind: type[Reply]) -> Reply | None:
         """The process' answer; none once it is lost, which `lost` then reports."""
         if self._child is None or self.lost:
-            return {}
+            return None
         try:
-            return self._child.ask(wanted, within_s=TAKE_S)
+            return self._child.ask(request, kind, within_s=TAKE_S)
         except ChildLost as lost:
             self.lost = str(lost)
-            return {}
+            return None

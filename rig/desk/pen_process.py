@@ -1,25 +1,19 @@
 """The process that follows an accelerometer at the pen, and keeps what is asked for.
 
-Its settings are the argument, as JSON; it answers each line by one, and ends with its input. It is
-a process of its own since PortAudio may end, or stop indefinitely, a process whose sound server
-dies.
+It is driven by `rig.desk.messages`, and a process of its own since PortAudio may end, or stop
+indefinitely, a process whose sound server dies.
 """
 
 from __future__ import annotations
 
-import json
-import shutil
-import sys
 import threading
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from modeling import InputError
 from rig.capture.input import AudioInput, InputBlock, InputSettings
-from rig.live.driven import settings_from_parent, tell
+from rig.desk.messages import Begin, End, Listening, Piece, Request, Take, Taken
+from rig.live.driven import Parent
+from rig.live.messages import Done, Message
 
 LOOK_S = 0.25  # from one look at the input to the next
 RECENT_S = 2.0  # what is not asked for is forgotten after this time
@@ -85,23 +79,16 @@ class PenLog:
 
 
 def main() -> None:
-    """Follow the input until standard input ends."""
-    settings = settings_from_parent()
-    source = AudioInput(InputSettings(**settings["input"]))
-    try:
+    """Follow the input until the parent is gone."""
+    with Parent() as parent:
+        source = AudioInput(parent.settings(InputSettings))
         source.open()
-    except InputError as error:
-        tell({"error": str(error)})
-        return
-    log, closing, folder = PenLog(source), threading.Event(), Path(settings["folder"])
-    thread = threading.Thread(target=_follow, args=(log, closing), daemon=True)
-    thread.start()
-    tell({"rate_hz": source.rate_hz})
-    for line in sys.stdin:
-        tell(_answer(log, source, json.loads(line), folder=folder))
-    shutil.rmtree(folder, ignore_errors=True)  # the parent may have been killed
-    closing.set()
-    source.close()
+        log, closing = PenLog(source), threading.Event()
+        threading.Thread(target=_follow, args=(log, closing), daemon=True).start()
+        parent.tell(Listening(source.rate_hz))
+        parent.serve(Request, lambda request: _answer(log, source, request=request))
+        closing.set()
+        source.close()
 
 
 def _follow(log: PenLog, closing: threading.Event) -> None:
@@ -109,28 +96,21 @@ def _follow(log: PenLog, closing: threading.Event) -> None:
         log.look()
 
 
-def _answer(
-    log: PenLog, source: AudioInput, wanted: Mapping[str, Any], *, folder: Path
-) -> dict[str, Any]:
-    match wanted["do"]:
-        case "begin":
-            log.begin(wanted["start_s"])
-        case "end":
+def _answer(log: PenLog, source: AudioInput, *, request: Request) -> Message:
+    match request:
+        case Begin(start_s):
+            log.begin(start_s)
+        case End():
             log.end()
-        case "take":
-            return {"runs": source.running, "pieces": _saved(log.take(), source, folder)}
-    return {}
+        case Take():
+            scale = source.settings.g_per_fullscale
+            return Taken(source.running, tuple(_piece(blocks, scale) for blocks in log.take()))
+    return Done()
 
 
-def _saved(pieces: list[list[InputBlock]], source: AudioInput, folder: Path) -> list[Any]:
-    """Each piece as a file of numbers in g, and when it begins."""
-    written = []
-    for number, piece in enumerate(pieces):
-        samples = np.concatenate([block.samples for block in piece])
-        path = folder / f"{number}.npy"
-        np.save(path, (samples * source.settings.g_per_fullscale).astype(np.float32))
-        written.append({"file": str(path), "start_s": piece[0].time_s})
-    return written
+def _piece(blocks: list[InputBlock], scale: float) -> Piece:
+    samples_g = scale * np.concatenate([block.samples for block in blocks])
+    return Piece(blocks[0].time_s, samples_g.astype(np.float32).tobytes())
 
 
 if __name__ == "__main__":

@@ -7,10 +7,10 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
 
 from rig.hand.devices import open_device
 from rig.hand.following import Follower, Reading
+from rig.hand.messages import Counts, Fault, Firmware
 from rig.hand.sample import LOST_S, Device, DeviceLost
 from rig.hand.settings import HandSettings
 from rig.hand.tracking import REST_S
@@ -20,7 +20,7 @@ BEAT_S = 0.002  # readings are written so often at most, and at rest
 AGAIN_S = 0.5  # between attempts to open a device that is gone
 COUNTS_S = 1.0  # between reports of what was read and lost
 
-Tell = Callable[[dict[str, Any]], None]
+Tell = Callable[[Fault | Counts | Firmware], None]
 
 
 class HandLoop:
@@ -31,8 +31,7 @@ class HandLoop:
     live : Live
     settings : HandSettings
     tell : callable
-        Takes what the parent should know: {"fault": sentence}, {"counts": {name: number}} or
-        {"firmware": version}.
+        Takes what the parent should know.
     opening : callable
         Gives the open device; InputError where it cannot.
     """
@@ -123,7 +122,7 @@ class HandLoop:
                 self._unwritten = reading
         if device.firmware != self._firmware:
             self._firmware = device.firmware
-            self._tell({"firmware": self._firmware})
+            self._tell(Firmware(self._firmware))
         counts = device.counts()
         if samples:
             self._tell_late(device, counts.get("late", 0))
@@ -136,13 +135,13 @@ class HandLoop:
                 f"expected the readings of the {device.name} within {LOST_S:g} s, got "
                 f"{late - self._late} that came later and were dropped; close other programs."
             )
-            self._tell({"fault": told})
+            self._tell(Fault(told))
             self._late = late
 
     def _report(self, counts: dict[str, int]) -> None:
         if counts != self._counts and now_s() > self._counts_s + COUNTS_S:
             self._counts, self._counts_s = counts, now_s()
-            self._tell({"counts": counts})
+            self._tell(Counts(counts))
 
     def _lose(self, why: str) -> None:
         self._write(self._follower.gone(now_s()))
@@ -152,7 +151,7 @@ class HandLoop:
         self._again_s = now_s() + AGAIN_S
         if why != self._told:
             self._told = why
-            self._tell({"fault": why})
+            self._tell(Fault(why))
 
     def _open_again(self) -> None:
         """Try to open the device in a thread: a sensor may take seconds, and the beat goes on."""

@@ -11,15 +11,24 @@ import numpy as np
 
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
-from modeling.files.tables import number, read_table
+from modeling.files.columns import Column, names
+from modeling.files.tables import read_table
 from rig.hand.sample import Sample
 from rig.hand.settings import SCRIPTS, HandSettings
 from rig.hand.tracking import REST_S
 from rig.live.memory import now_s
 
 RATE_HZ = 1000
-COLUMNS = ("time_s", "x_mm", "y_mm", "force_n")
 _LARGEST = 1e6  # of any number in a table
+COLUMNS = tuple(
+    Column(name, unit=unit, description=told, limits=(-_LARGEST, _LARGEST), required=True)
+    for name, unit, told in (
+        ("time_s", "s", "Rising; the first moment is when the device is opened"),
+        ("x_mm", "mm", "Position along x"),
+        ("y_mm", "mm", "Position along y"),
+        ("force_n", "N", "Normal force; the hand is lifted where it is 0 or less"),
+    )
+)
 _MOST_AT_ONCE = 1000  # after a longer pause, as when the process was stopped, the rest is left out
 
 
@@ -84,7 +93,7 @@ class Trajectory:
         """From a table with the columns time_s, x_mm, y_mm and force_n."""
         rows = read_table(path, COLUMNS)
         time_s, x_mm, y_mm, force_n = (
-            np.array([number(row[name], name) for row in rows]) for name in COLUMNS
+            np.array([row[name] for row in rows], dtype=float) for name in names(COLUMNS)
         )
         return cls(time_s, x_mm, y_mm=y_mm, force_n=force_n)
 

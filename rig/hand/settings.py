@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
-from typing import Any
 
 from modeling.checks import (
     check_choice,
-    check_keys,
     check_name,
     check_number,
     check_whole,
@@ -94,7 +91,6 @@ class HandSettings:
         check_whole("baud", self.baud, low=1200, high=12_000_000)
         self._check_what_is_assumed()
         if self.pressure_points is not None:
-            object.__setattr__(self, "pressure_points", _tuples(self.pressure_points))
             check_points(self.pressure_points)
 
     def _check_what_is_assumed(self) -> None:
@@ -114,21 +110,6 @@ class HandSettings:
                 f"expected {name} of a {self.kind} ({why}), got none; give it under [hand]."
             )
 
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> HandSettings:
-        """From plain values; InputError where they cannot be used."""
-        known = tuple(field.name for field in fields(cls))
-        check_keys(values, known, where="the settings of a hand")
-        if "kind" not in values:
-            raise InputError(
-                f"expected the kind of hand, got none; give one of {', '.join(KINDS)}."
-            )
-        return cls(**values)
-
 
 def check_points(points: object) -> None:
     """Refuse all but two or more points of rising pressure (a share) and rising force (N, ≥ 0)."""
@@ -143,11 +124,6 @@ def check_points(points: object) -> None:
             "expected rising pressure and force from 0 N up in a pressure curve, got "
             f"{shown(points)}; sort the points, or calibrate again."
         )
-
-
-def _tuples(values: object) -> object:
-    """Lists in lists, as JSON has them, as tuples in tuples."""
-    return tuple(map(_tuples, values)) if isinstance(values, list | tuple) else values
 
 
 def _is_point(point: object) -> bool:

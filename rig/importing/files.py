@@ -15,8 +15,9 @@ from modeling import InputError, Recording, RecordingSet
 from modeling.arrays import Floats
 from modeling.checks import check_number
 from modeling.errors import counted, shortened, shown
+from modeling.files.columns import number_in
 from modeling.files.reading import read_bytes
-from modeling.files.tables import csv_cells, is_number
+from modeling.files.tables import csv_cells
 from modeling.files.wav import full_scale, read_wav
 from modeling.recordings.appending import WavSource
 from modeling.recordings.recording import clipped_samples
@@ -386,7 +387,7 @@ def _read_lines(path: Path) -> tuple[list[str], bool]:
 
 def _check_last_row(path: Path, row: Sequence[str], header: Sequence[str]) -> str:
     """Refuse a row without a line end that is not whole; else a warning that it may not be."""
-    if len(row) != len(header) or not is_number(row[-1].replace(",", ".")):
+    if len(row) != len(header) or number_in(row[-1].replace(",", ".")) is None:
         raise InputError(
             f"expected {path.name} to end with a whole row, got {shown(','.join(row))} without a "
             "line end; the file is truncated, export or record it again."
@@ -428,7 +429,7 @@ def _read_columns(
     header = [cell.strip() for cell in rows[0]]
     if len(rows) > 2 and all(_UNIT_ALONE.fullmatch(cell) for cell in rows[1]):
         header = [f"{name} {unit.strip()}" for name, unit in zip(header, rows.pop(1), strict=False)]
-    if all(is_number(cell) for cell in header):
+    if all(number_in(cell) is not None for cell in header):
         raise InputError(
             f"expected a header line in {path.name} (time,x,y,z), got numbers; add one."
         )
@@ -449,7 +450,7 @@ def _read_columns(
     try:
         values = np.array(rows[1:], dtype=np.float64)
     except ValueError:
-        other = next((cell for row in rows[1:] for cell in row if not is_number(cell)), "text")
+        other = next((cell for row in rows[1:] for cell in row if number_in(cell) is None), "text")
         raise InputError(
             f"expected numbers below the header of {path.name}, got {shown(other)}; correct the "
             "file."

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from modeling import InputError
-from modeling.files.tables import check_columns, number, read_table, whole_number
-from modeling.files.wav import full_scale
+from modeling.files.columns import Column, chosen
+from modeling.files.tables import read_cells, typed
+from modeling.recordings.recording_set import KNOWN_COLUMNS
 
 LABEL_COLUMNS = (
-    *("file", "speed_mm_s", "force_n"),
-    *("texture", "repeat", "g_per_fullscale", "channel"),
+    *chosen(KNOWN_COLUMNS, "file", "speed_mm_s", "force_n"),
+    Column("texture", description="Name of the surface", optional=True),
+    *chosen(KNOWN_COLUMNS, "repeat", "g_per_fullscale", "channel"),
 )
 
 
@@ -49,14 +52,14 @@ def labels_from_table(
         For a column that is not known, a file that the table names not once, and cells that are no
         usable numbers.
     """
-    rows: dict[str, dict[str, str]] = {}
-    for row in read_table(table, LABEL_COLUMNS[:3]):
-        check_columns(row, LABEL_COLUMNS, table)
+    rows: dict[str, tuple[str, dict[str, str]]] = {}
+    for where, row in read_cells(table, LABEL_COLUMNS, only=True):
+        typed(row, LABEL_COLUMNS[:1], where)  # others may be filled in later
         if row["file"] in rows:
             raise InputError(
                 f"expected one row for {row['file']} in {table}, got several; remove the wrong one."
             )
-        rows[row["file"]] = row
+        rows[row["file"]] = where, row
     fallback = texture or table.parent.resolve().name
     used, labels = set(), []
     for path in paths:
@@ -64,18 +67,18 @@ def labels_from_table(
             raise InputError(
                 f"expected a row for {path.name} in {table}, got none; add its speed and force."
             )
-        used.add(found["file"])
-        labels.append(_label(path, found, texture=fallback))
+        where, row = found
+        used.add(row["file"])
+        labels.append(_label(typed(row, LABEL_COLUMNS, where), texture=fallback))
     return labels, tuple(file for file in rows if file not in used)
 
 
-def _label(path: Path, row: Mapping[str, str], *, texture: str) -> Label:
-    scale, channel = row.get("g_per_fullscale"), row.get("channel")
+def _label(row: Mapping[str, Any], *, texture: str) -> Label:
     return Label(
-        row.get("texture") or texture,
-        number(row["speed_mm_s"], f"speed_mm_s of {path.name}"),
-        number(row["force_n"], f"force_n of {path.name}"),
-        whole_number(row.get("repeat") or "1", f"repeat of {path.name}"),
-        full_scale(number(scale, f"g_per_fullscale of {path.name}"), path.name) if scale else None,
-        whole_number(channel, f"channel of {path.name}") if channel else None,
+        row["texture"] or texture,
+        row["speed_mm_s"],
+        row["force_n"],
+        row["repeat"] or 1,
+        row["g_per_fullscale"],
+        row["channel"],
     )

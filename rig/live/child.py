@@ -1,38 +1,37 @@
-"""A process of a rig that is driven by lines of JSON, watched and killed.
+"""A process of a rig that is driven by messages, watched and killed.
 
 docs/method/live.md#processes
 """
 
 from __future__ import annotations
 
-import json
 import os
 import queue
+import signal
 import subprocess
 import sys
 import sysconfig
 import tempfile
 import threading
-from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, TypeVar
 
 from modeling.errors import InputError
+from rig.live.messages import Message, Refused, decoded, received, send
 
 ANSWER_S = 5.0
 START_S = 15.0
 END_S = 2.0
+Reply = TypeVar("Reply", bound=Message)
 
 
 class ChildLost(RuntimeError):
     """The process has ended, or does not answer; the message is a part of a sentence."""
 
 
-def started(
-    module: str, settings: Mapping[str, Any], *, complaints: IO[bytes]
-) -> subprocess.Popen[str]:
-    """`python -P -m MODULE SETTINGS`, with pipes; its standard error goes to `complaints`.
+def _started(module: str, complaints: IO[bytes]) -> subprocess.Popen[bytes]:
+    """`python -P -m MODULE`, with pipes; its standard error goes to `complaints`.
 
     Its rooms are those of this process, installed or not. Without -P a file `rig.py` in the working
     folder would be imported in place of the room.
@@ -44,51 +43,43 @@ def started(
     if rooms not in (sysconfig.get_path("purelib"), sysconfig.get_path("platlib")):
         others.insert(0, rooms)
     return subprocess.Popen(
-        [sys.executable, "-P", "-m", module, json.dumps(settings)],
+        [sys.executable, "-P", "-m", module],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(others)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=complaints,
-        text=True,
     )
 
 
-def last_complaint(complaints: IO[bytes]) -> str:
+def _last_line(complaints: IO[bytes]) -> str:
     """The last line that a process wrote to its standard error, in brackets; empty for none."""
     complaints.seek(0)
-    lines = complaints.read().decode(errors="replace").split("\n")
-    last = [line.strip() for line in lines if line.strip()][-1:]
-    return f" ({last[0]})" if last else ""
+    text = complaints.read().decode(errors="replace").strip()
+    return f" ({text.splitlines()[-1].strip()})" if text else ""
 
 
 class Child:
-    """A process of `started`, which answers one line for each line that it gets.
+    """A process with a `rig.live.driven.Parent` at its other end; it is started at once.
 
     Parameters
     ----------
     module : str
-    settings : mapping
-        For the command line, as JSON.
-
-    Raises
-    ------
-    InputError
-        If it refuses its settings: its own sentence.
-    ChildLost
-        If it ends or does not answer.
+    settings : object
+        What it gets first: a frozen type that msgspec knows.
     """
 
-    def __init__(self, module: str, settings: Mapping[str, Any]) -> None:
+    def __init__(self, module: str, settings: object) -> None:
         self._complaints = tempfile.TemporaryFile()  # noqa: SIM115 (it lives as long as this)
-        self._said = ""
-        self._process = started(module, settings, complaints=self._complaints)
-        self._answers: queue.Queue[str] = queue.Queue()
+        self._ending = threading.Lock()
+        self._end = ""
+        self._process = _started(module, self._complaints)
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._stdin, self._stdout = self._process.stdin, self._process.stdout
+        self._heard: queue.Queue[bytes | None] = queue.Queue()
         threading.Thread(target=self._listen, daemon=True).start()
-        try:
-            self.ready = self._answer(START_S)
-        except (InputError, ChildLost):
-            self.kill()
-            raise
+        with suppress(OSError):  # `ready` says why
+            send(self._stdin, settings)
 
     @property
     def pid(self) -> int:
@@ -100,65 +91,95 @@ class Child:
         """Whether it has not ended."""
         return self._process.poll() is None
 
-    def ask(self, wanted: Mapping[str, Any], *, within_s: float = ANSWER_S) -> dict[str, Any]:
-        """Its answer to one line.
+    def ready(self, kind: type[Reply], *, within_s: float = START_S) -> Reply:
+        """Its first message; without one it is killed.
+
+        Raises
+        ------
+        InputError
+            If it refuses its settings: its own sentence.
+        ChildLost
+            If it ends or does not answer.
+        """
+        try:
+            return self.hear(kind, within_s=within_s)  # type: ignore[no-any-return]
+        except (InputError, ChildLost):
+            self.kill()
+            raise
+
+    def ask(self, request: Message, kind: type[Reply], *, within_s: float = ANSWER_S) -> Reply:
+        """Its answer, of this kind, to a request.
 
         Raises
         ------
         InputError
             If it refuses: its own sentence.
         ChildLost
-            If it has ended, or does not answer in time.
+            If it has ended, does not answer in time or answers something else.
         """
-        assert self._process.stdin is not None
+        self.tell(request)
+        return self.hear(kind, within_s=within_s)  # type: ignore[no-any-return]
+
+    def tell(self, request: Message) -> None:
+        """Send a request; ChildLost if it has ended."""
         try:
-            self._process.stdin.write(json.dumps(wanted) + "\n")
-            self._process.stdin.flush()
+            send(self._stdin, request)
         except (OSError, ValueError):
-            raise ChildLost(f"it has ended{self._complaint()}") from None
-        return self._answer(within_s)
+            raise ChildLost(f"it has ended {self.end()}") from None
+
+    def hear(self, kinds: Any, *, within_s: float | None = None) -> Any:
+        """Its next message, one of these types (a union or a type); raises what `ask` does."""
+        try:
+            heard = self._heard.get(timeout=within_s)
+        except queue.Empty:
+            raise ChildLost(f"it has not answered for {within_s:g} s") from None
+        if heard is None:
+            self._heard.put(None)  # for who asks next
+            raise ChildLost(f"it has ended {self.end()}")
+        try:
+            message = decoded(heard, kinds | Refused)
+        except InputError as error:
+            self.kill(f" ({error})")
+            raise ChildLost(f"it was killed ({error})") from None
+        if isinstance(message, Refused):
+            raise InputError(message.told)
+        return message
 
     def close(self) -> None:
         """End it by the end of its input; kill it where it does not."""
         with suppress(OSError, ValueError):
-            assert self._process.stdin is not None
-            self._process.stdin.close()
+            self._stdin.close()
+        self.end()
+
+    def end(self) -> str:
+        """Wait for its end, kill it where it does not come.
+
+        Returns
+        -------
+        str
+            By which signal or with which code it ended, and its last complaint.
+        """
         with suppress(subprocess.TimeoutExpired):
             self._process.wait(END_S)
         self.kill()
+        return self._end
 
-    def kill(self) -> None:
+    def kill(self, why: str = "") -> None:
         """End it at once."""
         self._process.kill()
-        self._process.wait()
-        for pipe in (self._process.stdin, self._process.stdout):
+        code = self._process.wait()
+        for pipe in (self._stdin, self._stdout):
             with suppress(OSError, ValueError):
-                assert pipe is not None
                 pipe.close()
-        self._said = self._complaint()
-        self._complaints.close()
-
-    def _complaint(self) -> str:
-        """The last line of its standard error, after its end, too."""
-        return self._said if self._complaints.closed else last_complaint(self._complaints)
+        with self._ending:
+            if not self._complaints.closed:
+                how = f"by {signal.Signals(-code).name}" if code < 0 else f"with code {code}"
+                self._end = how + (why or _last_line(self._complaints))
+                self._complaints.close()
 
     def _listen(self) -> None:
-        """Pass its lines on; an empty one is its end."""
-        assert self._process.stdout is not None
+        """Pass its messages on; None is its end."""
         with suppress(ValueError, OSError):  # closed by `kill`
-            for line in self._process.stdout:
-                self._answers.put(line)
-        self._answers.put("")
-
-    def _answer(self, within_s: float) -> dict[str, Any]:
-        try:
-            line = self._answers.get(timeout=within_s)
-        except queue.Empty:
-            raise ChildLost(f"it has not answered for {within_s:g} s") from None
-        if not line:
-            self._answers.put("")  # for who asks next
-            raise ChildLost(f"it has ended{self._complaint()}")
-        answer: dict[str, Any] = json.loads(line)
-        if "error" in answer:
-            raise InputError(answer["error"])
-        return answer
+            for data in received(self._stdout):
+                self._heard.put(data)
+        self._heard.put(None)

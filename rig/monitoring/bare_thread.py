@@ -1,16 +1,27 @@
-"""A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread SETTINGS`.
+"""A thread that does nothing but wake up in time: `python -m rig.monitoring.bare_thread`.
 
-Its misses are due to the machine; they are shown beside those of the audio callback. To each
-line on standard input it answers how often it woke up and how often too late.
+Its misses are due to the machine; they are shown beside those of the audio callback.
+It is started with its period in seconds.
 """
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 
-from rig.live.driven import settings_from_parent, tell
+from rig.live.driven import Parent
+from rig.live.messages import Done, Message
+
+
+class WakeUps(Message, frozen=True):
+    """How often it woke up so far, and how often too late."""
+
+    periods: int
+    misses: int
+
+
+class Look(Message, frozen=True):
+    """How often did it wake up?"""
 
 
 class BareThread:
@@ -44,12 +55,12 @@ class BareThread:
 
 
 def main() -> None:
-    """Wake up until standard input ends."""
-    thread = BareThread(float(settings_from_parent()["period_s"]))
-    threading.Thread(target=thread.run, daemon=True).start()
-    tell({"running": True})
-    for _ in sys.stdin:
-        tell({"periods": thread.periods, "misses": thread.misses})
+    """Wake up until the parent is gone."""
+    with Parent() as parent:
+        thread = BareThread(parent.settings(float))
+        threading.Thread(target=thread.run, daemon=True).start()
+        parent.tell(Done())
+        parent.serve(Look, lambda _: WakeUps(thread.periods, thread.misses))
 
 
 if __name__ == "__main__":

@@ -7,23 +7,23 @@ module, is the one that ships.
 
 from __future__ import annotations
 
+import datetime
 import hashlib
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar, Self
 
-from modeling import InputError
-from modeling.checks import check_keys
-from modeling.files.documents import check_version, read_toml, toml_section
+from modeling.files.described import BESIDE, DescribedFile, keys_of, naming
+from modeling.files.documents import read_toml
 from modeling.files.hashes import sha256_of_values
 from modeling.files.reading import read_bytes, read_text
 from modeling.files.writing import write_text
 from modeling.rendering.limits import Limits
 from modeling.vibrators.vibrator import Vibrator
-from rig.setup.editing import with_value
+from rig.setup.editing import with_values
 from rig.setup.figures import Curve, Figure
 from rig.setup.sections import (
     AccelerometerSection,
@@ -35,56 +35,42 @@ from rig.setup.sections import (
     RigName,
     SoundSection,
     VibratorSection,
-    figures_of,
-    plain_section,
-    section_from,
 )
 
-VERSION = 1
 SHIPPED_RIG_FILE = Path(__file__).with_name("desk_rig.toml")
-_SECTIONS: dict[str, type[Any]] = {
-    "rig": RigName,
-    "sound": SoundSection,
-    "vibrator": VibratorSection,
-    "limits": LimitsSection,
-    "hand": HandSection,
-    "accelerometer": AccelerometerSection,
-    "latency": LatencySection,
-    "calibration": CalibrationSection,
-    "real_surface": RealSurfaceSection,
-}
-_NOT_NEEDED = ("accelerometer", "latency", "calibration")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigFile:
-    """One rig, as its file describes it; made by `RigFile.load`.
+class RigFile(DescribedFile):
+    """One rig, as its file describes it.
 
     Parameters
     ----------
-    path : Path
-        The file.
     rig, sound, vibrator, limits, hand, accelerometer, latency, calibration, real_surface
         Its sections (`rig.setup.sections`). None where there is no accelerometer, and where
         latency or calibration have not been measured yet.
+    path : Path
+        The file.
     identified : Vibrator, optional
         What the file that [vibrator] names holds.
     """
 
-    path: Path
+    WHAT: ClassVar[str] = "a rig file"
+    VERSION: ClassVar[int] = 1
     rig: RigName
     sound: SoundSection
     vibrator: VibratorSection
-    limits: LimitsSection
+    limits: LimitsSection = field(default=LimitsSection())
     hand: HandSection
-    accelerometer: AccelerometerSection | None
-    latency: LatencySection | None
-    calibration: CalibrationSection | None
+    accelerometer: AccelerometerSection | None = None
+    latency: LatencySection | None = None
+    calibration: CalibrationSection | None = None
     real_surface: RealSurfaceSection
-    identified: Vibrator | None
+    path: Annotated[Path, BESIDE] = Path()
+    identified: Annotated[Vibrator | None, BESIDE] = None
 
-    @staticmethod
-    def load(path: str | Path) -> RigFile:
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
         """Read a rig file (TOML).
 
         Raises
@@ -94,11 +80,17 @@ class RigFile:
             other units, or values out of range; likewise of the vibrator that it names.
         """
         file = Path(path)
-        values = read_toml(file, "a rig file")
-        return _rig_from(values, file)
+        return cls._from(read_toml(file, cls.WHAT), file)
 
-    @staticmethod
-    def updated(path: str | Path, values: Mapping[str, object]) -> RigFile:
+    @classmethod
+    def _from(cls, values: Mapping[str, Any], file: Path) -> Self:
+        with naming(file):
+            rig = cls.from_tables(values)
+            named = [Vibrator.load(vibrator) for vibrator in replace(rig, path=file).files]
+        return replace(rig, path=file, identified=next(iter(named), None))
+
+    @classmethod
+    def updated(cls, path: str | Path, values: Mapping[str, object]) -> Self:
         """Change a rig file and read it again; comments are kept, and the file is never left half
         written.
 
@@ -115,14 +107,11 @@ class RigFile:
             has changed.
         """
         file = Path(path)
-        RigFile.load(file)
-        text = read_text(file, "a rig file")
-        for name, value in values.items():
-            section, _, key = name.partition(".")
-            text = with_value(text, section, key, value=value)
-        _rig_from(tomllib.loads(text), file)
+        cls.load(file)
+        text = with_values(read_text(file, cls.WHAT), values)
+        rig = cls._from(tomllib.loads(text), file)
         write_text(file, text)
-        return RigFile.load(file)
+        return rig
 
     @cached_property
     def vibrator_sha256(self) -> str | None:
@@ -134,10 +123,10 @@ class RigFile:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values that JSON takes too, defaults written out."""
-        sections = {name: getattr(self, name) for name in _SECTIONS}
-        given = {name: plain_section(part) for name, part in sections.items() if part is not None}
-        identified = {} if self.identified is None else {"file_sha256": self.identified.sha256}
-        return {"version": VERSION, **given, "vibrator": given["vibrator"] | identified}
+        given: dict[str, Any] = _given(super().to_dict())
+        if self.identified is not None:
+            given["vibrator"]["file_sha256"] = self.identified.sha256
+        return {"version": self.VERSION, **given}
 
     @cached_property
     def sha256(self) -> str:
@@ -146,11 +135,13 @@ class RigFile:
 
     def figures(self) -> dict[str, Figure | Curve]:
         """Every quantity by its name "section.key", in the order of the file."""
+        sections = [(one.name, getattr(self, one.field)) for one in keys_of(RigFile)]
         return {
-            f"{name}.{key}": figure
-            for name in _SECTIONS
-            if getattr(self, name) is not None
-            for key, figure in figures_of(getattr(self, name)).items()
+            f"{name}.{key}": value
+            for name, section in sections
+            if section is not None
+            for key, value in vars(section).items()
+            if isinstance(value, Figure | Curve)
         }
 
     def assumed(self) -> list[tuple[str, Figure | Curve]]:
@@ -185,26 +176,8 @@ class RigFile:
         return self.hand.kind == "scripted" or self.sound.simulated
 
 
-def _rig_from(values: Mapping[str, Any], file: Path) -> RigFile:
-    """A rig from the plain values of its file, which every refusal names."""
-    try:
-        return _checked_rig(values, file)
-    except InputError as error:
-        raise InputError(f"{file}: {error}") from None
-
-
-def _checked_rig(values: Mapping[str, Any], file: Path) -> RigFile:
-    check_keys(values, ("version", *_SECTIONS), where="a rig file")
-    check_version(values, VERSION, what="rig file")
-    sections = {name: _section(values, name, kind) for name, kind in _SECTIONS.items()}
-    named = sections["vibrator"].file
-    identified = None if named is None else Vibrator.load(file.parent / named)
-    return RigFile(path=file, identified=identified, **sections)
-
-
-def _section(values: Mapping[str, Any], name: str, kind: type[Any]) -> Any:
-    known = tuple(key.name for key in fields(kind))
-    table = toml_section(values, name, known)
-    if name in _NOT_NEEDED and name not in values:
-        return None
-    return section_from(kind, table, name)
+def _given(value: Any) -> Any:
+    """Plain values for JSON, without what is not given."""
+    if isinstance(value, dict):
+        return {name: _given(one) for name, one in value.items() if one is not None}
+    return value.isoformat() if isinstance(value, datetime.date) else value

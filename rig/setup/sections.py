@@ -3,128 +3,88 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields
-from typing import Any, TypeVar
+from dataclasses import dataclass, field
+from typing import Annotated, ClassVar, Literal
 
 from modeling import InputError
-from modeling.checks import (
-    check_choice,
-    check_name,
-    check_number,
-    check_rate,
-    check_whole,
-)
-from modeling.errors import shown
-from rig.setup.figures import Curve, Figure, curve_from, figure_from
+from modeling.files.described import Section, key
+from modeling.files.kinds import Name, Rate
+from rig.setup.figures import Curve, Figure
 
 LOUDEST_MASKING = 0.5
-HAND_KINDS = ("tablet", "mouse", "serial", "window", "scripted")
+HandKind = Literal["tablet", "mouse", "serial", "window", "scripted"]
 _WITHOUT_FORCE = ("mouse", "window")
 _LEAST = 1e-6  # far below any rig's, and far above what a division by it could not hold
-_DEFAULT = "default of tactileq, measured nowhere"
-Section = TypeVar("Section")
-Reader = Callable[[object, str], Any]
-
-
-def _read_by(reader: Reader) -> dict[str, Reader]:
-    return {"reader": reader}
-
-
-def _figure(unit: str, high: float, *, low: float = _LEAST) -> dict[str, Reader]:
-    """A quantity in a unit, from `low` to `high`."""
-    return _read_by(lambda value, what: figure_from(value, what, unit=unit, low=low, high=high))
+Channel = Annotated[int, key(ge=1, le=64)]
 
 
 def _assumed(value: float, unit: str) -> Figure:
-    return Figure(value, unit, True, _DEFAULT)
-
-
-def _whole(low: int, high: int) -> dict[str, Reader]:
-    return _read_by(lambda value, what: _checked_whole(value, what, low, high))
-
-
-def _text(value: object, what: str) -> str:
-    check_name(what, value)
-    return str(value)
-
-
-def _checked_whole(value: object, what: str, low: int, high: int) -> int:
-    check_whole(what, value, low=low, high=high)
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def _rate(value: object, what: str) -> float:
-    check_rate(value, what=what)
-    return float(value)  # type: ignore[arg-type]
-
-
-def _level(value: object, what: str) -> float:
-    check_number(f"{what} (RMS, shares of full scale)", value, high=LOUDEST_MASKING)
-    return float(value)  # type: ignore[arg-type]
-
-
-def _kind(value: object, what: str) -> str:
-    check_choice(what, value, HAND_KINDS)
-    return str(value)
-
-
-def _flag(value: object, what: str) -> bool:
-    if not isinstance(value, bool):
-        raise InputError(f"expected true or false for {what}, got {shown(value)}; correct it.")
-    return value
-
-
-def _date(value: object, what: str) -> datetime.date:
-    if not isinstance(value, datetime.date) or isinstance(value, datetime.datetime):
-        raise InputError(
-            f"expected a date for {what}, got {shown(value)}; write it as 2026-11-22, without "
-            "quotes."
-        )
-    return value
-
-
-def _names(value: object, what: str) -> tuple[str, ...]:
-    if not isinstance(value, list | tuple):
-        raise InputError(
-            f'expected a list of texts for {what}, got {shown(value)}; write ["…", "…"].'
-        )
-    for name in value:
-        check_name(what, name)
-    return tuple(value)
-
-
-def _pressure(value: object, what: str) -> Curve:
-    return curve_from(value, what, unit="N")
+    return Figure(value, unit, True, "default of tactileq, measured nowhere")
 
 
 @dataclass(frozen=True, kw_only=True)
-class RigName:
-    """[rig]: which rig this is; `serials` are those of all that its calibration depends on."""
+class RigName(Section):
+    """Which rig this is."""
 
-    name: str = field(metadata=_read_by(_text))
-    serials: tuple[str, ...] = field(default=(), metadata=_read_by(_names))
+    WHERE: ClassVar[str] = "[rig]"
+    name: Annotated[
+        Name, key("name of the rig; two processes cannot use a rig of one name at once")
+    ]
+    serials: Annotated[
+        tuple[Name, ...],
+        key("serial numbers of all that the calibration depends on (vibrator, amplifier, card)"),
+    ] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class SoundSection:
-    """[sound]: the card. Channels count from 1.
+class SoundSection(Section):
+    """The sound card. Channels count from 1."""
 
-    `fullscale_v` is the voltage at the vibrator for a sample of full scale, amplifier included;
-    `masking_level` the RMS of the masking noise in sessions, as a share of full scale.
-    """
-
-    device: str | None = field(default=None, metadata=_read_by(_text))
-    rate_hz: float = field(metadata=_read_by(_rate))
-    block: int = field(default=128, metadata=_whole(16, 4096))
-    channels: int = field(default=2, metadata=_whole(1, 64))
-    vibration_channel: int = field(default=1, metadata=_whole(1, 64))
-    masking_channel: int | None = field(default=None, metadata=_whole(1, 64))
-    masking_level: float = field(default=0.0, metadata=_read_by(_level))
-    fullscale_v: Figure = field(metadata=_figure("V", 1000.0))
-    simulated: bool = field(default=False, metadata=_read_by(_flag))
+    WHERE: ClassVar[str] = "[sound]"
+    device: (
+        Annotated[
+            Name,
+            key(
+                "name of the sound card, or a part of it that is in no other name; "
+                '"NAME, HOST" where a system lists a card several times; without it the system\'s '
+                "output"
+            ),
+        ]
+        | None
+    ) = None
+    rate_hz: Annotated[Rate, key("sampling rate; at least that of the models")]
+    block: Annotated[
+        int,
+        key(
+            "between two calls of the callback; fewer reduce latency but increase the risk of "
+            "missed blocks",
+            unit="samples",
+            ge=16,
+            le=4096,
+        ),
+    ] = 128
+    channels: Annotated[Channel, key("output channels that are opened")] = 2
+    vibration_channel: Annotated[Channel, key("which one drives the vibrator")] = 1
+    masking_channel: Annotated[Channel, key("which one plays noise for headphones")] | None = None
+    masking_level: Annotated[
+        float,
+        key("RMS of that noise during sessions", unit="of full scale", ge=0, le=LOUDEST_MASKING),
+    ] = 0.0
+    fullscale_v: Annotated[
+        Figure,
+        key(
+            "voltage at the vibrator for a sample of full scale, amplifier included",
+            unit="V",
+            ge=_LEAST,
+            le=1000,
+        ),
+    ]
+    simulated: Annotated[bool, key("whether no sound card plays: data are marked as simulated")] = (
+        False
+    )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.masking_level > 0 and self.masking_channel is None:
             raise InputError(
                 f"expected sound.masking_channel for a masking noise of {self.masking_level:g} of "
@@ -145,41 +105,116 @@ class SoundSection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class VibratorSection:
-    """[vibrator]: its identified resonance, and its calibration at the held pen."""
+class VibratorSection(Section):
+    """The vibrator: its identified resonance, and its calibration at the held pen."""
 
-    file: str | None = field(default=None, metadata=_read_by(_text))
-    g_per_volt: Figure = field(metadata=_figure("g/V", 1000.0))
-    measured_on: datetime.date | None = field(default=None, metadata=_read_by(_date))
+    WHERE: ClassVar[str] = "[vibrator]"
+    file: (
+        Annotated[Name, key("from `tactileq vibrator`; its resonance is then compensated")] | None
+    ) = None
+    g_per_volt: Annotated[
+        Figure,
+        key(
+            "acceleration at the held pen, in the flat part of the vibrator",
+            unit="g/V",
+            ge=_LEAST,
+            le=1000,
+        ),
+    ]
+    measured_on: Annotated[datetime.date, key("when")] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class LimitsSection:
-    """[limits]: what the hand gets at most (docs/method/rendering.md#limits)."""
+class LimitsSection(Section):
+    """What the hand gets at most ([why](method/rendering.md#limits))."""
 
-    peak_g: Figure = field(default=_assumed(3.0, "g"), metadata=_figure("g", 20.0))
-    rms_g: Figure = field(default=_assumed(1.0, "g"), metadata=_figure("g", 10.0))
-    rms_window_s: Figure = field(default=_assumed(1.0, "s"), metadata=_figure("s", 60.0))
-    duration_s: Figure = field(default=_assumed(60.0, "s"), metadata=_figure("s", 3600.0))
-    pause_s: Figure = field(default=_assumed(0.1, "s"), metadata=_figure("s", 60.0))
+    WHERE: ClassVar[str] = "[limits]"
+    peak_g: Annotated[
+        Figure, key("largest acceleration at the output", unit="g", ge=_LEAST, le=20)
+    ] = field(default=_assumed(3.0, "g"))
+    rms_g: Annotated[
+        Figure,
+        key("largest running RMS, weights exp(−age / rms_window_s)", unit="g", ge=_LEAST, le=10),
+    ] = field(default=_assumed(1.0, "g"))
+    rms_window_s: Annotated[
+        Figure,
+        key(
+            "time constant of those weights, which are not a finite window",
+            unit="s",
+            ge=_LEAST,
+            le=60,
+        ),
+    ] = field(default=_assumed(1.0, "s"))
+    duration_s: Annotated[
+        Figure,
+        key("longest vibration without a pause; then it is muted", unit="s", ge=_LEAST, le=3600),
+    ] = field(default=_assumed(60.0, "s"))
+    pause_s: Annotated[
+        Figure, key("shortest silence that counts as a pause", unit="s", ge=_LEAST, le=60)
+    ] = field(default=_assumed(0.1, "s"))
 
 
 @dataclass(frozen=True, kw_only=True)
-class HandSection:
-    """[hand]: what measures the hand, and what is assumed where it measures nothing."""
+class HandSection(Section):
+    """What measures the hand, and what is assumed where it measures nothing."""
 
-    kind: str = field(metadata=_read_by(_kind))
-    device: str | None = field(default=None, metadata=_read_by(_text))
-    counts_per_mm: Figure | None = field(default=None, metadata=_figure("counts/mm", 1e5))
-    filter_delay_s: Figure = field(default=_assumed(0.01, "s"), metadata=_figure("s", 0.1))
-    assumed_force_n: Figure | None = field(default=None, metadata=_figure("N", 20.0))
-    pressure_curve: Curve | None = field(default=None, metadata=_read_by(_pressure))
-    contact_n: Figure = field(default=_assumed(0.05, "N"), metadata=_figure("N", 5.0, low=0.0))
-    baud: int = field(default=115200, metadata=_whole(1200, 12_000_000))
-    grab: bool = field(default=False, metadata=_read_by(_flag))
-    script: str = field(default="strokes", metadata=_read_by(_text))
+    WHERE: ClassVar[str] = "[hand]"
+    kind: Annotated[HandKind, key("window: not for studies; scripted: simulated")]
+    device: (
+        Annotated[Name, key("path or name of the device; without it the only one that fits")] | None
+    ) = None
+    counts_per_mm: (
+        Annotated[
+            Figure,
+            key(
+                "steps of the device in 1 mm; required for a mouse and a window (pixels), without "
+                "it the tablet's own",
+                unit="counts/mm",
+                ge=_LEAST,
+                le=1e5,
+            ),
+        ]
+        | None
+    ) = None
+    filter_delay_s: Annotated[
+        Figure,
+        key("delay of the [tracking filter](method/hand.md#delay)", unit="s", ge=_LEAST, le=0.1),
+    ] = field(default=_assumed(0.01, "s"))
+    assumed_force_n: (
+        Annotated[
+            Figure,
+            key(
+                "where nothing measures force: a mouse, a window, a tablet without pressure_curve",
+                unit="N",
+                ge=_LEAST,
+                le=20,
+            ),
+        ]
+        | None
+    ) = None
+    pressure_curve: (
+        Annotated[
+            Curve,
+            key(
+                "force over pressure, straight lines between the points",
+                unit="N",
+                expected="two or more points [pressure as a share of its range, force in N] of "
+                "rising pressure and never falling force",
+            ),
+        ]
+        | None
+    ) = None
+    contact_n: Annotated[
+        Figure, key("below this force the hand does not touch", unit="N", ge=0, le=5)
+    ] = field(default=_assumed(0.05, "N"))
+    baud: Annotated[int, key("speed of a serial port", ge=1200, le=12_000_000)] = 115200
+    grab: Annotated[
+        bool, key("whether, while in use, a tablet or mouse does not move the pointer")
+    ] = False
+    script: Annotated[Name, key("of a scripted hand: strokes, hold, or a table's path")] = "strokes"
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.kind in _WITHOUT_FORCE:
             self._require("counts_per_mm", "of moving it along a ruler")
             self._require("assumed_force_n", "since it measures no force")
@@ -209,80 +244,53 @@ class HandSection:
 
 
 @dataclass(frozen=True, kw_only=True)
-class AccelerometerSection:
-    """[accelerometer]: what measures at the pen. The channel counts from 1."""
+class AccelerometerSection(Section):
+    """What measures at the pen, which sessions then record."""
 
-    device: str | None = field(default=None, metadata=_read_by(_text))
-    channel: int = field(default=1, metadata=_whole(1, 64))
-    rate_hz: float = field(metadata=_read_by(_rate))
-    g_per_fullscale: Figure = field(metadata=_figure("g", 10000.0))
-    noise_floor_g: Figure | None = field(default=None, metadata=_figure("g", 10.0, low=0.0))
-
-
-@dataclass(frozen=True, kw_only=True)
-class LatencySection:
-    """[latency]: from the hand to the vibration, end to end."""
-
-    median_ms: Figure = field(metadata=_figure("ms", 10000.0))
-    p95_ms: Figure = field(metadata=_figure("ms", 10000.0))
-    measured_on: datetime.date | None = field(default=None, metadata=_read_by(_date))
-
-
-@dataclass(frozen=True, kw_only=True)
-class CalibrationSection:
-    """[calibration]: when, and of which rig: its name and serial numbers at that time."""
-
-    date: datetime.date = field(metadata=_read_by(_date))
-    rig: str = field(metadata=_read_by(_text))
-    serials: tuple[str, ...] = field(default=(), metadata=_read_by(_names))
+    WHERE: ClassVar[str] = "[accelerometer]"
+    device: (
+        Annotated[Name, key("sound card of the accelerometer; without it the system's input")]
+        | None
+    ) = None
+    channel: Annotated[Channel, key("which of its channels, from 1")] = 1
+    rate_hz: Annotated[Rate, key("sampling rate")]
+    g_per_fullscale: Annotated[
+        Figure, key("acceleration of a full-scale sample", unit="g", ge=_LEAST, le=10000)
+    ]
+    noise_floor_g: Annotated[Figure, key("RMS without contact", unit="g", ge=0, le=10)] | None = (
+        None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
-class RealSurfaceSection:
-    """[real_surface]: whether the hand is measured there, too."""
+class LatencySection(Section):
+    """From the hand to the vibration, end to end; `tactileq rig latency` writes it."""
 
-    hand_measured: bool = field(metadata=_read_by(_flag))
-
-
-def section_from(kind: type[Section], values: Mapping[str, Any], name: str) -> Section:
-    """A section from the plain values of its table, whose keys are known.
-
-    Raises
-    ------
-    InputError
-        For what is missing or out of range, naming key and unit.
-    """
-    given: dict[str, Any] = {}
-    for key in fields(kind):  # type: ignore[arg-type]
-        if key.name in values:
-            given[key.name] = key.metadata["reader"](values[key.name], f"{name}.{key.name}")
-        elif key.default is MISSING:
-            raise InputError(
-                f"expected {key.name} under [{name}], got none; add it as in the shipped rig file "
-                "(rig/setup/desk_rig.toml)."
-            )
-    return kind(**given)
+    WHERE: ClassVar[str] = "[latency]"
+    median_ms: Annotated[Figure, key("median latency", unit="ms", ge=_LEAST, le=10000)]
+    p95_ms: Annotated[
+        Figure,
+        key("its 95th percentile; above 40 ms the rig is refused", unit="ms", ge=_LEAST, le=10000),
+    ]
+    measured_on: Annotated[datetime.date, key("when")] | None = None
 
 
-def plain_section(section: Any) -> dict[str, Any]:
-    """A section as plain values that JSON takes too; without what is not given."""
-    given = {key.name: getattr(section, key.name) for key in _keys(section)}
-    return {name: _plain(value) for name, value in given.items() if value is not None}
+@dataclass(frozen=True, kw_only=True)
+class CalibrationSection(Section):
+    """When the rig was calibrated, and as which one; `tactileq rig calibrate` writes it."""
+
+    WHERE: ClassVar[str] = "[calibration]"
+    date: Annotated[datetime.date, key("when")]
+    rig: Annotated[Name, key("name of the rig at that time")]
+    serials: Annotated[tuple[Name, ...], key("its serial numbers at that time")] = ()
 
 
-def figures_of(section: Any) -> dict[str, Figure | Curve]:
-    """The quantities of a section by their keys."""
-    given = {key.name: getattr(section, key.name) for key in _keys(section)}
-    return {name: value for name, value in given.items() if isinstance(value, Figure | Curve)}
+@dataclass(frozen=True, kw_only=True)
+class RealSurfaceSection(Section):
+    """The real surface beside the virtual one."""
 
-
-def _keys(section: Any) -> tuple[Field[Any], ...]:
-    return fields(section)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, Figure | Curve):
-        return value.to_dict()
-    if isinstance(value, datetime.date):
-        return value.isoformat()
-    return list(value) if isinstance(value, tuple) else value
+    WHERE: ClassVar[str] = "[real_surface]"
+    hand_measured: Annotated[
+        bool,
+        key("whether the hand is also measured there; otherwise its history there is n/a"),
+    ]

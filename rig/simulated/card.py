@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from modeling.errors import InputError
 from rig.live.child import Child, ChildLost
+from rig.live.messages import Done
+from rig.simulated.process import Card
 from rig.simulated.vibrator import SimulatedVibrator
 
 DEVICE = "simulated-vibrator"
@@ -35,9 +37,9 @@ class SimulatedCard:
         InputError
             Without a JACK server.
         """
-        settings = {"vibrator": self.vibrator.to_dict(), "name": self.name}
+        self._child = Child("rig.simulated.process", Card(self.vibrator, self.name))
         try:
-            self._child = Child("rig.simulated.process", settings)
+            self._child.ready(Done)
         except ChildLost as lost:
             raise InputError(
                 f"expected the simulated vibrator to start, got: {lost}; check that a "

@@ -1,37 +1,41 @@
-"""The simulated vibrator as a client of JACK: `python -m rig.simulated.process SETTINGS`.
+"""The simulated vibrator as a client of JACK: `python -m rig.simulated.process`.
 
-It answers with a line of JSON once it runs, and ends with its standard input. To PortAudio it is a
-device of its own: what is played on it comes back as its input, shaken and measured.
+It says once that it runs, and ends with its parent. To PortAudio it is a device of its own: what is
+played on it comes back as its input, shaken and measured.
 """
 
 from __future__ import annotations
 
 import ctypes
-import sys
 from typing import Any
 
 import numpy as np
 
 from modeling.arrays import Floats
 from modeling.errors import InputError, shown
-from rig.live.driven import settings_from_parent, tell
+from rig.live.driven import Parent
+from rig.live.messages import Done, Message
 from rig.simulated.vibrator import SimulatedAccelerometer, SimulatedVibrator
 from rig.sound.devices import SoundDevice, portaudio, sound_devices
 
 CHANNELS = 2
 
 
+class Card(Message, frozen=True):
+    """What it is started with."""
+
+    vibrator: SimulatedVibrator
+    name: str
+
+
 def main() -> None:
-    """Run until standard input ends."""
-    settings = settings_from_parent()
-    try:
-        stream = _stream(SimulatedVibrator(**settings["vibrator"]), name=settings["name"])
+    """Run until the parent is gone."""
+    with Parent() as parent:
+        card = parent.settings(Card)
+        stream = _stream(card.vibrator, name=card.name)
         stream.start()
-    except InputError as error:
-        tell({"error": str(error)})
-        return
-    tell({"running": True})
-    sys.stdin.read()
+        parent.tell(Done())
+        parent.serve(Done, lambda done: done)
 
 
 def _stream(vibrator: SimulatedVibrator, *, name: str) -> Any:

@@ -5,9 +5,8 @@ What a sound card plays goes in, what the accelerometer gives the card comes out
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -88,10 +87,6 @@ class SimulatedVibrator:
         values = read_toml(path, "the file of a simulated vibrator")
         check_keys(values, [field.name for field in fields(cls)], where=str(path))
         return cls(**values)
-
-    def to_dict(self) -> dict[str, Any]:
-        """All parameters by their names."""
-        return asdict(self)
 
     def response(self, frequency_hz: ArrayLike, *, rate_hz: float) -> NDArray[np.complex128]:
         """Acceleration (g) per full scale played, (n,), at (n,) frequencies, without the delay."""

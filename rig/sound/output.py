@@ -5,7 +5,6 @@ docs/method/live.md#output
 
 from __future__ import annotations
 
-import base64
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from modeling.rendering.limits import Limits
 from modeling.rendering.noise import stream_key
 from modeling.rendering.plan import RenderCounters, RenderPlan, plan_for, usual_update_s
 from modeling.vibrators.compensation import Compensation
-from rig.live.child import Child, ChildLost
+from rig.live.child import Child, ChildLost, Reply
 from rig.live.memory import (
     HEARTBEAT_S,
     NO_HEARTBEAT,
@@ -32,6 +31,18 @@ from rig.live.memory import (
     Live,
     Rows,
     now_s,
+)
+from rig.live.messages import Done
+from rig.sound.messages import (
+    Corrected,
+    Count,
+    Mask,
+    Members,
+    Playing,
+    PlaySignal,
+    PlaySurface,
+    Silence,
+    SoundSettings,
 )
 
 STALLED_S = 0.5  # without a block: the server is gone
@@ -125,19 +136,20 @@ class SoundOutput:
         self._limits, self._compensation, self._rate_hz = limits, compensation, rate_hz
         self._has_masking = masking_channel is not None
         self._masking = 0.0
-        self._settings = {
-            "live": str(live.path),
-            "device": device,
-            "rate_hz": rate_hz,
-            "block": block,
-            "channels": channels,
-            "vibration_channel": vibration_channel,
-            "masking_channel": masking_channel,
-            "fullscale_per_g": fullscale_per_g,
-            "masking_key": int(stream_key(seed, _MASKING_STREAM)),
-        }
+        self._settings = SoundSettings(
+            live=str(live.path),
+            device=device,
+            rate_hz=rate_hz,
+            block=block,
+            channels=channels,
+            vibration_channel=vibration_channel,
+            masking_channel=masking_channel,
+            fullscale_per_g=fullscale_per_g,
+            masking_key=int(stream_key(seed, _MASKING_STREAM)),
+        )
         self._block_s = block / rate_hz
         self._child: Child | None = None
+        self._latency_s = float("nan")
         self._faults: list[str] = []
         self._presentation = 0
         self._seen = live.blocks_written
@@ -183,7 +195,7 @@ class SoundOutput:
     @property
     def latency_s(self) -> float:
         """Of the output, as PortAudio states it; NaN while it is closed."""
-        return float("nan") if self._child is None else float(self._child.ready["latency_s"])
+        return float("nan") if self._child is None else self._latency_s
 
     @property
     def halted(self) -> bool:
@@ -215,14 +227,15 @@ class SoundOutput:
             If nothing can be played.
         """
         number = self._number()
-        wanted: dict[str, Any] = {"do": "surface", "presentation": number}
-        wanted["key"] = int(stream_key(self._seed, number))
         plan = self._plan(model.rate_hz, usual_update_s(model))
+        lattice = None
         if isinstance(model, ARModel):
             fields = lattice_fields(model, plan)
-            wanted |= {"texture": _listed(fields.texture), "lattice": _listed(fields.lattice)}
+            texture, lattice = _members(fields.texture), _members(fields.lattice)
         else:
-            wanted["texture"] = _listed(plan.texture(model))
+            texture = _members(plan.texture(model))
+        key = int(stream_key(self._seed, number))
+        wanted = PlaySurface(presentation=number, key=key, texture=texture, lattice=lattice)
         return self._begin(number, wanted)
 
     def play_signal(
@@ -252,8 +265,7 @@ class SoundOutput:
         samples = self.checked(samples_g, compensated=compensated)
         self._pause_before(samples.size / self._rate_hz)
         number = self._number()
-        data = base64.b64encode(samples.astype("<f4").tobytes()).decode("ascii")
-        presented = self._begin(number, {"do": "signal", "presentation": number, "samples": data})
+        presented = self._begin(number, PlaySignal(number, samples.astype(np.float32).tobytes()))
         if wait:
             self._wait_for_end(number, samples.size / self._rate_hz + STALLED_S)
         return presented
@@ -287,7 +299,7 @@ class SoundOutput:
         if self._child is None:
             return None
         try:
-            self._child.ask({"do": "silence"})
+            self._child.ask(Silence(), Done)
             self._wait(lambda rows: rows["presentation"] == 0)
         except ChildLost as lost:
             self._lose(str(lost))
@@ -299,17 +311,10 @@ class SoundOutput:
 
         None of a signal, where nothing was begun, or where its process is gone.
         """
-        if self._child is None:
+        told = self._told(Count(self._presentation), Corrected)
+        if told is None or told.counters is None:
             return None
-        number = self._presentation
-        try:
-            told = self._child.ask({"do": "counted", "presentation": number})
-        except ChildLost as lost:
-            self._lose(str(lost))
-            return None
-        if not told["counters"]:
-            return None
-        return Counted(presentation=number, counters=RenderCounters(**told["counters"]))
+        return Counted(presentation=self._presentation, counters=told.counters)
 
     def masking(self, level: float) -> None:
         """White noise on the masking channel from now on.
@@ -335,12 +340,7 @@ class SoundOutput:
                 "rig file."
             )
         self._masking = level
-        if self._child is None:
-            return
-        try:
-            self._child.ask({"do": "mask", "level": level})
-        except ChildLost as lost:
-            self._lose(str(lost))  # the next process begins with this level
+        self._told(Mask(level), Done)  # if it is lost, the next process begins with this level
 
     # --- Health -----------------------------------------------------------------------------
 
@@ -403,13 +403,15 @@ class SoundOutput:
 
     # --- The process ------------------------------------------------------------------------
 
-    def _start(self) -> None:
+    def _start(self) -> Child:
+        child = Child("rig.sound.process", self._settings)
         try:
-            self._child = Child("rig.sound.process", self._settings)
-            self._last_block_s = now_s()
+            self._latency_s = child.ready(Playing).latency_s
+            self._child, self._last_block_s = child, now_s()
             self._wait(lambda rows: rows["frames"] > 0)
             if self._masking:
-                self._child.ask({"do": "mask", "level": self._masking})
+                child.ask(Mask(self._masking), Done)
+            return child
         except ChildLost as lost:
             self.close()
             raise SoundLost(
@@ -417,30 +419,23 @@ class SoundOutput:
                 "(tactileq rig check)."
             ) from None
 
-    def _asked(self, wanted: Mapping[str, Any]) -> None:
-        """Ask the process, a new one where it is lost."""
-        if self._child is None:
-            self._start()
-        assert self._child is not None
+    def _told(self, request: Count | Mask, kind: type[Reply]) -> Reply | None:
+        """The process' answer; None where there is no process, or it is lost."""
         try:
-            self._child.ask(wanted)
+            return None if self._child is None else self._child.ask(request, kind)
         except ChildLost as lost:
             self._lose(str(lost))
-            self._start()
-            assert self._child is not None
-            self._child.ask(wanted)
+            return None
 
-    def _begin(self, number: int, wanted: Mapping[str, Any]) -> Presented:
+    def _begin(self, number: int, wanted: PlaySurface | PlaySignal) -> Presented:
         """Ask for something and wait for its first sample; once more where the process is lost."""
-        for last in (False, True):
+        for _ in range(2):
             try:
-                self._asked(wanted)
+                (self._child or self._start()).ask(wanted, Done)
                 row = self._wait(lambda rows: rows["presentation"] == number)
                 return Presented(presentation=number, time_s=float(row["dac_time_s"]))
             except ChildLost as lost:
                 self._lose(str(lost))
-                if last:
-                    break
             except InputError as error:  # of a new process: the device has changed
                 raise SoundLost(str(error)) from None
         raise SoundLost(
@@ -488,10 +483,10 @@ class SoundOutput:
         )
 
 
-def _listed(fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Members of a structure, as JSON can hold them."""
+def _members(fields: Mapping[str, Any]) -> Members:
+    """Members of a structure, as a message holds them."""
     return {
-        name: value.tolist() if isinstance(value, np.ndarray) else value
+        name: value.astype(np.float64).tobytes() if isinstance(value, np.ndarray) else value
         for name, value in fields.items()
     }
 

@@ -1,4 +1,4 @@
-"""The process that plays: `python -m rig.sound.process SETTINGS`, driven by lines of JSON.
+"""The process that plays: `python -m rig.sound.process`, driven by `rig.sound.messages`.
 
 A process of its own, so that nothing that the experiment does delays it and it can be killed when a
 sound server hangs. PortAudio calls `tq_sound_callback` (`rig/live/sound.h`); Python here only
@@ -8,13 +8,9 @@ silence and ends. docs/method/live.md#processes
 
 from __future__ import annotations
 
-import base64
-import json
 import os
-import sys
 import threading
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,9 +18,23 @@ import numpy as np
 
 from modeling.errors import InputError
 from modeling.rendering.compiled import filled, memory_reals, render_counters
-from rig.live.driven import settings_from_parent, tell
+from modeling.rendering.plan import RenderCounters
+from rig.live.driven import Parent
 from rig.live.memory import HEARTBEAT_S, OLDEST_READING_S, Live, compiled, now_s
+from rig.live.messages import Done, Message
 from rig.sound.devices import check_rate, find_device, portaudio
+from rig.sound.messages import (
+    Corrected,
+    Count,
+    Mask,
+    Members,
+    Playing,
+    PlaySignal,
+    PlaySurface,
+    Request,
+    Silence,
+    SoundSettings,
+)
 
 FADE_S = 5e-3
 LONGEST_END_S = 1.0  # PortAudio hangs where its server has died
@@ -40,34 +50,34 @@ class _Source:
     kept: tuple[Any, ...]
 
 
-class Playing:
+class Player:
     """The stream and its sources."""
 
-    def __init__(self, settings: Mapping[str, Any]) -> None:
+    def __init__(self, settings: SoundSettings) -> None:
         module = compiled()
         self._ffi, self._lib = module.ffi, module.lib
-        self._live = Live.attach(settings["live"])
+        self._live = Live.attach(settings.live)
         self._sources: dict[int, _Source] = {}
-        rate_hz, channels = float(settings["rate_hz"]), int(settings["channels"])
-        device = find_device(settings["device"], "output", channels=channels)
+        rate_hz, channels = settings.rate_hz, settings.channels
+        device = find_device(settings.device, "output", channels=channels)
         check_rate(device, "output", rate_hz=rate_hz, channels=channels)
         self._memory = self._ffi.new("char[]", self._lib.tq_sound_size())
         self._sound = self._ffi.cast("tq_sound *", self._memory)
-        masking = settings["masking_channel"]
+        masking = settings.masking_channel
         self._lib.tq_sound_start(
             self._sound,
             self._live.address,
             rate_hz,
             max(1, round(FADE_S * rate_hz)),
             channels,
-            settings["vibration_channel"],
+            settings.vibration_channel,
             -1 if masking is None else masking,
-            settings["fullscale_per_g"],
+            settings.fullscale_per_g,
             OLDEST_READING_S,
             HEARTBEAT_S,
-            settings["masking_key"],
+            settings.masking_key,
         )
-        self._stream = self._open(device.index, rate_hz, channels, int(settings["block"]))
+        self._stream = self._open(device.index, rate_hz, channels, settings.block)
         self._stream.start()
 
     def _open(self, device: int, rate_hz: float, channels: int, block: int) -> Any:
@@ -102,13 +112,28 @@ class Playing:
         """Of the output, as PortAudio states it."""
         return float(self._stream.latency)
 
-    def surface(self, wanted: Mapping[str, Any]) -> None:
-        """Play a texture, or an all-pole model's lattice, from now on."""
-        texture, arrays = self._filled("tq_texture", wanted["texture"])
+    def answer(self, request: Request) -> Message:
+        """Do what is asked for."""
+        match request:
+            case PlaySurface():
+                self._play_surface(request)
+            case PlaySignal():
+                self._play_signal(request)
+            case Silence():
+                self._want()
+            case Mask(level):
+                self._mask(level)
+            case Count(number):
+                return Corrected(self._corrected(number))
+        self._forget()
+        return Done()
+
+    def _play_surface(self, wanted: PlaySurface) -> None:
+        texture, arrays = self._filled("tq_texture", wanted.texture)
         source = self._ffi.new("tq_surface *")
-        number, key = wanted["presentation"], wanted["key"]
-        if "lattice" in wanted:
-            lattice, more = self._filled("tq_lattice", wanted["lattice"])
+        number, key = wanted.presentation, wanted.key
+        if wanted.lattice is not None:
+            lattice, more = self._filled("tq_lattice", wanted.lattice)
             memory = self._ffi.new("tq_real[]", self._lib.tq_lattice_memory(texture, lattice))
             start = self._lib.tq_surface_start_lattice
             start(source, texture, lattice, memory, key, number)
@@ -119,45 +144,37 @@ class Playing:
         self._sources[number] = _Source("surface", source, (texture, arrays, memory))
         self._want(surface=source)
 
-    def _filled(self, structure: str, told: Mapping[str, Any]) -> tuple[Any, list[Any]]:
+    def _filled(self, structure: str, told: Members) -> tuple[Any, list[Any]]:
         """A structure of the kernel, and the arrays that it only points at."""
         fields = {
-            name: np.array(value) if isinstance(value, list) else value
+            name: np.frombuffer(value) if isinstance(value, bytes) else value
             for name, value in told.items()
         }
         return filled(self._ffi, structure, fields, real=np.float64)
 
-    def signal(self, wanted: Mapping[str, Any]) -> None:
-        """Play a signal once."""
-        samples = np.frombuffer(base64.b64decode(wanted["samples"]), dtype="<f4").astype("=f4")
+    def _play_signal(self, wanted: PlaySignal) -> None:
+        samples = np.frombuffer(wanted.samples, dtype=np.float32)
         held = self._ffi.from_buffer("float[]", samples)
         source = self._ffi.new("tq_signal *")
-        number = wanted["presentation"]
-        self._lib.tq_signal_start(source, held, samples.size, number)
-        self._sources[number] = _Source("signal", source, (samples, held))
+        self._lib.tq_signal_start(source, held, samples.size, wanted.presentation)
+        self._sources[wanted.presentation] = _Source("signal", source, (samples, held))
         self._want(signal=source)
-
-    def silence(self) -> None:
-        """Fade to silence."""
-        self._want()
 
     def _want(self, *, surface: Any = None, signal: Any = None) -> None:
         """Play one of them, or none, from now on."""
         none = self._ffi.NULL
         self._lib.tq_sound_want(self._sound, surface or none, signal or none, now_s())
 
-    def mask(self, level: float) -> None:
-        """Masking noise of this RMS, in shares of full scale."""
+    def _mask(self, level: float) -> None:
         self._lib.tq_sound_mask(self._sound, round(level * _MILLION))
 
-    def counted(self, number: int) -> dict[str, int]:
-        """What rendering a surface had to correct so far; of a signal nothing."""
+    def _corrected(self, number: int) -> RenderCounters | None:
         source = self._sources.get(number)
         if source is None or source.kind != "surface":
-            return {}
-        return vars(render_counters(source.address.voice.state.counters))
+            return None
+        return render_counters(source.address.voice.state.counters)
 
-    def forget(self) -> None:
+    def _forget(self) -> None:
         """Free what is not used any more, but the latest."""
         for number in sorted(self._sources)[:-1]:
             source = self._sources[number]
@@ -168,8 +185,8 @@ class Playing:
     def close(self) -> None:
         """Fade to silence and end; the process ends even where PortAudio hangs."""
         threading.Thread(target=_end_after, args=(LONGEST_END_S,), daemon=True).start()
-        self.silence()
-        self.mask(0)
+        self._want()
+        self._mask(0)
         end = time.monotonic() + LONGEST_END_S / 2
         while self._lib.tq_sound_plays(self._sound) and time.monotonic() < end:
             time.sleep(0.002)
@@ -184,37 +201,15 @@ def _end_after(seconds: float) -> None:
     os._exit(1)
 
 
-def _answer(playing: Playing, wanted: Mapping[str, Any]) -> dict[str, Any]:
-    match wanted["do"]:
-        case "surface":
-            playing.surface(wanted)
-        case "signal":
-            playing.signal(wanted)
-        case "silence":
-            playing.silence()
-        case "mask":
-            playing.mask(wanted["level"])
-        case "counted":
-            return {"counters": playing.counted(wanted["presentation"])}
-    playing.forget()
-    return {}
-
-
 def main() -> None:
-    """Play what the lines on the standard input say, until they end."""
-    try:
-        playing = Playing(settings_from_parent())
-    except InputError as error:
-        tell({"error": str(error)})
-        return
-    tell({"latency_s": playing.latency_s})
-    try:
-        for line in sys.stdin:
-            tell(_answer(playing, json.loads(line)))
-    except BrokenPipeError:
-        pass
-    finally:
-        playing.close()
+    """Play what the parent asks for, until it is gone."""
+    with Parent() as parent:
+        player = Player(parent.settings(SoundSettings))
+        try:
+            parent.tell(Playing(player.latency_s))
+            parent.serve(Request, player.answer)
+        finally:
+            player.close()
 
 
 if __name__ == "__main__":

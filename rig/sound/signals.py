@@ -8,22 +8,27 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from modeling.errors import InputError, shown
+from modeling.files.columns import chosen
 from modeling.files.reading import read_bytes
-from modeling.files.tables import number, read_table
+from modeling.files.stimulus_table import COLUMNS, MANIFEST
+from modeling.files.tables import read_cells, typed
 from modeling.files.wav import read_wav
 from modeling.models.loading import load_model, made_from
 from rig.interface import PreparedSignal, Stimulus
 
 RAMP_S = 0.02
-MANIFEST = "manifest.tsv"
-_COLUMNS = ("file", "unit", "format", "full_scale_g", "sha256", "vibrator_sha256", "simulated")
+_SIGNAL = chosen(
+    COLUMNS,
+    *("file", "unit", "format", "full_scale_g", "sha256", "vibrator_sha256", "simulated"),
+)
 _WHERE = ("trajectory", "speed_mm_s", "force_n", "gain_db")
 _CONDITION = (*_WHERE, "vibrator_sha256")
-_OF_SURFACES = (*_COLUMNS, "texture", "model", "model_sha256", *_WHERE)
+OF_SURFACES = (*_SIGNAL, *chosen(COLUMNS, "texture", "model", "model_sha256", *_WHERE))
 
 
 def tone_burst(
@@ -79,10 +84,10 @@ def stimulus(folder: Path, which: str) -> PreparedSignal:
     InputError
         For no such file, one that has changed, or one without a calibrated unit.
     """
-    rows = read_table(folder / MANIFEST, _COLUMNS)
+    rows = read_cells(folder / MANIFEST, _SIGNAL)
     fitting = [
-        row
-        for row in rows
+        (where, row)
+        for where, row in rows
         if row["file"] == which or (len(which) >= 8 and row["sha256"].startswith(which))
     ]
     if len(fitting) != 1:
@@ -90,7 +95,8 @@ def stimulus(folder: Path, which: str) -> PreparedSignal:
             f"expected the name or SHA-256 of one file of the set {folder}, got {shown(which)}, "
             f"which fits {len(fitting)} of {len(rows)}; see its {MANIFEST}."
         )
-    return _prepared(folder, fitting[0])
+    where, row = fitting[0]
+    return _prepared(folder, row, where)
 
 
 def stimuli_of_surfaces(
@@ -113,8 +119,10 @@ def stimuli_of_surfaces(
         If no file has this label, several stand for one texture, or one cannot be used (see
         `stimulus`).
     """
-    rows = read_table(folder / MANIFEST, _OF_SURFACES)
-    labels = sorted({row["model"] for row in rows})
+    rows = read_cells(folder / MANIFEST, OF_SURFACES)
+    for where, row in rows:
+        typed(row, chosen(OF_SURFACES, "texture", "model"), where)
+    labels = sorted({row["model"] for _, row in rows})
     if label not in labels and len(labels) > 1:
         raise InputError(
             f"expected files of models labelled {shown(label)} in the stimulus set {folder}, got "
@@ -124,20 +132,28 @@ def stimuli_of_surfaces(
     sources = _sources(folder)
     found: dict[str, Stimulus] = {}
     for texture in textures:
-        fitting = [row for row in rows if (row["texture"], row["model"]) == (texture, wanted)]
+        fitting = [
+            (where, row)
+            for where, row in rows
+            if (row["texture"], row["model"]) == (texture, wanted)
+        ]
         if len(fitting) > 1:
             raise InputError(
                 f"expected one file of {texture} in the stimulus set {folder}, got {len(fitting)} "
-                f"({fitting[0]['file']} and {fitting[1]['file']} among them); make a set with one "
-                "trajectory, one seed and one rate."
+                f"({fitting[0][1]['file']} and {fitting[1][1]['file']} among them); make a set "
+                "with one trajectory, one seed and one rate."
             )
         if fitting:
-            found[texture] = _stimulus(folder, fitting[0], sources)
+            where, row = fitting[0]
+            found[texture] = _stimulus(folder, row, where, sources=sources)
     return found
 
 
-def _stimulus(folder: Path, row: dict[str, str], sources: Mapping[str, Path]) -> Stimulus:
-    prepared = _prepared(folder, row)
+def _stimulus(
+    folder: Path, row: Mapping[str, str], where: str, *, sources: Mapping[str, Path]
+) -> Stimulus:
+    typed(row, OF_SURFACES, where)
+    prepared = _prepared(folder, row, where)
     source = sources.get(row["model_sha256"])
     model = None if source is None else load_model(source)
     return Stimulus(
@@ -156,7 +172,8 @@ def _sources(folder: Path) -> dict[str, Path]:
     return {hashlib.sha256(read_bytes(path, "a model")).hexdigest(): path for path in copies}
 
 
-def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:
+def _prepared(folder: Path, row: Mapping[str, str], where: str) -> PreparedSignal:
+    told: dict[str, Any] = dict(typed(row, _SIGNAL, where))
     path = folder / row["file"]
     found = hashlib.sha256(read_bytes(path, "the stimulus")).hexdigest()
     if found != row["sha256"]:
@@ -171,11 +188,13 @@ def _prepared(folder: Path, row: dict[str, str]) -> PreparedSignal:
         )
     samples, rate_hz = read_wav(path)
     if row["format"] == "pcm24":
-        samples = samples * number(row["full_scale_g"], "full_scale_g")
-    compensated = row["vibrator_sha256"]
+        if (full_scale_g := told["full_scale_g"]) is None:
+            (column,) = chosen(_SIGNAL, "full_scale_g")
+            raise column.refusal("", where)
+        samples = samples * full_scale_g
     return PreparedSignal(
         samples_g=samples,
         rate_hz=rate_hz,
-        vibrator_sha256=None if compensated == "n/a" else compensated,
+        vibrator_sha256=told["vibrator_sha256"],
         simulated=row["simulated"] == "true",
     )

@@ -17,6 +17,7 @@ from modeling import InputError, Threshold, compensation_for
 from modeling.arrays import Floats
 from modeling.files.folders import Contents, check_replaceable, replace_folder
 from modeling.files.reading import reason_of
+from modeling.files.stimulus_table import MANIFEST
 from modeling.files.writing import file_stem
 from modeling.perception.sensation_level import SensationLevel, sensation_level
 from modeling.recordings.trajectory import Trajectory
@@ -25,7 +26,6 @@ from modeling.threads import in_order, usable_cores
 from stimuli.sets.manifest import (
     COLUMNS_FILE,
     COMPENSATED,
-    MANIFEST,
     Stimulus,
     level_db,
     measured,

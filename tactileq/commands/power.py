@@ -190,7 +190,7 @@ def planned_for(plan: Study, sizes: Sequence[int]) -> Study:
         If there is no claim, a claim is about a task that compares no models, or a number of
         participants is too small for the rule of the plan or leaves the order of models unbalanced.
     """
-    from experiments.study.plan import FEWEST_OF_MODEL
+    from experiments.study.study import FEWEST_OF_MODEL
     from modeling.files.answer_tables import ANSWER_TABLES
 
     if not plan.plan.claims:

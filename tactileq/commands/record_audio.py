@@ -202,7 +202,7 @@ def record_on(
             options,
             plan,
             settings={
-                "hand": hand.to_dict(),
+                "hand": asdict(hand),
                 "input": asdict(heard),
                 "device": source.device_name,
             },

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from modeling.models.loading import AnyModel
     from modeling.rendering.plan import RenderCounters
+    from rig.monitoring.bare_thread import WakeUps
     from rig.monitoring.figures import Range, Snapshot
     from rig.setup.rig_file import RigFile
     from rig.sound.output import SoundOutput
@@ -60,6 +61,8 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
     from rig.hand.reader import HandReader
     from rig.live.child import Child
     from rig.live.memory import Live
+    from rig.live.messages import Done
+    from rig.monitoring.bare_thread import Look, WakeUps
     from rig.monitoring.figures import Monitor
 
     rate_hz, period_s = rig.sound.rate_hz, rig.sound.block / rig.sound.rate_hz
@@ -69,19 +72,20 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
         opened_sound(rig, live) as sound,
     ):
         monitor = Monitor(live, rate_hz=rate_hz, peak_g=rig.limits.peak_g.value, grid=_grid(model))
-        bare = Child("rig.monitoring.bare_thread", {"period_s": period_s})
+        bare = Child("rig.monitoring.bare_thread", period_s)
+        bare.ready(Done)
         if model is not None:
             sound.play(model)
         start = time.monotonic()
         faults: list[str] = []
-        snapshot, missed = monitor.look(), bare.ask({})
+        snapshot, missed = monitor.look(), bare.ask(Look(), WakeUps)
         try:
             with Screen(auto_refresh=False, transient=True) as screen:
                 while seconds is None or time.monotonic() - start < seconds:
                     time.sleep(_EVERY_S)
                     faults += [*hand.faults(), *sound.faults()]
                     _play_on(sound, model, faults)
-                    snapshot, missed = monitor.look(), bare.ask({})
+                    snapshot, missed = monitor.look(), bare.ask(Look(), WakeUps)
                     screen.update(_table(snapshot, missed, faults[-3:]), refresh=True)
         except Interrupted as end:
             if end.signal_name != "SIGINT":
@@ -119,7 +123,7 @@ def _grid(model: AnyModel | None) -> tuple[Range, Range] | None:
     return (float(speeds[0]), float(speeds[-1])), (float(forces[0]), float(forces[-1]))
 
 
-def _table(now: Snapshot, bare: Mapping[str, int], faults: Sequence[str]) -> Table:
+def _table(now: Snapshot, bare: WakeUps, faults: Sequence[str]) -> Table:
     from rich.table import Table
     from rich.text import Text
 
@@ -133,9 +137,8 @@ def _table(now: Snapshot, bare: Mapping[str, int], faults: Sequence[str]) -> Tab
     table.add_row("level", f"{now.rms_g:8.4f} g RMS  {now.peak_g:6.3f} g peak  {bar}")
     table.add_row("at the limit", f"{now.limited_blocks} of {now.blocks} blocks")
     table.add_row("without hand", f"{now.stale_blocks} of {now.blocks} blocks")
-    table.add_row(
-        "missed", f"{now.misses} of {now.blocks} blocks; a bare thread {_bare(bare)} wake-ups"
-    )
+    missed = f"{now.misses} of {now.blocks} blocks; a bare thread {bare.misses} of {bare.periods}"
+    table.add_row("missed", f"{missed} wake-ups")
     table.add_row("callback", _callback(now))
     table.add_row(
         "delay", f"reading {now.reading_ms:.1f} ms old, output {now.output_ms:.1f} ms, as stated"
@@ -149,19 +152,15 @@ def _limited(counters: RenderCounters) -> int:
     return counters.limited_peak + counters.limited_rms + counters.limited_duration
 
 
-def _bare(bare: Mapping[str, int]) -> str:
-    return f"{bare['misses']} of {bare['periods']}"
-
-
 def _callback(now: Snapshot) -> str:
     return (
         f"takes {now.share_p50:.1%} of a block (median), {now.share_p999:.1%} in 99.9 % of blocks"
     )
 
 
-def _summary(now: Snapshot, bare: Mapping[str, int], seconds: float, *, limited: int) -> str:
+def _summary(now: Snapshot, bare: WakeUps, seconds: float, *, limited: int) -> str:
     return (
         f"{seconds:.0f} s: {now.misses} of {now.blocks} blocks missed (a bare thread "
-        f"{_bare(bare)} wake-ups), {now.stale_blocks} without a fresh hand, {limited} samples at a "
-        f"limit; the callback {_callback(now)}"
+        f"{bare.misses} of {bare.periods} wake-ups), {now.stale_blocks} without a fresh hand, "
+        f"{limited} samples at a limit; the callback {_callback(now)}"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -56,7 +57,7 @@ def rig_range(
     print(picture(found, grid))
     origin = provenance_of(
         COMMAND,
-        {"hand": settings.to_dict(), "seconds": seconds, **found.to_dict()},
+        {"hand": asdict(settings), "seconds": seconds, **found.to_dict()},
         inputs=inputs,
     )
     write_own_files({out: grid_text(grid, found).encode()}, note, origin)

@@ -97,13 +97,17 @@ def recipe_from(
         return Recipe.load(recipes[0])
     models, others = models_among(named)
     tell_passed_over(others)
+    if not models:
+        raise ValueError(
+            f"expected at least one model, got none in {', '.join(map(str, named))}; give one."
+        )
     return Recipe(
         name=Path(os.path.realpath(out)).name,
         models=tuple(map(ModelEntry, models)),
         trajectories=tuple(
             TrajectoryEntry.constant(v, f) for v in speeds or [150.0] for f in forces or [1.5]
         ),
-        rates_hz=(48_000,) if rate_hz is None else (rate_hz,),  # type: ignore[arg-type] # 48000.0 is whole
+        rates_hz=48_000 if rate_hz is None else rate_hz,  # type: ignore[arg-type] # or one
         seeds=(seed or 0,),
         duration_s=1.0 if duration_s is None else duration_s,
         vibrator=vibrator,

@@ -15,6 +15,7 @@ import typer
 from tactileq.commands.study_check import loaded
 
 HIGHEST_SEED = 2**53  # what every reader of numbers holds exactly
+SCHEMA = "study.schema.json"  # which the first line of the file names, for editors
 
 
 def study_init(
@@ -32,12 +33,14 @@ def study_init(
     """Write a commented study file, the paper's design with a freshly drawn seed.
 
     With --models, its textures are those in the folder, and the file passes tactileq study check.
+    study.schema.json beside it is for editors, which complete and check keys by it.
 
     Example: tactileq study init study.toml
 
     Example: tactileq study init study.toml --models models --simplified simplified
     """
     from experiments.study.study import SHIPPED_STUDY, Study
+    from modeling.files.describing import schema_text
     from modeling.files.writing import write_text
 
     if os.path.lexists(path):
@@ -51,12 +54,15 @@ def study_init(
             f"expected --models beside --simplified, got {simplified} alone; name the folder of "
             "full models, too."
         )
+    schema, described = path.parent / SCHEMA, schema_text(Study)
+    _check_schema(schema, described)
     seed = secrets.randbelow(HIGHEST_SEED)
     shipped = SHIPPED_STUDY.read_text(encoding="utf-8")
     text = shipped.replace("\nseed = 1 ", f"\nseed = {seed} ")
     if models is None:
         write_text(path, text)
         Study.load(path)
+        write_text(schema, described)
         print(f"study file: {path}")
         print(
             "Name your textures, trays, models and people in it, then: tactileq study check", path
@@ -71,8 +77,20 @@ def study_init(
     except ValueError:
         path.unlink()
         raise
+    write_text(schema, described)
     print(f"study file: {path}: {', '.join(textures)}")
     print(f"Write down your trays, anchors and people in it, then: tactileq study check {path}")
+
+
+def _check_schema(path: Path, described: str) -> None:
+    """Refuse to replace another file than the schema that would be written."""
+    from modeling.files.reading import read_text
+
+    if os.path.lexists(path) and read_text(path, "a schema of study files") != described:
+        raise ValueError(
+            f"expected no file at {path} but the schema of study files, got another one; remove it "
+            "(tactileq schema study makes the schema again), or choose another folder."
+        )
 
 
 def _textures_in(folders: Sequence[Path]) -> list[str]:
@@ -96,23 +114,28 @@ def _of_models(
     from experiments.study.design import fisher_yates
     from experiments.study.study import Study
     from modeling.seeds import generator
-    from rig.setup.editing import as_toml
 
-    full, simplified = (as_toml(os.path.relpath(folder, beside)) for folder in folders)
+    full, simplified = (_as_toml(os.path.relpath(folder, beside)) for folder in folders)
     trays = fisher_yates(ascii_uppercase[: len(textures)], generator(seed))
     pairs = zip(textures, trays, strict=True)
-    lines = [f"{as_toml(name)} = {as_toml(tray)}" for name, tray in pairs]
+    lines = [f"{_as_toml(name)} = {_as_toml(tray)}" for name, tray in pairs]
     changes = {
-        r"(?m)^textures = .*$": f"textures = {as_toml(list(textures))}",
+        r"(?m)^textures = .*$": f"textures = {_as_toml(list(textures))}",
         r"(?m)^full = .*$": f"full = {full}",
         r"(?m)^simplified = .*$": f"simplified = {simplified}",
         r"(?ms)^\[trays\]\n.*?\Z": "\n".join(["[trays]", *lines, ""]),
     }
     named = {name for pair in Study.load().tasks["absolute"].anchors.items() for name in pair}
     if not named <= set(textures):
-        first, second = map(as_toml, textures[:2])
+        first, second = map(_as_toml, textures[:2])
         for key in ("anchors", "catch"):
             changes[rf"(?m)^(# )?{key} = .*$"] = f"# {key} = {{{first} = {second}}}"
     for pattern, replacement in changes.items():
         text = re.sub(pattern, replacement.replace("\\", r"\\"), text)
     return text
+
+
+def _as_toml(value: object) -> str:
+    import tomlkit
+
+    return tomlkit.item(value).as_string()

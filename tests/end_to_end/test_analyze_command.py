@@ -14,10 +14,10 @@ import pytest
 from analysis.answers import loading
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
-from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import Threshold, simplify
+from modeling.files.claims import Claim, Plan
 from modeling.files.hashes import sha256_of_paths
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture

@@ -103,7 +103,7 @@ def break_recordings(folder: Path) -> dict[str, str]:
         "lost": "got nothing there",
         "nan": "expected finite samples",
         "still": "expected recordings with a speed and a force above 0",
-        "mislabelled": "expected a number for speed_mm_s",
+        "mislabelled": "got 'fast'",
         "short": "expected at least 64 samples",
         "headless": "expected the columns file, texture",
     }

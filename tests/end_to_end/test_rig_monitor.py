@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -55,8 +54,10 @@ def sound_process(monitor: Monitor) -> tuple[int, Path] | None:
     for child in children:
         with suppress(OSError):  # it may end meanwhile
             words = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")
-            if b"rig.sound.process" in words:
-                return int(child), Path(json.loads(words[-2])["live"])
+            maps = Path(f"/proc/{child}/maps").read_text().split()
+            shared = [word for word in maps if "/tactileq-live-" in word]
+            if b"rig.sound.process" in words and shared:
+                return int(child), Path(shared[0])
     return None
 
 

@@ -179,7 +179,7 @@ EDITS = {
         '"MDF", "silk"',
         "each texture of the scene light touch, got none of silk",
     ),
-    "beyond any model": (HAND, f"{HAND}\nbound.gfc30 = 1.1", "gfc30 of at most 1 under [bound]"),
+    "beyond any model": (HAND, f"{HAND}\nbound.gfc30 = 1.1", "for gfc30 under [bound], got 1.1"),
     "beyond the actuator": (
         HAND,
         f"{HAND}\nactuator.rms_g = 0.0001",
@@ -203,7 +203,7 @@ EDITS = {
     ),
     "unknown key": (HAND, f"{HAND}\nbound.gcf30 = 0.9", "expected only gfc30, bands_db, level_db"),
     "unknown section": (HAND, f"{HAND}\n[bounds]", "expected only version, scene, hand"),
-    "no hand": (HAND, "", "expected one hand under [hand]"),
+    "no hand": (HAND, "", "expected a table [hand], got none"),
     "unknown device": (HAND, f'{HAND}\nbudget.device = "abacus"', "expected a micro-controller"),
 }
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import tomllib
@@ -12,8 +13,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.sessions.traces import PRESENTATION_COLUMNS
 from experiments.study.study import SHIPPED_STUDY, Study
 from modeling import Threshold, simplify
+from modeling.files.columns import Column
+from modeling.files.describing import schema
+from modeling.files.stimulus_table import COLUMNS
 from modeling.files.tables import read_table
 from stimuli.planted.textures import planted_texture
 from tests.refusals import check_refusal
@@ -45,13 +50,26 @@ def test_a_new_study_file_is_the_shipped_one_with_a_seed_of_its_own(
     assert first.seed != second.seed
     lines = SHIPPED_STUDY.read_text(encoding="utf-8").splitlines()
     made = (tmp_path / "a.toml").read_text(encoding="utf-8").splitlines()
-    assert [line for line in made if line not in lines] == [made[2]]
+    assert [line for line in made if line not in lines] == [made[3]]
+    assert made[0] == "#:schema ./study.schema.json"
+    written = json.loads((tmp_path / "study.schema.json").read_text(encoding="utf-8"))
+    assert written == schema(Study)
+    (tmp_path / "bare.toml").write_text("\n".join(made[1:]), encoding="utf-8")
+    assert Study.load(tmp_path / "bare.toml").sha256 == first.sha256
     refused = main("study", "init", "a.toml")
     assert refused.returncode == 1
     assert refused.stderr == (
         "error: expected a new file at a.toml, got an existing one; choose another name.\n"
     )
     assert Study.load(tmp_path / "a.toml") == first
+
+
+def test_another_file_where_the_schema_would_be_is_kept(tmp_path: Path, main: Main) -> None:
+    (tmp_path / "study.schema.json").write_text("mine")
+    refused = main("study", "init", "a.toml")
+    check_refusal(refused.stderr.removeprefix("error: "), names="study.schema.json")
+    assert [path.name for path in tmp_path.iterdir()] == ["study.schema.json"]
+    assert (tmp_path / "study.schema.json").read_text() == "mine"
 
 
 def test_a_study_of_the_models_that_are_there_passes_its_check(place: Path, main: Main) -> None:
@@ -193,21 +211,21 @@ def test_a_stimulus_set_is_presented_in_the_place_of_models(place: Path, main: M
     simulated = main("simulate", "--study", "two.toml", "--data", "data")
     assert simulated.returncode == 0, simulated.stderr
     tables = [
-        read_table(path, ["model_sha256", "surface", "outside_share"])
+        read_table(path, PRESENTATION_COLUMNS)
         for path in sorted((place / "data").rglob("*_presentations.tsv"))
     ]
     assert len(tables) == 3
     shown = {row["model_sha256"] for rows in tables for row in rows if row["surface"] == "virtual"}
     files = {
         row["sha256"]
-        for row in read_table(place / "set/manifest.tsv", ["sha256", "texture"])
+        for row in read_table(place / "set/manifest.tsv", COLUMNS)
         if row["texture"] in ("canvas", "MDF")
     }
     assert shown == files
     # A signal has no grid of speeds and forces: nobody strokes outside of it, or trains for it.
-    assert {row["outside_share"] for rows in tables for row in rows} == {"n/a"}
+    assert {row["outside_share"] for rows in tables for row in rows} == {None}
     for path in (place / "data").glob("sub-*/ses-*/beh/*_task-absolute_beh.tsv"):
-        phases = [row["phase"] for row in read_table(path, ["phase"])]
+        phases = [row["phase"] for row in read_table(path, [Column("phase")])]
         assert phases == ["training"] + ["main"] * 4
     analyzed = main("analyze", "data", "--out", "results")
     assert analyzed.returncode == 0, analyzed.stderr

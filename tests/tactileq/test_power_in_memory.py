@@ -26,10 +26,10 @@ from analysis.statistics.verdicts import claim_values, people_data
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
-from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, Threshold, simplify
+from modeling.files.claims import Claim, Plan
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tactileq.commands.power import (

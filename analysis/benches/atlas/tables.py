@@ -11,7 +11,8 @@ import pandas as pd
 
 from analysis.benches.atlas.case import HOLDS, Axis
 from analysis.benches.atlas.edges import Examined
-from analysis.columns import SIMULATED, Column
+from analysis.columns import SIMULATED
+from modeling.files.columns import Column
 
 LEAST_MARGIN = 2.0
 

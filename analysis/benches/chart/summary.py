@@ -13,8 +13,8 @@ from scipy.special import stdtrit
 from analysis.benches.chart.judging import AT, BETWEEN, DOUBLE, PLACES, STROKING, UPDATES_MS
 from analysis.benches.chart.measures import SUMMARIES
 from analysis.benches.chart.methods import OUR_FAMILIES, OURS, RIVALS
-from analysis.columns import Column, Columns, names
 from modeling.arrays import Bools, Floats
+from modeling.files.columns import Column, Columns, names
 from modeling.models.texture_model import BLENDINGS
 
 VARIANT = ["kind", "method", "family", "blending", "default_blending", "update_ms", "precision"]

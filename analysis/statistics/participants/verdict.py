@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 import pandas as pd
 
-from analysis.columns import TEXTURE, Column, names
+from analysis.columns import TEXTURE
 from analysis.statistics.equivalence import (
     ALL_BUT,
     ALPHA,
@@ -32,6 +32,7 @@ from analysis.statistics.participants.posterior import (
     rating_draws,
 )
 from modeling.arrays import Floats
+from modeling.files.columns import Column, names
 from modeling.participants.choices import ChoicePriors, ChoiceStudies, DecisionModel
 from modeling.participants.ratings import RatingPriors, RatingStudies
 

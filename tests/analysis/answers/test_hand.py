@@ -27,6 +27,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, Threshold, simplify
 from modeling.files.answer_tables import ANSWER_TABLES, CORRECT, answer_table
+from modeling.files.columns import names, sidecar
 from rig.twin import SimulatedRig
 from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
@@ -67,7 +68,7 @@ def store(tmp_path: Path) -> Callable[..., Path]:
         hand = pd.concat(parts).assign(force_assumed=int(assumed))
         path = beh / f"{stem}_recording-start{run}_physio.tsv.gz"
         path.write_bytes(physio_bytes(at_regular_times(hand)))
-        told = {"SamplingFrequency": RATE_HZ, "Columns": list(COLUMNS), **COLUMNS}
+        told = {"SamplingFrequency": RATE_HZ, "Columns": names(COLUMNS), **sidecar(COLUMNS)}
         path.with_name(path.name.replace(".tsv.gz", ".json")).write_bytes(json_bytes(told))
         shown = [
             {"trial_type": "presented", "run": run, "trial": s[0], "surface": s[1]} for s in strokes

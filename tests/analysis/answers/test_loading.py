@@ -66,13 +66,6 @@ def test_a_file_that_was_cut_is_refused(study_folder, write_task, absolute_rows,
     _one_sentence(caught.value, path)
 
 
-def test_an_empty_file_is_refused(study_folder, write_task, absolute_rows):
-    path = write_task("absolute", absolute_rows)
-    path.write_text("")
-    with pytest.raises(InputError, match="expected the columns trial, phase"):
-        load_responses(study_folder)
-
-
 def test_a_session_without_an_answer_has_none(study_folder, write_task, absolute_rows):
     write_task("absolute", absolute_rows)
     write_task("absolute", [], participant="sub-02")
@@ -106,14 +99,6 @@ def test_windows_line_ends_and_byte_order_mark_are_read(study_folder, write_task
 @pytest.mark.parametrize(
     ("column", "value", "expected"),
     [
-        (6, "101", "from 0 to 100"),
-        (6, "-0.5", "from 0 to 100"),
-        (7, "high", "from 0 to 100"),
-        (7, "nan", "from 0 to 100"),
-        (9, "inf", "at least 0"),
-        (1, "warm-up", "training or main"),
-        (5, "left", "real or virtual"),
-        (2, "n/a", "a value in column texture"),
         (0, "3", "every trial once"),
         (10, "true", "simulated = false"),
     ],
@@ -134,8 +119,6 @@ def test_malformed_ratings_are_refused(
     [
         (6, "velvet", "stands in its trial's layout"),
         (7, "0", "correct = 1 exactly where"),
-        (7, "0.5", "correct = 1 exactly where"),
-        (7, "2", "from 0 to 1"),
         (7, "n/a", "correct = 1 exactly where"),
     ],
 )
@@ -145,22 +128,6 @@ def test_malformed_choices_are_refused(
     relative_rows[2][column] = value
     path = write_task("relative", relative_rows)
     with pytest.raises(InputError, match=expected) as caught:
-        load_responses(study_folder)
-    _one_sentence(caught.value, path)
-
-
-def test_a_missing_column_is_named(study_folder, write_task, relative_rows):
-    columns = [name for name in _relative_columns() if name != "layout"]
-    path = write_task("relative", [row[:5] + row[6:] for row in relative_rows], columns=columns)
-    with pytest.raises(InputError, match="the column layout") as caught:
-        load_responses(study_folder)
-    _one_sentence(caught.value, path)
-
-
-def test_a_line_with_too_many_values_is_refused(study_folder, write_task, absolute_rows):
-    absolute_rows[4].append("surplus")
-    path = write_task("absolute", absolute_rows)
-    with pytest.raises(InputError, match="16 values in line 6") as caught:
         load_responses(study_folder)
     _one_sentence(caught.value, path)
 
@@ -477,9 +444,7 @@ def test_claims_come_from_the_study_that_was_run(study_folder, write_task, absol
         _one_sentence(caught.value, description)
     for wrong in ({"bounds": [1, 2]}, {"measure": "toggle"}, {"models": ["full"]}, {"task": "?"}):
         _describe(study_folder, StudyDesign={"plan": {"claims": [stated | wrong]}})
-        with pytest.raises(
-            InputError, match=r"expected the claims of a study's \[plan\]"
-        ) as caught:
+        with refused(InputError, names=[description, *wrong]) as caught:
             load_responses(study_folder)
         _one_sentence(caught.value, description)
 

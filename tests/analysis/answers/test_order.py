@@ -160,14 +160,3 @@ def test_other_orders_of_a_resumed_session_are_refused(study_folder, resumed, ch
     resumed(change)
     with refused(InputError, names=[*facts, "sub-01_ses-01_task-absolute_beh.tsv"]):
         load_responses(study_folder)
-
-
-@pytest.mark.parametrize(
-    ("value", "told"), [("2", "from 0 to 1"), ("0.5", "1 or 0"), ("n/a", "a value in column")]
-)
-def test_what_is_neither_valid_nor_not_is_refused(study_folder, write, absolute_rows, value, told):
-    rows = answers(absolute_rows)
-    rows[3][VALID] = value
-    write(rows)
-    with pytest.raises(InputError, match=told):
-        load_responses(study_folder)

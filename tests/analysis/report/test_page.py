@@ -7,7 +7,6 @@ import re
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.columns import Column
 from analysis.report.page import (
     LONGEST_WORD_KEPT_WHOLE,
     MOST_ROWS,
@@ -19,6 +18,7 @@ from analysis.report.page import (
     picture_html,
     table_html,
 )
+from modeling.files.columns import Column
 
 
 def classes(frame: pd.DataFrame, *columns: Column) -> list[list[str]]:

@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.columns import names
 from analysis.report.page import Fold, Table, table_html
 from analysis.report.section_hand import hand_section
 from analysis.report.sections import Section
+from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "simplified")

@@ -11,7 +11,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis.answers.plan import AnalysisPlan
-from analysis.columns import names
 from analysis.labels import ALL_TEXTURES
 from analysis.report.page import Table, table_html
 from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section, oddity_sensitivity
@@ -20,6 +19,7 @@ from analysis.statistics.dprime import oddity_d_prime
 from analysis.statistics.equivalence import DIFFERENT
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import names
 from modeling.participants.choices import oddity_share
 
 pytestmark = pytest.mark.filterwarnings("error")

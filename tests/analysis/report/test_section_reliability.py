@@ -6,7 +6,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.columns import names
 from analysis.report.page import Table, table_html
 from analysis.report.section_reliability import (
     CARELESS_COLUMNS,
@@ -14,6 +13,7 @@ from analysis.report.section_reliability import (
     reliability_section,
 )
 from analysis.report.sections import Section
+from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 CHANCES = {"relative": 1 / 3}

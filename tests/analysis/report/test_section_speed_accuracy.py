@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.columns import names
 from analysis.report.outcomes import Weight
 from analysis.report.page import Fold, Picture, Table, table_html
 from analysis.report.section_speed_accuracy import speed_accuracy_section
 from analysis.report.sections import Section
+from modeling.files.columns import names
 
 MODELS = ("full", "simplified")
 pytestmark = pytest.mark.filterwarnings("error")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.columns import Column
 from analysis.report.outcomes import Outcome, Weight
 from analysis.report.page import Fold, Picture, Table
 from analysis.report.sections import Section, of_pairs
+from modeling.files.columns import Column
 
 
 def section(told: str) -> Section:

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from analysis.columns import names
 from analysis.statistics import buttons
 from analysis.statistics.buttons import BUTTON_COLUMNS, button_preference
+from modeling.files.columns import names
 
 TEXTURES = [f"t{n}" for n in range(7)]
 

@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 from scipy import stats
 
 from analysis.answers.plan import Claim
-from analysis.columns import names
 from analysis.labels import ALL_TEXTURES, IDENTICAL
 from analysis.statistics.claims import (
     BOUNDS_WITHHELD,
@@ -30,6 +29,7 @@ from analysis.statistics.claims import (
 )
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.paired import holm
+from modeling.files.columns import names
 
 CLAIM = Claim(
     name="as strong",

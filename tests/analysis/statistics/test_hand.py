@@ -8,7 +8,6 @@ import pytest
 from scipy import stats
 
 from analysis.answers.hand import MEASURES
-from analysis.columns import names
 from analysis.statistics.hand import (
     HAND_TEST_COLUMNS,
     PARTICIPANT_COLUMNS,
@@ -16,6 +15,7 @@ from analysis.statistics.hand import (
     hand_means,
     hand_tests,
 )
+from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "other")

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import minimize
 
-from analysis.columns import names
 from analysis.statistics.design import MODEL, ORDER, SESSION, complete_participants, design
 from analysis.statistics.mixed import (
     MIXED_COLUMNS,
@@ -23,6 +22,7 @@ from analysis.statistics.mixed import (
     t_of,
 )
 from analysis.statistics.paired import paired_test
+from modeling.files.columns import names
 
 DATA = Path(__file__).parents[2] / "data" / "sleepstudy" / "reaction_ms.tsv"
 MODELS = ("full", "simplified")

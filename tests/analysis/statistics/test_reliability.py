@@ -8,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from analysis.columns import names
 from analysis.statistics.reliability import (
     AGREEMENT_COLUMNS,
     RATER_COLUMNS,
@@ -20,6 +19,7 @@ from analysis.statistics.reliability import (
     same_ratings,
     within_participant_sd,
 )
+from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")
 SCALE = "magnitude_similarity"

@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.columns import names
 from analysis.statistics.mixed import MIXED_MODEL, PAIRED
 from analysis.statistics.speed_accuracy import (
     CELL_COLUMNS,
@@ -34,6 +33,7 @@ from analysis.statistics.speed_accuracy import (
     trade_off_sentence,
 )
 from modeling import InputError
+from modeling.files.columns import names
 from tests.refusals import refused
 
 MODELS = ("full", "simplified")

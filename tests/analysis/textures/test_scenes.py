@@ -7,7 +7,6 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from analysis.columns import names
 from analysis.figures.scenes import figure_tradeoff
 from analysis.labels import ALL_TEXTURES
 from analysis.textures.scenes import (
@@ -18,6 +17,7 @@ from analysis.textures.scenes import (
     steps_table,
 )
 from modeling import CompiledScene, Scene, compile_scene
+from modeling.files.columns import names
 from modeling.scenes.scene import HandRange
 from stimuli.planted.textures import planted_texture
 

@@ -32,6 +32,7 @@ from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError, simplify
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.columns import Column
 from modeling.files.tables import guarded
 from rig.twin import SimulatedRig
 from tests.experiments.sessions.conftest import STUDY, session_on_disk
@@ -426,7 +427,9 @@ def test_nothing_is_made_up_in_a_gap_or_beside_what_is_missing():
 
 @given(st.lists(st.text(), min_size=1, max_size=5))
 def test_text_survives_the_table(values):
-    data = table_bytes(("number", "note"), [{"number": 1, "note": text} for text in values])
+    data = table_bytes(
+        [Column("number"), Column("note")], [{"number": 1, "note": text} for text in values]
+    )
     found = pd.read_csv(io.BytesIO(data), sep="\t", keep_default_na=False, dtype=str)
     # Tabs, line ends and other control characters, which no cell of BIDS can hold, are pictured.
     pictured = {n: 0x2400 + n for n in range(32)} | {127: 0x2421}

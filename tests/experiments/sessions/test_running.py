@@ -28,7 +28,7 @@ from experiments.sessions.trial_loop import People, SessionResult
 from experiments.sessions.writer import StoreError
 from experiments.study.models import ModelSets
 from experiments.study.questions import Question
-from experiments.study.study import Study
+from experiments.study.study import Consent, Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session, task_named
 from modeling import InputError
@@ -198,7 +198,7 @@ def test_consent_and_questions_come_first_and_once(
 ) -> None:
     asking = replace(
         small,
-        consent="2026-11",
+        consent=Consent(version="2026-11"),
         questions=(Question(name="handedness", levels=("left", "right", "not said")),),
     )
     first, again = Scripted(), Scripted()
@@ -351,12 +351,12 @@ def test_a_session_goes_on_as_its_manifest_says_whatever_the_study_says_by_now(
     run: Callable[..., Any], small: Study
 ) -> None:
     age = Question(name="age", least=18, most=99)
-    began = replace(small, consent="1", questions=(age,))
+    began = replace(small, consent=Consent(version="1"), questions=(age,))
     run(Leaves(), study=began)
     absolute = replace(small.plan_of("absolute"), repeats=2, break_after=1)
     other = replace(
         small,
-        consent="2",
+        consent=Consent(version="2"),
         textures=("canvas", "MDF"),
         trays={"canvas": "A", "MDF": "B"},
         tasks={**small.tasks, "absolute": absolute},
@@ -481,11 +481,11 @@ def test_who_is_refused_is_not_enrolled(run: Callable[..., Any], tmp_path: Path)
 
 def test_another_consent_is_asked_for_again(run: Callable[..., Any], small: Study) -> None:
     again = Scripted()
-    run(study=replace(small, consent="1"))
+    run(study=replace(small, consent=Consent(version="1")))
     run(
         again,
         task="relative",
-        study=replace(small, consent="2"),
+        study=replace(small, consent=Consent(version="2")),
         override="the ethics committee asked for another form",
     )
     assert not again.asked[0].known

@@ -29,6 +29,7 @@ from experiments.sessions.state import session_state
 from experiments.sessions.store import MemoryStore, SessionStore, Store, StoreError
 from experiments.sessions.tables import GrowingTable, cell
 from modeling import InputError
+from modeling.files.columns import Column
 from modeling.files.reading import reason_of
 from rig.interface import Acceleration, HandRows, PresentationRecord
 from tests.refusals import check_refusal, refused
@@ -669,7 +670,7 @@ def test_no_text_breaks_a_row(value: str) -> None:
 
 def test_a_table_with_hostile_values_reads_back(tmp_path: Path) -> None:
     hostile = ['"unbalanced', "tab\there", "line\nend\r\n", "back\\slash", "", "\ud800", "ünï"]
-    table = GrowingTable(tmp_path / "hand.tsv", ("trial", "note"))
+    table = GrowingTable(tmp_path / "hand.tsv", (Column("trial"), Column("note")))
     table.extend({"trial": n, "note": value} for n, value in enumerate(hostile, start=1))
     table.close()
     read = pd.read_csv(table.path, sep="\t", keep_default_na=False)
@@ -697,14 +698,14 @@ def test_a_table_of_other_columns_is_left_alone(tmp_path: Path) -> None:
     path = tmp_path / "hand.tsv"
     path.write_text("other\n1\n")
     with refused(InputError, expected=["trial", "note", path], got="'other'"):
-        GrowingTable(path, ("trial", "note"))
+        GrowingTable(path, (Column("trial"), Column("note")))
     assert path.read_text() == "other\n1\n"
 
 
 def test_a_table_that_the_disk_does_not_take_keeps_whole_rows(
     tmp_path: Path, file_size_limit: FileSizeLimit
 ) -> None:
-    table = GrowingTable(tmp_path / "hand.tsv", ("trial", "note"))
+    table = GrowingTable(tmp_path / "hand.tsv", (Column("trial"), Column("note")))
     table.extend([{"trial": 1, "note": "kept"}])
     before = table.path.read_bytes()
     facts = [TOO_LARGE, "--resume"]

@@ -24,11 +24,11 @@ from experiments.study.design import (
     fisher_yates,
     models_of_session,
 )
-from experiments.study.plan import Plan
 from experiments.study.study import Study
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
 from modeling import InputError
+from modeling.files.claims import Plan
 from modeling.files.hashes import sha256_of_values
 from tests.refusals import refused
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pytest
 
-from experiments.study.plan import Claim, Plan
 from experiments.study.questions import Question
-from experiments.study.study import SHIPPED_STUDY, Study, plan_sha256
+from experiments.study.study import SHIPPED_STUDY, Consent, Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from modeling import InputError
 from modeling.files.answer_tables import ANSWER_TABLES, RESPONSE_TIME, answer_table
+from modeling.files.claims import Claim, Plan
+from modeling.files.described import Section, key
+from modeling.files.describing import key_tables, schema
 from tests.refusals import refused
 
 
@@ -48,7 +50,7 @@ def rich() -> Study:
     return replace(
         Study.load(),
         models={"full": "models", "AR": "ar", "simplified": "least.toml"},
-        consent="2026-11",
+        consent=Consent(version="2026-11"),
         questions=(Question(name="age", least=18, most=99), mood, craft),
         plan=Plan(claims=(claim,), exclusions=("None.",), highest_share_at_ends=0.3),
         tasks={
@@ -90,7 +92,7 @@ def test_every_change_of_a_study_changes_its_hash() -> None:
         {"seed": 2},
         {"languages": ("en",)},
         {"longest_gap_min": 31},
-        {"consent": "2026-12"},
+        {"consent": Consent(version="2026-12")},
         {"questions": ()},
         {"questions": (*study.questions[:2], replace(study.questions[2], levels_text=SWAPPED))},
         {"plan": Plan()},
@@ -109,6 +111,37 @@ def test_the_hash_of_the_plan_is_of_the_study_and_of_the_models() -> None:
     assert found == plan_sha256(Study.from_dict(study.to_dict()), models)
     assert found != plan_sha256(replace(study, seed=2), models)
     assert found != plan_sha256(study, {"canvas": {"full": "0a", "AR": "1c"}})
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaidPlan(TaskPlan):
+    """A task with one more key."""
+
+    reward: Annotated[float, key("for taking part", unit="EUR", ge=0, le=99)] = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PaidStudy(Study):
+    """A study with one more key."""
+
+    deposit: Annotated[float, key("for the key", unit="EUR", ge=0, le=50)] = 5.0
+
+
+@pytest.mark.parametrize(
+    ("paid", "name", "most", "where"),
+    [(PaidStudy, "deposit", 50, ""), (PaidPlan, "reward", 99, "[absolute]")],
+)
+def test_a_key_costs_one_line(paid: type[Section], name: str, most: int, where: str) -> None:
+    """Reading, refusing, saving, the schema and the documentation follow from the declaration."""
+    plain = Study.load().to_dict()
+    values = plain if paid is PaidStudy else plain["absolute"]
+    read = paid.read({**values, name: 2}, where=where)
+    assert read.to_dict() == {**values, name: 2.0}
+    with refused(InputError, names=[name, *where.split()], expected=f"{most} EUR", got=most + 1):
+        paid.read({**values, name: most + 1}, where=where)
+    described = schema(paid)["properties"][name]
+    assert (described["minimum"], described["maximum"]) == (0, most)
+    assert f"| `{name}` | a number from 0 to {most} EUR |" in key_tables(paid)
 
 
 def test_a_changed_file_is_followed(tmp_path: Path) -> None:
@@ -143,37 +176,21 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("seed = 1 ", "sede = 1 ", "got sede"),
-        ("seed = 1 ", "", "got no seed"),
-        ("seed = 1 ", "seed = -1 ", "for seed, got -1"),
-        ("seed = 1 ", "seed = 1.5 ", "for seed, got 1.5"),
-        ("seed = 1 ", "repeats = 3 # ", "got repeats"),
-        ("repeats = 3\n", "repeats = true\n", "for repeats, got True"),
-        ("repeats = 3\n", "repeats = 0\n", "for repeats, got 0"),
-        ("repeats = 3\n", "repeats = 3\ntraining_trials = 2", "expected TOML"),
         ("repeats = 3\n", "repeats = 3\nmost_training_trials = 1\n", "at least the 2 training"),
-        ("repeats = 3\n", "repeats = 3\nbreak_after = -1\n", "for break_after, got -1"),
-        ("repeats = 3\n", 'repeats = 3\nfeel_all = "yes"\n', "for feel_all, got 'yes'"),
         ("repeats = 3\n", 'repeats = 3\nanchors = {canvas = "PVC"}\n', r"got some in \[relative"),
         ("repeats = 3\n", 'repeats = 3\nmodels = ["full"]\n', "two models or more"),
-        ("repeats = 3\n", 'repeats = 3\nmodels = "full"\n', "a list of models in"),
-        ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "full"]\n', "different models"),
+        ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "full"]\n', "for models under"),
         ("repeats = 3\n", 'repeats = 3\nmodels = ["full", "AR"]\n', r"\[relative\], got AR"),
         (ABSOLUTE, f"{ABSOLUTE}\nfeel_all = true", r"got it in \[absolute\]"),
         ('canvas = "PVC"}', 'canvas = "canvas"}', "two different textures"),
         ('canvas = "PVC"}', 'canvas = "silk"}', "got 'canvas' = 'silk'"),
-        (ANCHORS, '["canvas"]', "expected a table anchors"),
         (RELATIVE, RELATIVE.replace("24", "23"), "even number of participants"),
-        (RELATIVE, RELATIVE.replace("participants", "subjects"), "got subjects"),
-        (RELATIVE, 'schedule = "by-day"', "got no participants"),
-        ('schedule = "by-day"\n', 'schedule = "daily"\n', "got 'daily'"),
         ("[plan]\n", '[oddity]\nparticipants = 2\nschedule = "by-day"\n[plan]\n', "interleaved in"),
         (
             "[plan]\n",
             '[oddity]\nparticipants = 2\nschedule = "interleaved"\nrepeats = 3\n[plan]\n',
             "an even number of repeats",
         ),
-        ("[plan]\n", "[threshold]\nparticipants = 2\n[plan]\n", r"schedule in \[threshold\]"),
         (
             "[plan]\n",
             '[threshold]\nparticipants = 2\nschedule = "by-day"\n[plan]\n',
@@ -188,11 +205,6 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
             for key, told in (
                 ("catch_trials = 4", "4 catch trials of .*without a surface .*catch_trials = 0"),
                 ("catch = {}\ncatch_trials = 1", "1 catch trials of .*without a surface"),
-                ("catch_trials = 101", "from 0 to 100 for catch_trials, got 101"),
-                ("catch_trials = -1", "from 0 to 100 for catch_trials, got -1"),
-                ("catch_trials = 2.5", "for catch_trials, got 2.5"),
-                ("catch_trials = true", "for catch_trials, got True"),
-                ('catch = ["canvas"]', r"a table catch in \[oddity\]"),
                 ('catch = {canvas = "canvas"}', "catch, got 'canvas' = 'canvas'"),
                 ('catch = {canvas = "silk"}', "catch, got 'canvas' = 'silk'"),
                 ('catch = {silk = "canvas"}', "catch, got 'silk' = 'canvas'"),
@@ -200,17 +212,13 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ),
         ("repeats = 3\n", 'repeats = 3\ncatch = {canvas = "PVC"}\n', r"got one in \[relative"),
         (ABSOLUTE, f"{ABSOLUTE}\ncatch_trials = 0", r"got one in \[absolute"),
-        ('simplified = "simplified"\n', "", "number of sets of models, got 1"),
-        ('simplified = "simplified"\n', "simplified = 3\n", "the place of the models simplified"),
-        ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for a set of models"),
-        ('["en", "ja"]', "[]", "one language at least"),
-        ('["en", "ja"]', '["English"]', "such as en or ja, got 'English'"),
+        ('simplified = "simplified"\n', "", "2 to 6 sets of models"),
+        ('simplified = "simplified"\n', '"si|mple" = "simplified"\n', "for models, got"),
+        ('["en", "ja"]', "[]", "for languages, got"),
+        ('["en", "ja"]', '["English"]', "such as en or ja for languages"),
         ('["en", "ja"]', '["en", "en"]', "different languages"),
-        ("longest_gap_min = 30 ", "longest_gap_min = -1 ", "for longest_gap_min, got -1"),
-        ("# [consent]\n# version", "[consent]\nwording", "got wording"),
-        ("# [consent]\n# version = ", "[consent]\nversion = 3 #", "text for version in"),
-        ('name = "sex"', 'name = "Sex"', "a name of lower-case letters"),
-        ('name = "sex"', 'name = "code"', "another name than"),
+        ('name = "sex"', 'name = "Sex"', "for name under"),
+        ('name = "sex"', 'name = "code"', "and none of .* got 'code'"),
         ('name = "sex"', 'name = "age"', "different questions"),
         ('name = "sex"', 'name = "mood"', "expected the question mood in en, ja"),
         ('name = "sex"', 'name = "mood"\ntext.en = "Mood?"', "got none in ja"),
@@ -219,50 +227,41 @@ CLAIM = 'models = ["full", "simplified"]\nbounds = [-0.1, 0.1]'
         ('levels = ["female",', f"levels = {LEVELS[:-1]},", "at most 18 levels, .* sex, got 22"),
         ('name = "sex"', f"{ASKED}.de = {JAPANESE}", "levels of the question sex in .* none in ja"),
         ('name = "sex"', f"{ASKED}.ja = {JAPANESE[1:]}", "4 texts in levels_text.ja .* got 3"),
-        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '女']}", "different levels_text.ja of"),
-        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '']}", "text for levels_text.ja of"),
-        ('name = "sex"', f"{ASKED}.ja = 3", "a list of levels_text.ja of 'sex'"),
-        ('name = "sex"', f"{ASKED} = 3", "a table levels_text of 'sex', got 3; write levels_text."),
+        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '女']}", "for levels_text under"),
+        ('name = "sex"', f"{ASKED}.ja = {[*JAPANESE[:3], '']}", "for levels_text under"),
         ("least = 18\n", 'least = 18\nlevels_text.ja = ["一"]\n', "levels for the levels_text"),
         ("least = 18\n", "least = -1\n", "whole numbers from 0 to 999999 for .* got -1 to 99"),
         ("least = 18\nmost = 99\n", "least = 1\nmost = 1_000_000\n", "got 1 to 1000000"),
         ("least = 18\nmost = 99\n", "least = 1.2\nmost = 1.8\n", "got 1.2 to 1.8"),
         ("least = 18\n", "least = 99\n", "least and most, or two levels"),
-        ("least = 18\n", "least = 18\nlevels = 3\n", "a list of levels of 'age'"),
-        ('"right", "left", "both"', '"right", "right"', "different levels"),
-        ("highest_share_at_ends = 0.2 ", "highest_share_at_ends = 2 ", "ends, got 2"),
-        ("exclusions = [", "exclusion = [", "got exclusion"),
-        ('rule = "model" ', 'rule = "bayes" ', "the rule in .* got 'bayes'"),
-        ('rule = "model" ', "rule = 1 ", "the rule in .* got 1"),
+        ('"right", "left", "both"', '"right", "right"', "for levels under"),
         ('rule = "model" ', 'rule = "tests" ', "few in .* beside rule .* got 0.15"),
         ('rule = "model" ', "", "few in .* beside rule .* got 0.15"),
-        ("few = 0.15 ", "few = 0.51 ", "from 0 to 0.5 for few, got 0.51"),
-        ("few = 0.15 ", "few = -0.01 ", "from 0 to 0.5 for few, got -0.01"),
-        ("few = 0.15 ", "few = true ", "for few, got True"),
-        ("few = 0.15 ", 'few = "15 %" ', "for few, got '15 %'"),
-        ("few = 0.15 ", "few = nan ", "for few, got nan"),
         (ABSOLUTE, ABSOLUTE.replace("20", "7"), r"8 participants or more in \[absolute.* got 7"),
         ('measure = "correct"', 'measure = "accuracy"', "got 'accuracy'"),
-        ('measure = "correct"', 'measure = "magnitude_similarity"', 'to be "correct"'),
+        (
+            'measure = "correct"',
+            'measure = "magnitude_similarity"',
+            "expected correct for the measure",
+        ),
         ('task = "relative"', 'task = "oddity"', "expected a planned task"),
-        (CLAIM, CLAIM.replace("-0.1", "0"), "bounds below and above 0 within -1 and 1"),
-        (CLAIM, CLAIM.replace("0.1]", "1.1]"), "bounds below and above 0 within -1 and 1"),
-        (CLAIM, CLAIM.replace("0.1]", "nan]"), "bounds below and above 0 within -1 and 1"),
+        (CLAIM, CLAIM.replace("-0.1", "0"), "two bounds, below and above 0"),
+        (CLAIM, CLAIM.replace("0.1]", "1.1]"), "bounds within -1 and 1"),
         (CLAIM, CLAIM.replace('"simplified"', '"AR"'), "got 'AR'"),
-        (CLAIM, CLAIM.replace('"simplified"', '"full"'), "two different models"),
-        (CLAIM, CLAIM.replace('"full", "simplified"', '"full"'), "two different models"),
-        ('name = "frequency feels the same"', 'name = "magnitude feels the same"', "names of cl"),
+        (CLAIM, CLAIM.replace('"simplified"', '"full"'), "two different sets of models"),
+        (
+            'name = "frequency feels the same"',
+            'name = "magnitude feels the same"',
+            "claims of different names",
+        ),
         ('"PVC", ', "", "got trays for"),
-        ('"PVC", ', '"PVC", "PVC", ', "different textures"),
-        ('PVC = "F"', 'PVC = "E"', "different trays"),
-        ('PVC = "F"', 'PVC = "F\\tG"', "printable text for tray"),
-        ('"canvas", ', '"can|vas", ', "printable text for texture"),
-        ('"canvas", ', '"can\\nvas", ', "printable text for texture"),
-        ("textures = [", 'textures = "PVC" #', "a list of textures"),
+        ('"PVC", ', '"PVC", "PVC", ', "for textures, got"),
+        ('PVC = "F"', 'PVC = "E"', "for trays, got"),
+        ('PVC = "F"', 'PVC = "F\\tG"', "for trays, got"),
+        ('PVC = "F"', "PVC = 'F\"G'", "for trays, got"),
+        ('"canvas", ', '"can|vas", ', "for textures, got"),
+        ('"canvas", ', '"can\\nvas", ', "for textures, got"),
         ("[relative]", "[[relative]]", r"expected a table \[relative\]"),
-        ("seed = 1 ", "seed = ", "expected TOML"),
-        ("seed = 1 ", "seed = 1\ncalibration_days = 0 ", "for calibration_days, got 0"),
-        ("seed = 1 ", "seed = 1\nmeasured_force = 1 ", "true or false for measured_force, got 1"),
     ],
 )
 def test_what_cannot_be_used_is_refused(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -291,8 +290,8 @@ def test_the_rule_of_verdicts_is_part_of_the_plan() -> None:
     assert (shipped.plan.rule, shipped.plan.few) == ("model", 0.15)
     fewer = replace(shipped.plan, few=0.1)
     assert len({p.sha256 for p in (shipped.plan, fewer, replace(shipped.plan, rule="tests"))}) == 3
-    assert Plan.from_dict(fewer.to_dict()) == fewer
-    assert Plan.from_dict({"rule": "model"}).few == 0.15
+    assert Plan.read(fewer.to_dict()) == fewer
+    assert Plan.read({"rule": "model"}).few == 0.15
     with refused(InputError, expected="model", got=[0.1, "tests"]):
         Plan(few=0.1)
     with refused(InputError, expected=8, got=7, names=["absolute", 'rule = "tests"']):
@@ -324,7 +323,7 @@ def test_new_studies_have_catch_trials_of_their_anchors(
 ) -> None:
     shipped = Study.load()
     plain = {"participants": 8, "schedule": "interleaved", **said}
-    plan = TaskPlan.from_dict("oddity", plain)
+    plan = TaskPlan.read({"repeats": 6, **plain})
     study = replace(
         shipped,
         plan=replace(shipped.plan, rule=rule),

@@ -83,8 +83,7 @@ def write_answers(data: Path, subject: int, rows: Sequence[Mapping[str, object]]
     start = f"sub-{subject:02d}/ses-01/beh/sub-{subject:02d}_ses-01"
     path = data / f"{start}_task-threshold_beh.tsv"
     path.parent.mkdir(parents=True, exist_ok=True)
-    columns = [column.name for column in ANSWER_TABLES["threshold"].columns]
-    write_table(path, columns, [[row[name] for name in columns] for row in rows])
+    write_table(path, ANSWER_TABLES["threshold"].columns, rows)
     return path
 
 

@@ -12,7 +12,6 @@ from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import Psychometrics
 from experiments.study.design import SessionPlan
 from experiments.study.models import ModelSets
-from experiments.study.plan import Claim, Plan
 from experiments.study.study import Study, plan_sha256
 from experiments.study.task_plan import TaskPlan
 from experiments.tasks import plan_session
@@ -26,6 +25,7 @@ from experiments.tasks.durations import (
 from experiments.tasks.page import plan_page, proof_of_sensitivity
 from modeling import InputError, TextureModel, Threshold
 from modeling.files.answer_tables import ANSWER_TABLES
+from modeling.files.claims import Claim, Plan
 from tests.refusals import refused
 
 

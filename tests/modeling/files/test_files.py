@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from modeling import InputError
+from modeling.files.columns import Column
 from modeling.files.documents import read_json_object
 from modeling.files.folders import check_replaceable, listed_file, replace_folder
 from modeling.files.tables import read_table, write_table
@@ -48,24 +49,24 @@ def test_tables_load_back_equal(
     rows: list[tuple[str, str]], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = tmp_path_factory.mktemp("table") / "table.tsv"
-    numbered = [(f"{n}", *row) for n, row in enumerate(rows)]
-    write_table(path, ("number", "a", "b"), numbered)
-    expected = [dict(zip(("number", "a", "b"), row, strict=True)) for row in numbered]
-    assert read_table(path, ("a",)) == expected
+    columns = [Column("number", limits=(0, 4), whole=True), Column("a"), Column("b")]
+    expected = [{"number": n, "a": a, "b": b} for n, (a, b) in enumerate(rows)]
+    write_table(path, columns, expected)
+    assert read_table(path, columns) == expected
     assert b"\r" not in path.read_bytes()
 
 
 @pytest.mark.parametrize("cell", ["a\tb", "a\nb", "a\rb"])
 def test_cells_that_would_break_the_table_are_refused(tmp_path: Path, cell: str) -> None:
     with refused(InputError, expected="cells", got=[[cell]]):
-        write_table(tmp_path / "t.tsv", ("x",), [(cell,)])
+        write_table(tmp_path / "t.tsv", [Column("x")], [{"x": cell}])
     assert not list(tmp_path.iterdir())
 
 
 def test_tables_from_other_programs_are_read(tmp_path: Path) -> None:
     path = tmp_path / "t.tsv"
     path.write_bytes("# a note\r\nx\ty\r\n1\tä\r\n\r\n".encode("utf-8-sig"))
-    assert read_table(path, ("x", "y")) == [{"x": "1", "y": "ä"}]
+    assert read_table(path, [Column("x"), Column("y")]) == [{"x": "1", "y": "ä"}]
 
 
 def test_failed_writing_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,7 +170,7 @@ def test_an_old_folder_that_stays_does_not_undo_the_new_one(
 
 def test_a_folder_that_an_index_lists_is_none_of_its_files(tmp_path: Path) -> None:
     target = tmp_path / "set"
-    write_table(target / "index.tsv", ("file",), [("0001.csv",), ("photos",)])
+    write_table(target / "index.tsv", [Column("file")], [{"file": "0001.csv"}, {"file": "photos"}])
     (target / "0001.csv").write_text("1\n")
     check_replaceable(target, index_name="index.tsv", what="a set")
     (target / "photos").mkdir()

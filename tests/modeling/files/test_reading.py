@@ -10,6 +10,7 @@ import pytest
 
 from modeling import InputError
 from modeling.errors import shortened, shown
+from modeling.files.columns import Column
 from modeling.files.documents import read_json_object, read_toml
 from modeling.files.reading import check_file, read_bytes, read_text, reason_of
 from modeling.files.tables import csv_cells, read_table
@@ -73,7 +74,7 @@ def test_marks_are_read_in_documents_and_tables(tmp_path: Path) -> None:
     path.write_bytes(mark + b"a = 1\r\n")
     assert read_toml(path, "a recipe") == {"a": 1}
     path.write_bytes(mark + b"a\tb\r\n1\t2\r\n")
-    assert read_table(path, ("a", "b")) == [{"a": "1", "b": "2"}]
+    assert read_table(path, [Column("a"), Column("b")]) == [{"a": "1", "b": "2"}]
 
 
 def test_numbers_at_the_edge_are_read(tmp_path: Path) -> None:
@@ -88,7 +89,7 @@ def test_numbers_at_the_edge_are_read(tmp_path: Path) -> None:
 def test_a_column_has_one_name(tmp_path: Path) -> None:
     (tmp_path / "t.tsv").write_text("a\tb\ta\n1\t2\t3\n")
     with pytest.raises(InputError, match="each column once in .*, got 'a' twice"):
-        read_table(tmp_path / "t.tsv", ("a",))
+        read_table(tmp_path / "t.tsv", [Column("a")])
 
 
 def test_cells_and_quotes() -> None:

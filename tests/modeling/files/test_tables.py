@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from analysis.columns import tsv_text
 from experiments.sessions.bids_tables import cell as bids_cell
 from experiments.sessions.tables import cell as session_cell
+from modeling.files.columns import Column
 from modeling.files.tables import guarded, read_table, table_text, unguarded, write_table
 
 FORMULAS = ["=1+1", "+1", "@SUM(A1)", "'=1", "''@x", '=HYPERLINK("a")']
@@ -25,7 +26,7 @@ TEXT = st.text(st.sampled_from("'=+@-a 1"), max_size=6)
 def test_no_cell_begins_as_a_formula(text: str) -> None:
     assert guarded(text) == f"'{text}"
     for written in (
-        table_text(["name"], [[text]]).splitlines()[1],
+        table_text([Column("name")], [{"name": text}]).splitlines()[1],
         tsv_text(pd.DataFrame({"name": [text]})).splitlines()[1],
         bids_cell(text),
         session_cell(text),
@@ -49,7 +50,8 @@ def test_every_text_is_read_back_as_it_was(text: str) -> None:
 
 def test_a_table_is_read_back_as_it_was(tmp_path: Path) -> None:
     texts = [*FORMULAS, *filter(None, PLAIN)]
-    write_table(tmp_path / "a.tsv", ["name", "number"], [[text, -1.5] for text in texts])
-    rows = read_table(tmp_path / "a.tsv", ["name"])
+    columns = [Column("name"), Column("number")]
+    write_table(tmp_path / "a.tsv", columns, [{"name": text, "number": -1.5} for text in texts])
+    rows = read_table(tmp_path / "a.tsv", columns)
     assert [row["name"] for row in rows] == texts
     assert {row["number"] for row in rows} == {"-1.5"}

@@ -74,7 +74,7 @@ def test_null_in_a_sidecar_is_missing(tmp_path: Path) -> None:
     assert (recording.texture, recording.unit) == (tmp_path.name, "arbitrary")
     assert (recording.repeat, recording.simulated) == (1, False)
     (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "speed_mm_s": None}))
-    with pytest.raises(InputError, match=r"speed_mm_s of a\.wav, got nothing"):
+    with pytest.raises(InputError, match=r"speed_mm_s, a\.json, got nothing"):
         RecordingSet.load(tmp_path)
 
 
@@ -105,7 +105,7 @@ def test_sidecar_speaks_of_its_own_file(tmp_path: Path) -> None:
 def test_meaningless_full_scale_is_refused(tmp_path: Path, scale: object) -> None:
     write_wav(tmp_path / "a.wav", NOISE / 10)
     (tmp_path / "a.json").write_text(json.dumps({**SIDECAR, "g_per_fullscale": scale}))
-    with pytest.raises(InputError, match=r"a\.wav: expected g per full scale above 0"):
+    with pytest.raises(InputError, match=r"above 0 g in column g_per_fullscale, a\.json"):
         RecordingSet.load(tmp_path)
 
 

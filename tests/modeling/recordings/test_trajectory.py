@@ -37,16 +37,12 @@ def test_lift_off_is_passed_on(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "expected", "got"),
     [
-        ("", ["time_s", "speed_mm_s", "force_n"], ["time_s", "speed_mm_s", "force_n"]),
-        ("time_s,speed_mm_s\n0,1\n1,1\n", ["time_s", "speed_mm_s", "force_n"], "force_n"),
         (HEADER, ["two", "times"], 0),
         (HEADER + "0,10,1\n", ["two", "times"], 1),
         (HEADER + "0,10,1\n0,10,1\n", ["rising", "times"], "0 s"),
         (HEADER + "0,10,1\n2,10,1\n1.5,10,1\n", ["rising", "times"], ["1.5 s", "2 s"]),
         (HEADER + "0,10,1\nnan,10,1\n", ["rising", "times"], "nan s"),
         (HEADER + "0,10,1\n4000,10,1\n", "3600 s", "4000 s"),
-        (HEADER + "0,10,1\n1,fast,1\n", ["speed_mm_s", "line 3"], "'fast'"),
-        (HEADER + "0,10,1\n1,10\n", ["3 values", "line 3"], 2),
     ],
 )
 def test_what_is_no_stroke(tmp_path: Path, text: str, expected: object, got: object) -> None:

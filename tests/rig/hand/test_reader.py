@@ -15,13 +15,16 @@ import numpy as np
 import pytest
 
 from modeling import InputError
+from modeling.files.columns import names
 from modeling.files.tables import write_table
 from rig.hand.following import Follower
 from rig.hand.reader import HandReader
 from rig.hand.sample import Sample
+from rig.hand.scripted import COLUMNS
 from rig.hand.settings import HandSettings
 from rig.hand.window import Pointer
 from rig.live.memory import BUTTON, CONTACT, FORCE_ASSUMED, SIMULATED, Live, now_s
+from rig.sound.messages import Silence
 from tests.refusals import refused
 from tests.rig.waiting import is_gone, wait_until
 
@@ -108,6 +111,20 @@ def test_unplugged_it_is_gone_with_one_fault_and_comes_back(live: Live) -> None:
         assert reader.faults() == ()
 
 
+def test_a_request_that_it_does_not_know_is_a_fault_and_it_reads_on(live: Live) -> None:
+    with HandReader(live, HOLD) as reader:
+        wait_until(lambda: moves(live))
+        first = reader.pid
+        assert reader._child is not None
+        reader._child.tell(Silence())
+        told = list[str]()
+        wait_until(lambda: bool(told.extend(reader.faults()) or told))
+        assert ["Silence" in fault for fault in told] == [True]
+        written = live.readings_written
+        wait_until(lambda: live.readings_written > written + 100)
+        assert reader.pid == first
+
+
 def test_killed_it_is_gone_at_once_and_started_again(live: Live) -> None:
     with HandReader(live, HOLD) as reader:
         wait_until(lambda: moves(live))
@@ -154,7 +171,7 @@ def test_who_watches_does_not_kill_for_time_in_which_it_was_held_up_itself(
 
     live.write_reading(0.0, 0.0, y_mm=0.0, speed_mm_s=0.0, force_n=0.0, flags=0)
     reader._closing = Closing()  # type: ignore[assignment]
-    reader._process = Process()  # type: ignore[assignment]
+    reader._child = Process()  # type: ignore[assignment]
     reader._alive_s = 0.0
     monkeypatch.setattr("rig.hand.reader.now_s", lambda: now[0])
     reader._watch()
@@ -190,7 +207,7 @@ def test_started_again_without_its_device_it_waits_for_it_and_is_watched(
 ) -> None:
     table = tmp_path / "hand.tsv"
     rows = [(0.0, 0.0, 0.0, 1.0), (1000.0, 150_000.0, 0.0, 1.0)]
-    write_table(table, ("time_s", "x_mm", "y_mm", "force_n"), rows)
+    write_table(table, COLUMNS, [dict(zip(names(COLUMNS), row, strict=True)) for row in rows])
     with HandReader(live, HandSettings(kind="scripted", script=str(table))) as reader:
         wait_until(lambda: moves(live))
         table.rename(tmp_path / "away.tsv")

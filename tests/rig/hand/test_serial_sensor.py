@@ -40,7 +40,7 @@ def live() -> Iterator[Live]:
 
 
 def settings_of(board: Board, **others: float) -> HandSettings:
-    return HandSettings.from_dict({"kind": "serial", "device": board.path, **others})
+    return HandSettings(kind="serial", device=board.path, **others)  # type: ignore[arg-type]
 
 
 def at_four_fifths(number: int) -> bytes:

@@ -1,4 +1,4 @@
-"""Processes that are driven by lines of JSON, watched and killed."""
+"""Processes that are driven by messages, watched and killed."""
 
 from __future__ import annotations
 
@@ -14,30 +14,57 @@ import pytest
 from modeling import InputError
 from rig.live import child
 from rig.live.child import Child, ChildLost
+from rig.live.messages import Done, Message, Refused
+from rig.sound.messages import Mask, Silence
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[3]
 
 PROGRAM = """
-import json, sys, time
-settings = json.loads(sys.argv[1])
-if settings.get("refuses"):
-    print(json.dumps({"error": "expected another setting, got this; change it."}), flush=True)
-    raise SystemExit
-if settings.get("fails"):
-    raise ValueError("what went wrong")
-print(json.dumps({"settings": settings}), flush=True)
-for line in sys.stdin:
-    wanted = json.loads(line)
-    if wanted == {"do": "sleep"}:
+import os, sys, time
+from modeling.errors import InputError
+from rig.live.driven import Parent
+from rig.live.messages import Done, Message, Refused
+
+class Say(Message, frozen=True):
+    text: str
+    number: float = 0.0
+
+def answer(wanted):
+    match wanted.text:
+        case "refuse":
+            raise InputError("expected sense, got none.")
+        case "sleep":
+            time.sleep(60)
+        case "end":
+            os._exit(3)
+        case "half":
+            os.write(parent._answers.fileno(), bytes([0, 0, 1, 0]) + b"half")
+            os._exit(3)
+        case "write":
+            os.write(parent._answers.fileno(), b"what is no message")
+        case "print":
+            print("a library says something", flush=True)
+    return wanted
+
+with Parent() as parent:
+    text = parent.settings(str)
+    if text == "refuses":
+        raise InputError("expected another setting, got this; change it.")
+    if text == "fails":
+        raise ValueError("what went wrong")
+    parent.tell(Say(text))
+    parent.serve(Say, answer)
+    if text == "lingers":
         time.sleep(60)
-    if wanted == {"do": "end"}:
-        break
-    answer = {"error": "expected sense, got none."} if wanted == {"do": "err"} else wanted
-    print(json.dumps(answer), flush=True)
-if settings.get("lingers"):
-    time.sleep(60)
 """
+
+
+class Say(Message, frozen=True):
+    """What is said, and answered."""
+
+    text: str
+    number: float = 0.0
 
 
 @pytest.fixture(autouse=True)
@@ -46,51 +73,93 @@ def program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), *sys.path]))
 
 
-def test_it_answers_line_by_line_and_ends_with_its_input() -> None:
-    process = Child("driven", {"text": 'quotes " and μ'})
-    assert process.ready == {"settings": {"text": 'quotes " and μ'}}
-    assert process.ask({"a": [1, 2.5]}) == {"a": [1, 2.5]}
-    assert process.ask({"large": "x" * 1_000_000})["large"] == "x" * 1_000_000
+def started(settings: object = "") -> Child:
+    process = Child("driven", settings)
+    process.ready(Say)
+    return process
+
+
+def test_it_answers_message_by_message_and_ends_with_its_input() -> None:
+    process = Child("driven", 'quotes " and μ')
+    assert process.ready(Say) == Say('quotes " and μ')
+    assert process.ask(Say("a", float("inf")), Say) == Say("a", float("inf"))
+    assert process.ask(Say("x" * 1_000_000), Say).text == "x" * 1_000_000
     assert process.runs
     process.close()
     assert not process.runs
+    assert process.end() == "with code 0"
 
 
 def test_its_refusals_are_its_own_sentences() -> None:
     with pytest.raises(InputError, match=r"^expected another setting, got this; change it\.$"):
-        Child("driven", {"refuses": True})
-    process = Child("driven", {})
+        started("refuses")
+    process = started()
     with refused(InputError, expected="sense", got="none"):
-        process.ask({"do": "err"})
-    assert process.ask({"go": "on"}) == {"go": "on"}
+        process.ask(Say("refuse"), Say)
+    assert process.ask(Say("on"), Say) == Say("on")
     process.close()
 
 
+def test_settings_and_requests_that_it_does_not_know_are_refused_and_it_goes_on() -> None:
+    with refused(InputError, expected="message", got="int"):
+        started(3)
+    process = started()
+    for unknown, got in ((Mask(0.1), "Mask"), (Silence(), "Silence"), (Refused("no"), "Refused")):
+        with refused(InputError, expected="message", got=got):
+            process.ask(unknown, Done)
+    assert process.ask(Say("on"), Say) == Say("on")
+    process.close()
+
+
+def test_one_that_answers_what_was_not_asked_for_is_killed() -> None:
+    process = started()
+    with refused(ChildLost, names=["expected", "Say"]):
+        process.ask(Say("on"), Done)
+    assert not process.runs
+    with refused(ChildLost, names=["ended by SIGKILL", "Say"]):
+        process.ask(Say("on"), Say)
+
+
+def test_one_that_writes_what_is_no_message_is_killed() -> None:
+    process = started()
+    with refused(ChildLost, names=["expected", "another"]):
+        process.ask(Say("write"), Say)
+    assert not process.runs
+
+
+def test_what_its_libraries_print_is_no_message() -> None:
+    process = started()
+    assert process.ask(Say("print"), Say) == Say("print")
+    process.close()
+    assert "a library says something" in process.end()
+
+
 def test_what_it_says_when_it_fails_is_passed_on() -> None:
-    with refused(ChildLost, names=["ended", "ValueError: what went wrong"]):
-        Child("driven", {"fails": True})
+    with refused(ChildLost, names=["ended with code 1", "ValueError: what went wrong"]):
+        started("fails")
 
 
-def test_one_that_has_ended_is_lost() -> None:
-    process = Child("driven", {})
-    with refused(ChildLost, names="ended"):
-        process.ask({"do": "end"})
-    with refused(ChildLost, names="ended"):
-        process.ask({"more": 1})
+@pytest.mark.parametrize("end", ["end", "half"])
+def test_one_that_has_ended_is_lost(end: str) -> None:
+    process = started()
+    with refused(ChildLost, names="ended with code 3"):
+        process.ask(Say(end), Say)
+    with refused(ChildLost, names="ended with code 3"):
+        process.ask(Say("more"), Say)
     process.close()
 
 
 def test_one_that_does_not_answer_is_lost_and_can_be_killed() -> None:
-    process = Child("driven", {})
+    process = started()
     with refused(ChildLost, names="0.1 s"):
-        process.ask({"do": "sleep"}, within_s=0.1)
+        process.ask(Say("sleep"), Say, within_s=0.1)
     process.kill()
     assert not process.runs
 
 
 def test_one_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(child, "END_S", 0.2)
-    process = Child("driven", {"lingers": True})
+    process = started("lingers")
     began = time.monotonic()
     process.close()
     assert not process.runs
@@ -105,17 +174,19 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
     for room in ("modeling", "rig/live"):
         kept_out = shutil.ignore_patterns("__pycache__", "[a-z]*")  # but __init__.py
         shutil.copytree(ROOT / room, house / room, ignore=kept_out)
-    for file in ("rig/__init__.py", "rig/live/child.py", "modeling/face.py", "modeling/errors.py"):
+    names = ("rig/__init__", "rig/live/child", "rig/live/driven", "rig/live/messages")
+    for file in (f"{name}.py" for name in (*names, "modeling/face", "modeling/errors")):
         shutil.copy(ROOT / file, house / file)
     (house / "rig/telling.py").write_text(
-        "import json, modeling.errors\nprint(json.dumps({'told': modeling.errors.__file__}))\n"
+        "import modeling.errors\nfrom rig.live.driven import Parent\n"
+        "raise SystemExit(modeling.errors.__file__)\n"
     )
     work.mkdir()
     for room in ("rig", "modeling"):
         (work / f"{room}.py").write_text("raise SystemExit('not this one')\n")
     program = (
         f"import sys; sys.path.insert(0, {str(house)!r}); from rig.live.child import Child; "
-        "child = Child('rig.telling', {}); print(child.ready['told']); child.close()"
+        "child = Child('rig.telling', None); print(child.end()); child.close()"
     )
     told = subprocess.run(
         [sys.executable, "-P", "-c", program],
@@ -124,4 +195,4 @@ def test_its_rooms_are_those_of_its_parent_though_not_installed_and_though_files
         capture_output=True,
         text=True,
     )
-    assert told.stdout.strip() == str(house / "modeling/errors.py"), told.stderr
+    assert f"({house / 'modeling/errors.py'})" in told.stdout, told.stderr

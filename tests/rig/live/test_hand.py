@@ -69,9 +69,7 @@ class Sensor:
         monkeypatch.setattr(loop, "now_s", lambda: self._now_s)
         device = SerialSensor(self._port)
         monkeypatch.setattr(device, "wait", lambda seconds: None)
-        settings = HandSettings.from_dict(
-            {"kind": "serial", "device": path, "filter_delay_s": DELAY_S}
-        )
+        settings = HandSettings(kind="serial", device=path, filter_delay_s=DELAY_S)
         self._loop = HandLoop(live, settings, tell=lambda told: None, opening=lambda _: device)
         self._loop.open()
 

@@ -9,7 +9,8 @@ import pytest
 
 from rig.live.child import Child
 from rig.live.memory import BLOCK, CONTACT, FORCE_ASSUMED, GONE, STALE, UNDERFLOW, Live, Rows
-from rig.monitoring.bare_thread import BareThread
+from rig.live.messages import Done
+from rig.monitoring.bare_thread import BareThread, Look, WakeUps
 from rig.monitoring.figures import Monitor
 
 GRID = ((50.0, 350.0), (0.5, 3.5))
@@ -103,11 +104,12 @@ def test_a_thread_misses_what_it_sleeps_over() -> None:
 
 
 def test_the_bare_thread_answers_and_ends_with_its_input() -> None:
-    child = Child("rig.monitoring.bare_thread", {"period_s": 0.001})
-    first = child.ask({})
-    assert first["periods"] >= first["misses"] >= 0
-    while (later := child.ask({}))["periods"] == first["periods"]:
+    child = Child("rig.monitoring.bare_thread", 0.001)
+    child.ready(Done)
+    first = child.ask(Look(), WakeUps)
+    assert first.periods >= first.misses >= 0
+    while (later := child.ask(Look(), WakeUps)).periods == first.periods:
         pass
-    assert later["periods"] > first["periods"]
+    assert later.periods > first.periods
     child.close()
     assert not child.runs

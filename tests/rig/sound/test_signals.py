@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 
 from modeling import InputError, TextureModel, Threshold, simplify
 from modeling.errors import shown
+from modeling.files.stimulus_table import COLUMNS
 from modeling.files.tables import read_table
 from modeling.rendering.limits import Limits
 from modeling.rendering.plan import RenderPlan, plan_for
@@ -168,8 +170,8 @@ def test_a_stimulus_without_its_source_was_made_from_nothing_known(
     assert few["canvas"].made_from == frozenset()
 
 
-def row_of(folder: Path) -> dict[str, str]:
-    (row,) = read_table(folder / "manifest.tsv", ["file", "sha256", "peak", "rms"])
+def row_of(folder: Path) -> dict[str, Any]:
+    (row,) = read_table(folder / "manifest.tsv", COLUMNS)
     return row
 
 

@@ -20,10 +20,11 @@ import pytest
 import soundfile
 
 from modeling import InputError, TextureModel, Threshold, fit_ar, regressed
+from modeling.files.stimulus_table import COLUMNS
 from modeling.perception.sensation_level import sensation_level
 from stimuli.planted.textures import planted_texture, record_texture
 from stimuli.sets import writing
-from stimuli.sets.manifest import COLUMNS, Stimulus
+from stimuli.sets.manifest import Stimulus
 from stimuli.sets.recipe import Level, ModelEntry, Recipe, TrajectoryEntry
 from stimuli.sets.rendering import fade_samples
 from stimuli.sets.writing import write_set
@@ -100,8 +101,12 @@ def test_manifest_tells_the_truth(tmp_path: Path, recipe: MakeRecipe, level: Lev
 def test_every_column_is_described(tmp_path: Path, recipe: MakeRecipe) -> None:
     write_set(tmp_path / "set", recipe())
     described = json.loads((tmp_path / "set/manifest.json").read_text(encoding="utf-8"))
-    assert list(described) == list(manifest(tmp_path / "set")[0]) == list(COLUMNS)
-    assert list(Stimulus.__dataclass_fields__) == list(COLUMNS)
+    assert (
+        list(described)
+        == list(manifest(tmp_path / "set")[0])
+        == [column.name for column in COLUMNS]
+    )
+    assert list(Stimulus.__dataclass_fields__) == [column.name for column in COLUMNS]
 
 
 def test_samples_are_g(tmp_path: Path, recipe: MakeRecipe, truth: TextureModel) -> None:

@@ -19,7 +19,7 @@ from analysis.benches.atlas.tables import (
     edge_table,
     margin_table,
 )
-from analysis.columns import names
+from modeling.files.columns import names
 
 SPEED = Axis(name="speed", unit="Hz", mild=1.0, severe=10_000.0, default=3.0)
 LEVEL = Axis(name="level", unit="dB", mild=-20.0, severe=20.0, logarithmic=False)

@@ -1,0 +1,82 @@
+"""Write what follows from declarations: tables of keys and columns in docs/, and JSON Schemas.
+
+    python tools/docs_tables.py    # or make docs-tables
+
+In a page, what stands between `<!-- keys: NAME -->` (or `table:`) and `<!-- end -->` is replaced. A
+test finds all of it current (tests/test_docs_tables.py).
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+from experiments.sessions import bids_events, bids_people, bids_physio, traces  # noqa: E402
+from experiments.tasks import threshold_table  # noqa: E402
+from modeling.files import answer_tables, stimulus_table  # noqa: E402
+from modeling.files.columns import markdown  # noqa: E402
+from modeling.files.describing import key_tables, schema_text  # noqa: E402
+from modeling.perception import thresholds  # noqa: E402
+from modeling.recordings import recording_set, trajectory  # noqa: E402
+from modeling.scenes import microcontrollers  # noqa: E402
+from rig.capture import pieces  # noqa: E402
+from rig.hand import scripted  # noqa: E402
+from rig.importing import labels  # noqa: E402
+from tactileq.commands.schema import declared  # noqa: E402
+
+TABLES = {
+    "recordings": recording_set.KNOWN_COLUMNS,
+    "labels": labels.LABEL_COLUMNS,
+    "pieces": pieces.COLUMNS,
+    "manifest": stimulus_table.COLUMNS,
+    "trajectory": trajectory.COLUMNS,
+    "script": scripted.COLUMNS,
+    "threshold": thresholds.COLUMNS,
+    "measured-threshold": threshold_table.COLUMNS,
+    "microcontrollers": microcontrollers.COLUMNS,
+    "participants": (answer_tables.PARTICIPANT_ID, *answer_tables.PARTICIPANT_COLUMNS),
+    "sessions": bids_people.SESSION_COLUMNS,
+    **{f"answers-{task}": table.columns for task, table in answer_tables.ANSWER_TABLES.items()},
+    "events": bids_events.COLUMNS,
+    "physio": bids_physio.COLUMNS,
+    "hand": traces.HAND_COLUMNS,
+    "presentations": traces.PRESENTATION_COLUMNS,
+}
+PAGES = (
+    "docs/scene-file.md",
+    "docs/recipe-file.md",
+    "docs/rig-file.md",
+    "docs/study-file.md",
+    "docs/data.md",
+)
+SCHEMAS = {
+    "modeling/scenes/shipped/scene.schema.json": "scene",
+    "docs/recipe.schema.json": "recipe",
+    "rig/setup/rig.schema.json": "rig",
+    "experiments/study/study.schema.json": "study",
+}
+_MADE = {
+    "keys": lambda name: key_tables(declared(name)),
+    "table": lambda name: markdown(TABLES[name]).rstrip("\n"),
+}
+_MARKED = re.compile(r"(<!-- (\w+): (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def page(text: str) -> str:
+    """A page with its tables as they are declared now."""
+    return _MARKED.sub(lambda m: f"{m[1]}\n{_MADE[m[2]](m[3])}\n\n{m[5]}", text)
+
+
+def generated() -> dict[str, str]:
+    """What every page and schema should hold, by its path."""
+    pages = {path: page((ROOT / path).read_text(encoding="utf-8")) for path in PAGES}
+    return pages | {path: schema_text(declared(name)) for path, name in SCHEMAS.items()}
+
+
+if __name__ == "__main__":
+    for path, text in generated().items():
+        (ROOT / path).write_text(text, encoding="utf-8")
