@@ -112,6 +112,8 @@ def key(
     return Meta(description=description or None, extra=extra or None, **limits)
 
 
+# How JSON files say numbers that it does not have.
+NOT_FINITE = ("nan", "inf", "-inf")
 # In an annotation: the field is no key but stands beside those of the file, such as its path.
 BESIDE = "beside"
 
@@ -206,11 +208,11 @@ class Key:
         if self.quantity is not None:
             return self._with_quantity(value, where, folder)
         if self.section is not None:
-            return self._sections(value, folder)
+            return self._sections(value, where, folder)
         if self.shape:
             return self._array(value, where)
         plain_value = _without_numpy(self.reads(value))
-        if self.any_number and plain_value in ("nan", "inf", "-inf"):
+        if self.any_number and plain_value in NOT_FINITE:
             plain_value = float(plain_value)
         try:
             converted = msgspec.convert(
@@ -225,31 +227,31 @@ class Key:
             raise self.refusal(value, where)
         return plain_value if self.as_given else converted
 
-    def refusal(self, value: object, where: str) -> InputError:
-        """The sentence about a value that the key does not hold."""
+    def refusal(self, value: object, where: str, *, got: str = "") -> InputError:
+        """The sentence about a value that the key does not hold, which it shows or calls `got`."""
         return InputError(
             f"expected {self.words} for {self.name}{where and f' under {where}'}, got "
-            f"{shown(value)}; {self.advice}."
+            f"{got or shown(value)}; {self.advice}."
         )
 
     def _array(self, value: Any, where: str) -> np.ndarray[Any, Any]:
         """A read-only copy of numbers, or of true and false, that are within the limits."""
         kind = item_of(self.kind)
-        numbers = isinstance(kind, inspect.FloatType)
+        dtype, kinds = (np.bool_, "b") if isinstance(kind, inspect.BoolType) else (float, "iuf")
         try:
             given = np.asarray(value)
         except ValueError:  # rows of several lengths
             raise self.refusal(value, where) from None
-        fits = given.dtype.kind in ("iuf" if numbers else "b") and given.ndim == len(self.shape)
-        if given.size and not fits:
+        if given.size and given.dtype.kind not in kinds:
             raise self.refusal(value, where)
-        array = np.array(given, dtype=np.float64 if numbers else np.bool_)
-        if isinstance(kind, inspect.FloatType) and not self.any_number:
-            wrong = array[~_within(kind, array)]
-            if wrong.size:
-                raise self.refusal(wrong.flat[0], where)
+        array: np.ndarray[Any, Any] = np.array(given, dtype=dtype)
+        if not self.any_number and (wrong := array[~_within(kind, array)]).size:
+            raise self.refusal(wrong.flat[0], where)
+        if array.size and array.ndim != len(self.shape):
+            raise self.refusal(value, where, got=f"one of shape {array.shape}")
         if self.holds is not None and not self.holds(array):
-            raise self.refusal(value, where)
+            is_empty = not array.size and array.ndim > 1
+            raise self.refusal(value, where, got=f"one of shape {array.shape}" * is_empty)
         array.setflags(write=False)
         return array
 
@@ -260,7 +262,7 @@ class Key:
             raise self.refusal(value, where)
         return self.section(**_held(self.keys, values, self.within(where), folder=folder))
 
-    def _sections(self, value: Any, folder: Path | None) -> Any:
+    def _sections(self, value: Any, where: str, folder: Path | None) -> Any:
         assert self.section is not None  # or there is no section to read
         if self.tables:
             check_keys(value, self.tables, where=self.name)
@@ -269,7 +271,7 @@ class Key:
                 for name, one in value.items()
             }
         if not self.several:
-            return _section(self.section, value, folder)
+            return _section(self.section, value, folder, where=self.within(where))
         if not isinstance(value, list | tuple):
             raise no_table(self.section, value)
         if self.required and not (value or self.always):
@@ -505,9 +507,11 @@ def _range(kind: inspect.IntType | inspect.FloatType) -> str:
     return "" if kind.le is None else f"of at most {_short(kind.le)}"
 
 
-def _within(kind: inspect.FloatType, values: Any) -> Any:
-    """Which of an array's numbers are finite and within the limits of a type."""
+def _within(kind: inspect.Type, values: Any) -> Any:
+    """Which of an array's values are finite and within the limits of a type."""
     good = np.isfinite(values)
+    if not isinstance(kind, inspect.FloatType):
+        return good
     for limit, compared in (
         (kind.ge, np.greater_equal),
         (kind.gt, np.greater),

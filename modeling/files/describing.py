@@ -7,7 +7,8 @@ from typing import Any
 
 import msgspec
 
-from modeling.files.described import DescribedFile, Key, Section, keys_of, plain
+from modeling.files.described import NOT_FINITE, DescribedFile, Key, Section, keys_of, plain
+from modeling.files.described_json import DescribedJson
 
 
 def schema(file: type[Section]) -> dict[str, Any]:
@@ -79,6 +80,9 @@ def _properties(keys: tuple[Key, ...]) -> tuple[dict[str, Any], list[str]]:
 def _object(
     section: type[Section], properties: dict[str, Any], required: list[str]
 ) -> dict[str, Any]:
+    if issubclass(section, DescribedJson):
+        head = {"format": {"const": section.FORMAT}, "version": {"const": section.VERSION}}
+        properties, required = {**head, **properties}, [*head, *required]
     return {
         "type": "object",
         "description": _summary(section),
@@ -97,15 +101,17 @@ def _of_key(one: Key) -> dict[str, Any]:
         if one.quantity is not None:
             return table | about
         return about | ({"type": "array", "items": table} if one.several else table)
-    either = [_value(one.annotation)] + ([] if one.also is None else [_value(one.also)])
+    either = [_value(one.annotation, null=one.always)]
+    either += [] if one.also is None else [_value(one.also)]
+    either += [{"enum": list(NOT_FINITE)}] if one.any_number and not one.shape else []
     return {**(either[0] if len(either) == 1 else {"anyOf": either}), **about}
 
 
-def _value(annotation: Any) -> dict[str, Any]:
-    """The schema of a value, without its null: TOML has none, a key is left out."""
+def _value(annotation: Any, *, null: bool = False) -> dict[str, Any]:
+    """The schema of a value. TOML has no null, a key is left out."""
     found: dict[str, Any] = msgspec.json.schema(
         annotation, schema_hook=lambda kind: {"type": "string"}
     )
-    if "anyOf" in found:
+    if "anyOf" in found and not null:
         found["anyOf"] = [one for one in found["anyOf"] if one != {"type": "null"}]
     return found

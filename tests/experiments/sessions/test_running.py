@@ -153,7 +153,7 @@ def test_textures_whose_models_are_equal_are_marked(
         sets={"full": full, "simplified": {**models.sets["simplified"], "PVC": full["PVC"]}}
     )
     _, manifest = run(models=one)
-    assert SessionManifest.load(manifest).identical == {"PVC": [["full", "simplified"]]}
+    assert SessionManifest.load(manifest).identical == {"PVC": (("full", "simplified"),)}
     same = ModelSets(sets={"full": full, "simplified": full})
     with refused(InputError, expected=["simplified", "full"], got="identical"):
         run(models=same, folder=tmp_path / "all")
@@ -435,7 +435,7 @@ def test_the_second_day_comes_after_the_first_and_on_another_date(run: Callable[
     person.simulated = False
     result, manifest = run(task="relative", session=2)  # nobody has to wait who is simulated
     assert result.completed
-    assert SessionManifest.load(manifest).overrides == []
+    assert SessionManifest.load(manifest).overrides == ()
 
 
 def test_people_and_simulations_never_share_a_folder(run: Callable[..., Any]) -> None:

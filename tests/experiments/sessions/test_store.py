@@ -541,7 +541,7 @@ def test_what_differs_from_the_data_set_goes_on_for_a_stated_reason(
     assert contents(tmp_path) == before
     with SessionStore.create(tmp_path, other, overrides=Overrides("the lamp broke")) as store:
         record = {"what": what, "reason": "the lamp broke"}
-        assert SessionManifest.load(store.files.manifest).overrides == [record]
+        assert SessionManifest.load(store.files.manifest).overrides == (record,)
     assert read_log(store.files.log).events[0]["overrides"] == [record]
 
 
@@ -598,7 +598,7 @@ def test_the_second_day_comes_after_the_first(
     completed(tmp_path, second)
     third = manifest_of(session=3)
     with SessionStore.create(tmp_path, third, overrides=Overrides("leaves town")) as store:
-        assert store.manifest.overrides == [{"what": "same date", "reason": "leaves town"}]
+        assert store.manifest.overrides == ({"what": "same date", "reason": "leaves town"},)
     assert len(sessions_in(tmp_path)) == 3
 
 

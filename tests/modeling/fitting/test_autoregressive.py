@@ -334,7 +334,7 @@ def test_gains_of_another_grid_are_refused() -> None:
         (np.full((2, 2, 2), 1.0), np.ones((2, 2)), ["unstable", "made"]),
         (np.full((2, 2, 0), 1.0), np.ones((2, 2)), ["line_spectral_frequencies", "(2, 2, 0)"]),
         (np.full((2, 2), 1.0), np.ones((2, 2)), ["line_spectral_frequencies", "(2, 2)"]),
-        (np.full((2, 2, 1), 1.0), -np.ones((2, 2)), ["gains", -1]),
+        (np.full((2, 2, 1), 1.0), -np.ones((2, 2)), ["gains", -1.0]),
         (np.full((2, 2, 1), 1.0), np.full((2, 2), np.inf), ["gains", "inf"]),
     ],
 )

@@ -160,7 +160,7 @@ def test_other_files_among_models_are_passed_over(
     assert [path.name for path in sources.passed_over] == ["a.json", "z.json"]
     assert [labelled.model for labelled in sources.models] == [truth, truth.with_layers([0])]
     # Named itself, it is to be a model.
-    with refused(InputError, expected=["tactileq.texture-model", tmp_path / "full/a.json"]):
+    with refused(InputError, names=tmp_path / "full/a.json", expected="tactileq.texture-model"):
         load_sources(recipe(models=(ModelEntry(tmp_path / "full/a.json", "m"),)))
     for text in ("{", "{}", "[]", '{"format": 3}'):
         (tmp_path / "full/broken.json").write_text(text)
