@@ -164,7 +164,7 @@ def test_other_files_among_models_are_passed_over(
         load_sources(recipe(models=(ModelEntry(tmp_path / "full/a.json", "m"),)))
     for text in ("{", "{}", "[]", '{"format": 3}'):
         (tmp_path / "full/broken.json").write_text(text)
-        with refused(InputError, expected=tmp_path / "full/broken.json"):
+        with refused(InputError, names=tmp_path / "full/broken.json"):
             load_sources(recipe())
     (tmp_path / "full/broken.json").unlink()
     (tmp_path / "full/paper.json").unlink()
