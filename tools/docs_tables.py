@@ -51,6 +51,7 @@ PAGES = (
     "docs/recipe-file.md",
     "docs/rig-file.md",
     "docs/study-file.md",
+    "docs/saved-files.md",
     "docs/data.md",
 )
 SCHEMAS = {

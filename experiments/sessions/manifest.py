@@ -38,18 +38,18 @@ class SessionManifest(DescribedJson):
     FORMAT = "tactileq.session-manifest"
     ADVICE = "restore the file from a copy"
 
-    task: str
-    subject: _FromOne
-    session: _FromOne
+    task: Annotated[str, key("as in the study file")]
+    subject: Annotated[_FromOne, key("number of the participant")]
+    session: Annotated[_FromOne, key("number of the participant's session")]
     slot: Annotated[_FromOne, key("the balanced parts of the order follow from it")]
     code: Annotated[str, key("the participant's pseudonym")]
-    language: str
-    pilot: bool
-    simulated_participant: bool
-    simulated_rig: bool
+    language: Annotated[str, key("of what the participant reads")]
+    pilot: Annotated[bool, key("whether it is a pilot")]
+    simulated_participant: Annotated[bool, key("whether a program answered")]
+    simulated_rig: Annotated[bool, key("whether nothing was played to a person")]
     study: Annotated[_Plain, key("the values of the study file")]
-    study_sha256: str
-    plan_sha256: str
+    study_sha256: Annotated[str, key("of these values")]
+    plan_sha256: Annotated[str, key("of the study and the hashes of its models")]
     models_sha256: Annotated[
         Mapping[str, Mapping[str, str]], key("of each texture in each set of models")
     ]
@@ -70,7 +70,7 @@ class SessionManifest(DescribedJson):
         key("what was allowed against a rule (`what`), and the `reason`"),
     ] = ()
     versions: Annotated[Mapping[str, str], key("of Python and of the packages that are installed")]
-    platform: str
+    platform: Annotated[str, key("of the machine")]
     git_revision: Annotated[str, key("the commit; empty where it is not known")]
     git_uncommitted: Annotated[
         bool | None, key("whether files differ from that commit; null where it is not known")

@@ -478,7 +478,8 @@ def words(kind: inspect.Type, *, unit: str = "") -> str:
             return " or ".join(words(one, unit=unit) for one in either)
         case inspect.IntType() | inspect.FloatType():
             number = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
-            return " ".join(filter(None, (number, _range(kind), unit)))
+            of_unit = unit if _range(kind) or not unit else f"in {unit}"
+            return " ".join(filter(None, (number, _range(kind), of_unit)))
         case inspect.LiteralType(values=values):
             return " or ".join(
                 f'"{value}"' if isinstance(value, str) else str(value) for value in values

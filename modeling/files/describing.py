@@ -10,6 +10,8 @@ import msgspec
 from modeling.files.described import NOT_FINITE, DescribedFile, Key, Section, keys_of, plain
 from modeling.files.described_json import DescribedJson
 
+BAR = r"\|"  # in a cell of Markdown
+
 
 def schema(file: type[Section]) -> dict[str, Any]:
     """The JSON Schema (2020-12) of a file, for editors that complete and check what one types."""
@@ -38,7 +40,11 @@ def key_tables(file: type[Section]) -> str:
     """The keys of a file in Markdown, a table for each of its sections."""
     keys = keys_of(file)
     parts = [] if all(one.is_table for one in keys) else [_key_table(file)]
-    parts += [key_tables(one.section) for one in keys if one.section and one.is_table]
+    parts += [
+        key_tables(one.section)
+        for one in keys
+        if one.section is not None and one.is_table and not issubclass(one.section, DescribedJson)
+    ]
     return "\n\n".join(parts)
 
 
@@ -52,10 +58,17 @@ def _key_table(section: type[Section]) -> str:
         "| --- | --- | --- | --- |",
     ]
     for one in keys_of(section):
-        if not one.is_table:
-            cells = (f"`{one.name}`", one.words, _default(one), one.description)
-            lines.append(f"| {' | '.join(cells)} |")
+        if not one.is_table or issubclass(section, DescribedJson):  # whose keys name their tables
+            cells = (f"`{one.name}`", _holds(one), _default(one), one.description)
+            lines.append(f"| {' | '.join(cell.replace('|', BAR) for cell in cells)} |")
     return "\n".join(lines)
+
+
+def _holds(one: Key) -> str:
+    if not one.is_table:
+        return one.words.removesuffix(",")
+    below = "a list of tables, below" if one.several else "a table, below"
+    return str(getattr(one.section, "WHAT", below))
 
 
 def _summary(section: type[Section]) -> str:

@@ -63,7 +63,7 @@ class RegressedModel(SavedModel):
     ]
     centroid_hz: Annotated[
         Floats,
-        key("c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing", shape="c"),
+        key("c0 (Hz) and c1 (Hz per mm/s); empty where the centroid drives nothing", shape="terms"),
     ]
     estimator: Annotated[str, key("of the `TextureModel` behind it")]
     unit: Unit = "g"

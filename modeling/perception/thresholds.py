@@ -75,7 +75,7 @@ class Threshold(Section):
     WHERE = "threshold"
     ADVICE = "correct the table"
 
-    name: str
+    name: Annotated[str, key("of a shipped table, or the file's")]
     frequency_hz: Annotated[
         Floats, key("rising, 1e-6 … 1e6", unit="Hz", shape="frequencies", finite=False)
     ]

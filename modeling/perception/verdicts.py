@@ -39,7 +39,7 @@ class LayerVerdict(Section):
     ADVICE = _ADVICE
 
     layer: Annotated[int, key("from 1, in the order of the full model", ge=1)]
-    verdict: Literal["kept", "dropped"]
+    verdict: Annotated[Literal["kept", "dropped"], key("whether the simplified model has it")]
     reason: Annotated[str, key("one phrase")]
     worst_speed_mm_s: Annotated[float, key("of the worst condition", unit="mm/s")]
     worst_force_n: Annotated[float, key("of the worst condition", unit="N")]
@@ -85,7 +85,7 @@ class Simplification(DescribedJson):
         bool,
         key("whether the simplified model is the full one, so that there is nothing to compare"),
     ] = False
-    criterion: CriterionName
+    criterion: Annotated[CriterionName, key("by which layers were kept or dropped")]
     margin_db: Annotated[float, key("below the threshold", unit="dB", ge=0, as_given=True)]
     hold_above: Annotated[
         bool,

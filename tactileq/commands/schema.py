@@ -18,15 +18,21 @@ DECLARED = {
     "recipe": "stimuli.sets.recipe:Recipe",
     "study": "experiments.study.study:Study",
     "rig": "rig.setup.rig_file:RigFile",
+    "model": "modeling.models.texture_model:TextureModel",
+    "regressed-model": "modeling.models.regressed_model:RegressedModel",
+    "ar-model": "modeling.models.ar_model:ARModel",
+    "simplification": "modeling.perception.verdicts:Simplification",
+    "vibrator": "modeling.vibrators.vibrator:Vibrator",
+    "session": "experiments.sessions.manifest:SessionManifest",
 }
 
 
 def schema(
     name: Annotated[str, typer.Argument(help=f"A kind of file: {', '.join(DECLARED)}.")],
 ) -> None:
-    """Print the JSON Schema of a kind of file, for editors that complete and check TOML.
+    """Print the JSON Schema of a kind of file, for editors that complete and check it.
 
-    A file names its schema in the first line, as a path relative to it: #:schema
+    A TOML file names its schema in the first line, as a path relative to it: #:schema
     ./scene.schema.json
 
     Example: tactileq schema scene > scene.schema.json
