@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike
 from modeling.arrays import Floats
 from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S, is_number
 from modeling.errors import InputError, shown
-from modeling.files.described import DescribedFile, NameOrFile, Section, key, keys_of, naming
+from modeling.files.described import DescribedFile, Section, key, keys_of, naming
 from modeling.files.hashes import sha256_of, sha256_of_values
 from modeling.files.kinds import Name, Rate, TextureNames
+from modeling.files.values import NameOrFile
 from modeling.perception.thresholds import Threshold
 from modeling.recordings.trajectory import Trajectory, load_trajectory
 from modeling.rendering.limits import Limits

@@ -16,8 +16,9 @@ import tomlkit
 from modeling import InputError
 from modeling.checks import HIGHEST_FORCE_N, HIGHEST_SPEED_MM_S
 from modeling.errors import shown
-from modeling.files.described import DescribedFile, NameOrFile, Section, key, keys_of, plain
+from modeling.files.described import DescribedFile, Section, key, keys_of, plain
 from modeling.files.kinds import Name
+from modeling.files.values import NameOrFile
 from modeling.recordings.trajectory import LONGEST_S
 from modeling.scenes.loading import scene_name
 

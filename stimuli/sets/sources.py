@@ -14,7 +14,7 @@ import numpy as np
 
 from modeling import InputError, Scene, Threshold, Vibrator, compensation_for
 from modeling.errors import shown
-from modeling.files.described import NameOrFile
+from modeling.files.values import NameOrFile
 from modeling.files.writing import file_stem, write_text
 from modeling.models.loading import AnyModel, load_model, models_in
 from modeling.recordings.trajectory import Trajectory, load_trajectory

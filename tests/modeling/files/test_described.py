@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from modeling import InputError
 from modeling.errors import shown
-from modeling.files.described import BESIDE, DescribedFile, NameOrFile, Section, key, keys_of
+from modeling.files.described import BESIDE, DescribedFile, Section, key, keys_of
 from modeling.files.describing import key_tables, schema
 from modeling.files.kinds import Name, TextureNames
+from modeling.files.values import NameOrFile
 from tests.refusals import refused
 
 
