@@ -131,7 +131,7 @@ def test_a_model_of_a_newer_version(main, tmp_path: Path) -> None:
     values["version"] = 2
     path.write_text(json.dumps(values))
     for command in (["simplify", "new.json"], ["stimuli", "new.json"]):
-        assert_refused(main(*command), expected=["version 1", "new.json"], got="version 2")
+        assert_refused(main(*command), names="new.json", expected="version 1", got="version 2")
     path.write_text("{")
     assert_refused(main("simplify", "new.json"), expected=["JSON", "new.json"], got="line 1")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["new.json"]

@@ -145,7 +145,7 @@ REFUSED = {
         "study/models/PVC.json",
         "--vibrator",
         "v.json",
-    ): "a model file at v.json, got nothing",
+    ): "at v.json, got nothing",
     ("stimuli", "study/models/PVC.json", "--rate", "44100.5"): "for rate_hz, got 44100.5",
     ("stimuli", "study/models/PVC.json", "--speed", "nan"): "for speed_mm_s, got nan",
     ("stimuli", "study/models/PVC_provenance.json"): "expected at least one model",
