@@ -174,7 +174,13 @@ def wrong_cells(column: Column) -> Iterator[str]:
         yield from ["other"] * bool(column.levels)
         return
     low, high = column.limits
-    yield from ("much", "inf", "-inf", *["nan"] * (not column.nan), *["1.5"] * column.whole)
+    yield from (
+        "much",
+        "inf",
+        *["-inf"] * (not column.silence),
+        *["nan"] * (not column.nan),
+        *["1.5"] * column.whole,
+    )
     if low > -inf:
         yield "0" if low == ABOVE_0 else repr(low - 1)
     if high < inf:

@@ -10,8 +10,8 @@ import pandas as pd
 
 from modeling.arrays import Bools, Floats
 from modeling.files.folders import listed_file
-from modeling.files.stimulus_table import MANIFEST
-from modeling.files.tables import unguarded
+from modeling.files.stimulus_table import COLUMNS, MANIFEST
+from modeling.files.tables import read_table
 from stimuli.sets.manifest import COMPENSATED
 from stimuli.sets.recipe import Recipe
 from stimuli.sets.rendering import steady_part
@@ -68,7 +68,7 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
         A set that `stimuli.sets.writing.write_set` has written.
     """
     place = Path(folder)
-    manifest = _manifest(place / MANIFEST)
+    manifest = pd.DataFrame(read_table(place / MANIFEST, COLUMNS))
     chosen = manifest[manifest["rate_hz"] == manifest["rate_hz"].min()]
     names = [tuple(dict.fromkeys(chosen[column])) for column in _NAMES]
     rate_hz = int(chosen["rate_hz"].iloc[0])
@@ -101,27 +101,13 @@ def contact_sheet(folder: str | Path) -> ContactSheet:
     )
 
 
-def _manifest(path: Path) -> pd.DataFrame:
-    # A texture may be called "NA".
-    table = pd.read_csv(
-        path,
-        sep="\t",
-        dtype=dict.fromkeys(_NAMES, str),
-        keep_default_na=False,
-        na_values={"full_scale_g": ["n/a"]},
-    )
-    names = [name for name in _NAMES if name in table]
-    table[names] = table[names].map(unguarded)
-    return table
-
-
-def _density(path: Path, full_scale_g: float) -> Floats:
+def _density(path: Path, full_scale_g: float | None) -> Floats:
     """Power spectral density of one file in g²/Hz."""
     import soundfile  # late: loads a shared library that most uses never need
     from scipy.signal import welch
 
     samples, rate_hz = soundfile.read(path, dtype="float64")
-    scale = 1.0 if np.isnan(full_scale_g) else full_scale_g
+    scale = 1.0 if full_scale_g is None or np.isnan(full_scale_g) else full_scale_g
     steady = steady_part(samples * scale, rate_hz)
     line = round(rate_hz / LINE_HZ)
     _, density = welch(steady, rate_hz, nperseg=min(line, steady.size), nfft=line, detrend=False)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from math import inf, isinf, isnan
 from typing import Any
 
@@ -46,6 +46,8 @@ class Column:
         Its numbers are whole.
     nan : bool
         A number may be NaN.
+    silence : bool
+        A level may be −inf.
     levels : mapping of value to its meaning
         The only values that a column of text may hold; any text without it. Where none has a
         meaning, the description says all.
@@ -72,6 +74,7 @@ class Column:
     limits: tuple[float, float] | None = None
     whole: bool = False
     nan: bool = False
+    silence: bool = False
     levels: Mapping[str, str] = field(default_factory=dict, hash=False)
     required: bool = False
     optional: bool = False
@@ -96,6 +99,8 @@ class Column:
             return self.nan
         assert self.limits is not None
         low, high = self.limits
+        if self.silence and number == -inf:
+            return True
         return low <= number <= high and abs(number) < inf and not (self.whole and number % 1)
 
     @property
@@ -107,8 +112,10 @@ class Column:
         bounds = f" of at least {low:g}" if high == inf else f" from {low:g} to {high:g}"
         if low == ABOVE_0:
             bounds = " above 0" if high == inf else f" above 0, at most {high:g}"
+        bounded = bounds if low > -inf else " in" * (self.unit not in ("", "arbitrary"))
         unit = f" {self.unit}" if self.unit != "arbitrary" else ""
-        return f"a {'whole ' * self.whole}number{bounds * (low > -inf)}{unit.rstrip()}"
+        silence = ", -inf for silence" * self.silence
+        return f"a {'whole ' * self.whole}number{bounded}{unit.rstrip()}{silence}"
 
     def read(self, cell: str, where: str, *, advice: str = "correct it") -> Value:
         """The value of a cell: a number, text, or None where there is none.
@@ -224,9 +231,10 @@ def markdown(columns: Sequence[Column]) -> str:
     rows: list[tuple[str, ...]] = [("column", "meaning", "unit", "values"), ("---",) * 4]
     for column in columns:
         levels = [f"`{level}` {meaning}".strip() for level, meaning in column.levels.items()]
-        values = "; ".join(levels) or (column.wanted if column.limits is not None else "text")
+        numbers = replace(column, unit="").wanted  # which stands beside them
+        values = "; ".join(levels) or (numbers if column.limits is not None else "text")
         may_be = [*["n/a"] * (not column.required), *["no column"] * column.optional]
-        told = ", or ".join([values.removesuffix(f" {column.unit}"), *may_be])
+        told = ", or ".join([values, *may_be])
         cells = (f"`{column.name}`", column.description, column.unit, told)
         rows.append(tuple(cell.replace("|", "\\|") for cell in cells))
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)

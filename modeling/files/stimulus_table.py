@@ -93,6 +93,7 @@ COLUMNS = (
         unit="dB",
         description="the same in dB re 1 g (re 1 where the unit is arbitrary)",
         limits=(-inf, inf),
+        silence=True,
     ),
     Column(
         "sensation_level_db",
@@ -101,6 +102,7 @@ COLUMNS = (
         "same part at the model's rate, before any compensation; n/a where "
         "loudness was not matched",
         limits=(-inf, inf),
+        silence=True,
     ),
     Column(
         "share_without_threshold",
