@@ -40,7 +40,9 @@ def png_of(figure: Figure, *, dpi: float) -> tuple[bytes, str]:
         # Laid out and drawn in one go; `savefig` goes through everything twice.
         FigureCanvasAgg(figure).print_png(buffer)  # type: ignore[no-untyped-call]
 
-    return _in_its_fonts(figure, draw)
+    drawn = _in_its_fonts(figure, draw)
+    figure.set_layout_engine("none")  # its parts stay where they are: in an SVG of it, too
+    return drawn
 
 
 def svg_of(figure: Figure) -> tuple[bytes, str]:
