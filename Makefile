@@ -27,10 +27,15 @@ install: .venv/installed
 	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-compile -r requirements.lock
 	@touch $@
 
+# What nearly every process loads; otherwise those that begin side by side compile all of it, each for itself.
+COMPILED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
+
 # The project itself and its C parts; reports a missing compiler.
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h analysis/benches/rivals.h analysis/benches/sounds.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
+	@$(BIN)/python -m compileall -q -j 0 -x '/tests?/' modeling stimuli rig experiments analysis tactileq \
+		$(addprefix .venv/lib/python*/site-packages/,$(COMPILED))
 	@touch $@
 
 demo: install

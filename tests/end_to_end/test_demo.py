@@ -46,17 +46,24 @@ def test_demo_from_recording_to_report(run, tmp_path: Path) -> None:
     assert len(manifest) == 14
     assert manifest.simulated.all()
 
+    people = pd.read_csv(demo / "data/participants.tsv", sep="\t")
+    assert list(people.participant_id) == [f"sub-{n:02d}" for n in range(1, 25)]
+    assert json.loads((demo / "data/dataset_description.json").read_text())["Simulated"] is True
     answers = {task: answers_of(demo / "data", task) for task in ("absolute", "relative")}
     assert answers["absolute"].participant.nunique() == 20
     assert answers["relative"].participant.nunique() == 24
     # 7 textures × 2 models and two anchors; 7 textures × 3 repeats on each of two days.
     assert (answers["absolute"].groupby("participant").size() == 16).all()
     assert (answers["relative"].groupby("participant").size() == 42).all()
+    assert set(answers["relative"].groupby(["texture", "model"]).size()) == {24 * 3}
     assert all(table.simulated.all() for table in answers.values())
     absolute = answers["absolute"]
     own = absolute[absolute.virtual_texture == absolute.texture]
+    assert set(own.groupby(["texture", "model"]).size()) == {20}
     ratings = own.set_index(["texture", "participant", "model"])
     ratings = ratings[["magnitude_similarity", "frequency_similarity"]]
+    assert ratings.stack().between(0, 100).all()
+    assert 1.5 / 7 < answers["relative"].correct.mean() < 0.95
     assert (ratings >= 99.5).to_numpy().mean() < 0.05
     planted = json.loads((demo / "provenance.json").read_text())["settings"]["planted"]
     assert {p for points in planted.values() for p in points.values()} == {-15.0, 0.0}

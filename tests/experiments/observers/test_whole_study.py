@@ -7,16 +7,13 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from experiments import Study, simulate_study
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.percepts import Perception
 from experiments.observers.psychometrics import Psychometrics
 from experiments.study.models import ModelSets
-from modeling import InputError, TextureModel, Threshold, simplify
+from modeling import InputError, TextureModel, Threshold
 from rig.twin import SimulatedRig
-from stimuli.planted.textures import planted_texture
 from tests.refusals import refused
 
 
@@ -31,46 +28,6 @@ def simulate(study: Study, folder: Path, truths: Any, models: ModelSets, **more:
     )
 
 
-@pytest.mark.usefixtures("unsynced")
-def test_the_papers_study_in_silico(tmp_path: Path, threshold: Threshold, rows: Any) -> None:
-    study = Study.load()
-    truths = {texture: planted_texture(texture) for texture in study.textures}
-    reduced = {
-        name: simplify(model, threshold, criterion="paper-fft").model
-        for name, model in truths.items()
-    }
-    steps: list[tuple[int, int, str]] = []
-    results = simulate(
-        study,
-        tmp_path,
-        truths,
-        ModelSets(sets={"full": truths, "simplified": reduced}),
-        threshold=threshold,
-        progress=lambda done, total, name: steps.append((done, total, name)),
-    )
-    assert len(results) == 20 + 2 * 24
-    assert [(done, total) for done, total, _ in steps] == [(n, 68) for n in range(1, 69)]
-    assert all(result.completed for result in results)
-    participants = rows(tmp_path / "participants.tsv")
-    assert [row["participant_id"] for row in participants] == [f"sub-{n:02d}" for n in range(1, 25)]
-    assert json.loads((tmp_path / "dataset_description.json").read_text())["Simulated"] is True
-
-    absolute = [r for p in tmp_path.rglob("*_task-absolute_beh.tsv") for r in rows(p)]
-    main = [row for row in absolute if row["phase"] == "main"]
-    own = [row for row in main if row["virtual_texture"] == row["texture"]]
-    assert set(Counter((row["texture"], row["model"]) for row in own).values()) == {20}
-    assert len(main) - len(own) == 20 * len(study.plan_of("absolute").anchors)
-    assert len(absolute) - len(main) == 20 * study.plan_of("absolute").training_trials
-    assert all(0 <= float(row["magnitude_similarity"]) <= 100 for row in absolute)
-
-    relative = [r for p in tmp_path.rglob("*_task-relative_beh.tsv") for r in rows(p)]
-    main = [row for row in relative if row["phase"] == "main"]
-    assert set(Counter((row["texture"], row["model"]) for row in main).values()) == {24 * 3}
-    assert {row["simulated"] for row in absolute + relative} == {"true"}
-    share = sum(row["correct"] == "1" for row in main) / len(main)
-    assert 1.5 / 7 < share < 0.95
-
-
 def test_each_participant_meets_either_model_on_one_day(
     tmp_path: Path,
     study: Study,
@@ -79,7 +36,18 @@ def test_each_participant_meets_either_model_on_one_day(
     threshold: Threshold,
     rows: Any,
 ) -> None:
-    simulate(study, tmp_path, truths, models, threshold=threshold)
+    steps: list[tuple[int, int]] = []
+    results = simulate(
+        study,
+        tmp_path,
+        truths,
+        models,
+        threshold=threshold,
+        progress=lambda done, total, name: steps.append((done, total)),
+    )
+    assert all(result.completed for result in results)
+    assert steps == [(n, len(results)) for n in range(1, len(results) + 1)]
+    assert json.loads((tmp_path / "dataset_description.json").read_text())["Simulated"] is True
     days = {
         (subject, day): {
             row["model"]
