@@ -16,6 +16,10 @@ PYTEST_FLAGS ?=
 # libraries again; .venv/ and the project store theirs, whatever the machine's settings.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Processes that begin side by side would otherwise compile what all of them load, each for itself.
+COMPILE := $(BIN)/python -W ignore -m compileall -q -j 0 -x '/tests?/'
+LOADED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
+
 .PHONY: install demo test quick bench plant lint lock docs-tables clean
 
 install: .venv/installed
@@ -25,17 +29,14 @@ install: .venv/installed
 	@echo "Setting up .venv with $(PYTHON) (about 1.5 GB, a minute or two) ..."
 	@$(PYTHON) -m venv .venv || { echo "error: expected the venv module, got none; install python3-venv." >&2; exit 1; }
 	@$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes --no-compile -r requirements.lock
+	@$(COMPILE) $(addprefix .venv/lib/python*/site-packages/,$(LOADED))
 	@touch $@
-
-# What nearly every process loads; otherwise those that begin side by side compile all of it, each for itself.
-COMPILED := numpy scipy pandas statsmodels sklearn pingouin seaborn matplotlib psychopy hypothesis _pytest
 
 # The project itself and its C parts; reports a missing compiler.
 .venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h analysis/benches/rivals.h analysis/benches/sounds.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
-	@$(BIN)/python -m compileall -q -j 0 -x '/tests?/' modeling stimuli rig experiments analysis tactileq \
-		$(addprefix .venv/lib/python*/site-packages/,$(COMPILED))
+	@$(COMPILE) modeling stimuli rig experiments analysis tactileq
 	@touch $@
 
 demo: install

@@ -107,7 +107,7 @@ def _density(path: Path, full_scale_g: float | None) -> Floats:
     from scipy.signal import welch
 
     samples, rate_hz = soundfile.read(path, dtype="float64")
-    scale = 1.0 if full_scale_g is None or np.isnan(full_scale_g) else full_scale_g
+    scale = 1.0 if pd.isna(full_scale_g) else full_scale_g
     steady = steady_part(samples * scale, rate_hz)
     line = round(rate_hz / LINE_HZ)
     _, density = welch(steady, rate_hz, nperseg=min(line, steady.size), nfft=line, detrend=False)

@@ -45,6 +45,7 @@ def test_each_participant_meets_either_model_on_one_day(
         threshold=threshold,
         progress=lambda done, total, name: steps.append((done, total)),
     )
+    assert len(results) == 3 + 2 * 4
     assert all(result.completed for result in results)
     assert steps == [(n, len(results)) for n in range(1, len(results) + 1)]
     assert json.loads((tmp_path / "dataset_description.json").read_text())["Simulated"] is True
