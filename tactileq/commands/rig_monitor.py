@@ -90,6 +90,7 @@ def _watch(rig: RigFile, model: AnyModel | None, seconds: float | None) -> None:
         except Interrupted as end:
             if end.signal_name != "SIGINT":
                 raise
+            end.accept()
         finally:
             bare.close()
             for fault in faults:

@@ -47,6 +47,7 @@ def rig_twin(
         except Interrupted as end:
             if end.signal_name != "SIGINT":
                 raise
+            end.accept()
             return
     raise ValueError(
         "expected the simulated vibrator to run, got its end; check that the JACK server runs."
