@@ -233,7 +233,7 @@ def test_a_folder_that_took_the_place_of_the_one_waited_for_is_held_under_its_ow
     writer.start()
     assert waits.wait(5)
     folder.rename(tmp_path / "old")
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)  # the writer, which asks again meanwhile, may have made it
     lock.release()
     writer.join()
     assert wrote.is_set()
