@@ -33,10 +33,10 @@ install: .venv/installed
 	@touch $@
 
 # The project itself and its C parts; reports a missing compiler.
-.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h analysis/benches/rivals.h analysis/benches/sounds.h
+.venv/installed: .venv/packages pyproject.toml setup.py tools/c_parts.py modeling/estimation/slopes.h modeling/rendering/kernel.h modeling/rendering/lattice.h modeling/rendering/many.h modeling/rendering/many_lanes.h modeling/rendering/call.c modeling/rendering/player.h rig/live/live.h rig/live/sound.h benches/rendering/rivals.h benches/rendering/sounds.h
 	@$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
 	@$(BIN)/python -c "from modeling.rendering.compiled import is_compiled; is_compiled()"
-	@$(COMPILE) modeling stimuli rig experiments analysis tactileq
+	@$(COMPILE) modeling stimuli rig experiments analysis benches tactileq
 	@touch $@
 
 demo: install
@@ -74,4 +74,4 @@ lock:
 	uv pip compile --universal --python-version 3.11 --generate-hashes --no-emit-index-url --extra test pyproject.toml -o requirements.lock
 
 clean:
-	rm -rf .venv demo build *.egg-info modeling/rendering/_kernel* modeling/rendering/_call.* modeling/rendering/_many.* modeling/estimation/_slopes.* analysis/benches/_rivals.* rig/live/_live.* .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	rm -rf .venv demo build *.egg-info modeling/rendering/_kernel* modeling/rendering/_call.* modeling/rendering/_many.* modeling/estimation/_slopes.* benches/rendering/_rivals.* rig/live/_live.* .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -7,7 +7,7 @@ folder in place of the room; every way into the command line passes here and say
 from importlib.util import find_spec
 from pathlib import Path
 
-ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis")
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches")
 
 
 def _in_place_of_rooms() -> list[str]:

@@ -21,7 +21,7 @@ from tactileq.telling import (
 from tactileq.workers import working
 
 if TYPE_CHECKING:
-    from analysis.report.findings import Findings
+    from analysis.spectra.findings import Findings
     from modeling import RecordingSet
     from modeling.models.fit_summary import FitSummary
 
@@ -166,7 +166,7 @@ def _write(made: _Made, start: Path, *, texture: str) -> Outcome:
 
 def _model_one(source: Source, *, out: Path, how: HowToModel) -> _Made:
     """Load and model one texture; what is wrong with it becomes its outcome's error."""
-    from analysis.report.findings import find_in, findings_files
+    from analysis.spectra.findings import find_in, findings_files
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of
     from modeling.recordings.recording_set import load_usable
@@ -335,7 +335,7 @@ def _sources_in(folders: Iterable[Path]) -> tuple[list[Source], list[Outcome]]:
 
 def _require_own_files(sources: Iterable[Source], out: Path) -> None:
     """Refuse textures whose files would overwrite each other's or another command's."""
-    from analysis.report.findings import ENDINGS
+    from analysis.spectra.findings import ENDINGS
 
     taken: dict[Path, Source] = {}
     for source in sources:

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "tactileq")
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
 
 COMMAND = '''"""tactileq greet: a dummy."""
 

@@ -70,8 +70,18 @@ def test_pages_have_no_gaps_and_point_at_what_exists(name: str) -> None:
 
 def test_every_cited_page_and_anchor_of_the_method_exists() -> None:
     cited: set[str] = set()
-    rooms = ("modeling", "stimuli", "rig", "experiments", "analysis", "tactileq", "tests", "docs")
-    for path in (p for room in rooms for p in (ROOT / room).rglob("*.*")):
+    rooms = (
+        "modeling",
+        "stimuli",
+        "rig",
+        "experiments",
+        "analysis",
+        "benches",
+        "tactileq",
+        "tests",
+        "docs",
+    )
+    for path in (p for room in (*rooms, "tests", "docs") for p in (ROOT / room).rglob("*.*")):
         if path.suffix in (".py", ".h", ".c", ".toml"):
             text = path.read_text(encoding="utf-8")
             cited |= set(re.findall(r"docs/method[\w./#-]*\w", text))

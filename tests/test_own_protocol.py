@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.answers.responses import Responses
-from analysis.report.page import Table
+from analysis.page.page import Table
 from analysis.report.section_task import task_section
 from analysis.statistics.rates import UNKNOWN_CHANCE
 from analysis.statistics.verdicts import claims_found

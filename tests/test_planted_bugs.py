@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 PATCHES = sorted((ROOT / "tools" / "plant_bugs").glob("*.patch"))
-ROOMS = {"modeling", "stimuli", "rig", "experiments", "analysis", "tactileq"}
+ROOMS = {"modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq"}
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +46,12 @@ def test_there_are_forty_of_all_rooms_each_named_after_its_own_and_described(
 def test_the_tests_of_a_bug_are_those_of_its_module_then_of_what_is_around_it(
     plant: ModuleType,
 ) -> None:
-    (bug,) = (one for one in plant.all_bugs() if one.name == "analysis-benches-edge-on-wrong-side")
+    (bug,) = (one for one in plant.all_bugs() if one.name == "benches-atlas-edge-on-wrong-side")
     places = [place.relative_to(ROOT).as_posix() for place in bug.tests(ROOT)]
     assert places == [
-        "tests/analysis/benches/atlas/test_edges.py",
-        "tests/analysis/benches/atlas",
-        "tests/analysis/benches",
-        "tests/analysis",
+        "tests/benches/atlas/test_edges.py",
+        "tests/benches/atlas",
+        "tests/benches",
     ]
 
 

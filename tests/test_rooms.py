@@ -17,7 +17,7 @@ import modeling
 from tests.refusals import refused
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "tactileq")
+ROOMS = ("modeling", "stimuli", "rig", "experiments", "analysis", "benches", "tactileq")
 
 
 def name_of(path: Path) -> str:
@@ -82,6 +82,8 @@ PLANTED = {
     "rig/importing/files.py": ("import rig.twin", "Floors of rig"),
     "experiments/study/study.py": ("import experiments.sessions.store", "Floors of experiments"),
     "analysis/statistics/holm.py": ("import analysis.figures.answers", "Floors of analysis"),
+    "analysis/spectra/findings.py": ("import benches.rendering.bench", "Data flows one way"),
+    "benches/rendering/clicks.py": ("import benches.atlas.tables", "Floors of the benches"),
     "tactileq/telling.py": ("import tactileq.commands.demo", "Floors of the command line"),
     "modeling/perception/clock.py": ("import time", "modeling is pure numerics"),
     "modeling/hand.py": ("import random", "modeling is pure numerics"),

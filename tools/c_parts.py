@@ -2,7 +2,7 @@
 
 `modeling.rendering._kernel` is the rendering kernel, `_kernel_single` the same in single precision,
 `_many` renders many streams side by side, `modeling.estimation._slopes` is what the fit of layers
-spends its time on, `analysis.benches._rivals` is what the bench compares,
+spends its time on, `benches.rendering._rivals` is what the bench compares,
 `rig.live._live` is the memory that processes of a rig share and the callback that plays.
 """
 
@@ -19,8 +19,8 @@ LATTICE = ROOT / "modeling" / "rendering" / "lattice.h"
 MANY = ROOT / "modeling" / "rendering" / "many.h"
 MANY_LANES = ROOT / "modeling" / "rendering" / "many_lanes.h"
 SLOPES = ROOT / "modeling" / "estimation" / "slopes.h"
-RIVALS = ROOT / "analysis" / "benches" / "rivals.h"
-SOUNDS = ROOT / "analysis" / "benches" / "sounds.h"
+RIVALS = ROOT / "benches" / "rendering" / "rivals.h"
+SOUNDS = ROOT / "benches" / "rendering" / "sounds.h"
 PLAYER = ROOT / "modeling" / "rendering" / "player.h"
 LIVE = ROOT / "rig" / "live" / "live.h"
 SOUND = ROOT / "rig" / "live" / "sound.h"
@@ -67,7 +67,7 @@ def binding(
 
 kernel = binding("modeling.rendering._kernel", KERNEL)
 kernel_single = binding("modeling.rendering._kernel_single", KERNEL, real="float")
-rivals = binding("analysis.benches._rivals", KERNEL, RIVALS, SOUNDS)
+rivals = binding("benches.rendering._rivals", KERNEL, RIVALS, SOUNDS)
 many = binding(
     "modeling.rendering._many",
     KERNEL,

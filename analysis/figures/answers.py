@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import stats
 
-from analysis.figures.drawing import (
+from analysis.labels import ALL_TEXTURES, IDENTICAL, SCALES, significance_mark
+from analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -19,7 +20,6 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import ALL_TEXTURES, IDENTICAL, SCALES, significance_mark
 from analysis.statistics.paired import CONFIDENCE, ignoring_case
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Floats

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import GREY, axes_or_new, stamp_if_simulated
+from analysis.page.drawing import GREY, axes_or_new, stamp_if_simulated
 from analysis.statistics.confusion import ConfusionMatrix
 from modeling.arrays import Floats
 

@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from analysis.answers.plan import MODEL_RULE
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     BLACK,
     BLUE,
     GREEN,

@@ -6,7 +6,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,

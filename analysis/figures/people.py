@@ -9,7 +9,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import (
+from analysis.labels import unit_of
+from analysis.page.drawing import (
     BLACK,
     BLUE,
     GREY,
@@ -19,7 +20,6 @@ from analysis.figures.drawing import (
     shared_legend,
     stamp_if_simulated,
 )
-from analysis.labels import unit_of
 from analysis.statistics.participants.verdict import LIKELY, PeopleFound, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound
 from modeling.arrays import Bools

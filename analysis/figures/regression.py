@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     GREY,
     axes_or_new,
     finish_axes,

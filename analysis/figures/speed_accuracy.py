@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from analysis.figures.answers import ROLE_COLOURS
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     BLACK,
     GREY,
     axes_or_new,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, unit_of
-from analysis.report.outcomes import Outcome, Weight
+from analysis.page.outcomes import Outcome, Weight
 from analysis.report.people_sentences import (
     Row,
     chains_disagree,

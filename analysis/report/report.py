@@ -12,11 +12,9 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.columns import tsv_text
-from analysis.figures.saving import missing_fonts, png_of, svg_of
 from analysis.labels import MODELS
-from analysis.report.answer import answer, unfinished_tasks
-from analysis.report.outcomes import by_weight
-from analysis.report.page import (
+from analysis.page.outcomes import by_weight
+from analysis.page.page import (
     PICTURE_DPI,
     Fold,
     Item,
@@ -31,6 +29,10 @@ from analysis.report.page import (
     table_html,
     tiles,
 )
+from analysis.page.provenance import provenance_table
+from analysis.page.saving import missing_fonts, png_of, svg_of
+from analysis.page.sections import Progress, Section, of_pairs
+from analysis.report.answer import answer, unfinished_tasks
 from analysis.report.people_sentences import FEEL_IT
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
@@ -41,11 +43,9 @@ from analysis.report.section_models import model_section
 from analysis.report.section_oddity import oddity_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_planted import planted_section
-from analysis.report.section_provenance import provenance_table
 from analysis.report.section_reliability import reliability_section
 from analysis.report.section_speed_accuracy import speed_accuracy_section
 from analysis.report.section_task import task_section, tasks_without_chapter
-from analysis.report.sections import Progress, Section, of_pairs
 from analysis.report.sentences import cautions
 from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import INCONCLUSIVE

@@ -11,10 +11,10 @@ from analysis.answers.responses import Responses
 from analysis.figures.answers import figure_correct_rates, figure_ratings
 from analysis.figures.forest import figure_forest
 from analysis.labels import ALL_TEXTURES, MODELS, TASKS, sentence_case
+from analysis.page.page import Fold, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.claim_sentences import claim_outcomes
-from analysis.report.page import Fold, Picture, Table
 from analysis.report.section_people import people_items
-from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, UNKNOWN_CHANCE, correct_rates

@@ -12,9 +12,9 @@ import pandas as pd
 
 from analysis.columns import MODEL, TEXTURE, P
 from analysis.figures.confusions import figure_confusion, figure_similarities
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Fold, Item, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import confusion_outcomes
 from analysis.statistics.buttons import BUTTON_COLUMNS, ButtonPreference, button_preference
 from analysis.statistics.confusion import (

@@ -13,9 +13,9 @@ import pandas as pd
 
 from analysis.figures.hand import figure_hand
 from analysis.labels import TASKS
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Fold, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Fold, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import signed
 from analysis.statistics.hand import (
     HAND_TEST_COLUMNS,

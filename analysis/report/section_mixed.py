@@ -13,9 +13,9 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.labels import SCALES
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Table
+from analysis.page.sections import Section
 from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.gee import GEE, GEE_COLUMNS, gee_effects

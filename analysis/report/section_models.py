@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from analysis.figures.layers_over_speed import figure_layers_over_speed
-from analysis.figures.spectra import figure_spectra_and_threshold
 from analysis.labels import MODELS
-from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.page import Fold, Item, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import described, left_out_outcomes, simplification_outcomes
 from analysis.spectra.comparison import compare_spectra
+from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from analysis.spectra.figures.spectra import figure_spectra_and_threshold
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.textures.between import LEFT_OUT_COLUMNS, left_out_summary
 from analysis.textures.likeness import GFC_COLUMNS

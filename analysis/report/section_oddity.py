@@ -13,10 +13,10 @@ import pandas as pd
 
 from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Table
+from analysis.page.sections import Section
 from analysis.report.claim_sentences import NO_TEST
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Table
-from analysis.report.sections import Section
 from analysis.statistics.dprime import d_primes, oddity_d_prime
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES

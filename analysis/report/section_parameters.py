@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis.figures.regression import figure_centroid
-from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.page import Fold, Item, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import described, driving_outcomes, regression_outcomes
 from analysis.textures.regressions import (
     CENTROID_AMPLITUDE_COLUMNS,

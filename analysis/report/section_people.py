@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis.figures.people import figure_people
+from analysis.page.page import Fold, Item, Picture, Table
 from analysis.report.claim_sentences import overall_row
-from analysis.report.page import Fold, Item, Picture, Table
 from analysis.report.people_sentences import verdict_of_doubled
 from analysis.statistics.participants.verdict import PEOPLE_COLUMNS, PeopleSummary
 from analysis.statistics.verdicts import ClaimFound

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import pandas as pd
 
 from analysis.labels import ALL_LAYERS
-from analysis.report.page import Fold, Item, Table
-from analysis.report.sections import Section
+from analysis.page.page import Fold, Item, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import described, planted_outcomes
 from analysis.textures.between import PLANTED_BETWEEN_COLUMNS, planted_between_table
 from analysis.textures.recovery import (

@@ -12,9 +12,9 @@ import numpy as np
 import pandas as pd
 
 from analysis.labels import SCALES, TASKS
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Item, Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Item, Table
+from analysis.page.sections import Section
 from analysis.statistics.draws import generators
 from analysis.statistics.reliability import (
     AGREEMENT_COLUMNS,

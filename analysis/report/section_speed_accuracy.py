@@ -12,9 +12,9 @@ import pandas as pd
 
 from analysis.figures.speed_accuracy import figure_conditional_accuracy, figure_speed_accuracy
 from analysis.labels import TASKS
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Fold, Item, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Fold, Item, Picture, Table
+from analysis.page.sections import Section
 from analysis.statistics.speed_accuracy import (
     CELL_COLUMNS,
     COMPARISON_COLUMNS,

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from analysis.answers.imported import Imported
 from analysis.figures.confusions import plot_confusion
 from analysis.figures.factorial import figure_factorial
-from analysis.report.outcomes import Outcome, Weight
-from analysis.report.page import Fold, Picture, Table
-from analysis.report.sections import Section
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Fold, Picture, Table
+from analysis.page.sections import Section
 from analysis.report.sentences import ALPHA
 from analysis.statistics.confusion import CONFUSION_COLUMNS, ConfusionMatrix, confusion_table
 from analysis.statistics.factorial import (

@@ -12,10 +12,10 @@ import pandas as pd
 
 from analysis.answers.responses import Responses
 from analysis.labels import TASKS, sentence_case
-from analysis.report.outcomes import Outcome
-from analysis.report.page import Item, Table
+from analysis.page.outcomes import Outcome
+from analysis.page.page import Item, Table
+from analysis.page.sections import Section
 from analysis.report.section_answers import rates_picture, rates_table, who_took_part
-from analysis.report.sections import Section
 from analysis.report.sentences import rate_outcomes
 from analysis.statistics.claims import CLAIM_COLUMNS
 from analysis.statistics.rates import correct_rates

@@ -15,7 +15,7 @@ from analysis.labels import (
     TASKS,
     sentence_case,
 )
-from analysis.report.outcomes import Outcome, Weight
+from analysis.page.outcomes import Outcome, Weight
 from analysis.statistics.confusion import ConfusionMatrix
 from analysis.statistics.rates import UNKNOWN_CHANCE
 from modeling.errors import counted

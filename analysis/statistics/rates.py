@@ -154,3 +154,9 @@ def bootstrap_intervals(rates: Floats, rng: np.random.Generator) -> tuple[Floats
         rng=rng,
     ).confidence_interval
     return np.asarray(interval.low), np.asarray(interval.high)
+
+
+def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
+    """Exact 95 % interval of a probability by `hits` of `of` (Clopper and Pearson 1934)."""
+    interval = stats.binomtest(hits, of).proportion_ci(CONFIDENCE, method="exact")
+    return float(interval.low), float(interval.high)

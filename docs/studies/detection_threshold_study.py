@@ -20,8 +20,8 @@ import pandas as pd
 from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import finish_axes, shared_legend
-from analysis.figures.drawing import stamp_if_simulated as stamp
+from analysis.page.drawing import finish_axes, shared_legend
+from analysis.page.drawing import stamp_if_simulated as stamp
 from experiments.tasks.threshold import FREQUENCIES_HZ
 from experiments.tasks.threshold_posterior import POINT_DB, Answer, estimate, next_level_db
 

@@ -20,13 +20,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     LAYER_COLOURS,
     LAYER_MARKERS,
     finish_axes,
     shared_legend,
 )
-from analysis.figures.drawing import stamp_if_simulated as stamp
+from analysis.page.drawing import stamp_if_simulated as stamp
 from analysis.textures.between import FilterAt, halfway, truth_summary
 from modeling import Recording, RecordingSet, fit_ar, fit_texture
 from modeling.arrays import Floats

@@ -15,13 +15,13 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from analysis.figures.drawing import (
+from analysis.page.drawing import (
     LAYER_COLOURS,
     LAYER_MARKERS,
     finish_axes,
     shared_legend,
 )
-from analysis.figures.drawing import stamp_if_simulated as stamp
+from analysis.page.drawing import stamp_if_simulated as stamp
 from modeling import CRITERIA, TextureModel, Threshold, simplify
 from modeling.perception.thresholds import SHIPPED
 

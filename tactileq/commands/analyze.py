@@ -113,8 +113,8 @@ def analyze(
             "expected a folder of answers, or --table with files, got neither; give one of the two."
         )
     from analysis.report.report import write_report
-    from analysis.report.section_validation import validation_section
     from analysis.statistics.verdicts import check_complete
+    from benches.validation.section import validation_section
     from modeling.files.folders import replace_folder
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder
@@ -292,13 +292,13 @@ def validated(
     dask : str, optional
         Address of a scheduler.
     """
-    from analysis.statistics.validation import cells, simulate_cell, validation_table
-    from analysis.statistics.validation_model import (
+    from benches.validation.model import (
         model_cells,
         model_table,
         simulate_model_cell,
     )
-    from analysis.statistics.validation_ranks import KINDS, rank_table, simulate_ranks
+    from benches.validation.procedures import cells, simulate_cell, validation_table
+    from benches.validation.ranks import KINDS, rank_table, simulate_ranks
 
     settings: dict[str, int] = {"simulations": simulations, "seed": seed}
     listed, planted = cells(), model_cells()

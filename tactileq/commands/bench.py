@@ -16,9 +16,9 @@ from tactileq.telling import progress
 from tactileq.workers import working
 
 if TYPE_CHECKING:
-    from analysis.benches.chart.chart import Chart
-    from analysis.benches.chart.surfaces import Source
-    from analysis.benches.rendering import RenderingBench
+    from benches.chart.chart import Chart
+    from benches.chart.surfaces import Source
+    from benches.rendering.bench import RenderingBench
     from modeling.files.folders import Contents
 
 bench = typer.Typer(
@@ -92,7 +92,7 @@ def bench_chart(
 
     Example: tactileq bench chart --recordings recordings/cork --out chart
     """
-    from analysis.benches.chart.methods import chosen_methods
+    from benches.chart.methods import chosen_methods
 
     seen = check_own_results(out, "bench chart")
     methods = chosen_methods(method or [], full=full)
@@ -122,7 +122,7 @@ def chart_sources(
     ValueError
         For models without recordings, and a texture of which a folder holds no model.
     """
-    from analysis.benches.chart.surfaces import (
+    from benches.chart.surfaces import (
         FULL,
         USUAL,
         recorded_sources,
@@ -146,8 +146,8 @@ def charted(
     dask: str | None = None,
 ) -> Chart:
     """Judge all textures, several at a time, then time rendering with nothing else running."""
-    from analysis.benches.chart.chart import chart_of
-    from analysis.benches.chart.judging import Judged, judge
+    from benches.chart.chart import chart_of
+    from benches.chart.judging import Judged, judge
 
     made = dict[int, Judged]()
     with progress("Modeling and judging", len(sources)) as advance:
@@ -160,7 +160,7 @@ def charted(
 
 
 def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str, object]) -> None:
-    from analysis.report.chart_page import chart_files
+    from benches.chart.page import chart_files
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 
@@ -172,10 +172,10 @@ def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str,
 
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer and its rivals; print and write the results."""
-    from analysis.benches.rendering import QUICK, Effort, bench_rendering
     from analysis.columns import tsv_text
-    from analysis.figures.rendering import figure_rendering
-    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.spectra.findings import DOTS_PER_INCH
+    from benches.rendering.bench import QUICK, Effort, bench_rendering
+    from benches.rendering.figure import figure_rendering
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.files.writing import write_text

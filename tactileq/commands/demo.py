@@ -17,11 +17,11 @@ from tactileq.telling import progress, share_of
 from tactileq.workers import mapping
 
 if TYPE_CHECKING:
-    from analysis.benches.atlas.edges import Examined
-    from analysis.benches.chart.judging import Judged
-    from analysis.report.sections import Section
+    from analysis.page.sections import Section
     from analysis.textures.compared import Mapped
     from analysis.textures.results import TextureResult
+    from benches.atlas.edges import Examined
+    from benches.chart.judging import Judged
     from experiments.observers.psychometrics import Psychometrics
     from modeling import ARModel, Threshold
     from stimuli.sets.recipe import Recipe
@@ -174,11 +174,11 @@ class Benches(NamedTuple):
     @classmethod
     def begun(cls, mapped: Mapped, made: Sequence[TextureResult]) -> Benches:
         """All of them, from now on."""
-        from analysis.benches.atlas.cases import CASES
-        from analysis.benches.chart.judging import judge
-        from analysis.benches.chart.methods import BRIEF
-        from analysis.benches.chart.surfaces import FEW, simulated_sources
-        from analysis.benches.scenes import compile_examples, drawn_example
+        from benches.atlas.cases import CASES
+        from benches.chart.judging import judge
+        from benches.chart.methods import BRIEF
+        from benches.chart.surfaces import FEW, simulated_sources
+        from benches.scenes.examples import compile_examples, drawn_example
 
         models = {result.texture: result.model for result in made}
         return cls(
@@ -193,13 +193,13 @@ class Benches(NamedTuple):
 
         `rivals` are the AR models of the planted textures' recordings.
         """
-        from analysis.benches.atlas.cases import CASES
-        from analysis.benches.chart.chart import chart_of
-        from analysis.benches.chart.surfaces import FEW
-        from analysis.benches.scenes import Surface
-        from analysis.report.chart_page import chart_section
-        from analysis.report.section_scenes import scene_section
-        from analysis.report.section_stability import stability_section
+        from benches.atlas.cases import CASES
+        from benches.atlas.section import stability_section
+        from benches.chart.chart import chart_of
+        from benches.chart.page import chart_section
+        from benches.chart.surfaces import FEW
+        from benches.scenes.examples import Surface
+        from benches.scenes.section import scene_section
         from stimuli.planted.textures import PlantedSurface
 
         surfaces = {m.texture: Surface(PlantedSurface(m.texture), m) for m in rivals}

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from analysis.answers.responses import PlannedTask, Responses
+    from analysis.power.power import Verdict
     from analysis.statistics.participants.posterior import Effort
-    from analysis.statistics.power import Verdict
     from experiments.observers.in_memory import Row
     from experiments.observers.percepts import Perception
     from experiments.observers.psychometrics import Psychometrics
@@ -325,9 +325,9 @@ def chances(
     Returns
     -------
     DataFrame
-        `analysis.statistics.power.POWER_COLUMNS`.
+        `analysis.power.power.POWER_COLUMNS`.
     """
-    from analysis.statistics.power import power_table
+    from analysis.power.power import power_table
 
     work = partial(simulated_verdicts, people, sizes, seed=seed, effort=effort)
     found: dict[int, list[Verdict]] = {}
@@ -358,7 +358,7 @@ def simulated_verdicts(
     effort: Effort | None = None,
 ) -> list[Verdict]:
     """All verdicts of one simulation: the largest study, and its first n participants."""
-    from analysis.statistics.power import verdicts_by_size
+    from analysis.power.power import verdicts_by_size
     from experiments.observers.in_memory import simulate_sessions
     from modeling.seeds import generator
 
@@ -424,8 +424,8 @@ def _write(
     inputs: Mapping[str, str],
 ) -> None:
     from analysis.columns import tsv_text
-    from analysis.figures.power import figure_power
-    from analysis.figures.saving import save_figure, svg_of
+    from analysis.page.saving import save_figure, svg_of
+    from analysis.power.figure import figure_power
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
     from modeling.files.writing import write_text
@@ -445,6 +445,6 @@ def _write(
 
 def _sentences(table: pd.DataFrame, plan: Study, out: Path) -> list[str]:
     from analysis.answers.plan import plan_from
-    from analysis.statistics.power import power_sentences
+    from analysis.power.power import power_sentences
 
     return power_sentences(table, claims=plan_from(plan.plan.to_dict(), path=out).claims)

@@ -17,8 +17,8 @@ from tactileq.workers import working
 if TYPE_CHECKING:
     import pandas as pd
 
-    from analysis.benches.atlas.case import Case
-    from analysis.benches.atlas.edges import Examined
+    from benches.atlas.case import Case
+    from benches.atlas.edges import Examined
     from modeling.files.folders import Contents
 
 
@@ -45,7 +45,7 @@ def stability(
 
     Example: tactileq stability --only filters
     """
-    from analysis.benches.atlas.cases import CASES
+    from benches.atlas.cases import CASES
 
     seen = check_own_results(out, "stability")
     chosen = cases_of(CASES, only)
@@ -112,7 +112,7 @@ def columns_of(cases: Sequence[Case], *, full: bool) -> list[tuple[int, str]]:
 
 def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool) -> Examined:
     """One of `columns_of`, in whatever process."""
-    from analysis.benches.atlas.edges import examine
+    from benches.atlas.edges import examine
 
     number, column = which
     return examine(cases[number], column, full=full)
@@ -121,8 +121,8 @@ def examine_column(cases: Sequence[Case], which: tuple[int, str], *, full: bool)
 def _write(
     found: Sequence[Examined], out: Path, *, seen: Contents, settings: dict[str, object]
 ) -> None:
-    from analysis.benches.atlas.tables import margin_table
-    from analysis.report.section_stability import atlas_files
+    from benches.atlas.section import atlas_files
+    from benches.atlas.tables import margin_table
     from modeling.files.folders import replace_folder
     from modeling.files.provenance import provenance_of, seal_folder
 

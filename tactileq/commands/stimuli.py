@@ -154,10 +154,10 @@ def render_set(
     check_place(out)
     sources = load_sources(recipe)
     count = stimulus_count(recipe, sources)
-    from analysis.figures.saving import save_figure
-    from analysis.figures.stimuli import figure_contact_sheet
-    from analysis.report.findings import DOTS_PER_INCH
+    from analysis.page.saving import save_figure
     from analysis.spectra.contact_sheet import contact_sheet
+    from analysis.spectra.figures.stimuli import figure_contact_sheet
+    from analysis.spectra.findings import DOTS_PER_INCH
 
     def draw(folder: Path) -> None:
         sheet = figure_contact_sheet(contact_sheet(folder))

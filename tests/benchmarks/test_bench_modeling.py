@@ -11,7 +11,7 @@ from joblib import Parallel, cpu_count, delayed
 from pytest_benchmark.fixture import BenchmarkFixture
 from scipy.signal import resample, resample_poly
 
-from analysis.report.findings import find_in
+from analysis.spectra.findings import find_in
 from modeling import (
     ESTIMATORS,
     Recording,

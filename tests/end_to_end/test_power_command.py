@@ -100,7 +100,9 @@ def test_power_refuses_in_one_sentence_and_replaces_nothing(main, place: Path) -
 
 @pytest.mark.usefixtures("undrawn")
 def test_the_report_gets_the_appendix(main, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from analysis.statistics import validation, validation_model, validation_ranks
+    from benches.validation import model as validation_model
+    from benches.validation import procedures as validation
+    from benches.validation import ranks as validation_ranks
 
     few = validation.cells(["TOST, guard on ends"], sizes=[8])
     monkeypatch.setattr(validation, "cells", lambda: few)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.benches.atlas.cases import CASES
+from benches.atlas.cases import CASES
 
 CONTENTS = {
     "cells.tsv",

@@ -11,6 +11,7 @@ import pytest
 
 from analysis.answers.loading import load_responses
 from analysis.labels import ALL_TEXTURES
+from analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
 from analysis.statistics.claims import WITHHELD
 from analysis.statistics.equivalence import (
     DIFFERENT,
@@ -20,9 +21,8 @@ from analysis.statistics.equivalence import (
     WITHIN_BOUNDS,
 )
 from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
-from analysis.statistics.validation import cells, simulate_cell
 from analysis.statistics.verdicts import claim_values, people_data
+from benches.validation.procedures import cells, simulate_cell
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets

@@ -19,15 +19,15 @@ from analysis.figures.answers import (
     figure_ratings,
 )
 from analysis.figures.confusions import figure_confusion, figure_similarities
-from analysis.figures.drawing import LAYER_COLOURS, VERMILLION
 from analysis.figures.forest import figure_forest
-from analysis.figures.layers_over_speed import figure_layers_over_speed
-from analysis.figures.spectra import (
+from analysis.page.drawing import LAYER_COLOURS, VERMILLION
+from analysis.spectra.comparison import compare_spectra, spectrum_panels
+from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed
+from analysis.spectra.figures.spectra import (
     figure_spectra,
     figure_spectra_and_threshold,
     plot_layers_and_threshold,
 )
-from analysis.spectra.comparison import compare_spectra, spectrum_panels
 from analysis.spectra.layers_over_grid import layers_over_speed
 from analysis.statistics.confusion import confusion_matrices
 from analysis.statistics.verdicts import ClaimFound, claims_found

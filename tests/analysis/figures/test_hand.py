@@ -8,9 +8,9 @@ import pytest
 from matplotlib.colors import to_hex
 from scipy import stats
 
-from analysis.figures.drawing import GREY
 from analysis.figures.hand import figure_hand, plot_measure
-from analysis.figures.saving import png_of
+from analysis.page.drawing import GREY
+from analysis.page.saving import png_of
 
 pytestmark = pytest.mark.filterwarnings("error")
 PAIR = ("full", "simplified")

@@ -10,9 +10,9 @@ import pytest
 from analysis.answers.plan import AnalysisPlan
 from analysis.answers.responses import PlannedTask, Responses
 from analysis.labels import ALL_TEXTURES
+from analysis.page.outcomes import HEADINGS, Outcome, Weight, by_weight
 from analysis.report.answer import NOBODY_ASKED, answer, unfinished_tasks
 from analysis.report.claim_sentences import claim_outcomes, difference, overall_row
-from analysis.report.outcomes import HEADINGS, Outcome, Weight, by_weight
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.statistics.claims import CONTROL
 from analysis.statistics.verdicts import ClaimFound, claims_found

@@ -10,10 +10,10 @@ import pytest
 
 from analysis.answers.plan import MODEL_RULE
 from analysis.answers.responses import PlannedTask, Responses
+from analysis.page.outcomes import Weight
 from analysis.report.answer import answer
 from analysis.report.claim_sentences import claim_outcomes, overall_row
 from analysis.report.model_sentences import decided_by_tests
-from analysis.report.outcomes import Weight
 from analysis.report.people_sentences import FEEL_IT, about, headline, percent
 from analysis.report.plan_sentences import deviations, methods_paragraph
 from analysis.report.report import write_report

@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 from analysis.answers.responses import PlannedTask, Responses
-from analysis.figures import saving
+from analysis.page import saving
 from analysis.report.report import write_report
 from analysis.report.section_reliability import careless_signs
 from analysis.textures.results import TextureResult

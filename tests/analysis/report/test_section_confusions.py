@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.report.page import Fold, Table
+from analysis.page.page import Fold, Table
+from analysis.page.sections import Section
 from analysis.report.section_confusions import confusion_section
-from analysis.report.sections import Section
 from analysis.statistics.confusion import confusion_matrices, participant_counts
 
 TEXTURES = ("canvas", "leather", "MDF", "PVC")

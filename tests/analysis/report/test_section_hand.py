@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.report.page import Fold, Table, table_html
+from analysis.page.page import Fold, Table, table_html
+from analysis.page.sections import Section
 from analysis.report.section_hand import hand_section
-from analysis.report.sections import Section
 from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")

@@ -10,9 +10,9 @@ import pytest
 
 from analysis.answers.plan import AnalysisPlan
 from analysis.answers.responses import Responses
-from analysis.report.page import Table, table_html
+from analysis.page.page import Table, table_html
+from analysis.page.sections import Section
 from analysis.report.section_mixed import mixed_section
-from analysis.report.sections import Section
 from analysis.statistics.gee import SIGN_FLIPS
 from analysis.statistics.verdicts import claims_found
 from tests.analysis.conftest import choice_table, rating_table

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 
 from analysis.answers.plan import AnalysisPlan
 from analysis.labels import ALL_TEXTURES
-from analysis.report.page import Table, table_html
+from analysis.page.page import Table, table_html
 from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section, oddity_sensitivity
 from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
 from analysis.statistics.dprime import oddity_d_prime

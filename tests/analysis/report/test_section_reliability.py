@@ -6,13 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.report.page import Table, table_html
+from analysis.page.page import Table, table_html
+from analysis.page.sections import Section
 from analysis.report.section_reliability import (
     CARELESS_COLUMNS,
     careless_signs,
     reliability_section,
 )
-from analysis.report.sections import Section
 from modeling.files.columns import names
 
 pytestmark = pytest.mark.filterwarnings("error")

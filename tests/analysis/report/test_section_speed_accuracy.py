@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.report.outcomes import Weight
-from analysis.report.page import Fold, Picture, Table, table_html
+from analysis.page.outcomes import Weight
+from analysis.page.page import Fold, Picture, Table, table_html
+from analysis.page.sections import Section
 from analysis.report.section_speed_accuracy import speed_accuracy_section
-from analysis.report.sections import Section
 from modeling.files.columns import names
 
 MODELS = ("full", "simplified")

@@ -16,11 +16,11 @@ from analysis.answers.plan import AnalysisPlan, Claim
 from analysis.answers.responses import PlannedTask, Responses
 from analysis.figures.answers import figure_correct_rates
 from analysis.labels import ALL_TEXTURES, TASKS
+from analysis.page.sections import Section
 from analysis.report.answer import NOTHING_TO_CLAIM, answer
 from analysis.report.plan_sentences import methods_paragraph
 from analysis.report.report import write_report
 from analysis.report.section_task import task_section, tasks_without_chapter
-from analysis.report.sections import Section
 from analysis.statistics.rates import UNKNOWN_CHANCE
 from analysis.statistics.verdicts import ClaimFound, chance_of, claims_found
 from modeling.files.answer_tables import (

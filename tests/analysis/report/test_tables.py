@@ -12,22 +12,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import analysis.report.page
+import analysis.page.page
 from analysis.answers.hand import HAND_COLUMNS
 from analysis.answers.responses import Responses
-from analysis.benches.atlas import hands
-from analysis.benches.atlas.edges import examine
-from analysis.benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
-from analysis.benches.chart.chart import chart_of
-from analysis.benches.chart.judging import judge
-from analysis.benches.chart.summary import COMPARISON_COLUMNS, METHOD_COLUMNS
-from analysis.benches.chart.surfaces import Simulated, simulated_sources
-from analysis.benches.scenes import COMPARISON_COLUMNS as SCENE_COMPARISON_COLUMNS
-from analysis.benches.scenes import CompiledExample, Surface
 from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
-from analysis.report.chart_page import chart_section
-from analysis.report.page import Fold, Item, Table, table_html
+from analysis.page.page import Fold, Item, Table, table_html
+from analysis.page.provenance import PROVENANCE_COLUMNS
+from analysis.page.sections import Section
 from analysis.report.section_answers import choice_section, rating_section, verdict_section
 from analysis.report.section_confusions import (
     BIAS_COLUMNS,
@@ -47,16 +39,8 @@ from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section
 from analysis.report.section_parameters import parameter_section
 from analysis.report.section_people import PRIORS_COLUMNS
 from analysis.report.section_planted import planted_section
-from analysis.report.section_provenance import PROVENANCE_COLUMNS
 from analysis.report.section_reliability import CARELESS_COLUMNS, reliability_section
-from analysis.report.section_scenes import (
-    SCENE_STEP_COLUMNS,
-    SCENE_TEXTURE_COLUMNS,
-    scene_section,
-)
 from analysis.report.section_speed_accuracy import speed_accuracy_section
-from analysis.report.section_stability import stability_section
-from analysis.report.sections import Section
 from analysis.statistics.buttons import BUTTON_COLUMNS
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
@@ -88,6 +72,22 @@ from analysis.textures.regressions import (
 )
 from analysis.textures.results import FIT_COLUMNS as MODEL_FIT_COLUMNS
 from analysis.textures.results import VERDICT_COLUMNS as LAYER_VERDICT_COLUMNS
+from benches.atlas import hands
+from benches.atlas.edges import examine
+from benches.atlas.section import stability_section
+from benches.atlas.tables import EDGE_COLUMNS, MARGIN_COLUMNS
+from benches.chart.chart import chart_of
+from benches.chart.judging import judge
+from benches.chart.page import chart_section
+from benches.chart.summary import COMPARISON_COLUMNS, METHOD_COLUMNS
+from benches.chart.surfaces import Simulated, simulated_sources
+from benches.scenes.examples import COMPARISON_COLUMNS as SCENE_COMPARISON_COLUMNS
+from benches.scenes.examples import CompiledExample, Surface
+from benches.scenes.section import (
+    SCENE_STEP_COLUMNS,
+    SCENE_TEXTURE_COLUMNS,
+    scene_section,
+)
 from modeling import Scene, compile_scene, fit_ar
 from modeling.files.columns import Column, Columns, chosen, names, without
 from modeling.scenes.scene import HandRange
@@ -95,7 +95,7 @@ from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 from tests.analysis.conftest import by_model, people_summary
 
-PAGE = Path(analysis.report.page.__file__)
+PAGE = Path(analysis.page.page.__file__)
 DECLARED = {
     "claims": VERDICT_COLUMNS,
     "claim_tests": CLAIM_COLUMNS,

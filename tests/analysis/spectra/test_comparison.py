@@ -9,17 +9,17 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.figures.layers_over_grid import (
+from analysis.spectra.comparison import compare_condition, compare_spectra, spectrum_panels
+from analysis.spectra.figures.layers_over_grid import (
     QUANTITIES,
     figure_layers_over_grid,
     plot_layers_over_grid,
 )
-from analysis.figures.spectra import (
+from analysis.spectra.figures.spectra import (
     figure_spectra,
     figure_spectra_and_threshold,
     plot_model_spectrum,
 )
-from analysis.spectra.comparison import compare_condition, compare_spectra, spectrum_panels
 from analysis.spectra.layers_over_grid import layers_over_grid
 from analysis.textures.results import TextureResult
 from modeling import CRITERIA, InputError, RecordingSet, TextureModel, Threshold, simplify

@@ -9,8 +9,8 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.figures.stimuli import figure_contact_sheet, plot_stimuli
 from analysis.spectra.contact_sheet import LINE_HZ, ContactSheet, contact_sheet
+from analysis.spectra.figures.stimuli import figure_contact_sheet, plot_stimuli
 from modeling import TextureModel
 from stimuli.planted.textures import planted_texture
 from stimuli.planted.vibrators import planted_vibrator

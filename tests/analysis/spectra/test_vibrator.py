@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from analysis.figures.vibrator import figure_vibrator, plot_coherence, plot_compensation
+from analysis.spectra.figures.vibrator import figure_vibrator, plot_coherence, plot_compensation
 from analysis.spectra.vibrator import CompensatedVibrator, compensated
 from modeling import Vibrator, compensation_for
 from stimuli.planted.vibrators import SimulatedVibrator

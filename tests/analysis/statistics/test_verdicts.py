@@ -13,6 +13,7 @@ import pytest
 from analysis.answers.plan import AnalysisPlan
 from analysis.answers.responses import PlannedTask, Responses, leave_out
 from analysis.labels import ALL_TEXTURES
+from analysis.power.power import verdicts
 from analysis.report.answer import answer
 from analysis.report.claim_sentences import claim_outcomes
 from analysis.report.plan_sentences import methods_paragraph
@@ -25,7 +26,6 @@ from analysis.statistics.claims import (
     WITHHELD,
 )
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
-from analysis.statistics.power import verdicts
 from analysis.statistics.verdicts import (
     ClaimFound,
     all_claims,

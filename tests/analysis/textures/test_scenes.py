@@ -7,8 +7,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from analysis.figures.scenes import figure_tradeoff
 from analysis.labels import ALL_TEXTURES
+from analysis.spectra.figures.scenes import figure_tradeoff
 from analysis.textures.scenes import (
     BEFORE_AFTER_COLUMNS,
     SHARED,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import modeling.rendering
-from analysis.benches.rivals import layered_texture
+from benches.rendering.rivals import layered_texture
 from modeling import Limits, compensation_for
 from modeling.rendering.plan import RenderPlan, plan_for
 from stimuli.planted.vibrators import planted_vibrator

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.benches.rivals import layered_texture
+from benches.rendering.rivals import layered_texture
 from modeling import Renderer, TextureModel
 from modeling.engines import SWITCH
 from modeling.rendering.noise import stream_key

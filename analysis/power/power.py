@@ -1,0 +1,371 @@
+"""How often a study of n participants comes to each verdict, counted over simulated studies.
+
+docs/method/power.md
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from analysis.answers.plan import EQUIVALENCE, Claim
+from analysis.answers.responses import Responses
+from analysis.columns import TEXTURE
+from analysis.labels import ALL_TEXTURES
+from analysis.statistics.claims import (
+    BOUNDS_WITHHELD,
+    WITHHELD,
+    Standing,
+    Values,
+    every_equivalent,
+    words_of_people,
+)
+from analysis.statistics.draws import generators
+from analysis.statistics.equivalence import (
+    ALL_BUT,
+    AVERAGE_FELT,
+    DIFFERENT,
+    EQUAL_ON_AVERAGE,
+    EQUIVALENT,
+    FELT,
+    INCONCLUSIVE,
+    WITHIN_BOUNDS,
+    Bounds,
+    equivalence_test,
+)
+from analysis.statistics.paired import (
+    holm,
+    sign_flips_p,
+    t_test,
+    why_undefined,
+    without_rounding_noise,
+)
+from analysis.statistics.participants.design import PeopleData
+from analysis.statistics.participants.posterior import Effort
+from analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
+from analysis.statistics.rates import clopper_pearson
+from analysis.statistics.verdicts import claim_shares, claim_standing, claim_values, people_data
+from modeling.arrays import Floats
+from modeling.files.columns import Column, names
+
+TARGET = 0.8  # usual power to plan for
+EVERY_TEXTURE = "every texture"
+MEAN_ALONE = "mean alone"
+NO_VERDICT = "no verdict"
+FELT_WORDS = (AVERAGE_FELT, ALL_BUT, FELT)
+VERDICTS = (
+    *(EQUIVALENT, EQUAL_ON_AVERAGE, *FELT_WORDS, WITHIN_BOUNDS, DIFFERENT, INCONCLUSIVE),
+    *(WITHHELD, BOUNDS_WITHHELD, NO_VERDICT),
+)
+
+POWER_COLUMNS = (
+    Column("claim", is_name=True),
+    TEXTURE,
+    Column("n"),
+    Column("verdict", is_name=True),
+    Column("hits"),
+    Column("simulations"),
+    Column("chance", format=".3f"),
+    Column("ci_low", "95% CI from", format=".3f"),
+    Column("ci_high", "to", format=".3f"),
+)
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The verdict of one simulated study of n participants on one claim and texture."""
+
+    claim: str
+    texture: str
+    n: int
+    verdict: str
+
+
+def verdicts_by_size(
+    by_size: Mapping[int, Responses],
+    *,
+    rng: np.random.Generator,
+    effort: Effort | None = None,
+) -> list[Verdict]:
+    """The verdicts on all claims of the plan, by its rule, at every number of participants.
+
+    Parameters
+    ----------
+    by_size : mapping of int to Responses
+        A finished study and its first people alone, from few to many.
+    rng : Generator
+        Draws sign flips where participants do not vary, and seeds the draws from posteriors.
+    effort : Effort, optional
+        Of the model of the participants, where it decides.
+    """
+    judged = judged_claims(by_size, rng=rng, effort=effort)
+    found = []
+    for n, responses in by_size.items():
+        for claim in responses.plan.claims:
+            standing, key = claim_standing(responses, claim, rng=rng), (claim.name, n)
+            if key in judged:
+                shares, few = claim_shares(responses, claim), responses.plan.few
+                found += people_verdicts(
+                    claim, judged[key], n=n, shares=shares, standing=standing, few=few
+                )
+            else:
+                values = claim_values(responses, claim)
+                found += verdicts(claim, values, n=n, standing=standing, rng=rng)
+    return found
+
+
+def judged_claims(
+    by_size: Mapping[int, Responses],
+    *,
+    rng: np.random.Generator,
+    effort: Effort | None = None,
+) -> dict[tuple[str, int], PeopleJudged]:
+    """What the model of the participants says of each claim by name and number of participants.
+
+    Claims of one task with the same bounds and as many answers are sampled side by side.
+
+    Parameters
+    ----------
+    by_size, rng, effort
+        As for `verdicts_by_size`.
+
+    Returns
+    -------
+    dict
+        Without claims of which the tests decide.
+    """
+    sizes, groups = list(by_size), _sampled_together(by_size[max(by_size)])
+    own = generators(rng) if groups else {}
+    found: dict[tuple[str, int], PeopleJudged] = {}
+    for claims in groups:
+        first = claims[0][0]
+        assert first.bounds is not None
+        data = [one for _, one in claims]
+        judged = judged_by_size(data, first.bounds, sizes=sizes, rng=own[first.task], effort=effort)
+        for (claim, _), by_n in zip(claims, judged, strict=True):
+            found |= {(claim.name, n): one for n, one in zip(sizes, by_n, strict=True)}
+    return found
+
+
+def _sampled_together(responses: Responses) -> list[list[tuple[Claim, PeopleData]]]:
+    """Claims that the model of the participants decides, those alike in one list."""
+    alike: dict[tuple[object, ...], list[tuple[Claim, PeopleData]]] = {}
+    for claim in responses.plan.claims:
+        data = people_data(responses, claim)
+        if data is not None:
+            shapes = (one.shape for one in vars(data.studies).values())
+            key = (claim.task, claim.bounds, data.model, *shapes)
+            alike.setdefault(key, []).append((claim, data))
+    return list(alike.values())
+
+
+def people_verdicts(
+    claim: Claim,
+    judged: PeopleJudged,
+    *,
+    n: int,
+    shares: Mapping[str, float],
+    standing: Standing,
+    few: float,
+) -> list[Verdict]:
+    """The verdicts of the model of the participants, as `claims.with_people` states them.
+
+    docs/method/power.md#verdicts
+
+    Parameters
+    ----------
+    claim : Claim
+        With bounds.
+    judged : PeopleJudged
+    n : int
+        Participants of the study, for the record.
+    shares : mapping of texture to float
+        As `Values.share_at_ends`.
+    standing : Standing
+        Of a finished study.
+    few : float
+        Of the plan.
+
+    Returns
+    -------
+    list of Verdict
+        Over all textures, of each, whether every single mean lies inside the bounds (as
+        `claims.all_equivalent`), and whether that over all does.
+    """
+    assert claim.bounds is not None
+    textures = list(judged.textures["texture"])
+    words = words_of_people(
+        judged, claim.bounds, textures=textures, shares=shares, standing=standing, few=few
+    )
+    doubts = [standing.doubt(shares.get(texture, np.nan)) for texture in textures]
+    every = every_equivalent(judged.textures["p_equivalence"].to_numpy(float), doubts=doubts)
+    mean = EQUAL_ON_AVERAGE if judged.summary.inside(claim.bounds) else INCONCLUSIVE
+    rows = {
+        **{texture: word or NO_VERDICT for texture, word in words.items()},
+        EVERY_TEXTURE: EQUIVALENT if every else INCONCLUSIVE,
+        MEAN_ALONE: standing.allowed(mean, share_at_ends=shares.get(ALL_TEXTURES, np.nan)),
+    }
+    return [Verdict(claim.name, texture, n, word) for texture, word in rows.items()]
+
+
+def verdicts(
+    claim: Claim, values: Values, *, n: int, standing: Standing, rng: np.random.Generator
+) -> list[Verdict]:
+    """The verdicts of `claims.claim_tests`, without the tests that no verdict rests on.
+
+    docs/method/power.md#verdicts
+
+    Parameters
+    ----------
+    claim : Claim
+    values : Values
+    n : int
+        Participants of the study, for the record.
+    standing : Standing
+        Of a finished study.
+    rng : Generator
+        Draws sign flips where participants do not vary.
+
+    Returns
+    -------
+    list of Verdict
+        Over all textures that are compared, of each, and whether every single one is equivalent
+        (the largest unadjusted p of TOST, as `claims.all_equivalent`); empty where models are
+        identical for all, or the claim has no bounds.
+    """
+    compared = values.table[~values.table["texture"].isin(list(standing.identical))]
+    if compared.empty or claim.bounds is None:
+        return []
+    wide = compared.assign(difference=compared["other"] - compared["reference"]).pivot(
+        index="participant_id", columns="texture", values="difference"
+    )
+    complete = wide.dropna().mean(axis=1).to_numpy(dtype=float)
+    overall = _p_values(complete, claim.bounds, rng=rng)
+    own = (wide[texture].dropna().to_numpy(float) for texture in wide)
+    each = np.array([_p_values(differences, claim.bounds, rng=rng) for differences in own])
+    adjusted = np.column_stack([holm(each[:, 0]), holm(each[:, 1])])
+    rows = {ALL_TEXTURES: overall, **dict(zip(map(str, wide), adjusted, strict=True))}
+    shares = {texture: values.share_at_ends.get(texture, np.nan) for texture in rows}
+    found = [
+        Verdict(
+            claim.name,
+            texture,
+            n,
+            standing.verdict(*p, share_at_ends=shares[texture]) or NO_VERDICT,
+        )
+        for texture, p in rows.items()
+    ]
+    doubts = [standing.doubt(shares[str(texture)]) for texture in wide]
+    every = every_equivalent(each[:, 1], doubts=doubts)
+    return [*found, Verdict(claim.name, EVERY_TEXTURE, n, EQUIVALENT if every else INCONCLUSIVE)]
+
+
+def _p_values(
+    differences: Floats, bounds: Bounds, *, rng: np.random.Generator
+) -> tuple[float, float]:
+    """p of a difference and of equivalence, over participants."""
+    differences = without_rounding_noise(differences)
+    undefined = why_undefined(differences)
+    p = sign_flips_p(differences, rng=rng) if undefined else t_test(differences)[1]
+    return p, equivalence_test(differences, bounds, rng=rng).p
+
+
+def power_table(found: Iterable[Verdict], *, simulations: int) -> pd.DataFrame:
+    """How often each verdict occurred, with its 95 % interval (Clopper–Pearson).
+
+    Parameters
+    ----------
+    found : iterable of Verdict
+        Of all simulations, in any order but with the same claims, textures and n in each.
+    simulations : int
+
+    Returns
+    -------
+    DataFrame
+        `POWER_COLUMNS`: claims and textures as they first came, then by n; all verdicts that came
+        at any n, in the order of `VERDICTS`; of `EVERY_TEXTURE` only how often all were equivalent,
+        of `MEAN_ALONE`, where the model of the participants decides, how often it lay inside.
+    """
+    counts = Counter(found)
+    places = dict.fromkeys((one.claim, one.texture) for one in counts)
+    rows = []
+    for claim, texture in places:
+        of_place = {
+            (one.n, one.verdict): hits
+            for one, hits in counts.items()
+            if (one.claim, one.texture) == (claim, texture)
+        }
+        shown = _shown(texture, of_place, by_model=(claim, MEAN_ALONE) in places)
+        for n in sorted({n for n, _ in of_place}):
+            for verdict in (verdict for verdict in VERDICTS if verdict in shown):
+                hits = of_place.get((n, verdict), 0)
+                low, high = clopper_pearson(hits, simulations)
+                rows.append(
+                    (claim, texture, n, verdict, hits, simulations, hits / simulations, low, high)
+                )
+    return pd.DataFrame(rows, columns=names(POWER_COLUMNS))
+
+
+def _shown(texture: str, hits: Iterable[tuple[int, str]], *, by_model: bool) -> set[str]:
+    """The verdicts of one place of the table: those that came, and those that are always listed."""
+    alone = {EVERY_TEXTURE: EQUIVALENT, MEAN_ALONE: EQUAL_ON_AVERAGE}
+    if texture in alone:
+        return {alone[texture]}
+    equal = EQUAL_ON_AVERAGE if by_model and texture != ALL_TEXTURES else EQUIVALENT
+    return {verdict for _, verdict in hits} | {equal, INCONCLUSIVE}
+
+
+def power_sentences(table: pd.DataFrame, *, claims: Sequence[Claim]) -> list[str]:
+    """One line for each claim: the smallest n with sufficient power over all textures.
+
+    Where no n suffices, the line is for the largest n and states so. Where the model of the
+    participants decides, a claim of equivalence also says how often the mean alone lay inside.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `power_table`.
+    claims : sequence of Claim
+        In the order of the lines.
+    """
+    overall = table[table["texture"] == ALL_TEXTURES]
+    lines = []
+    for claim in claims:
+        own = overall[overall["claim"] == claim.name]
+        if own.empty:
+            lines.append(f"{claim.name}: identical models, nothing to compare")
+            continue
+        wanted = EQUIVALENT if claim.test == EQUIVALENCE else DIFFERENT
+        enough = own[(own["verdict"] == wanted) & (own["chance"] >= TARGET)]["n"]
+        n = enough.min() if len(enough) else own["n"].max()
+        at_n = table[(table["claim"] == claim.name) & (table["n"] == n)]
+        told = [_chances(at_n[at_n["texture"] == ALL_TEXTURES])]
+        mean = at_n[at_n["texture"] == MEAN_ALONE]
+        if wanted == EQUIVALENT and len(mean):
+            told.append(f"mean alone inside the bounds {_chance(mean.iloc[0])}")
+        if not len(enough):
+            why = _too_few_people(at_n) if wanted == EQUIVALENT and len(mean) else ""
+            told.append(f"{wanted} with {TARGET:.0%} is not reached{why}")
+        lines.append(f"{claim.name}: simulated: {n} participants: {'; '.join(told)}")
+    return lines
+
+
+def _chances(rows: pd.DataFrame) -> str:
+    return ", ".join(f"{row['verdict']} {_chance(row)}" for _, row in rows.iterrows())
+
+
+def _chance(row: pd.Series) -> str:
+    return f"{row['chance']:.2f} ({row['ci_low']:.2f}–{row['ci_high']:.2f})"
+
+
+def _too_few_people(rows: pd.DataFrame) -> str:
+    """Says so where the mean lies inside the bounds, but nothing is known of the people."""
+    overall = rows[rows["texture"] == ALL_TEXTURES].set_index("verdict")["chance"]
+    felt = overall.reindex(list(FELT_WORDS)).sum()
+    mean = rows[rows["texture"] == MEAN_ALONE]["chance"]
+    enough = mean.iloc[0] >= TARGET and overall[INCONCLUSIVE] > felt
+    return ", the study is too small to count people outside the bounds" if enough else ""

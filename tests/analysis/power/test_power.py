@@ -1,0 +1,271 @@
+"""Chances of verdicts: the very verdicts of the report, counted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from analysis.answers.plan import Claim
+from analysis.labels import ALL_TEXTURES
+from analysis.power.power import (
+    EVERY_TEXTURE,
+    MEAN_ALONE,
+    NO_VERDICT,
+    Verdict,
+    people_verdicts,
+    power_sentences,
+    power_table,
+    verdicts,
+)
+from analysis.statistics.claims import (
+    NOT_TESTED,
+    SHOWN,
+    WITHHELD,
+    Standing,
+    Values,
+    all_equivalent,
+    claim_tests,
+    with_people,
+)
+from analysis.statistics.equivalence import (
+    AVERAGE_FELT,
+    DIFFERENT,
+    EQUAL_ON_AVERAGE,
+    EQUIVALENT,
+    FELT,
+    INCONCLUSIVE,
+)
+from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
+from benches.validation.procedures import equivalence_power
+
+CLAIM = Claim(
+    name="same",
+    task="absolute",
+    measure="magnitude_similarity",
+    models=("full", "simplified"),
+    bounds=(-7.5, 7.5),
+    test="equivalence",
+)
+
+
+def table_of(differences: np.ndarray) -> pd.DataFrame:
+    """Values of (textures, n) differences."""
+    return pd.DataFrame(
+        {
+            "texture": f"t{texture}",
+            "participant_id": f"sub-{person}",
+            "reference": 60.0,
+            "other": 60.0 + difference,
+        }
+        for (texture, person), difference in np.ndenumerate(differences)
+    )
+
+
+def told(values: Values, standing: Standing, *, n: int) -> dict[str, str]:
+    found = verdicts(CLAIM, values, n=n, standing=standing, rng=np.random.default_rng(1))
+    return {one.texture: one.verdict for one in found}
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    mean=st.sampled_from([0.0, 4.0, 12.0]),
+    sd=st.sampled_from([0.0, 1.0, 9.0]),
+    sensitivity=st.sampled_from([SHOWN, NOT_TESTED, "nobody felt anything"]),
+    at_end=st.sampled_from([0.0, 0.5]),
+)
+def test_verdicts_are_those_of_the_report(
+    seed: int, mean: float, sd: float, sensitivity: str, at_end: float
+):
+    rng = np.random.default_rng(seed)
+    differences = rng.normal(mean, sd, (4, 10))
+    differences[1, 3:5] = np.nan
+    values = Values(table=table_of(differences), share_at_ends={"t0": at_end})
+    standing = Standing(
+        identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity, unfinished=False
+    )
+    tests = claim_tests(CLAIM, values, standing=standing, rng=np.random.default_rng(1))
+    compared = tests[tests["texture"] != "t3"]
+    known = dict(zip(compared["texture"], compared["verdict"], strict=True))
+    known[EVERY_TEXTURE] = EQUIVALENT if all_equivalent(tests) else INCONCLUSIVE
+    assert told(values, standing, n=10) == known
+
+
+def found_of(rng: np.random.Generator, *, textures: int) -> PeopleFound:
+    """Any posterior in short."""
+    mean, half = rng.normal(0, 5), rng.uniform(0.5, 6)
+    share, most = sorted(rng.uniform(0, 0.3, 2))
+    summary = PeopleSummary(
+        mean=mean,
+        mean_low=mean - 1.2 * half,
+        mean_high=mean + 1.2 * half,
+        mean90_low=mean - half,
+        mean90_high=mean + half,
+        share=share,
+        share_low=0.0,
+        share_high=1.1 * most,
+        share_most=most,
+        somebody=float(rng.choice([0.2, 0.97])),
+        r_hat=1.0,
+    )
+    table = pd.DataFrame(
+        {
+            "texture": [f"t{number}" for number in range(textures)],
+            **dict.fromkeys(("mean", "ci_low", "ci_high"), 0.0),
+            "p_difference": rng.choice([0.001, 0.02, 0.5], textures),
+            "p_equivalence": rng.choice([0.001, 0.01, 0.3], textures, p=[0.6, 0.3, 0.1]),
+        }
+    )
+    return PeopleFound(
+        summary=summary, textures=table, doubled=summary, people=pd.DataFrame(), lapses=0.0
+    )
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    sensitivity=st.sampled_from([SHOWN, SHOWN, NOT_TESTED]),
+    at_end=st.sampled_from([0.0, 0.5]),
+)
+def test_verdicts_on_people_are_those_of_the_report(seed: int, sensitivity: str, at_end: float):
+    rng = np.random.default_rng(seed)
+    values = Values(table=table_of(rng.normal(0, 3, (4, 8))), share_at_ends={"t0": at_end})
+    standing = Standing(identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity)
+    found = found_of(rng, textures=3)
+    tests = claim_tests(CLAIM, values, standing=standing, rng=rng)
+    table = with_people(tests, found, CLAIM, standing=standing, few=0.15)
+    compared = table[table["texture"] != "t3"]
+    known = dict(zip(compared["texture"], compared["verdict"], strict=True))
+    known[EVERY_TEXTURE] = EQUIVALENT if all_equivalent(table) else INCONCLUSIVE
+    told = {
+        one.texture: one.verdict
+        for one in people_verdicts(
+            CLAIM, found, n=8, shares=values.share_at_ends, standing=standing, few=0.15
+        )
+    }
+    inside = EQUAL_ON_AVERAGE if sensitivity == SHOWN else WITHHELD
+    mean = inside if found.summary.inside((-7.5, 7.5)) else INCONCLUSIVE
+    assert told == known | {MEAN_ALONE: mean}
+
+
+def test_what_says_nothing_is_counted_as_no_verdict():
+    nobody = table_of(np.full((2, 3), np.nan))
+    found = told(Values(table=nobody), Standing(), n=3)
+    assert found == {ALL_TEXTURES: NO_VERDICT, "t0": NO_VERDICT, "t1": NO_VERDICT} | {
+        EVERY_TEXTURE: INCONCLUSIVE
+    }
+    assert told(Values(table=nobody), Standing(identical=["t0", "t1"]), n=3) == {}
+
+
+def test_a_doubted_texture_is_no_equivalent_one():
+    values = Values(
+        table=table_of(np.tile([-0.5, 0.5, 0.0, 0.1], (2, 3))), share_at_ends={"t1": 0.3}
+    )
+    found = told(values, Standing(highest_share_at_ends=0.2, sensitivity=SHOWN), n=12)
+    assert found == {ALL_TEXTURES: EQUIVALENT, "t0": EQUIVALENT, "t1": WITHHELD} | {
+        EVERY_TEXTURE: INCONCLUSIVE
+    }
+
+
+def test_the_chance_of_equivalence_is_that_of_the_closed_form():
+    """One texture, 20 people: equivalent, or different but within bounds, in 0.80."""
+    rng = np.random.default_rng(4)
+    simulations = 300
+    found = []
+    for _ in range(simulations):
+        values = Values(table=table_of(rng.normal(0, 11, (1, 20))))
+        standing = Standing(sensitivity=SHOWN)
+        found += verdicts(CLAIM, values, n=20, standing=standing, rng=rng)
+    table = power_table(found, simulations=simulations)
+    every = table[table["texture"] == EVERY_TEXTURE].iloc[0]
+    assert every["ci_low"] < equivalence_power(20, 0.0) < every["ci_high"]
+    overall = table[table["texture"] == ALL_TEXTURES]
+    assert overall["hits"].sum() == simulations
+    assert overall["chance"].sum() == pytest.approx(1.0)
+
+
+def rows_of(**hits: int) -> list[Verdict]:
+    names = {"equal": EQUIVALENT, "differ": DIFFERENT, "unclear": INCONCLUSIVE}
+    return [
+        Verdict("same", ALL_TEXTURES, int(key[-2:]), names[key[:-2]])
+        for key, times in hits.items()
+        for _ in range(times)
+    ]
+
+
+def test_chances_are_counted_with_every_verdict_at_every_n():
+    table = power_table(rows_of(equal20=8, unclear20=2, unclear12=9, differ12=1), simulations=10)
+    assert list(zip(table["n"], table["verdict"], table["hits"], strict=True)) == [
+        (12, EQUIVALENT, 0),
+        (12, DIFFERENT, 1),
+        (12, INCONCLUSIVE, 9),
+        (20, EQUIVALENT, 8),
+        (20, DIFFERENT, 0),
+        (20, INCONCLUSIVE, 2),
+    ]
+    assert ((table["ci_low"] <= table["chance"]) & (table["chance"] <= table["ci_high"])).all()
+
+
+def people_rows(
+    n: int, words: dict[str, int], *, inside: int, simulations: int = 10
+) -> list[Verdict]:
+    """Verdicts under the model: over all textures, and how often the mean lay inside."""
+    found = [
+        Verdict("same", ALL_TEXTURES, n, word)
+        for word, times in words.items()
+        for _ in range(times)
+    ]
+    equal, rest = [EQUAL_ON_AVERAGE] * inside, [INCONCLUSIVE] * (simulations - inside)
+    return [*found, *(Verdict("same", MEAN_ALONE, n, word) for word in equal + rest)]
+
+
+def test_of_people_the_summary_tells_the_mean_alone_and_studies_that_are_too_small():
+    small = people_rows(8, {EQUIVALENT: 1, INCONCLUSIVE: 9}, inside=9)
+    large = people_rows(24, {EQUIVALENT: 8, AVERAGE_FELT: 2}, inside=10)
+    (line,) = power_sentences(power_table(small + large, simulations=10), claims=[CLAIM])
+    assert line == (
+        "same: simulated: 24 participants: equivalent 0.80 (0.44–0.97), equal on average, felt by "
+        "some 0.20 (0.03–0.56), inconclusive 0.00 (0.00–0.31); mean alone inside the bounds 1.00 "
+        "(0.69–1.00)"
+    )
+    (line,) = power_sentences(power_table(small, simulations=10), claims=[CLAIM])
+    assert line.endswith(
+        "mean alone inside the bounds 0.90 (0.55–1.00); equivalent with 80% is not reached, the "
+        "study is too small to count people outside the bounds"
+    )
+    felt = people_rows(48, {FELT: 7, INCONCLUSIVE: 3}, inside=9)
+    (line,) = power_sentences(power_table(felt, simulations=10), claims=[CLAIM])
+    assert line.endswith("equivalent with 80% is not reached")
+
+
+def test_single_textures_of_people_are_equal_on_average():
+    one = [Verdict("same", "canvas", 8, INCONCLUSIVE)] * 10
+    every = [Verdict("same", EVERY_TEXTURE, 8, INCONCLUSIVE)] * 10
+    small = people_rows(8, {INCONCLUSIVE: 10}, inside=2)
+    table = power_table(small + one + every, simulations=10)
+    listed = {place: list(rows["verdict"]) for place, rows in table.groupby("texture")}
+    assert listed == {
+        ALL_TEXTURES: [EQUIVALENT, INCONCLUSIVE],
+        MEAN_ALONE: [EQUAL_ON_AVERAGE],
+        "canvas": [EQUAL_ON_AVERAGE, INCONCLUSIVE],
+        EVERY_TEXTURE: [EQUIVALENT],
+    }
+
+
+def test_the_summary_names_the_fewest_people_with_enough_power():
+    table = power_table(rows_of(equal20=8, unclear20=2, unclear12=10, equal28=10), simulations=10)
+    (line,) = power_sentences(table, claims=[CLAIM])
+    assert line == (
+        "same: simulated: 20 participants: equivalent 0.80 (0.44–0.97), inconclusive 0.20 "
+        "(0.03–0.56)"
+    )
+    (short,) = power_sentences(
+        power_table(rows_of(unclear20=10, unclear12=10), simulations=10), claims=[CLAIM]
+    )
+    assert short.startswith("same: simulated: 20 participants: equivalent 0.00")
+    assert short.endswith("equivalent with 80% is not reached")
+    (same,) = power_sentences(power_table([], simulations=10), claims=[CLAIM])
+    assert same == "same: identical models, nothing to compare"
