@@ -21,3 +21,8 @@ def tsv_text(table: pd.DataFrame) -> str:
     """A table as the text of a TSV; what is missing is n/a, text as `files.tables.guarded`."""
     safe = table.map(lambda value: guarded(value) if isinstance(value, str) else value)
     return str(safe.to_csv(sep="\t", index=False, na_rep="n/a", lineterminator="\n"))
+
+
+def table_bytes(table: pd.DataFrame) -> bytes:
+    """A table as the text of a TSV file."""
+    return tsv_text(table).encode()

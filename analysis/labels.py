@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from modeling.files.answer_tables import ANSWER_TABLES
 
 # The sets of models that the statistics compare, the reference first.
@@ -43,3 +45,13 @@ SIGNIFICANCE_MARKS = ((0.001, "***"), (0.01, "**"), (0.05, "*"))
 def significance_mark(p: float) -> str:
     """*, ** or *** below .05, .01 and .001; nothing else, and nothing for NaN."""
     return next((mark for level, mark in SIGNIFICANCE_MARKS if p < level), "")
+
+
+def signed(value: float, digits: int) -> str:
+    """A number with its sign, with a true minus sign."""
+    return f"{value:+.{digits}f}".replace("-", "−")
+
+
+def names_or_none(textures: Iterable[str]) -> str:
+    """Names as a list in a sentence."""
+    return ", ".join(textures) or "none"

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from analysis.answers.responses import Responses
+from analysis.chapters.tasks.section import task_section
 from analysis.page.page import Table
-from analysis.report.section_task import task_section
 from analysis.statistics.rates import UNKNOWN_CHANCE
 from analysis.statistics.verdicts import claims_found
 from experiments.study.study import Study

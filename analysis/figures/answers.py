@@ -1,15 +1,12 @@
-"""Figures of people's answers: ratings and correct rates."""
+"""Bars of people's answers, ratings or correct rates, with either model."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy import stats
 
-from analysis.labels import ALL_TEXTURES, IDENTICAL, SCALES, significance_mark
+from analysis.labels import ALL_TEXTURES, IDENTICAL, significance_mark
 from analysis.page.drawing import (
     BLACK,
     BLUE,
@@ -17,7 +14,6 @@ from analysis.page.drawing import (
     ORANGE,
     axes_or_new,
     finish_axes,
-    shared_legend,
     stamp_if_simulated,
 )
 from analysis.statistics.paired import CONFIDENCE, ignoring_case
@@ -36,56 +32,6 @@ BAR_OPACITY = 0.35
 POINTS_WIDTH = 0.85  # of a bar
 SIDES = (-0.5, 0.5)
 GOLDEN_RATIO = (5**0.5 - 1) / 2
-
-
-def figure_ratings(found: Sequence[ClaimFound], *, simulated: bool) -> Figure:
-    """Rated similarity on each scale with either model (PAPER fig. 9).
-
-    Parameters
-    ----------
-    found : sequence of ClaimFound
-        About the same two models, a panel each.
-    simulated : bool
-        Written into the figure.
-    """
-    figure = Figure(figsize=(6.25 * len(found), 5), layout="constrained")
-    axes = np.atleast_1d(figure.subplots(1, len(found)))
-    for panel, ax, one in zip("abcdef", axes, found, strict=False):
-        scale = SCALES[one.claim.measure]
-        plot_paired_bars(one, simulated=simulated, ax=ax)
-        ax.set_title(f"({panel}) {scale}", loc="left")
-        ax.set_ylabel(f"rated similarity of {scale} (0–100)")
-        ax.set_ylim(0, 115)
-        ax.set_yticks(range(0, 101, 20))
-    shared_legend(figure, figure.axes[:1], ncols=3)
-    figure.supxlabel(LEGEND_OF_BARS, fontsize=9, color=GREY)
-    return figure
-
-
-def figure_correct_rates(found: ClaimFound, *, chance: float, simulated: bool) -> Figure:
-    """Correct rates with either model against chance (PAPER fig. 11).
-
-    Parameters
-    ----------
-    found : ClaimFound
-    chance : float
-        Rate of a guessing participant, drawn as a line; NaN for none.
-    simulated : bool
-        Written into the figure.
-    """
-    figure = Figure(figsize=(9.5, 5), layout="constrained")
-    ax = figure.subplots()
-    plot_paired_bars(found, simulated=simulated, ax=ax)
-    if np.isfinite(chance):
-        ax.axhline(chance, color=BLACK, ls="--", lw=1)
-        text = f" chance\n {chance:.1%}"
-        ax.text(1.0, chance, text, transform=ax.get_yaxis_transform(), va="center")
-    ax.set_ylabel("correct rate (share of trials, 0–1)")
-    ax.set_ylim(0, 1.15)
-    ax.set_yticks(np.arange(0, 1.01, 0.2))
-    shared_legend(figure, figure.axes[:1], ncols=3)
-    figure.supxlabel(LEGEND_OF_BARS, fontsize=9, color=GREY)
-    return figure
 
 
 def plot_paired_bars(found: ClaimFound, *, simulated: bool, ax: Axes | None = None) -> Axes:

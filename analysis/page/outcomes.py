@@ -38,3 +38,8 @@ def by_weight(outcomes: Iterable[Outcome]) -> dict[str, list[str]]:
     for outcome in sorted(outcomes, key=lambda each: each.weight):
         groups.setdefault(HEADINGS[outcome.weight], []).append(outcome.sentence)
     return groups
+
+
+def described(sentences: Iterable[str]) -> list[Outcome]:
+    """These sentences as descriptive findings, without tests."""
+    return [Outcome(Weight.DESCRIPTIVE, sentence) for sentence in sentences]

@@ -17,6 +17,7 @@ from matplotlib.font_manager import FontProperties, findfont, findSystemFonts, f
 from matplotlib.ft2font import FT2Font
 from matplotlib.text import Text
 
+DOTS_PER_INCH = 110  # of pictures that commands write
 DEFAULT_FAMILY = "DejaVu Sans"  # comes with Matplotlib
 REGULAR_WEIGHTS = (400, "normal", "regular", "book")
 
@@ -161,3 +162,10 @@ def _covered(path: str, index: int, *, characters: Iterable[str]) -> str:
     except (RuntimeError, OSError):
         return ""
     return "".join(c for c in characters if font.get_char_index(ord(c)))
+
+
+def picture_bytes(figure: Figure) -> bytes:
+    """A figure as a PNG file; a warning names what no font of this machine can draw."""
+    picture, lacking = png_of(figure, dpi=DOTS_PER_INCH)
+    warn_of_missing_fonts(lacking)
+    return picture

@@ -27,6 +27,16 @@ class Section:
         What was done.
     tiles : tuple of (str, str)
         Key figures: value, and what it is.
+    answer, lead : str
+        The sentence that answers the question of the whole report, and what its words mean.
+    cautions : tuple of str
+        What must not be concluded.
+    deviations : tuple of str
+        What was planned, who was left out, and how the study deviated from the plan.
+    methods : str
+        The statistical methods, worded for a paper.
+
+    Without items it has no place of its own in the page; its sentences are shown at a glance.
     """
 
     anchor: str
@@ -35,6 +45,41 @@ class Section:
     outcomes: tuple[Outcome, ...] = ()
     done: tuple[str, ...] = ()
     tiles: tuple[tuple[str, str], ...] = ()
+    answer: str = ""
+    lead: str = ""
+    cautions: tuple[str, ...] = ()
+    deviations: tuple[str, ...] = ()
+    methods: str = ""
+
+
+def of_task(section: Section, ending: str) -> Section:
+    """The section of a task whose anchor and files have this ending; unchanged with an empty one.
+
+    Parameters
+    ----------
+    section : Section
+    ending : str
+        Such as `_pair`.
+    """
+    if not ending:
+        return section
+    return replace(
+        section,
+        anchor=f"{section.anchor}{ending.replace('_', '-')}",
+        items=tuple(_renamed(item, lambda name: f"{name}{ending}") for item in section.items),
+    )
+
+
+def _renamed(item: Item, name: Callable[[str], str], *, words: str = "") -> Item:
+    """An item whose files have another name, and whose title these words behind it."""
+
+    def renamed(single: Table | Picture) -> Table | Picture:
+        return replace(single, name=name(single.name), title=f"{single.title}{words}")
+
+    if isinstance(item, Fold):
+        inner = tuple(renamed(each) for each in item.items)
+        return replace(item, summary=f"{item.summary}{words}", items=inner)
+    return renamed(item)
 
 
 def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | None:
@@ -58,13 +103,8 @@ def of_pairs(sections: Mapping[tuple[str, str], Section | None]) -> Section | No
 
 def _of_pair(item: Item, pair: tuple[str, str]) -> Item:
     reference, other = pair
-    compared = f": {other} compared with {reference} models"
-
-    def named(single: Table | Picture) -> Table | Picture:
-        name = file_stem(f"{single.name}_{other}_{reference}")
-        return replace(single, name=name, title=single.title + compared)
-
-    if isinstance(item, Fold):
-        inner = tuple(named(each) for each in item.items)
-        return replace(item, summary=item.summary + compared, items=inner)
-    return named(item)
+    return _renamed(
+        item,
+        lambda name: file_stem(f"{name}_{other}_{reference}"),
+        words=f": {other} compared with {reference} models",
+    )

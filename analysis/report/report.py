@@ -5,12 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pandas as pd
 
 from analysis.answers.responses import Responses
+from analysis.chapters.chapter import AnswerChapter, Answered, ModelChapter, Modelled
 from analysis.columns import tsv_text
 from analysis.labels import MODELS
 from analysis.page.outcomes import by_weight
@@ -31,33 +34,33 @@ from analysis.page.page import (
 )
 from analysis.page.provenance import provenance_table
 from analysis.page.saving import missing_fonts, png_of, svg_of
-from analysis.page.sections import Progress, Section, of_pairs
-from analysis.report.answer import answer, unfinished_tasks
-from analysis.report.people_sentences import FEEL_IT
-from analysis.report.plan_sentences import deviations, methods_paragraph
-from analysis.report.section_answers import choice_section, rating_section, verdict_section
-from analysis.report.section_confusions import confusion_section
-from analysis.report.section_hand import hand_section
-from analysis.report.section_mixed import mixed_section
-from analysis.report.section_models import model_section
-from analysis.report.section_oddity import oddity_section
-from analysis.report.section_parameters import parameter_section
-from analysis.report.section_planted import planted_section
-from analysis.report.section_reliability import reliability_section
-from analysis.report.section_speed_accuracy import speed_accuracy_section
-from analysis.report.section_task import task_section, tasks_without_chapter
-from analysis.report.sentences import cautions
-from analysis.statistics.draws import generators
-from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import ClaimFound, chance_of, claims_found, models_of
+from analysis.page.sections import Progress, Section
+from analysis.statistics.verdicts import claims_found
 from analysis.textures.compared import Comparison, Mapped, comparisons
 from analysis.textures.regressions import driving_table
 from analysis.textures.results import TextureResult
 from modeling import InputError
-from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.writing import write_text
 
-LEAD = "Surfaces recorded, modelled, simplified by detection thresholds, and judged."
+# The chapters in the order of the page: folders of `analysis/chapters`. The generator of a report
+# is passed on from each chapter to the next, so a new one goes to the end of its list.
+ANSWER_CHAPTERS = (
+    "claims",
+    "ratings",
+    "choices",
+    "confusions",
+    "oddity",
+    "tasks",
+    "single_answers",
+    "speed",
+    "hand",
+    "reliability",
+)
+MODEL_CHAPTERS = (
+    "models",
+    "parameters",
+    "planted",
+)
 MODELS_SHARE = 0.4  # of the time that a report of a whole study takes
 PICTURES_SHARE = 0.4
 
@@ -70,7 +73,6 @@ def write_report(
     benches: Sequence[Section] = (),
     provenance: Mapping[str, object] | None = None,
     title: str = "Can anybody feel the difference?",
-    answered: str = "",
     hand: pd.DataFrame | None = None,
     planted: Mapping[str, Mapping[str, float]] | None = None,
     seed: int = 0,
@@ -88,13 +90,10 @@ def write_report(
     textures : sequence of TextureResult, optional
         Models, their simplification and, where known, the planted truth.
     benches : sequence of Section
-        Results on methods rather than this study: speed against accuracy, where methods fail.
+        What was made elsewhere: results on methods rather than this study, chapters on a table.
     provenance : mapping of str to object, optional
         Versions, configuration, hashes of inputs; nested values are flattened.
     title : str
-    answered : str
-        The sentence at the top where `benches` contain the answers; otherwise computed from
-        `responses`.
     hand : DataFrame, optional
         How the hand moved with either model (`analysis.answers.hand.load_hand`).
     planted : mapping of texture to mapping of measure to points, optional
@@ -125,13 +124,25 @@ def write_report(
     # Begun first: other processes compare models while this one analyses answers.
     compared = comparisons(textures, rng=rng, mapped=mapped) if textures else ()
     report_progress(0.0, "analysing answers")
-    found = [] if responses is None else claims_found(responses, rng=rng)
-    people = []
+    sections: list[Section] = []
     if responses is not None:
-        people = _answer_sections(responses, found, hand=hand, planted=planted, rng=rng)
-    models = _model_sections(textures, compared, people=people, progress=report_progress)
-    sections = [*models, *benches]
-    if not sections:
+        answered = Answered(
+            responses=responses,
+            found=claims_found(responses, rng=rng),
+            rng=rng,
+            seed=seed,
+            hand=hand,
+            planted=planted,
+        )
+        for name in ANSWER_CHAPTERS:
+            chapter = cast(AnswerChapter, _sections_of(name))
+            sections += chapter(answered)
+    if textures:
+        modelled = _modelled(textures, compared, progress=report_progress)
+        for name in MODEL_CHAPTERS:
+            sections += cast(ModelChapter, _sections_of(name))(modelled)
+    sections += benches
+    if not any(section.items for section in sections):
         raise InputError(
             "expected answers or models to report on, got neither; run a session or fit a model."
         )
@@ -143,21 +154,21 @@ def write_report(
         share = 1 - PICTURES_SHARE * (1 - number / len(pictures))
         report_progress(share, f"drawing {picture.title}")
         files.add_picture(picture, formats, lacking=lacking)
-    shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections]
+    shown = [(s.anchor, s.heading, files.html(s.items)) for s in sections if s.items]
     undrawn = missing_fonts("".join(sorted(files.lacking)))
-    overview = _overview(sections, responses, found=found, models=bool(textures), undrawn=undrawn)
-    methods = ""
-    judged = [one for one in found if not one.standing.unfinished]
-    if responses is not None and judged:
-        text = methods_paragraph(responses, judged)
-        methods = paragraph("Statistical methods, for a paper", text)
+    methods = "".join(
+        paragraph("Statistical methods, for a paper", section.methods)
+        for section in sections
+        if section.methods
+    )
+    answer, lead = _answer(sections)
     html = page(
         title=title,
-        answer=answered or answer(found, responses),
-        lead="" if answered else _lead(found),
+        answer=answer,
+        lead=lead,
         banner=_banner(responses, textures),
         sections=[
-            ("overview", "At a glance", overview),
+            ("overview", "At a glance", _overview(sections, undrawn=undrawn)),
             *shown,
             ("origin", "Methods and provenance", methods + files.html([provenance_table(facts)])),
         ],
@@ -169,21 +180,21 @@ def write_report(
     return target
 
 
-def _lead(found: Sequence[ClaimFound]) -> str:
-    """What stands below the answer: what its words mean, where it is about people."""
-    return f"{FEEL_IT} {LEAD}" if any(one.people is not None for one in found) else LEAD
+def _sections_of(name: str) -> object:
+    """The function `sections` of a chapter."""
+    return import_module(f"analysis.chapters.{name}.section").sections
 
 
-def _model_sections(
-    textures: Sequence[TextureResult],
-    compared: Iterable[Comparison],
-    *,
-    people: Sequence[Section],
-    progress: Progress,
-) -> list[Section]:
-    """The sections on models, where there are some, around those on the answers."""
-    if not textures:
-        return list(people)
+def _answer(sections: Sequence[Section]) -> tuple[str, str]:
+    """The first answer that a section gives, and what stands below it."""
+    answers = ((section.answer, section.lead) for section in sections if section.answer)
+    return next(answers, ("", ""))
+
+
+def _modelled(
+    textures: Sequence[TextureResult], compared: Iterable[Comparison], *, progress: Progress
+) -> Modelled:
+    """The models, compared one by one, which takes its time."""
     gfc, driven = [], []
     before = 1 - PICTURES_SHARE - MODELS_SHARE
     for number, (result, comparison) in enumerate(zip(textures, compared, strict=True)):
@@ -192,10 +203,9 @@ def _model_sections(
         gfc.append(comparison.gfc)
         driven.append(comparison.driven)
     progress(1 - PICTURES_SHARE, "regressing parameters on speed and force")
-    models = model_section(textures, pd.concat(gfc, ignore_index=True))
-    parameters = parameter_section(textures, driving_table(driven))
-    truths = [result for result in textures if result.truth is not None]
-    return [models, parameters, *people, *([planted_section(truths)] if truths else [])]
+    return Modelled(
+        textures=textures, gfc=pd.concat(gfc, ignore_index=True), driving=driving_table(driven)
+    )
 
 
 def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> Responses:
@@ -207,99 +217,14 @@ def _with_identical(responses: Responses, textures: Sequence[TextureResult]) -> 
     return replace(responses, equal=equal)
 
 
-def _answer_sections(
-    responses: Responses,
-    found: Sequence[ClaimFound],
-    *,
-    hand: pd.DataFrame | None,
-    planted: Mapping[str, Mapping[str, float]] | None,
-    rng: np.random.Generator,
-) -> list[Section]:
-    """The answers, and how reliable they are.
-
-    Models are not compared by answers of an unfinished task.
-    """
-    shown = [one for one in found if len(one.tests)]
-    others = tasks_without_chapter(responses)
-    if not shown and not others:
-        return []
-    simulated = responses.simulated
-    sections: list[Section | None] = []
-    if shown:
-        sections.append(verdict_section(responses, shown, planted=planted))
-    judged = [one for one in shown if not one.standing.unfinished]
-    finished = {t: own for t, own in responses.answers.items() if t not in responses.unfinished}
-    by_task = {task: [one for one in judged if one.claim.task == task] for task in finished}
-    if by_task.get("absolute"):
-        sections.append(rating_section(responses, by_task["absolute"]))
-    if by_task.get("relative"):
-        sections.append(choice_section(responses, by_task["relative"], rng=rng))
-        models = models_of(responses, "relative")
-        confused = confusion_section(responses.relative, models, simulated=simulated, rng=rng)
-        sections.append(confused)
-    sections.append(oddity_section(judged, simulated=simulated))
-    draws = generators(rng)
-    for task in others:
-        sections.append(task_section(responses, task, by_task.get(task, ()), rng=draws[task]))
-    sections.append(mixed_section(responses, judged, rng=rng))
-    # Task by task, so that a further task does not change the results of earlier ones.
-    pairs = list(dict.fromkeys(one.claim.models for own in by_task.values() for one in own))
-    speeds, hands = {}, {}
-    for pair in pairs:
-        same = list(responses.identical(pair))
-        different = {task: t[~t["texture"].isin(same)] for task, t in finished.items()}
-        speeds[pair] = speed_accuracy_section(different, models=pair, simulated=simulated, rng=rng)
-        if hand is not None:
-            moved = hand[~hand["texture"].isin(same) & hand["task"].isin(list(finished))]
-            hands[pair] = hand_section(moved, models=pair, simulated=simulated, rng=rng)
-    sections.append(of_pairs(speeds))
-    asked = {*(one.claim.task for one in shown), *others}
-    tasks = {task: answers for task, answers in responses.answers.items() if task in asked}
-    sections.append(
-        # Whether somebody answers at chance is tested on the share of right answers: an effect.
-        reliability_section(
-            tasks,
-            chances=_chances({task: t for task, t in tasks.items() if task in finished}),
-            simulated=simulated,
-            rng=rng,
-        )
-    )
-    sections.append(of_pairs(hands))
-    return [section for section in sections if section is not None]
-
-
-def _chances(tasks: Mapping[str, pd.DataFrame]) -> dict[str, float]:
-    """Rates of guessing participants in the tasks with right answers."""
-    chances = {
-        task: chance_of(task, answers)
-        for task, answers in tasks.items()
-        if "correct" in ANSWER_TABLES[task].measures and len(answers)
-    }
-    return {task: chance for task, chance in chances.items() if not np.isnan(chance)}
-
-
-def _overview(
-    sections: Sequence[Section],
-    responses: Responses | None,
-    *,
-    found: Sequence[ClaimFound],
-    models: bool,
-    undrawn: str,
-) -> str:
-    verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
-    warned = cautions(
-        simulated_participants=responses is not None and responses.simulated_participants,
-        simulated_rig=responses is not None and responses.simulated_rig,
-        models=models,
-        inconclusive=bool((verdicts == INCONCLUSIVE).any()),
-        unfinished=[] if responses is None else unfinished_tasks(responses),
-    )
+def _overview(sections: Sequence[Section], *, undrawn: str) -> str:
     outcomes = [outcome for section in sections for outcome in section.outcomes]
     # An unfinished task is reported in its own section and in the one on the verdicts.
     tiles_once = list(dict.fromkeys(tile for section in sections for tile in section.tiles))
     done = list(dict.fromkeys(sentence for section in sections for sentence in section.done))
     done += [f"While drawing the figures: {undrawn}"] * bool(undrawn)
-    otherwise = [] if responses is None else deviations(responses, found)
+    warned = [sentence for section in sections for sentence in section.cautions]
+    otherwise = [sentence for section in sections for sentence in section.deviations]
     planned = "<h3>Exclusions, and deviations from the plan</h3>" + bullets(otherwise)
     return (
         tiles(tiles_once)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from analysis.columns import tsv_text
+from analysis.columns import table_bytes
 from analysis.textures.between import (
     distances_to_recordings,
     field_fit,
@@ -26,10 +25,6 @@ from modeling import GridError, Recording, RecordingSet, Spectrum, TextureModel
 from modeling.fitting.conditions import only_unit, recording_spectra
 from modeling.fitting.texture import fit_spectra
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-DOTS_PER_INCH = 110
 # Endings of the files with the findings from one texture's recordings.
 ENDINGS = (
     ".json",
@@ -151,22 +146,9 @@ def findings_files(found: Findings, *, plot: bool) -> dict[str, bytes]:
     return files | (_pictures(found) if plot else {})
 
 
-def table_bytes(table: pd.DataFrame) -> bytes:
-    """A table as the text of a TSV file."""
-    return tsv_text(table).encode()
-
-
-def picture_bytes(figure: Figure) -> bytes:
-    """A figure as a PNG file; a warning names what no font of this machine can draw."""
-    from analysis.page.saving import png_of, warn_of_missing_fonts  # late: loads Matplotlib
-
-    picture, lacking = png_of(figure, dpi=DOTS_PER_INCH)
-    warn_of_missing_fonts(lacking)
-    return picture
-
-
 def _pictures(found: Findings) -> dict[str, bytes]:
     # Late: without pictures there is nothing to load Matplotlib for.
+    from analysis.page.saving import picture_bytes
     from analysis.spectra.comparison import spectrum_panels
     from analysis.spectra.figures.layers_over_grid import figure_layers_over_grid
     from analysis.spectra.figures.spectra import figure_spectra

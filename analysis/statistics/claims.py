@@ -57,6 +57,7 @@ DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
 SHOWN, NOT_TESTED = "shown", "sensitivity not tested"
 INTERIM = "interim, no verdict"
 CONTROL = "control"
+NO_TEST = "no test"  # of answers that are incomplete
 
 CLAIM_COLUMNS = (
     Column("claim", is_name=True),

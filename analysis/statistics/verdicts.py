@@ -46,7 +46,7 @@ from analysis.statistics.participants.design import (
 from analysis.statistics.participants.verdict import FEWEST, PeopleFound, people_found
 from modeling import InputError
 from modeling.arrays import Floats
-from modeling.files.answer_tables import ANSWER_TABLES, ENDS
+from modeling.files.answer_tables import ANSWER_TABLES, ENDS, AnswerTable
 from modeling.files.columns import Column, names
 from modeling.participants.choices import (
     ODDITY,
@@ -175,12 +175,17 @@ def people_data(responses: Responses, claim: Claim) -> PeopleData | None:
 
 def decision_model(task: str, answers: pd.DataFrame) -> DecisionModel | None:
     """The decision model of a task with right answers, by its chance; None where none is known."""
-    chance = chance_of(task, answers)
     if ANSWER_TABLES[task].both_models:
-        return ODDITY if np.isclose(chance, ODDITY.chance) else None
+        return ODDITY if is_oddity(ANSWER_TABLES[task]) else None
+    chance = chance_of(task, answers)
     if np.isnan(chance) or not np.isclose(1 / chance, round(1 / chance)):
         return None
     return forced_choice(round(1 / chance))
+
+
+def is_oddity(table: AnswerTable) -> bool:
+    """Whether a task is to find the odd one of three, by what its table declares."""
+    return table.both_models and bool(np.isclose(table.chance, ODDITY.chance))
 
 
 def all_claims(responses: Responses) -> tuple[Claim, ...]:
@@ -297,22 +302,23 @@ def claim_standing(responses: Responses, claim: Claim, *, rng: np.random.Generat
 def _sensitivity(responses: Responses, claim: Claim, *, rng: np.random.Generator) -> str:
     """Whether participants told different surfaces apart, as `Standing.sensitivity` states it.
 
-    Ratings show it by anchors, the forced choice by its reference, the odd one out by catch trials;
-    no other task can so far.
+    Ratings show it by anchors, right answers to trials of one model by the reference's share above
+    chance, those to trials of both models by catch trials.
     """
-    anchors = responses.anchors.get(claim.task)
-    if claim.task == "absolute" and anchors is not None and len(anchors):
+    task, table = claim.task, ANSWER_TABLES[claim.task]
+    apart = responses.anchors.get(task, pd.DataFrame())
+    if claim.measure in table.scales and len(apart):
         own = answers_about(responses, claim)
-        own = own[own["texture"].isin(anchors["texture"])]
-        means = [table.groupby("participant_id")[claim.measure].mean() for table in (own, anchors)]
+        own = own[own["texture"].isin(apart["texture"])]
+        means = [each.groupby("participant_id")[claim.measure].mean() for each in (own, apart)]
         above = means[0] - means[1]
         failed = "anchors were not rated lower than the textures' own models"
-    elif claim.task == "relative":
+    elif claim.measure == "correct" and table.has_rates and table.has_chance:
         values = claim_values(responses, claim).table.groupby("participant_id")["reference"].mean()
-        above = values - chance_of("relative", responses.relative)
+        above = values - chance_of(task, responses.answers[task])
         failed = f"answers on {claim.models[0]} models were not above chance"
-    elif claim.task == "oddity" and anchors is not None and len(anchors):
-        above = anchors.groupby("participant_id")["correct"].mean() - chance_of("oddity", anchors)
+    elif table.both_models and len(apart):
+        above = apart.groupby("participant_id")["correct"].mean() - chance_of(task, apart)
         failed = "catch trials were not answered above chance"
     else:
         return NOT_TESTED
@@ -348,11 +354,6 @@ def chance_of(task: str, answers: pd.DataFrame) -> float:
             f"{' and '.join(map(str, sorted(numbers)))}; declare its chance instead."
         )
     return 1 / numbers.pop() if numbers else float("nan")
-
-
-def has_rates(task: str) -> bool:
-    """Whether each model has a share of right answers: each trial has one of the models."""
-    return "correct" in ANSWER_TABLES[task].measures and not ANSWER_TABLES[task].both_models
 
 
 def _one_sided_p(values: pd.Series, *, rng: np.random.Generator) -> float:

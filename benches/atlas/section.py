@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.page.outcomes import Outcome
+from analysis.columns import table_bytes
+from analysis.page.outcomes import Outcome, described
 from analysis.page.page import (
     PICTURE_DPI,
     Fold,
@@ -24,8 +25,6 @@ from analysis.page.page import (
 from analysis.page.provenance import PROVENANCE_COLUMNS, unfolded
 from analysis.page.saving import png_of, svg_of, warn_of_missing_fonts
 from analysis.page.sections import Section
-from analysis.report.sentences import described
-from analysis.spectra.findings import table_bytes
 from benches.atlas.cases import TO_COME
 from benches.atlas.edges import Examined
 from benches.atlas.figure import figure_atlas

@@ -10,6 +10,7 @@ from importlib import resources
 import pandas as pd
 from plotly.offline import get_plotlyjs
 
+from analysis.columns import table_bytes
 from analysis.page.page import (
     PICTURE_DPI,
     Picture,
@@ -22,7 +23,6 @@ from analysis.page.page import (
 )
 from analysis.page.saving import png_of, warn_of_missing_fonts
 from analysis.page.sections import Section
-from analysis.spectra.findings import table_bytes
 from benches.chart.chart import Chart
 from benches.chart.figure import STYLES, figure_chart
 from benches.chart.judging import PLACES

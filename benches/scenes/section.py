@@ -7,10 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import pandas as pd
 
 from analysis.labels import ALL_TEXTURES
-from analysis.page.outcomes import Outcome
+from analysis.page.outcomes import Outcome, described
 from analysis.page.page import Fold, Picture, Table
 from analysis.page.sections import Section
-from analysis.report.sentences import described
 from analysis.spectra.figures.scenes import figure_tradeoff
 from analysis.textures.scenes import (
     BEFORE_AFTER_COLUMNS,

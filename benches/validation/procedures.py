@@ -15,9 +15,9 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy import integrate, stats
 
+from analysis.chapters.confusions.information import information_bits, transferred_information
+from analysis.chapters.single_answers.gee import fit_gee
 from analysis.statistics.equivalence import ALPHA, Bounds, one_sided_tests
-from analysis.statistics.gee import fit_gee
-from analysis.statistics.information import information_bits, transferred_information
 from analysis.statistics.mixed import fit_mixed, t_of
 from analysis.statistics.paired import CONFIDENCE, d_z_interval, holm, sign_flips_p, t_tests
 from analysis.statistics.rates import bootstrap_intervals, clopper_pearson

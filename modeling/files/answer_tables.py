@@ -93,8 +93,7 @@ class AnswerTable:
             raise ValueError(
                 f"expected a chance or alternatives in the {self.title}, got both; keep one."
             )
-        declared = self.alternatives or not isnan(self.chance)
-        if not self.both_models and declared and "correct" not in names:
+        if not self.both_models and self.has_chance and "correct" not in names:
             raise ValueError(
                 f"expected right answers in the {self.title}, whose chance is declared, got no "
                 "column correct; declare it."
@@ -114,6 +113,34 @@ class AnswerTable:
         if not self.of_surfaces:
             return ()
         return tuple(c.name for c in self.columns if c.scale or c.name == "correct")
+
+    @property
+    def scales(self) -> tuple[str, ...]:
+        """The measures that are ratings on a scale of similarity."""
+        return tuple(name for name in self.measures if name != "correct")
+
+    @property
+    def has_rates(self) -> bool:
+        """Whether each model has a share of right answers: each trial has one of the models."""
+        return "correct" in self.measures and not self.both_models
+
+    @property
+    def has_chance(self) -> bool:
+        """Whether the rate of a participant who guesses is known."""
+        return bool(self.alternatives) or not isnan(self.chance)
+
+    @property
+    def is_identification(self) -> bool:
+        """Whether a trial asks which of several listed textures the one presented is."""
+        asked = any(c.name == "answer" and c.right == "texture" for c in self.columns)
+        return self.has_rates and bool(self.alternatives) and asked
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether right answers to surfaces have a response time."""
+        return "correct" in self.measures and any(
+            c.name == RESPONSE_TIME.name for c in self.columns
+        )
 
 
 def answer_table(

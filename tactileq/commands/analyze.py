@@ -171,8 +171,8 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
     import numpy as np
 
     from analysis.answers.imported import load_imported, parse_map
+    from analysis.chapters.tables.section import table_sections
     from analysis.report.report import write_report
-    from analysis.report.section_table import answer_of_table, table_sections
     from modeling.files.folders import replace_folder
     from modeling.files.hashes import sha256_of_paths
     from modeling.files.provenance import provenance_of, seal_folder
@@ -190,7 +190,6 @@ def analyze_tables(files: Sequence[Path], columns: str, *, out: Path, seed: int)
         write_report(
             fresh / "report.html",
             benches=sections,
-            answered=answer_of_table(imported),
             provenance=provenance,
             title="What the tables show",
             seed=seed,

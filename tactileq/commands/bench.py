@@ -173,7 +173,7 @@ def _write_chart(chart: Chart, out: Path, *, seen: Contents, settings: dict[str,
 def bench_rendering_into(out: Path, *, quick: bool, plot: bool) -> None:
     """Time the renderer and its rivals; print and write the results."""
     from analysis.columns import tsv_text
-    from analysis.spectra.findings import DOTS_PER_INCH
+    from analysis.page.saving import DOTS_PER_INCH
     from benches.rendering.bench import QUICK, Effort, bench_rendering
     from benches.rendering.figure import figure_rendering
     from modeling.files.folders import replace_folder

@@ -85,8 +85,9 @@ def scene(
 
 def write_scene(compiled: CompiledScene, folder: Path, *, seed: int) -> None:
     """Write the models of a compiled scene, its tables, its figure and its C header."""
+    from analysis.columns import table_bytes
+    from analysis.page.saving import picture_bytes
     from analysis.spectra.figures.scenes import figure_tradeoff
-    from analysis.spectra.findings import picture_bytes, table_bytes
     from analysis.textures.scenes import before_after_table, steps_table
     from modeling.files.writing import file_stem
 

@@ -52,7 +52,7 @@ def simplify(
 
     Example: tactileq simplify models/canvas.json --threshold pen-hold --margin-db 3 --plot
     """
-    from analysis.spectra.findings import table_bytes
+    from analysis.columns import table_bytes
     from analysis.textures.results import simplification_table
     from modeling import TextureModel, Threshold
     from modeling import simplify as drop_layers
@@ -139,9 +139,9 @@ def draw_condition(
     Returns a PNG file. Without speed (mm/s) or force (N) it is the fastest and strongest
     condition, of the recordings if there are any, else of the grid.
     """
+    from analysis.page.saving import picture_bytes
     from analysis.spectra.comparison import compare_condition, compare_spectra
     from analysis.spectra.figures.spectra import figure_spectra_and_threshold
-    from analysis.spectra.findings import picture_bytes
     from analysis.textures.results import TextureResult, reference_condition
 
     if recordings is None:

@@ -154,10 +154,9 @@ def render_set(
     check_place(out)
     sources = load_sources(recipe)
     count = stimulus_count(recipe, sources)
-    from analysis.page.saving import save_figure
+    from analysis.page.saving import DOTS_PER_INCH, save_figure
     from analysis.spectra.contact_sheet import contact_sheet
     from analysis.spectra.figures.stimuli import figure_contact_sheet
-    from analysis.spectra.findings import DOTS_PER_INCH
 
     def draw(folder: Path) -> None:
         sheet = figure_contact_sheet(contact_sheet(folder))

@@ -54,8 +54,8 @@ def identify_from(test: Path, out: Path, *, plot: Path | None, simulated: bool) 
     simulated : bool
         Whether the test was simulated.
     """
+    from analysis.page.saving import picture_bytes
     from analysis.spectra.figures.vibrator import figure_vibrator
-    from analysis.spectra.findings import picture_bytes
     from analysis.spectra.vibrator import compensated
     from modeling import identify_vibrator
     from modeling.files.hashes import sha256_of_paths

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -360,3 +360,13 @@ def results(once_per_run: Callable[..., Any]) -> tuple[TextureResult, ...]:
 def truth() -> TextureModel:
     """Four planted layers over 2 × 2 conditions."""
     return _small_truth("canvas", "canvas")
+
+
+@pytest.fixture(scope="module")
+def few_draws() -> Iterator[None]:
+    """No test of a report hangs on p values of more than a thousand draws."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 19)
+        patch.setattr("analysis.statistics.paired.RESAMPLES", 999)
+        patch.setattr("analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 500)
+        yield

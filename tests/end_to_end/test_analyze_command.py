@@ -27,7 +27,7 @@ from tactileq.commands.analyze import _later_plan, read_answers
 @pytest.fixture(autouse=True)
 def quick(undrawn: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Reports without pictures, and with fewer simulated tables, of which no test here is."""
-    monkeypatch.setattr("analysis.statistics.similarity_choice.SIMULATIONS", 9)
+    monkeypatch.setattr("analysis.chapters.confusions.similarity_choice.SIMULATIONS", 9)
 
 
 TEXTURES = ("leather", "MDF", "PVC")

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.answers.responses import Responses
+from analysis.chapters.claims.forest import figure_forest
 from analysis.figures.answers import (
     BAR_WIDTH,
     ROLE_COLOURS,
@@ -19,7 +20,6 @@ from analysis.figures.answers import (
     figure_ratings,
 )
 from analysis.figures.confusions import figure_confusion, figure_similarities
-from analysis.figures.forest import figure_forest
 from analysis.page.drawing import LAYER_COLOURS, VERMILLION
 from analysis.spectra.comparison import compare_spectra, spectrum_panels
 from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed

@@ -14,9 +14,9 @@ import pandas as pd
 import pytest
 
 from analysis.answers.responses import PlannedTask, Responses
+from analysis.chapters.reliability.section import careless_signs
 from analysis.page import saving
 from analysis.report.report import write_report
-from analysis.report.section_reliability import careless_signs
 from analysis.textures.results import TextureResult
 from modeling import InputError, RecordingSet, Threshold, simplify
 from tests.refusals import refused

@@ -15,13 +15,10 @@ import pytest
 import analysis.page.page
 from analysis.answers.hand import HAND_COLUMNS
 from analysis.answers.responses import Responses
-from analysis.columns import TEXTURE
-from analysis.labels import ALL_TEXTURES
-from analysis.page.page import Fold, Item, Table, table_html
-from analysis.page.provenance import PROVENANCE_COLUMNS
-from analysis.page.sections import Section
-from analysis.report.section_answers import choice_section, rating_section, verdict_section
-from analysis.report.section_confusions import (
+from analysis.chapters.claims.people import PRIORS_COLUMNS
+from analysis.chapters.claims.section import choice_section, rating_section, verdict_section
+from analysis.chapters.confusions.buttons import BUTTON_COLUMNS
+from analysis.chapters.confusions.section import (
     BIAS_COLUMNS,
     CHANGE_COLUMNS,
     FIT_COLUMNS,
@@ -29,33 +26,36 @@ from analysis.report.section_confusions import (
     SIMILARITY_COLUMNS,
     confusion_section,
 )
-from analysis.report.section_mixed import (
+from analysis.chapters.hand.statistics import HAND_TEST_COLUMNS
+from analysis.chapters.models.section import model_section
+from analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section
+from analysis.chapters.parameters.section import parameter_section
+from analysis.chapters.planted.section import planted_section
+from analysis.chapters.reliability.section import CARELESS_COLUMNS, reliability_section
+from analysis.chapters.reliability.statistics import AGREEMENT_COLUMNS, RATER_COLUMNS
+from analysis.chapters.single_answers.section import (
     CLAIM_GEE_COLUMNS,
     CLAIM_MIXED_COLUMNS,
     mixed_section,
 )
-from analysis.report.section_models import model_section
-from analysis.report.section_oddity import ODDITY_COLUMNS, oddity_section
-from analysis.report.section_parameters import parameter_section
-from analysis.report.section_people import PRIORS_COLUMNS
-from analysis.report.section_planted import planted_section
-from analysis.report.section_reliability import CARELESS_COLUMNS, reliability_section
-from analysis.report.section_speed_accuracy import speed_accuracy_section
-from analysis.statistics.buttons import BUTTON_COLUMNS
-from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
-from analysis.statistics.confusion import CONFUSION_COLUMNS
-from analysis.statistics.hand import HAND_TEST_COLUMNS
-from analysis.statistics.participants.verdict import PEOPLE_COLUMNS
-from analysis.statistics.rates import CORRECT_RATE_COLUMNS
-from analysis.statistics.reliability import AGREEMENT_COLUMNS, RATER_COLUMNS
-from analysis.statistics.speed_accuracy import (
+from analysis.chapters.speed.section import speed_accuracy_section
+from analysis.chapters.speed.statistics import (
     CELL_COLUMNS,
     CONDITIONAL_COLUMNS,
     RIGHT_WRONG_COLUMNS,
     SCORE_COLUMNS,
     TIME_RATIO_COLUMNS,
 )
-from analysis.statistics.speed_accuracy import COMPARISON_COLUMNS as SPEED_COLUMNS
+from analysis.chapters.speed.statistics import COMPARISON_COLUMNS as SPEED_COLUMNS
+from analysis.columns import TEXTURE
+from analysis.labels import ALL_TEXTURES
+from analysis.page.page import Fold, Item, Table, table_html
+from analysis.page.provenance import PROVENANCE_COLUMNS
+from analysis.page.sections import Section
+from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
+from analysis.statistics.confusion import CONFUSION_COLUMNS
+from analysis.statistics.participants.verdict import PEOPLE_COLUMNS
+from analysis.statistics.rates import CORRECT_RATE_COLUMNS
 from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS, ClaimFound
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
@@ -94,6 +94,8 @@ from modeling.scenes.scene import HandRange
 from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
 from tests.analysis.conftest import by_model, people_summary
+
+pytestmark = pytest.mark.usefixtures("few_draws")
 
 PAGE = Path(analysis.page.page.__file__)
 DECLARED = {

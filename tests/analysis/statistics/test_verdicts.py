@@ -12,11 +12,11 @@ import pytest
 
 from analysis.answers.plan import AnalysisPlan
 from analysis.answers.responses import PlannedTask, Responses, leave_out
+from analysis.chapters.claims.answer import answer
+from analysis.chapters.claims.plan_sentences import methods_paragraph
+from analysis.chapters.claims.sentences import claim_outcomes
 from analysis.labels import ALL_TEXTURES
 from analysis.power.power import verdicts
-from analysis.report.answer import answer
-from analysis.report.claim_sentences import claim_outcomes
-from analysis.report.plan_sentences import methods_paragraph
 from analysis.statistics.claims import (
     BOUNDS_WITHHELD,
     EQUALITY,

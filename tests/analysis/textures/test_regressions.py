@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from analysis.figures.regression import figure_centroid, plot_centroid
-from analysis.report.section_parameters import parameter_section
+from analysis.chapters.parameters.figure import figure_centroid, plot_centroid
+from analysis.chapters.parameters.section import parameter_section
 from analysis.textures.compared import comparisons
 from analysis.textures.regressions import (
     NAMES,

@@ -1,0 +1,219 @@
+"""The section on speed and accuracy: time against right answers, with each model.
+
+docs/method/speed-accuracy.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pandas as pd
+
+from analysis.chapters.chapter import Answered, Stream
+from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
+from analysis.chapters.speed.statistics import (
+    CELL_COLUMNS,
+    COMPARISON_COLUMNS,
+    CONDITIONAL_COLUMNS,
+    MEASURES,
+    RIGHT_WRONG_COLUMNS,
+    SCORE_COLUMNS,
+    TIME_RATIO_COLUMNS,
+    compare_models,
+    conditional_accuracy,
+    participant_scores,
+    right_and_wrong,
+    score_means,
+    speed_and_accuracy,
+    time_ratios,
+    trade_off_sentence,
+)
+from analysis.labels import TASKS, sentence_case
+from analysis.page.outcomes import Outcome, Weight
+from analysis.page.page import Fold, Item, Picture, Table
+from analysis.page.sections import Section, of_pairs
+from analysis.statistics.verdicts import chance_of, holding_both
+from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
+
+BOTH = "both models in each trial"
+# Title, note and columns of the tables behind the pictures.
+_DETAILS = {
+    "right_and_wrong": (
+        "Times of right and wrong answers",
+        "Geometric means of participants who gave both, and their ratio by a paired t-test of "
+        "logarithms.",
+        RIGHT_WRONG_COLUMNS,
+    ),
+    "scores": (
+        "Time and accuracy of each participant",
+        "Over the textures judged with all models shown, weighted equally; LISAS over trials.",
+        SCORE_COLUMNS,
+    ),
+    "cells": ("By texture and model", "Median times.", CELL_COLUMNS),
+    "quantiles": (
+        "Right answers by quantile of time",
+        "Means over participants with 95% intervals over them.",
+        CONDITIONAL_COLUMNS,
+    ),
+}
+
+
+def applies(table: AnswerTable) -> bool:
+    """Whether answers about surfaces are right or wrong, and timed."""
+    return table.is_timed
+
+
+def sections(answered: Answered) -> list[Section]:
+    """A section on the time and the accuracy of answers with either model of each pair."""
+    streams = list(answered.streams("speed", applies))
+    by_pair = {}
+    for pair in answered.pairs:
+        different = answered.different(pair, applies)
+        by_pair[pair] = speed_accuracy_section(
+            [(stream, different[stream.task]) for stream in streams],
+            models=pair,
+            simulated=answered.responses.simulated,
+        )
+    section = of_pairs(by_pair)
+    return [section] if section is not None else []
+
+
+def speed_accuracy_section(
+    answers: Iterable[tuple[Stream, pd.DataFrame]], *, models: tuple[str, str], simulated: bool
+) -> Section | None:
+    """How fast and how accurate answers were; None where answers are not scored or timed.
+
+    Where both models are in every trial they are not compared.
+
+    Parameters
+    ----------
+    answers : iterable of (Stream, DataFrame)
+        Tasks with `Responses.answers`, textures with identical models left out.
+    models : (str, str)
+        The reference, and the other one.
+    simulated : bool
+    """
+    items: list[Item] = []
+    outcomes: list[Outcome] = []
+    for stream, table in answers:
+        task, shown, compared = stream.task, table, True
+        groups: tuple[str, ...] = models
+        if ANSWER_TABLES[task].both_models:
+            shown = holding_both(task, table, models).assign(model=BOTH)
+            groups, compared = (BOTH,), False
+        if not len(shown) or not len(participant_scores(shown, models=groups)):
+            continue
+        chance = chance_of(task, shown)
+        items += _pictures(shown, task, groups, chance=chance, simulated=simulated)
+        if compared:
+            tables, sentences = _compared(shown, models, simulated=simulated, stream=stream)
+            items += tables
+            outcomes += sentences
+        items.append(_details(shown, task, groups, simulated=simulated, rng=stream.rng))
+    if not items:
+        return None
+    return Section("speed", "Speed and accuracy", tuple(items), outcomes=tuple(outcomes))
+
+
+def _pictures(
+    answers: pd.DataFrame, task: str, models: Sequence[str], *, chance: float, simulated: bool
+) -> list[Item]:
+    scores = participant_scores(answers, models=models)
+    points = Picture(
+        f"speed_accuracy_{task}",
+        f"Time against right answers, {TASKS[task]}",
+        "Farther left is faster, higher is more accurate: lower and farther left is a "
+        "speed–accuracy trade-off, not an advantage. Means over the textures judged with all "
+        "models shown, with equal weight for each texture.",
+        figure_speed_accuracy(scores, score_means(scores), models=models, simulated=simulated),
+        simulated,
+    )
+    by_time = conditional_accuracy(answers, models=models)
+    if by_time.empty:
+        return [points]
+    conditional = Picture(
+        f"conditional_accuracy_{task}",
+        f"Right answers by response time, {TASKS[task]}",
+        "Conditional accuracy: each participant's answers from the fastest to the slowest group. "
+        "All textures are pooled, so textures that are difficult and therefore slow make the line "
+        "fall.",
+        figure_conditional_accuracy(by_time, models=models, chance=chance, simulated=simulated),
+        simulated,
+    )
+    return [points, conditional]
+
+
+def _compared(
+    answers: pd.DataFrame,
+    models: tuple[str, str],
+    *,
+    simulated: bool,
+    stream: Stream,
+) -> tuple[list[Item], list[Outcome]]:
+    """The effect of two models on time, accuracy and both together."""
+    reference, other = models
+    comparison = compare_models(answers, models=models, rng=stream.rng)
+    ratios = time_ratios(answers, models=models, rng=stream.rng)
+    whose = f"{sentence_case(TASKS[stream.task])}: " * bool(stream.ending)
+    paired = Table(
+        f"speed_accuracy{stream.ending}",
+        f"{whose}time, accuracy and both together" if whose else "Time, accuracy and both together",
+        f"Paired t-tests over participants, {other} compared with {reference} models; time is "
+        "tested in logarithms, so its effect is a ratio. LISAS: mean time of right answers plus "
+        "the weighted share of wrong ones (Vandierendonck 2017), low where answers are fast and "
+        "right; it does not settle a trade-off. Not corrected for the number of tests; no claim "
+        "rests on them.",
+        comparison.replace({"measure": MEASURES}),
+        COMPARISON_COLUMNS,
+        simulated,
+    )
+    mixed = Table(
+        f"time_ratio{stream.ending}",
+        f"{whose}response time by a mixed model" if whose else "Response time by a mixed model",
+        "Log time by texture × model, session and order, with a random intercept and slope of the "
+        "model per participant; the degrees of freedom of t are the number of participants minus "
+        "1.",
+        ratios,
+        TIME_RATIO_COLUMNS,
+        simulated,
+    )
+    sentences = [trade_off_sentence(comparison, models=models), *_ratio_sentences(ratios, models)]
+    outcomes = [Outcome(Weight.SECONDARY, f"{whose}{sentence}") for sentence in sentences]
+    return [paired, mixed], outcomes
+
+
+def _ratio_sentences(ratios: pd.DataFrame, models: tuple[str, str]) -> list[str]:
+    found = ratios.to_dict("records")[0]
+    if not np.isfinite(found["ci_low"]):
+        return []
+    how = "; ".join(filter(None, [f"{found['method']} of log time", found["note"]]))
+    return [
+        f"Answers with {models[1]} models took {found['ratio']:.2f} times as long as with "
+        f"{models[0]} models (95% CI {found['ci_low']:.2f} to {found['ci_high']:.2f}; {how})."
+    ]
+
+
+def _details(
+    answers: pd.DataFrame,
+    task: str,
+    models: Sequence[str],
+    *,
+    simulated: bool,
+    rng: np.random.Generator,
+) -> Fold:
+    """Tables behind the pictures."""
+    frames = {
+        "right_and_wrong": right_and_wrong(answers, models=models, rng=rng),
+        "scores": participant_scores(answers, models=models),
+        "cells": speed_and_accuracy(answers, models=models),
+        "quantiles": conditional_accuracy(answers, models=models),
+    }
+    return Fold(
+        f"Times and right answers of each participant, {TASKS[task]}",
+        tuple(
+            Table(f"speed_{name}_{task}", *_DETAILS[name][:2], frame, _DETAILS[name][2], simulated)
+            for name, frame in frames.items()
+            if len(frame)
+        ),
+    )

@@ -1,0 +1,204 @@
+"""The sentence on top: it answers by the plan, with intervals, and claims no more."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from analysis.answers.plan import AnalysisPlan
+from analysis.answers.responses import PlannedTask, Responses
+from analysis.chapters.claims.answer import NOBODY_ASKED, answer, unfinished_tasks
+from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
+from analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
+from analysis.labels import ALL_TEXTURES
+from analysis.page.outcomes import HEADINGS, Outcome, Weight, by_weight
+from analysis.statistics.claims import CONTROL
+from analysis.statistics.verdicts import ClaimFound, claims_found
+
+pytestmark = pytest.mark.usefixtures("few_draws")
+
+
+@pytest.fixture(scope="module")
+def people(ratings, choices, plan) -> Responses:
+    return Responses(
+        {"absolute": ratings, "relative": choices},
+        simulated_participants=False,
+        simulated_rig=False,
+        plan=plan,
+    )
+
+
+@pytest.fixture(scope="module")
+def own(people) -> list[ClaimFound]:
+    """The claims about these people's answers."""
+    return analysed(people)
+
+
+def analysed(responses: Responses) -> list[ClaimFound]:
+    return claims_found(responses, rng=np.random.default_rng(5))
+
+
+def told(responses: Responses | None) -> str:
+    return answer([] if responses is None else analysed(responses), responses)
+
+
+def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
+    """The same tests with this verdict on all textures together."""
+    changed = []
+    for one in found:
+        tests = one.tests.copy()
+        tests.loc[tests["texture"] == ALL_TEXTURES, "verdict"] = verdict
+        changed.append(replace(one, tests=tests))
+    return changed
+
+
+def test_the_answer_is_the_verdicts_with_their_intervals(people, own):
+    sentence = answer(own, people)
+    assert sentence.startswith("Simplified compared with full models, over all textures: ")
+    assert sentence.count(".") == sentence.replace(". ", "").count(".")  # one sentence
+    for one in own:
+        row = overall_row(one)
+        assert row is not None
+        assert difference(one, row, confidence="90%") in sentence
+    low, high = (f"{own[0].tests.iloc[0][name]:+.1f}" for name in ("ci90_low", "ci90_high"))
+    shown = f"(90% CI {low} to {high}, bounds -7.5 to +7.5)".replace("-", "−")
+    assert shown in sentence
+    assert "bounds −10.0 to +10.0)" in sentence
+    assert (
+        "; single textures that differ: PVC (rated similarity of vibration magnitude)" in sentence
+    )
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        ("equivalent", "equivalent in rated similarity of vibration magnitude"),
+        ("different", "different in rated similarity"),
+        ("different but within bounds", "different, but within the bounds, in rated"),
+        ("inconclusive", "inconclusive in rated similarity"),
+        ("interim, no verdict", "no verdict before the study is complete on rated"),
+        ("", "not tested, because answers are incomplete, in rated"),
+    ],
+)
+def test_each_verdict_has_its_words(people, found, verdict, words):
+    sentence = answer(with_verdict(found, verdict), people)
+    assert words in sentence
+    # Those of one verdict stand together.
+    assert " and the correct rate" in sentence
+    assert ("CI" in sentence) == (not verdict.startswith("interim"))
+
+
+def test_why_equality_is_withheld_is_said(people, found):
+    withheld = with_verdict(found, "equivalence withheld")
+    alike = replace(withheld[1], tests=withheld[1].tests.assign(doubt="all alike"))
+    assert "since all alike" in answer([alike], people)
+    assert "withheld, since all alike" in claim_outcomes([alike])[0].sentence
+    assert "BF₀₁" not in claim_outcomes([alike])[0].sentence
+    assert "BF₀₁" in claim_outcomes([found[1]])[0].sentence
+
+
+def test_without_a_plan_nothing_is_called_equal(people):
+    bare = replace(people, plan=AnalysisPlan(claims=()))
+    sentence = told(bare)
+    assert "(exploratory: nothing was planned)" in sentence
+    assert "equivalent" not in sentence
+    assert "95% CI" in sentence
+    assert "bounds" not in sentence.replace("without bounds equivalence cannot be tested", "")
+    [first, *_] = deviations(bare, analysed(bare))
+    assert first.startswith("No claim was registered before the first answer")
+
+
+def test_who_did_not_feel_a_surface_is_said_first(people, own):
+    assert answer(own, replace(people, simulated_participants=True)).startswith(
+        "In a simulation without people, simplified compared with full models"
+    )
+    assert answer(own, replace(people, simulated_rig=True)).startswith(
+        "At a simulated rig, where nobody felt a real surface, simplified"
+    )
+
+
+def test_an_unfinished_study_answers_so_far(people):
+    begun = replace(people, planned={"relative": PlannedTask(24, 48, repeats=3)})
+    sentence = told(begun)
+    assert sentence.startswith("So far, simplified compared with full models")
+    assert "no verdict before the study is complete on the correct rate" in sentence
+    assert unfinished_tasks(begun) == [
+        "forced choice: 16 of 24 planned participants, 16 of 48 planned sessions"
+    ]
+    done = replace(people, planned={"relative": PlannedTask(16, 16, repeats=3)})
+    assert told(done).startswith("Simplified")
+    assert unfinished_tasks(done) == []
+
+
+def test_nothing_is_answered_where_nothing_can_be(people, choices):
+    assert told(None) == NOBODY_ASKED
+    same = {texture: [("full", "simplified")] for texture in people.textures}
+    assert "are identical" in told(replace(people, equal=same))
+    one_model = replace(people, answers={"relative": choices[choices["model"] == "full"]})
+    assert "answers are incomplete" in told(one_model)
+
+
+def test_every_texture_is_told_with_its_verdict(people):
+    same = replace(people, equal={"canvas": [("full", "simplified")]})
+    found = analysed(same)
+    outcomes = claim_outcomes(found)
+    assert [outcome.weight for outcome in outcomes[::2]] == [Weight.OVERALL] * 3
+    assert [outcome.weight for outcome in outcomes[1::2]] == [
+        *(Weight.TEXTURES, Weight.TEXTURES, Weight.SECONDARY)
+    ]
+    for one, outcome in zip(found, outcomes[1::2], strict=True):
+        for row in one.tests.iloc[1:].to_dict("records"):
+            assert row["texture"] in outcome.sentence
+            assert row["verdict"] in (CONTROL, *outcome.sentence.replace(":", ";").split("; "))
+        assert "identical models, nothing to compare: canvas" in outcome.sentence
+
+
+def test_deviations_name_who_was_left_out_and_what_was_not_planned(people, plan):
+    gone = (people.absolute["participant_id"] == "sub-05") & (people.absolute["texture"] == "MDF")
+    cut = replace(
+        people,
+        answers={**people.answers, "absolute": people.absolute[~gone]},
+        plan=replace(plan, claims=plan.claims[:1], sha256=("0a" * 32, "0b" * 32)),
+        warnings=("sub-09 relative ses-01 was a pilot.",),
+    )
+    sentences = deviations(cut, analysed(cut))
+    assert sentences[0] == (
+        "Claims fixed before the first answer: 1 (preregistration page: 0a0a0a0a0a0a…)."
+    )
+    assert sentences[1] == "Planned exclusion: Trials in which the rig failed are repeated."
+    assert "other sessions ran under 0b0b0b0b0b0b…" in sentences[2]
+    assert sentences[3] == (
+        "Exploratory, since not in the plan: rated similarity of frequency pattern; correct rate."
+    )
+    assert "answers are incomplete: sub-05 (MDF)." in sentences[4]
+    assert sentences[-1] == "On reading the answers: sub-09 relative ses-01 was a pilot."
+
+
+def test_the_methods_are_reported_as_in_a_paper(people, own):
+    text = methods_paragraph(people, own)
+    assert text.startswith(
+        "16 participants took part in the absolute evaluation with 7 textures; 16 participants "
+        "took part in the forced choice with 7 textures."
+    )
+    assert "rated similarity of vibration magnitude −7.5 to +7.5" in text
+    assert "bounds fixed before the first answer" in text
+    bare = replace(people, plan=AnalysisPlan(claims=()), simulated_participants=True)
+    other = methods_paragraph(bare, analysed(bare))
+    assert other.startswith("16 simulated participants")
+    assert "TOST" not in other
+
+
+def test_the_weightiest_findings_come_first():
+    outcomes = [
+        Outcome(Weight.DESCRIPTIVE, "layers"),
+        Outcome(Weight.TEXTURES, "canvas"),
+        Outcome(Weight.OVERALL, "all"),
+        Outcome(Weight.TEXTURES, "PVC"),
+    ]
+    assert by_weight(outcomes) == {
+        HEADINGS[Weight.OVERALL]: ["all"],
+        HEADINGS[Weight.TEXTURES]: ["canvas", "PVC"],
+        HEADINGS[Weight.DESCRIPTIVE]: ["layers"],
+    }

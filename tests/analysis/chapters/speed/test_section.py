@@ -1,0 +1,110 @@
+"""What the report says of speed and accuracy: tables, pictures, sentences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.chapters.speed.section import speed_accuracy_section
+from analysis.page.outcomes import Weight
+from analysis.page.page import Fold, Picture, Table, table_html
+from analysis.page.sections import Section
+from modeling.files.columns import names
+
+MODELS = ("full", "simplified")
+pytestmark = pytest.mark.filterwarnings("error")
+
+
+def timed(choices: pd.DataFrame, *, ratio: float = 1.0) -> pd.DataFrame:
+    """The choices with times of everybody's own, `ratio` as long with the simplified models."""
+    draws = np.random.default_rng(3)
+    log_s = draws.normal(2.0, 0.3, len(choices))
+    people = choices["participant_id"].unique()
+    slopes = dict(zip(people, draws.normal(np.log(ratio), 0.2, len(people)), strict=True))
+    slope = choices["participant_id"].map(slopes).where(choices["model"] == "simplified", 0.0)
+    return choices.assign(response_time_s=np.exp(log_s + slope))
+
+
+def odd_ones(people: int = 4) -> pd.DataFrame:
+    draws = np.random.default_rng(4)
+    rows = [
+        (f"sub-{who}", texture, model, layout, float(draws.random() < 0.5), 3 + draws.random())
+        for who in range(people)
+        for texture in ("canvas", "PVC")
+        for model, layout in (
+            ("full", "simplified|full|simplified"),
+            ("simplified", "simplified|full|full"),
+        )
+        for _ in range(4)
+    ]
+    columns = ["participant_id", "texture", "model", "layout", "correct", "response_time_s"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def section_of(answers: dict[str, pd.DataFrame], *, simulated: bool = False) -> Section:
+    section = speed_accuracy_section(
+        answers, models=MODELS, simulated=simulated, rng=np.random.default_rng(1)
+    )
+    assert section is not None
+    return section
+
+
+def shown(section: Section) -> list[Table | Picture]:
+    inside = [i.items if isinstance(i, Fold) else (i,) for i in section.items]
+    return [item for items in inside for item in items]
+
+
+def test_the_forced_choice_is_compared_and_the_odd_one_out_pooled(choices):
+    section = section_of({"relative": timed(choices), "oddity": odd_ones()})
+    assert [item.name for item in shown(section)] == [
+        *("speed_accuracy_relative", "conditional_accuracy_relative", "speed_accuracy"),
+        *("time_ratio", "speed_right_and_wrong_relative", "speed_scores_relative"),
+        *("speed_cells_relative", "speed_quantiles_relative", "speed_accuracy_oddity"),
+        *("conditional_accuracy_oddity", "speed_right_and_wrong_oddity", "speed_scores_oddity"),
+        *("speed_cells_oddity", "speed_quantiles_oddity"),
+    ]
+    pooled = next(item for item in shown(section) if item.name == "speed_cells_oddity")
+    assert isinstance(pooled, Table)
+    assert set(pooled.frame["trials"]) == {8}
+    assert set(pooled.frame["model"]) == {"both models in each trial"}
+
+
+def test_a_planted_ratio_is_told_without_praise(choices):
+    section = section_of({"relative": timed(choices, ratio=0.5)})
+    told = [outcome.sentence for outcome in section.outcomes]
+    assert told[0].startswith("Speed and accuracy, simplified compared with full models: faster; ")
+    assert told[1].startswith("Answers with simplified models took 0.")
+    assert told[1].endswith("mixed model of log time).")
+    assert {outcome.weight for outcome in section.outcomes} == {Weight.SECONDARY}
+    assert "better" not in " ".join(told)
+
+
+def test_tables_are_whole_and_stamped(choices):
+    answers = {"relative": timed(choices), "oddity": odd_ones()}
+    for item in shown(section_of(answers, simulated=True)):
+        assert item.simulated
+        if isinstance(item, Table):
+            assert names(item.columns) == list(item.frame)
+            assert "(SIMULATED)" in table_html(item)
+
+
+def test_odd_ones_of_other_models_are_left_out():
+    others = odd_ones().assign(layout="full|AR|AR")
+    assert section_of({"oddity": pd.concat([odd_ones(), others])}).outcomes == ()
+    rng = np.random.default_rng(1)
+    for answers in ({"oddity": others}, {}, {"absolute": pd.DataFrame({"texture": ["a"]})}):
+        assert speed_accuracy_section(answers, models=MODELS, simulated=False, rng=rng) is None
+
+
+def test_one_participant_is_described_and_not_compared(choices):
+    one = timed(choices)
+    section = section_of({"relative": one[one["participant_id"] == "sub-01"]})
+    (told,) = (outcome.sentence for outcome in section.outcomes)
+    assert told.endswith("not compared, because 1 participant answered with both.")
+
+
+def test_one_model_alone_is_no_comparison(choices):
+    rng = np.random.default_rng(1)
+    alone = {"relative": choices[choices["model"] == "full"]}
+    assert speed_accuracy_section(alone, models=MODELS, simulated=False, rng=rng) is None
