@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ import pytest
 
 from analysis.answers.plan import AnalysisPlan, Claim
 from analysis.answers.responses import Responses
+from analysis.chapters.chapter import Answered
 from analysis.labels import ALL_TEXTURES, SCALES
 from analysis.statistics.claims import with_people
 from analysis.statistics.participants.verdict import PeopleFound, PeopleSummary
@@ -370,3 +371,16 @@ def few_draws() -> Iterator[None]:
         patch.setattr("analysis.statistics.paired.RESAMPLES", 999)
         patch.setattr("analysis.statistics.rates.BOOTSTRAP_RESAMPLES", 500)
         yield
+
+
+def answered_of(
+    responses: Responses,
+    *,
+    found: Sequence[ClaimFound] | None = None,
+    planted: Mapping[str, Mapping[str, float]] | None = None,
+    seed: int = 1,
+) -> Answered:
+    """What chapters get; the claims are those of the answers if not given."""
+    rng = np.random.default_rng(seed)
+    found = claims_found(responses, rng=rng) if found is None else found
+    return Answered(responses=responses, found=found, rng=rng, seed=seed, planted=planted)

@@ -12,14 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from analysis.answers.responses import Responses
+from analysis.chapters.choices.figure import figure_correct_rates
 from analysis.chapters.claims.forest import figure_forest
-from analysis.figures.answers import (
-    BAR_WIDTH,
-    ROLE_COLOURS,
-    figure_correct_rates,
-    figure_ratings,
-)
-from analysis.figures.confusions import figure_confusion, figure_similarities
+from analysis.chapters.confusions.figure import figure_confusion, figure_similarities
+from analysis.chapters.ratings.figure import figure_ratings
+from analysis.figures.answers import BAR_WIDTH, ROLE_COLOURS
 from analysis.page.drawing import LAYER_COLOURS, VERMILLION
 from analysis.spectra.comparison import compare_spectra, spectrum_panels
 from analysis.spectra.figures.layers_over_speed import figure_layers_over_speed

@@ -15,8 +15,11 @@ import pytest
 import analysis.page.page
 from analysis.answers.hand import HAND_COLUMNS
 from analysis.answers.responses import Responses
+from analysis.chapters.chapter import Stream
+from analysis.chapters.choices import section as choices_chapter
+from analysis.chapters.claims import section as claims
 from analysis.chapters.claims.people import PRIORS_COLUMNS
-from analysis.chapters.claims.section import choice_section, rating_section, verdict_section
+from analysis.chapters.confusions import section as confusions
 from analysis.chapters.confusions.buttons import BUTTON_COLUMNS
 from analysis.chapters.confusions.section import (
     BIAS_COLUMNS,
@@ -24,13 +27,13 @@ from analysis.chapters.confusions.section import (
     FIT_COLUMNS,
     INFORMATION_COLUMNS,
     SIMILARITY_COLUMNS,
-    confusion_section,
 )
 from analysis.chapters.hand.statistics import HAND_TEST_COLUMNS
 from analysis.chapters.models.section import model_section
 from analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section
 from analysis.chapters.parameters.section import parameter_section
 from analysis.chapters.planted.section import planted_section
+from analysis.chapters.ratings import section as ratings_chapter
 from analysis.chapters.reliability.section import CARELESS_COLUMNS, reliability_section
 from analysis.chapters.reliability.statistics import AGREEMENT_COLUMNS, RATER_COLUMNS
 from analysis.chapters.single_answers.section import (
@@ -93,7 +96,7 @@ from modeling.files.columns import Column, Columns, chosen, names, without
 from modeling.scenes.scene import HandRange
 from modeling.scenes.strokes import windows_kept
 from stimuli.planted.textures import PlantedSurface, planted_texture, record_texture
-from tests.analysis.conftest import by_model, people_summary
+from tests.analysis.conftest import answered_of, by_model, people_summary
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 
@@ -213,26 +216,23 @@ def tables(results, ratings, choices, found) -> list[Table]:
     [surface] = simulated_sources(Simulated(1, ()))
     textures = [replace(results[0], left_out={"joint": predicted}), *results[1:]]
     compared = list(comparisons(textures, rng=np.random.default_rng(1)))
+    judged = [by_model(found[0], people_summary()), *found[1:]]
+    planted = {"PVC": {"magnitude_similarity": -30.0}}
+    answered = answered_of(responses, found=judged, planted=planted)
+    odd = replace(responses, answers={"oddity": choices})
     sections = (
         model_section(textures, pd.concat([each.gfc for each in compared])),
         parameter_section(textures, driving_table([each.driven for each in compared])),
-        verdict_section(
-            responses,
-            [by_model(found[0], people_summary()), *found[1:]],
-            planted={"PVC": {"magnitude_similarity": -30.0}},
-        ),
-        rating_section(responses, found[:2]),
-        choice_section(responses, found[2:], rng=np.random.default_rng(1)),
-        confusion_section(
-            choices, ("full", "simplified"), simulated=True, rng=np.random.default_rng(1)
-        ),
+        *claims.sections(answered),
+        *ratings_chapter.sections(answered),
+        *choices_chapter.sections(answered),
+        *confusions.sections(answered),
         mixed_section(responses, found, rng=np.random.default_rng(1)),
-        oddity_section([_about_the_odd_one(found[2])], simulated=True),
+        oddity_section([_about_the_odd_one(found[2])], odd),
         speed_accuracy_section(
-            {"relative": choices},
+            [(Stream("relative", "", np.random.default_rng(1)), choices)],
             models=("full", "simplified"),
             simulated=True,
-            rng=np.random.default_rng(1),
         ),
         reliability(ratings, choices),
         planted_section(textures),

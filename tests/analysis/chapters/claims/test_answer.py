@@ -9,7 +9,7 @@ import pytest
 
 from analysis.answers.plan import AnalysisPlan
 from analysis.answers.responses import PlannedTask, Responses
-from analysis.chapters.claims.answer import NOBODY_ASKED, answer, unfinished_tasks
+from analysis.chapters.claims.answer import answer, unfinished_tasks
 from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
 from analysis.chapters.claims.sentences import claim_outcomes, difference, overall_row
 from analysis.labels import ALL_TEXTURES
@@ -40,8 +40,8 @@ def analysed(responses: Responses) -> list[ClaimFound]:
     return claims_found(responses, rng=np.random.default_rng(5))
 
 
-def told(responses: Responses | None) -> str:
-    return answer([] if responses is None else analysed(responses), responses)
+def told(responses: Responses) -> str:
+    return answer(analysed(responses), responses)
 
 
 def with_verdict(found: list[ClaimFound], verdict: str) -> list[ClaimFound]:
@@ -133,7 +133,8 @@ def test_an_unfinished_study_answers_so_far(people):
 
 
 def test_nothing_is_answered_where_nothing_can_be(people, choices):
-    assert told(None) == NOBODY_ASKED
+    nobody = {task: table[:0] for task, table in people.answers.items()}
+    assert told(replace(people, answers=nobody)) == ""
     same = {texture: [("full", "simplified")] for texture in people.textures}
     assert "are identical" in told(replace(people, equal=same))
     one_model = replace(people, answers={"relative": choices[choices["model"] == "full"]})

@@ -15,7 +15,7 @@ from analysis.chapters.claims.model_sentences import decided_by_tests
 from analysis.chapters.claims.people import DOUBLED, OWN, people_items, people_table, priors_table
 from analysis.chapters.claims.people_sentences import FEEL_IT, about, headline, percent
 from analysis.chapters.claims.plan_sentences import deviations, methods_paragraph
-from analysis.chapters.claims.section import verdict_section
+from analysis.chapters.claims.section import sections
 from analysis.chapters.claims.sentences import claim_outcomes, overall_row
 from analysis.page.outcomes import Weight
 from analysis.report.report import write_report
@@ -36,12 +36,12 @@ from analysis.statistics.verdicts import ClaimFound, claims_found
 from modeling.files.writing import file_stem
 from modeling.participants.choices import ODDITY, ChoicePriors, forced_choice
 from modeling.participants.ratings import RatingPriors
-from tests.analysis.conftest import by_model, people_summary, rating_table
+from tests.analysis.conftest import answered_of, by_model, people_summary, rating_table
 from tests.analysis.conftest import people_table as people
 
 pytestmark = pytest.mark.usefixtures("few_draws")
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 SOME = {"share": (0.42, 0.25, 0.58), "most": 0.55, "somebody": 1.0}
 FEW = {"share": (0.09, 0.04, 0.16), "most": 0.14, "somebody": 0.99}
 SUMMARIES = {
@@ -233,13 +233,11 @@ def test_everybody_is_in_the_table_with_their_claim(found):
 
 def test_each_claim_that_the_model_decides_has_its_picture(responses, found):
     judged = [by_model(found[0], SUMMARIES[FELT]), *found[1:]]
-    with_model = verdict_section(responses, judged)
+    (with_model,) = sections(answered_of(responses, found=judged))
+    (without,) = sections(answered_of(responses, found=found))
     names = {getattr(item, "name", "") for item in with_model.items}
     assert {file_stem(f"people_{found[0].claim.name}"), "people_priors"} <= names
-    assert not any(
-        str(getattr(item, "name", "")).startswith("people")
-        for item in verdict_section(responses, found).items
-    )
+    assert not any(str(getattr(item, "name", "")).startswith("people") for item in without.items)
 
 
 def test_the_model_is_reported_as_in_a_paper(responses, found):

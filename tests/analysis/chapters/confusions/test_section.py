@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from analysis.chapters.chapter import Stream
 from analysis.chapters.confusions.section import confusion_section
 from analysis.page.page import Fold, Table
 from analysis.page.sections import Section
@@ -33,7 +34,8 @@ def answers(*, people: int = 10, other_confuses: bool = False) -> pd.DataFrame:
 
 
 def section_of(table: pd.DataFrame) -> Section:
-    return confusion_section(table, ("full", "AR"), simulated=False, rng=np.random.default_rng(1))
+    stream = Stream("relative", "", np.random.default_rng(1))
+    return confusion_section(table, ("full", "AR"), simulated=False, stream=stream)
 
 
 def frame(section: Section, name: str) -> pd.DataFrame:

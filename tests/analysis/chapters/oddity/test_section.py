@@ -11,9 +11,15 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis.answers.plan import AnalysisPlan
+from analysis.answers.responses import Responses
 from analysis.chapters.oddity.dprime import oddity_d_prime
-from analysis.chapters.oddity.section import ODDITY_COLUMNS, oddity_section, oddity_sensitivity
-from analysis.labels import ALL_TEXTURES
+from analysis.chapters.oddity.section import (
+    ODDITY_COLUMNS,
+    oddity_section,
+    oddity_sensitivity,
+    sections,
+)
+from analysis.labels import ALL_TEXTURES, TASKS
 from analysis.page.page import Table, table_html
 from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
 from analysis.statistics.equivalence import DIFFERENT
@@ -21,6 +27,7 @@ from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import names
 from modeling.participants.choices import oddity_share
+from tests.analysis.conftest import answered_of
 
 pytestmark = pytest.mark.filterwarnings("error")
 MakeFound = Callable[..., ClaimFound]
@@ -76,14 +83,16 @@ def test_the_upper_bound_is_a_share_and_a_d_prime(odd):
     assert np.isinf(wide["bound_d_prime"]).all()
 
 
-def of_another_task(one: ClaimFound) -> ClaimFound:
-    return replace(one, claim=replace(one.claim, task="relative"))
+def answers(*, layout: str = "full|full|simplified") -> Responses:
+    """Of somebody who was asked once."""
+    row = {"participant_id": "sub-01", "session": "ses-01", "texture": "canvas", "correct": 1.0}
+    table = pd.DataFrame([row | {"model": "full", "layout": layout}])
+    return Responses({"oddity": table}, simulated_participants=True, simulated_rig=False)
 
 
 def test_the_section_tells_the_mean_over_textures(odd):
     one = odd({"canvas": 0.0, "PVC": 2.5})
-    section = oddity_section([of_another_task(one), one], simulated=True)
-    assert section is not None
+    section = oddity_section([one], answers())
     (table,) = section.items
     assert isinstance(table, Table)
     assert table.frame["texture"].tolist() == [ALL_TEXTURES, "canvas", "PVC"]
@@ -95,8 +104,7 @@ def test_the_section_tells_the_mean_over_textures(odd):
 
 
 def test_without_bounds_there_is_no_bound(odd):
-    section = oddity_section([odd({"canvas": 1.0}, bounds=None)], simulated=False)
-    assert section is not None
+    section = oddity_section([odd({"canvas": 1.0}, bounds=None)], answers())
     (told,) = (outcome.sentence for outcome in section.outcomes)
     assert "bound" not in told
 
@@ -106,15 +114,31 @@ def test_everybody_right_is_infinite_without_interval(odd):
     row = oddity_sensitivity(one).iloc[1]
     assert (row["share"], row["d_prime"]) == (1.0, np.inf)
     assert np.isnan(row["d_prime_low"])
-    section = oddity_section([one], simulated=False)
-    assert section is not None
+    section = oddity_section([one], answers())
     assert "100.0% of the answers were right over all textures, d′ ∞" in (
         section.outcomes[0].sentence
     )
 
 
-def test_other_tasks_and_nobody_have_no_section(odd):
+def test_other_tasks_and_nobody_have_no_section(odd, choices):
     one = odd({"canvas": 0.0})
     nobody = replace(one, tests=one.tests[:0])
-    assert oddity_section([of_another_task(one), nobody], simulated=False) is None
-    assert oddity_section([], simulated=False) is None
+    assert sections(answered_of(answers(), found=[nobody])) == []
+    other = replace(one, claim=replace(one.claim, task="relative"))
+    chosen = replace(answers(), answers={"relative": choices})
+    assert sections(answered_of(chosen, found=[other])) == []
+    (section,) = sections(answered_of(answers(), found=[one]))
+    assert section.done == ("Oddity task: 1 simulated participant, 1 trial (without training).",)
+
+
+def test_another_task_of_this_kind_has_its_own_section(odd, monkeypatch):
+    """Which task it is about follows from what is declared, not from the name."""
+    table = replace(ANSWER_TABLES["oddity"], title="triangle test")
+    monkeypatch.setitem(ANSWER_TABLES, "triangle", table)
+    monkeypatch.setitem(TASKS, "triangle", table.title)
+    one = odd({"canvas": 1.0})
+    one = replace(one, claim=replace(one.claim, task="triangle"))
+    asked = replace(answers(), answers={"triangle": answers().answers["oddity"]})
+    (section,) = sections(answered_of(asked, found=[one]))
+    assert (section.anchor, section.heading) == ("oddity-triangle", "Triangle test: d′")
+    assert [item.name for item in section.items if isinstance(item, Table)] == ["oddity_triangle"]

@@ -6,10 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from analysis.chapters.speed.section import speed_accuracy_section
+from analysis.chapters.chapter import Stream
+from analysis.chapters.speed.section import applies, speed_accuracy_section
 from analysis.page.outcomes import Weight
 from analysis.page.page import Fold, Picture, Table, table_html
 from analysis.page.sections import Section
+from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import names
 
 MODELS = ("full", "simplified")
@@ -42,10 +44,14 @@ def odd_ones(people: int = 4) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=columns)
 
 
+def section_or_none(answers: dict[str, pd.DataFrame], *, simulated: bool = False) -> Section | None:
+    rng = np.random.default_rng(1)
+    tasks = [(Stream(task, "", rng), table) for task, table in answers.items()]
+    return speed_accuracy_section(tasks, models=MODELS, simulated=simulated)
+
+
 def section_of(answers: dict[str, pd.DataFrame], *, simulated: bool = False) -> Section:
-    section = speed_accuracy_section(
-        answers, models=MODELS, simulated=simulated, rng=np.random.default_rng(1)
-    )
+    section = section_or_none(answers, simulated=simulated)
     assert section is not None
     return section
 
@@ -92,9 +98,13 @@ def test_tables_are_whole_and_stamped(choices):
 def test_odd_ones_of_other_models_are_left_out():
     others = odd_ones().assign(layout="full|AR|AR")
     assert section_of({"oddity": pd.concat([odd_ones(), others])}).outcomes == ()
-    rng = np.random.default_rng(1)
-    for answers in ({"oddity": others}, {}, {"absolute": pd.DataFrame({"texture": ["a"]})}):
-        assert speed_accuracy_section(answers, models=MODELS, simulated=False, rng=rng) is None
+    assert section_or_none({"oddity": others}) is None
+    assert section_or_none({}) is None
+
+
+def test_only_timed_answers_that_are_right_or_wrong_have_the_section():
+    applied = {task for task, table in ANSWER_TABLES.items() if applies(table)}
+    assert applied == {"relative", "oddity"}
 
 
 def test_one_participant_is_described_and_not_compared(choices):
@@ -105,6 +115,4 @@ def test_one_participant_is_described_and_not_compared(choices):
 
 
 def test_one_model_alone_is_no_comparison(choices):
-    rng = np.random.default_rng(1)
-    alone = {"relative": choices[choices["model"] == "full"]}
-    assert speed_accuracy_section(alone, models=MODELS, simulated=False, rng=rng) is None
+    assert section_or_none({"relative": choices[choices["model"] == "full"]}) is None

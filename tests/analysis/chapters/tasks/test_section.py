@@ -14,10 +14,13 @@ from scipy import stats
 
 from analysis.answers.plan import AnalysisPlan, Claim
 from analysis.answers.responses import PlannedTask, Responses
+from analysis.chapters.choices import section as choices_chapter
+from analysis.chapters.choices.figure import figure_correct_rates
 from analysis.chapters.claims.answer import NOTHING_TO_CLAIM, answer
 from analysis.chapters.claims.plan_sentences import methods_paragraph
-from analysis.chapters.tasks.section import task_section, tasks_without_chapter
-from analysis.figures.answers import figure_correct_rates
+from analysis.chapters.oddity import section as oddity_chapter
+from analysis.chapters.ratings import section as ratings_chapter
+from analysis.chapters.tasks import section as tasks_chapter
 from analysis.labels import ALL_TEXTURES, TASKS
 from analysis.page.sections import Section
 from analysis.report.report import write_report
@@ -31,7 +34,7 @@ from modeling.files.answer_tables import (
     AnswerColumn,
     answer_table,
 )
-from tests.analysis.conftest import choice_table, rating_table
+from tests.analysis.conftest import answered_of, choice_table, rating_table
 
 pytestmark = pytest.mark.usefixtures("undrawn", "few_draws")
 CLAIM = Claim(
@@ -88,8 +91,14 @@ def found_in(responses: Responses) -> list[ClaimFound]:
     return claims_found(responses, rng=np.random.default_rng(5))
 
 
-def section_of(responses: Responses) -> Section:
-    return task_section(responses, "pair", found_in(responses), rng=np.random.default_rng(6))
+def rates_of(responses: Responses) -> Section:
+    (section,) = choices_chapter.sections(answered_of(responses))
+    return section
+
+
+def counted_in(responses: Responses) -> Section:
+    (section,) = tasks_chapter.sections(answered_of(responses, found=()))
+    return section
 
 
 def tables_of(section: Section) -> dict[str, pd.DataFrame]:
@@ -105,31 +114,43 @@ def written(folder: Path, responses: Responses) -> dict[str, pd.DataFrame]:
 
 def test_shares_of_right_answers_are_those_of_the_answers(declare, alone, pairs):
     declare(CORRECT, chance=1 / 7)
-    rates = tables_of(section_of(alone))["correct_rates_pair"].set_index(["model", "texture"])
+    rates = tables_of(rates_of(alone))["correct_rates_pair"].set_index(["model", "texture"])
     own = pairs.groupby(["model", "participant_id"])["correct"].mean()
     for model in ("full", "simplified"):
         row = rates.loc[(model, ALL_TEXTURES)]
         assert row["mean"] == pytest.approx(own[model].mean())
         assert row["p"] == pytest.approx(stats.ttest_1samp(own[model], 1 / 7).pvalue)
         assert row["trials"] == 18 * 7 * 3
-    claims = tables_of(section_of(alone))["claims_pair"].set_index("texture")
+    (claim,) = found_in(alone)
+    claims = claim.tests.set_index("texture")
     difference = own["simplified"].mean() - own["full"].mean()
     assert claims.loc[ALL_TEXTURES, "mean_difference"] == pytest.approx(difference)
 
 
-def test_what_was_done_stands_beside_what_was_planned(declare, alone):
+def test_right_answers_of_one_model_are_compared_with_chance(declare, alone, pairs):
+    """Nothing is claimed of them, as there is no other model."""
     declare(CORRECT, chance=1 / 7)
-    asked = tables_of(section_of(alone))["asked_pair"]
+    one_model = pairs[pairs["model"] == "full"].assign(model="mine")
+    asked = replace(alone, answers={"pair": one_model}, plan=AnalysisPlan(claims=()), planned={})
+    rates = tables_of(rates_of(asked))["correct_rates_pair"].set_index("texture")
+    assert set(rates["model"]) == {"mine"}
+    people = one_model.groupby("participant_id")["correct"].mean()
+    assert rates.loc[ALL_TEXTURES, "p"] == pytest.approx(stats.ttest_1samp(people, 1 / 7).pvalue)
+
+
+def test_what_was_done_stands_beside_what_was_planned(declare, alone):
+    declare(RESPONSE_TIME)
+    asked = tables_of(counted_in(alone))["asked_pair"]
     assert asked["done"].tolist() == [18, 18, 18 * 42]
     assert asked["planned"].tolist() == [18, 18, 18 * 42]
-    unplanned = tables_of(section_of(replace(alone, planned={})))["asked_pair"]
+    unplanned = tables_of(counted_in(replace(alone, planned={})))["asked_pair"]
     assert unplanned["planned"].isna().all()
 
 
 def test_nothing_is_tested_against_a_chance_that_is_not_declared(tmp_path, declare, alone, pairs):
     declare(CORRECT)
     assert np.isnan(chance_of("pair", pairs))
-    section = section_of(alone)
+    section = rates_of(alone)
     rates = tables_of(section)["correct_rates_pair"]
     assert rates[["t", "p", "p_holm"]].isna().to_numpy().all()
     assert set(rates["note"]) == {UNKNOWN_CHANCE}
@@ -154,7 +175,7 @@ def test_an_unfinished_task_shows_no_effect(tmp_path, declare, alone):
     declare(CORRECT, chance=1 / 7)
     begun = replace(alone, planned={"pair": PlannedTask(20, 20, repeats=3)})
     tables = written(tmp_path, begun)
-    assert {name for name in tables if name.endswith("_pair")} == {"asked_pair"}
+    assert not any(name.endswith("_pair") for name in tables)
     assert tables["claims"]["mean_difference"].isna().all()
     html = (tmp_path / "report.html").read_text("utf-8")
     assert html.count("18 of 20 planned simulated participants") == 1
@@ -180,9 +201,10 @@ def test_where_trials_hold_both_models_right_answers_are_compared_with_chance(
     planned = {"pair": PlannedTask(18, 18, repeats=6)}
     pairs = pairs.drop(columns="layout") if layout is None else pairs.assign(layout=layout)
     held = replace(alone, answers={"pair": pairs}, planned=planned)
-    tables = tables_of(section_of(held))
-    assert "correct_rates_pair" not in tables  # of either model there is none
-    row = tables["claims_pair"].set_index("texture").loc[ALL_TEXTURES]
+    assert choices_chapter.sections(answered_of(held)) == []  # of either model there is none
+    assert set(tables_of(counted_in(held))) == {"asked_pair"}
+    (claim,) = found_in(held)
+    row = claim.tests.set_index("texture").loc[ALL_TEXTURES]
     share = pairs.groupby("participant_id")["correct"].mean()
     assert row[["n", "mean_reference"]].tolist() == [18, 0.5]
     assert row["mean_other"] == pytest.approx(share.mean())
@@ -205,8 +227,17 @@ def test_ratings_of_another_task_are_told_apart_from_those_of_the_first(tmp_path
     assert len(claims) == 3
 
 
-def test_old_tasks_have_chapters(ratings, choices):
-    both = Responses(
-        {"absolute": ratings, "relative": choices}, simulated_participants=True, simulated_rig=True
-    )
-    assert tasks_without_chapter(both) == []
+def test_every_task_has_a_chapter_by_what_it_declares():
+    """The paper's two, the odd one out, and a threshold, which is only counted."""
+    by_chapter = {
+        chapter.__name__.split(".")[2]: [
+            t for t, own in ANSWER_TABLES.items() if chapter.applies(own)
+        ]
+        for chapter in (ratings_chapter, choices_chapter, oddity_chapter, tasks_chapter)
+    }
+    assert by_chapter == {
+        "ratings": ["absolute"],
+        "choices": ["relative"],
+        "oddity": ["oddity"],
+        "tasks": ["threshold"],
+    }

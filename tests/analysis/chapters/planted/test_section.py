@@ -1,4 +1,4 @@
-"""Sentences that name the worst of several textures, from tables with a known worst."""
+"""The sentence on the worst of several textures, from a table with a known worst."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.report.sentences import left_out_outcomes, planted_outcomes
+from analysis.chapters.planted.section import planted_outcomes
 from analysis.textures.recovery import ALL_LAYERS
 
 
@@ -38,11 +38,3 @@ def test_the_worst_recovered_layer_is_the_furthest_off_to_either_side() -> None:
     assert "−30.0 Hz (elm, the edge of elm)" in sentence
     assert "a factor of 0.50 (elm, the edge of elm)" in sentence  # 1/2 is further off than 1.9
     assert "−6.0 dB (oak, the edge of oak)" in sentence
-
-
-def test_the_worst_prediction_is_the_furthest_off_to_either_side() -> None:
-    names = ("texture", "foretold_by", "worst_level_error_db", "worst_level_error_at")
-    rows = [("oak", "joint", 1.5, "here"), ("elm", "joint", -4.0, "there")]
-    table = pd.DataFrame(rows, columns=list(names))
-    (sentence,) = left_out_outcomes(table.assign(median_level_error_db=0.5, median_distance_db=1.0))
-    assert "at worst −4.0 dB, elm at there" in sentence
