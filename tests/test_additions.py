@@ -135,6 +135,32 @@ assert pairs.groupby(["participant_id", "texture", "model"]).size().tolist() == 
 assert len(found.training["pair"]) == 4
 assert {len(layout.split("|")) for layout in pairs["layout"]} == {2}
 """
+# A chapter of the report on whatever is timed.
+CHAPTER = '''"""When people answered."""
+
+from __future__ import annotations
+
+import pandas as pd
+
+from analysis.chapters.chapter import Answered
+from analysis.page.page import Table
+from analysis.page.sections import Section
+from modeling.files.columns import Column
+
+
+def sections(answered: Answered) -> list[Section]:
+    counts = [(task, len(answers)) for task, answers in answered.finished.items()]
+    columns = (Column("task"), Column("trials"))
+    table = Table(
+        "by_hour",
+        "Trials",
+        "Counted.",
+        pd.DataFrame(counts, columns=["task", "trials"]),
+        columns,
+        answered.responses.simulated,
+    )
+    return [Section("hours", "Answers by hour", (table,))]
+'''
 # Pictures take most of the time of a report; other tests draw them.
 ANALYZE = """
 from analysis.report import report
@@ -208,7 +234,9 @@ def work(tmp_path: Path) -> Path:
     return work
 
 
-def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, work: Path) -> None:
+def test_a_task_costs_its_file_and_columns_and_a_chapter_its_folder_and_a_line(
+    house: Path, work: Path
+) -> None:
     """It can be planned, done at the console, simulated, stored, loaded and reported."""
     (house / "experiments/tasks/pair.py").write_text(TASK, encoding="utf-8")
     declared = house / "modeling/files/answer_tables.py"
@@ -217,6 +245,8 @@ def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, work:
         "experiments/tasks/pair.py",
         "modeling/files/answer_tables.py",
     }
+    add_a_chapter(house)
+    assert touched(house)["analysis/report/report.py"] == 1
     assert "|pair>" in run(house, "-m", "tactileq", "session", "--help").stdout
     succeed(house, "-c", MODELS, folder=work)
     checked = succeed(house, "-m", "tactileq", "study", "check", "study.toml", folder=work)
@@ -230,15 +260,27 @@ def test_a_task_costs_its_file_and_the_columns_of_its_answers(house: Path, work:
     succeed(house, "-c", ANALYZE, folder=work)
     reported, before = tables(work / "of-data"), tables(work / "of-without")
     page = (work / "of-data/report.html").read_text(encoding="utf-8")
-    assert "<h2>Pair comparison</h2>" in page
+    assert "<h2>Pair comparison: right answers</h2>" in page
+    assert "<h2>Answers by hour</h2>" in page
     assert "Correct rates of the pair comparison, full and simplified models (SIMULATED)" in page
     assert_pairs_are_reported(reported, own_answers(work / "data"))
     assert_others_are_reported_as_before(reported, before)
 
 
+def add_a_chapter(house: Path) -> None:
+    """A folder, and a line in the list of chapters."""
+    folder = house / "analysis/chapters/hours"
+    folder.mkdir()
+    (folder / "__init__.py").touch()
+    (folder / "section.py").write_text(CHAPTER, encoding="utf-8")
+    report = house / "analysis/report/report.py"
+    text = report.read_text(encoding="utf-8")
+    last = '    "reliability",\n'
+    assert text.count(last) == 1
+    report.write_text(text.replace(last, f'{last}    "hours",\n'), encoding="utf-8")
+
+
 def assert_pairs_are_reported(reported: dict[str, pd.DataFrame], answers: pd.DataFrame) -> None:
-    asked = reported["asked_pair"].set_index("what")
-    assert asked[["done", "planned"]].to_numpy().tolist() == [["4", "4"], ["4", "4"], ["48", "48"]]
     rates = reported["correct_rates_pair"].set_index(["model", "texture"])
     assert set(rates["simulated"]) == {"true"}
     cells = {model: own for model, own in answers.groupby("model")}
@@ -248,25 +290,28 @@ def assert_pairs_are_reported(reported: dict[str, pd.DataFrame], answers: pd.Dat
         shares |= own.groupby("texture")["correct"].mean().to_dict()
         for texture, share in shares.items():
             assert float(rates.loc[(model, texture), "mean"]) == pytest.approx(share)
-    claims = reported["claims_pair"].set_index("texture")
+    claims = reported["claims"]
+    claims = claims[claims["claim"] == "pairs are told alike"].set_index("texture")
     difference = cells["simplified"]["correct"].mean() - cells["full"]["correct"].mean()
     assert float(claims.loc["all textures", "mean_difference"]) == pytest.approx(difference)
-    verdicts = reported["claims"]
-    verdicts = verdicts[verdicts["claim"] == "pairs are told alike"].set_index("texture")["verdict"]
-    assert verdicts.equals(claims["verdict"])
-    assert set(verdicts) <= {"different", "inconclusive", "equivalence withheld"}
+    times = reported["speed_scores_pair"].groupby("model")["participant_id"].count()
+    assert times.to_dict() == {"full": 4, "simplified": 4}
 
 
 def assert_others_are_reported_as_before(
     reported: dict[str, pd.DataFrame], before: dict[str, pd.DataFrame]
 ) -> None:
-    assert reported.keys() - before.keys() == {"asked_pair", "claims_pair", "correct_rates_pair"}
+    of_speed = ("scores", "cells", "quantiles", "right_and_wrong")
+    assert reported.keys() - before.keys() == {
+        *("correct_rates_pair", "speed_accuracy_pair", "time_ratio_pair"),
+        *(f"speed_{name}_pair" for name in of_speed),
+    }
     assert set(before["claims"]["claim"]) == {
         "rated similarity of vibration magnitude",
         "rated similarity of frequency pattern",
         "correct rate",
     }
-    for name in before.keys() - {"provenance"}:
+    for name in before.keys() - {"provenance", "by_hour"}:
         table = reported[name]
         if "claim" in table:
             table = table[table["claim"] != "pairs are told alike"].reset_index(drop=True)

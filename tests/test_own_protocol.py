@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from analysis.answers.responses import Responses
-from analysis.chapters.tasks.section import task_section
-from analysis.page.page import Table
+from analysis.labels import TASKS
+from analysis.report.report import write_report
 from analysis.statistics.rates import UNKNOWN_CHANCE
-from analysis.statistics.verdicts import claims_found
 from experiments.study.study import Study
-from modeling.files.answer_tables import AnswerTable
+from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 from tests.analysis.conftest import choice_table
 
 ROOT = Path(__file__).parents[1]
@@ -58,10 +58,15 @@ def test_the_last_step_tells_all_that_a_table_declares() -> None:
     assert UNKNOWN_CHANCE in step
 
 
-def test_the_last_step_names_the_tables_of_a_task() -> None:
-    answers = {"relative": choice_table(np.random.default_rng(1), people=2, repeats=1)}
+@pytest.mark.usefixtures("undrawn")
+def test_the_last_step_names_the_tables_of_a_task(tmp_path: Path, monkeypatch) -> None:
+    """Those of a task like the forced choice that is not the first of its kind."""
+    again = replace(ANSWER_TABLES["relative"], title="choice once more")
+    monkeypatch.setitem(ANSWER_TABLES, "again", again)
+    monkeypatch.setitem(TASKS, "again", again.title)
+    answers = {"again": choice_table(np.random.default_rng(1), people=8, repeats=1)}
     responses = Responses(answers, simulated_participants=True, simulated_rig=True)
-    found = claims_found(responses, rng=np.random.default_rng(2))
-    section = task_section(responses, "relative", found, rng=np.random.default_rng(3))
-    tables = [item.name for item in section.items if isinstance(item, Table)]
-    assert tables == [f"{name}_relative" for name in re.findall(r"`tables/(\w+)_TASK\.tsv`", PAGE)]
+    write_report(tmp_path / "report.html", responses=responses)
+    written = {path.stem for path in (tmp_path / "tables").glob("*_again.tsv")}
+    said = set(re.findall(r"`tables/(\w+)_TASK\.tsv`", PAGE))
+    assert {f"{name}_again" for name in said} == {*written, "asked_again"}

@@ -84,6 +84,10 @@ PLANTED = {
     "analysis/statistics/holm.py": ("import analysis.figures.answers", "Floors of analysis"),
     "analysis/spectra/findings.py": ("import benches.rendering.bench", "Data flows one way"),
     "benches/rendering/clicks.py": ("import benches.atlas.tables", "Floors of the benches"),
+    "analysis/chapters/hand/speed.py": (
+        "import analysis.chapters.speed.section",
+        "A chapter of the report imports no other",
+    ),
     "tactileq/telling.py": ("import tactileq.commands.demo", "Floors of the command line"),
     "modeling/perception/clock.py": ("import time", "modeling is pure numerics"),
     "modeling/hand.py": ("import random", "modeling is pure numerics"),
