@@ -76,7 +76,7 @@ class Answered:
     @cached_property
     def judged(self) -> tuple[ClaimFound, ...]:
         """The claims with a verdict."""
-        return tuple(one for one in self.tested if not one.standing.unfinished)
+        return tuple(one for one in self.tested if not one.caveats.unfinished)
 
     def judged_in(self, task: str) -> tuple[ClaimFound, ...]:
         """The claims about a task that have a verdict."""

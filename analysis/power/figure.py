@@ -26,7 +26,7 @@ from analysis.page.drawing import (
     stamp_if_simulated,
 )
 from analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, NO_VERDICT, TARGET
-from analysis.statistics.claims import BOUNDS_WITHHELD, WITHHELD
+from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
 from analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,

@@ -16,14 +16,9 @@ from analysis.answers.plan import EQUIVALENCE, Claim
 from analysis.answers.responses import Responses
 from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import (
-    BOUNDS_WITHHELD,
-    WITHHELD,
-    Standing,
-    Values,
-    every_equivalent,
-    words_of_people,
-)
+from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD, Caveats
+from analysis.statistics.claims import Values, every_equivalent, words_of_people
+from analysis.statistics.compared_answers import claim_shares, claim_values
 from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import (
     ALL_BUT,
@@ -48,7 +43,7 @@ from analysis.statistics.participants.design import PeopleData
 from analysis.statistics.participants.posterior import Effort
 from analysis.statistics.participants.verdict import PeopleJudged, judged_by_size
 from analysis.statistics.rates import clopper_pearson
-from analysis.statistics.verdicts import claim_shares, claim_standing, claim_values, people_data
+from analysis.statistics.verdicts import claim_caveats, people_data
 from modeling.arrays import Floats
 from modeling.files.columns import Column, names
 
@@ -106,15 +101,15 @@ def verdicts_by_size(
     found = []
     for n, responses in by_size.items():
         for claim in responses.plan.claims:
-            standing, key = claim_standing(responses, claim, rng=rng), (claim.name, n)
+            caveats, key = claim_caveats(responses, claim, rng=rng), (claim.name, n)
             if key in judged:
                 shares, few = claim_shares(responses, claim), responses.plan.few
                 found += people_verdicts(
-                    claim, judged[key], n=n, shares=shares, standing=standing, few=few
+                    claim, judged[key], n=n, shares=shares, caveats=caveats, few=few
                 )
             else:
                 values = claim_values(responses, claim)
-                found += verdicts(claim, values, n=n, standing=standing, rng=rng)
+                found += verdicts(claim, values, n=n, caveats=caveats, rng=rng)
     return found
 
 
@@ -169,7 +164,7 @@ def people_verdicts(
     *,
     n: int,
     shares: Mapping[str, float],
-    standing: Standing,
+    caveats: Caveats,
     few: float,
 ) -> list[Verdict]:
     """The verdicts of the model of the participants, as `claims.with_people` states them.
@@ -185,7 +180,7 @@ def people_verdicts(
         Participants of the study, for the record.
     shares : mapping of texture to float
         As `Values.share_at_ends`.
-    standing : Standing
+    caveats : Caveats
         Of a finished study.
     few : float
         Of the plan.
@@ -199,21 +194,21 @@ def people_verdicts(
     assert claim.bounds is not None
     textures = list(judged.textures["texture"])
     words = words_of_people(
-        judged, claim.bounds, textures=textures, shares=shares, standing=standing, few=few
+        judged, claim.bounds, textures=textures, shares=shares, caveats=caveats, few=few
     )
-    doubts = [standing.doubt(shares.get(texture, np.nan)) for texture in textures]
+    doubts = [caveats.doubt(shares.get(texture, np.nan)) for texture in textures]
     every = every_equivalent(judged.textures["p_equivalence"].to_numpy(float), doubts=doubts)
     mean = EQUAL_ON_AVERAGE if judged.summary.inside(claim.bounds) else INCONCLUSIVE
     rows = {
         **{texture: word or NO_VERDICT for texture, word in words.items()},
         EVERY_TEXTURE: EQUIVALENT if every else INCONCLUSIVE,
-        MEAN_ALONE: standing.allowed(mean, share_at_ends=shares.get(ALL_TEXTURES, np.nan)),
+        MEAN_ALONE: caveats.allowed(mean, share_at_ends=shares.get(ALL_TEXTURES, np.nan)),
     }
     return [Verdict(claim.name, texture, n, word) for texture, word in rows.items()]
 
 
 def verdicts(
-    claim: Claim, values: Values, *, n: int, standing: Standing, rng: np.random.Generator
+    claim: Claim, values: Values, *, n: int, caveats: Caveats, rng: np.random.Generator
 ) -> list[Verdict]:
     """The verdicts of `claims.claim_tests`, without the tests that no verdict rests on.
 
@@ -225,7 +220,7 @@ def verdicts(
     values : Values
     n : int
         Participants of the study, for the record.
-    standing : Standing
+    caveats : Caveats
         Of a finished study.
     rng : Generator
         Draws sign flips where participants do not vary.
@@ -237,7 +232,7 @@ def verdicts(
         (the largest unadjusted p of TOST, as `claims.all_equivalent`); empty where models are
         identical for all, or the claim has no bounds.
     """
-    compared = values.table[~values.table["texture"].isin(list(standing.identical))]
+    compared = values.table[~values.table["texture"].isin(list(caveats.identical))]
     if compared.empty or claim.bounds is None:
         return []
     wide = compared.assign(difference=compared["other"] - compared["reference"]).pivot(
@@ -255,11 +250,11 @@ def verdicts(
             claim.name,
             texture,
             n,
-            standing.verdict(*p, share_at_ends=shares[texture]) or NO_VERDICT,
+            caveats.verdict(*p, share_at_ends=shares[texture]) or NO_VERDICT,
         )
         for texture, p in rows.items()
     ]
-    doubts = [standing.doubt(shares[str(texture)]) for texture in wide]
+    doubts = [caveats.doubt(shares[str(texture)]) for texture in wide]
     every = every_equivalent(each[:, 1], doubts=doubts)
     return [*found, Verdict(claim.name, EVERY_TEXTURE, n, EQUIVALENT if every else INCONCLUSIVE)]
 

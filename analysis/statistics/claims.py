@@ -14,14 +14,11 @@ import pandas as pd
 from analysis.answers.plan import MODEL_RULE, TESTS_RULE, Claim
 from analysis.columns import TEXTURE, P
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES
+from analysis.statistics.caveats import Caveats
 from analysis.statistics.equivalence import (
-    ALL_BUT,
     ALPHA,
-    AVERAGE_FELT,
-    DIFFERENT,
     EQUAL_ON_AVERAGE,
     EQUIVALENT,
-    FELT,
     WITHIN_BOUNDS,
     Bounds,
     bayes_factor_null,
@@ -41,21 +38,6 @@ from analysis.statistics.participants.verdict import PeopleFound, PeopleJudged
 from modeling.arrays import Floats
 from modeling.files.columns import Column, chosen, names
 
-WITHHELD = "equivalence withheld"
-BOUNDS_WITHHELD = "different, bounds withheld"
-# What remains of a word of equality where equality must not be concluded.
-_WITHOUT_EQUALITY = {
-    EQUIVALENT: WITHHELD,
-    WITHIN_BOUNDS: BOUNDS_WITHHELD,
-    EQUAL_ON_AVERAGE: WITHHELD,
-    AVERAGE_FELT: FELT,
-    ALL_BUT: FELT,
-}
-EQUALITY = tuple(_WITHOUT_EQUALITY)
-WITHOUT_EQUALITY = (WITHHELD, BOUNDS_WITHHELD)
-DIFFERENCES = (DIFFERENT, WITHIN_BOUNDS, BOUNDS_WITHHELD)
-SHOWN, NOT_TESTED = "shown", "sensitivity not tested"
-INTERIM = "interim, no verdict"
 CONTROL = "control"
 NO_TEST = "no test"  # of answers that are incomplete
 
@@ -138,77 +120,8 @@ class Values:
     share_at_ends: dict[str, float] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Standing:
-    """Doubts about a verdict, whatever the tests show.
-
-    Parameters
-    ----------
-    identical : collection of str
-        Textures whose two models are the same: controls, described but never tested.
-    highest_share_at_ends : float
-        Above it equivalence is not concluded.
-    sensitivity : str
-        `SHOWN` where the data show that participants told different surfaces apart;
-        `NOT_TESTED` where nothing in them could show it; else how they failed.
-    unfinished : bool
-        Whether participants or sessions are missing.
-    """
-
-    identical: Collection[str] = ()
-    highest_share_at_ends: float = 1.0
-    sensitivity: str = NOT_TESTED
-    unfinished: bool = False
-
-    def doubt(self, share_at_ends: float) -> str:
-        """Why equivalence must not be concluded, whatever the tests show; empty where it may be.
-
-        docs/method/statistics.md#withheld
-
-        Parameters
-        ----------
-        share_at_ends : float
-            Share of the answers at an end of their scale; NaN of a measure that has none.
-        """
-        if self.sensitivity != SHOWN:
-            return self.sensitivity
-        if share_at_ends > self.highest_share_at_ends:
-            return (
-                f"{share_at_ends:.0%} of the ratings lie at an end of the scale (at most "
-                f"{self.highest_share_at_ends:.0%} were planned)"
-            )
-        return ""
-
-    def verdict(
-        self, p_difference: float, p_equivalence: float, *, share_at_ends: float = np.nan
-    ) -> str:
-        """The verdict of two tests, without equivalence where there is doubt.
-
-        Parameters
-        ----------
-        p_difference, p_equivalence : float
-            As for `equivalence.verdict`.
-        share_at_ends : float
-            As for `doubt`.
-        """
-        return self.allowed(verdict(p_difference, p_equivalence), share_at_ends=share_at_ends)
-
-    def allowed(self, word: str, *, share_at_ends: float = np.nan) -> str:
-        """A verdict as it may be said: without equality where there is doubt.
-
-        Parameters
-        ----------
-        word : str
-        share_at_ends : float
-            As for `doubt`.
-        """
-        if self.unfinished:
-            return INTERIM
-        return _WITHOUT_EQUALITY.get(word, word) if self.doubt(share_at_ends) else word
-
-
 def claim_tests(
-    claim: Claim, values: Values, *, standing: Standing, rng: np.random.Generator
+    claim: Claim, values: Values, *, caveats: Caveats, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Every test of one claim: the mean over textures whose models differ, then each texture.
 
@@ -216,7 +129,7 @@ def claim_tests(
     ----------
     claim : Claim
     values : Values
-    standing : Standing
+    caveats : Caveats
     rng : Generator
         Draws sign flips.
 
@@ -229,11 +142,11 @@ def claim_tests(
         textures come last, without tests; where all are, there is nothing else. Of an unfinished
         task there are numbers of participants and shares at the ends, and no effect.
     """
-    compared = values.table[~values.table["texture"].isin(list(standing.identical))]
-    controls = _controls(values, claim, standing, rng=rng)
-    tests = _tests(compared, values, claim, standing, rng=rng) if len(compared) else controls[:0]
+    compared = values.table[~values.table["texture"].isin(list(caveats.identical))]
+    controls = _controls(values, claim, caveats, rng=rng)
+    tests = _tests(compared, values, claim, caveats, rng=rng) if len(compared) else controls[:0]
     table = pd.concat([each for each in (tests, controls) if len(each)] or [controls])
-    if standing.unfinished:
+    if caveats.unfinished:
         table = _without_effects(table)
     reference, other = claim.models
     low, high = claim.bounds or (np.nan, np.nan)
@@ -243,7 +156,7 @@ def claim_tests(
             claim=claim.name,
             measure=MEASURES[claim.measure],
             planned="yes" if claim.planned else "no",
-            rule="" if standing.unfinished else TESTS_RULE,
+            rule="" if caveats.unfinished else TESTS_RULE,
             reference=reference,
             other=other,
             bound_low=low,
@@ -257,7 +170,7 @@ def _tests(
     compared: pd.DataFrame,
     values: Values,
     claim: Claim,
-    standing: Standing,
+    caveats: Caveats,
     *,
     rng: np.random.Generator,
 ) -> pd.DataFrame:
@@ -274,14 +187,14 @@ def _tests(
     table = pd.concat([pd.DataFrame([overall]), textures], ignore_index=True)
     shares = table["texture"].map(values.share_at_ends).astype(float)
     table["share_at_ends"] = shares
-    table["doubt"] = [standing.doubt(share) for share in shares]
+    table["doubt"] = [caveats.doubt(share) for share in shares]
     adjusted = zip(table["p_holm"], table["p_equivalence_holm"], shares, strict=True)
-    table["verdict"] = [standing.verdict(*p, share_at_ends=share) for *p, share in adjusted]
+    table["verdict"] = [caveats.verdict(*p, share_at_ends=share) for *p, share in adjusted]
     return table
 
 
 def with_people(
-    tests: pd.DataFrame, found: PeopleFound, claim: Claim, *, standing: Standing, few: float
+    tests: pd.DataFrame, found: PeopleFound, claim: Claim, *, caveats: Caveats, few: float
 ) -> pd.DataFrame:
     """The tests of a claim, with the verdicts of the model of the participants.
 
@@ -292,7 +205,7 @@ def with_people(
     found : PeopleFound
     claim : Claim
         With bounds.
-    standing : Standing
+    caveats : Caveats
     few : float
         Of the plan.
 
@@ -312,7 +225,7 @@ def with_people(
         claim.bounds,
         textures=list(table["texture"][judged]),
         shares=dict(zip(table["texture"], table["share_at_ends"].astype(float), strict=True)),
-        standing=standing,
+        caveats=caveats,
         few=few,
     )
     decided = overall | judged
@@ -346,7 +259,7 @@ def words_of_people(
     *,
     textures: Sequence[str],
     shares: Mapping[str, float],
-    standing: Standing,
+    caveats: Caveats,
     few: float,
 ) -> dict[str, str]:
     """The verdicts of the model of the participants: over all textures, then on each.
@@ -359,7 +272,7 @@ def words_of_people(
         Those that are compared. Their posterior probabilities are corrected after Holm.
     shares : mapping of texture to float
         As `Values.share_at_ends`.
-    standing : Standing
+    caveats : Caveats
     few : float
         Of the plan.
     """
@@ -370,7 +283,7 @@ def words_of_people(
         word = verdict(float(differs), float(equals))
         words[texture] = EQUAL_ON_AVERAGE if word in (EQUIVALENT, WITHIN_BOUNDS) else word
     return {
-        texture: standing.allowed(word, share_at_ends=shares.get(texture, np.nan))
+        texture: caveats.allowed(word, share_at_ends=shares.get(texture, np.nan))
         for texture, word in words.items()
     }
 
@@ -407,7 +320,7 @@ def every_equivalent(p_equivalence: Floats, *, doubts: Iterable[str]) -> bool:
     p_equivalence : (n,) ndarray
         NaN where there is none.
     doubts : iterable of str
-        `Standing.doubt` of each texture.
+        `Caveats.doubt` of each texture.
     """
     return bool(p_equivalence.size and (p_equivalence < ALPHA).all() and not any(doubts))
 
@@ -443,7 +356,7 @@ def _row(
 
 
 def _controls(
-    values: Values, claim: Claim, standing: Standing, *, rng: np.random.Generator
+    values: Values, claim: Claim, caveats: Caveats, *, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Textures whose models are the same: described, without tests and verdict."""
     described = (
@@ -452,7 +365,7 @@ def _controls(
     )
     rows = []
     for texture, of_texture in values.table.groupby("texture", sort=False):
-        if texture in standing.identical:
+        if texture in caveats.identical:
             found = _row(of_texture, claim.bounds, rng=rng)
             kept = {name: found[name] for name in described}
             rows.append({"texture": texture, "verdict": CONTROL, "note": IDENTICAL, **kept})

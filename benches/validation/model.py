@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from analysis.statistics.claims import EQUALITY, SHOWN, Standing
+from analysis.statistics.caveats import EQUALITY, SHOWN, Caveats
 from analysis.statistics.equivalence import (
     ALL_BUT,
     ALPHA,
@@ -160,8 +160,8 @@ def _holds(low: float, truth: float, high: float) -> float:
 
 def said(summary: PeopleSummary, situation: Situation, *, sensitive: bool) -> str:
     """The verdict as the report says it: without equality where sensitivity was not shown."""
-    standing = Standing(sensitivity=SHOWN if sensitive else "not shown")
-    return standing.allowed(summary.verdict(situation.bounds, few=FEW))
+    caveats = Caveats(sensitivity=SHOWN if sensitive else "not shown")
+    return caveats.allowed(summary.verdict(situation.bounds, few=FEW))
 
 
 def posterior_of(

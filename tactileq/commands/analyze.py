@@ -113,7 +113,7 @@ def analyze(
             "expected a folder of answers, or --table with files, got neither; give one of the two."
         )
     from analysis.report.report import write_report
-    from analysis.statistics.verdicts import check_complete
+    from analysis.statistics.described_verdicts import check_complete
     from benches.validation.section import validation_section
     from modeling.files.folders import replace_folder
     from modeling.files.hashes import sha256_of_paths

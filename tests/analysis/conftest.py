@@ -271,9 +271,7 @@ def by_model(
         ),
         lapses=lapses,
     )
-    tests = with_people(
-        found.tests, told, found.claim, standing=found.standing, few=AnalysisPlan.few
-    )
+    tests = with_people(found.tests, told, found.claim, caveats=found.caveats, few=AnalysisPlan.few)
     return replace(found, tests=tests, people=told)
 
 

@@ -12,7 +12,8 @@ import pytest
 from analysis.answers.loading import load_responses
 from analysis.labels import ALL_TEXTURES
 from analysis.power.power import EVERY_TEXTURE, MEAN_ALONE, POWER_COLUMNS, judged_claims
-from analysis.statistics.claims import WITHHELD
+from analysis.statistics.caveats import WITHHELD
+from analysis.statistics.compared_answers import claim_values
 from analysis.statistics.equivalence import (
     DIFFERENT,
     EQUAL_ON_AVERAGE,
@@ -21,7 +22,7 @@ from analysis.statistics.equivalence import (
     WITHIN_BOUNDS,
 )
 from analysis.statistics.participants.posterior import Effort
-from analysis.statistics.verdicts import claim_values, people_data
+from analysis.statistics.verdicts import people_data
 from benches.validation.procedures import cells, simulate_cell
 from experiments.observers.in_memory import simulate_sessions
 from experiments.observers.whole_study import simulate_study

@@ -13,8 +13,9 @@ from analysis.labels import ALL_TEXTURES, TASKS, names_or_none, sentence_case
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Picture, Table
 from analysis.page.sections import Section, of_task
+from analysis.statistics.compared_answers import chance_of, models_of
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS, UNKNOWN_CHANCE, correct_rates
-from analysis.statistics.verdicts import ClaimFound, chance_of, models_of
+from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 from modeling.files.columns import chosen, without
 

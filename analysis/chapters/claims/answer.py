@@ -12,14 +12,14 @@ from analysis.chapters.claims.sentences import (
     overall_row,
 )
 from analysis.labels import MEASURES, TASKS
-from analysis.statistics.claims import (
+from analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     DIFFERENCES,
     INTERIM,
-    NO_TEST,
     WITHHELD,
     WITHOUT_EQUALITY,
 )
+from analysis.statistics.claims import NO_TEST
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, INCONCLUSIVE, WITHIN_BOUNDS
 from analysis.statistics.verdicts import ClaimFound
 
@@ -59,7 +59,7 @@ def answer(found: Sequence[ClaimFound], responses: Responses) -> str:
     asked = [one for one in found if one.claim.planned] or list(found)
     parts = _parts(asked)
     if not parts:
-        return IDENTICAL if all(one.standing.identical for one in asked) else NOTHING_ANSWERED
+        return IDENTICAL if all(one.caveats.identical for one in asked) else NOTHING_ANSWERED
     differing = _differing_textures(asked)
     sentence = f"{_circumstances(responses)}{_subject(asked)}: {'; '.join(parts)}{differing}."
     return f"{sentence[0].upper()}{sentence[1:]}"

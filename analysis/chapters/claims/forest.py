@@ -25,7 +25,8 @@ from analysis.page.drawing import (
     VERMILLION,
     stamp_if_simulated,
 )
-from analysis.statistics.claims import BOUNDS_WITHHELD, CONTROL, WITHHELD
+from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
+from analysis.statistics.claims import CONTROL
 from analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,

@@ -9,9 +9,10 @@ from collections.abc import Sequence
 
 from analysis.answers.responses import Responses
 from analysis.labels import SCALES
+from analysis.statistics.compared_answers import decision_model
 from analysis.statistics.participants.posterior import UNSEEN, Effort
 from analysis.statistics.participants.verdict import DOUBLED_CHAINS, FEWEST
-from analysis.statistics.verdicts import ClaimFound, decision_model
+from analysis.statistics.verdicts import ClaimFound
 from modeling.participants.choices import ChoicePriors, DecisionModel
 from modeling.participants.effects import COMPONENTS, EffectPriors
 from modeling.participants.ratings import AT_END, RatingPriors
@@ -67,7 +68,7 @@ def decided_by_tests(responses: Responses, found: Sequence[ClaimFound]) -> list[
 
 
 def _is_judged(found: ClaimFound) -> bool:
-    return not found.standing.unfinished and bool(found.tests["t"].notna().any())
+    return not found.caveats.unfinished and bool(found.tests["t"].notna().any())
 
 
 def _names(found: Sequence[ClaimFound]) -> str:

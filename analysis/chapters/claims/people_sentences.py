@@ -9,7 +9,7 @@ from collections.abc import Hashable, Mapping
 from typing import Any
 
 from analysis.labels import sentence_case, signed, unit_of
-from analysis.statistics.claims import BOUNDS_WITHHELD, WITHHELD
+from analysis.statistics.caveats import BOUNDS_WITHHELD, WITHHELD
 from analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
@@ -148,7 +148,7 @@ def verdict_of_doubled(found: ClaimFound, *, share_at_ends: float) -> str:
     """The verdict on all textures with doubled priors, by the same rule and doubts."""
     assert found.claim.bounds is not None
     word = _people(found).doubled.verdict(found.claim.bounds, few=found.few)
-    return found.standing.allowed(word, share_at_ends=share_at_ends)
+    return found.caveats.allowed(word, share_at_ends=share_at_ends)
 
 
 def chains_disagree(found: ClaimFound) -> str:

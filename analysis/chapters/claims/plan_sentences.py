@@ -10,7 +10,9 @@ from analysis.answers.plan import EQUIVALENCE, MODEL_RULE, Claim
 from analysis.answers.responses import Responses
 from analysis.chapters.claims.model_sentences import decided_by_tests, model_methods
 from analysis.labels import MEASURES, TASKS
-from analysis.statistics.verdicts import ClaimFound, chance_of, incomplete
+from analysis.statistics.compared_answers import chance_of
+from analysis.statistics.described_verdicts import incomplete
+from analysis.statistics.verdicts import ClaimFound
 from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import shortened_hash
@@ -145,9 +147,9 @@ def _bounds(found: Sequence[ClaimFound]) -> list[str]:
 def _sensitivity(found: Sequence[ClaimFound]) -> str:
     """Whether participants were shown to tell surfaces apart, claim by claim."""
     states = "; ".join(
-        f"{one.claim.name}: {one.standing.sensitivity}"
+        f"{one.claim.name}: {one.caveats.sensitivity}"
         for one in found
-        if one.claim.bounds is not None and not one.standing.unfinished
+        if one.claim.bounds is not None and not one.caveats.unfinished
     )
     return (
         "Equivalence was not concluded where the data do not show that participants could tell "

@@ -18,14 +18,14 @@ from analysis.chapters.claims.sentences import claim_outcomes
 from analysis.page.page import Fold, Picture, Table
 from analysis.page.sections import Section
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
-from analysis.statistics.equivalence import INCONCLUSIVE
-from analysis.statistics.verdicts import (
+from analysis.statistics.described_verdicts import (
     PLANTED_COLUMNS,
     SETUP_COLUMNS,
-    ClaimFound,
     differences_by_setup,
     planted_verdicts,
 )
+from analysis.statistics.equivalence import INCONCLUSIVE
+from analysis.statistics.verdicts import ClaimFound
 from modeling.files.columns import Columns, chosen, names, without
 
 TESTS_SHOWN = chosen(
@@ -47,7 +47,7 @@ BY_MODEL = (
 def sections(answered: Answered) -> list[Section]:
     """The verdicts of all claims, and what they answer to the question of the report."""
     responses, found = answered.responses, answered.found
-    judged = [one for one in found if not one.standing.unfinished]
+    judged = [one for one in found if not one.caveats.unfinished]
     by_model = any(one.people is not None for one in found)
     verdicts = pd.concat([one.tests["verdict"] for one in found]) if found else pd.Series()
     section = _verdicts(answered) if answered.tested else Section("verdicts", "Verdicts", ())
@@ -70,7 +70,7 @@ def _verdicts(answered: Answered) -> Section:
     responses, found, planted = answered.responses, answered.tested, answered.planted
     simulated = responses.simulated
     judged = answered.judged
-    begun = dict.fromkeys(one.claim.task for one in found if one.standing.unfinished)
+    begun = dict.fromkeys(one.claim.task for one in found if one.caveats.unfinished)
     so_far = [who_took_part(responses, task) for task in begun]
     tests = pd.concat([one.tests for one in found], ignore_index=True)
     by_model = any(one.people is not None for one in judged)

@@ -16,14 +16,8 @@ from analysis.chapters.claims.people_sentences import (
 )
 from analysis.labels import ALL_TEXTURES, IDENTICAL, MEASURES, sentence_case, signed, unit_of
 from analysis.page.outcomes import Outcome, Weight
-from analysis.statistics.claims import (
-    CONTROL,
-    DIFFERENCES,
-    INTERIM,
-    NO_TEST,
-    WITHOUT_EQUALITY,
-    all_equivalent,
-)
+from analysis.statistics.caveats import DIFFERENCES, INTERIM, WITHOUT_EQUALITY
+from analysis.statistics.claims import CONTROL, NO_TEST, all_equivalent
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import p_value
@@ -47,7 +41,7 @@ def claim_outcomes(found: Sequence[ClaimFound]) -> list[Outcome]:
         if row is not None:
             outcomes.append(Outcome(Weight.OVERALL, _overall(one, row)))
             outcomes += _beside(one, row)
-        if one.standing.unfinished:
+        if one.caveats.unfinished:
             continue
         textures = by_verdict(one)
         differ = set(DIFFERENCES) & textures.keys()

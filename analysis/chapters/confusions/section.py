@@ -27,6 +27,7 @@ from analysis.labels import TASKS, sentence_case
 from analysis.page.outcomes import Outcome, Weight, described
 from analysis.page.page import Fold, Item, Picture, Table
 from analysis.page.sections import Section, of_task
+from analysis.statistics.compared_answers import models_of
 from analysis.statistics.confusion import (
     CONFUSION_COLUMNS,
     ConfusionMatrix,
@@ -34,7 +35,6 @@ from analysis.statistics.confusion import (
     confusion_table,
     participant_counts,
 )
-from analysis.statistics.verdicts import models_of
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 from modeling.files.columns import Column, names, p_value
 

@@ -20,7 +20,8 @@ from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Table
 from analysis.page.sections import Section, of_task
 from analysis.statistics.claims import NO_TEST
-from analysis.statistics.verdicts import ClaimFound, is_oddity
+from analysis.statistics.compared_answers import is_oddity
+from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import AnswerTable
 from modeling.files.columns import Column, names
 from modeling.participants.choices import ODDITY

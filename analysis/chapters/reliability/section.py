@@ -27,8 +27,8 @@ from analysis.labels import SCALES, TASKS
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Item, Table
 from analysis.page.sections import Section
+from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.draws import generators
-from analysis.statistics.verdicts import chance_of
 from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES
 from modeling.files.columns import Column, names

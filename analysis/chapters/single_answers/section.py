@@ -18,10 +18,11 @@ from analysis.labels import SCALES
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Table
 from analysis.page.sections import Section
+from analysis.statistics.compared_answers import answers_about
 from analysis.statistics.draws import generators
 from analysis.statistics.equivalence import ALPHA
 from analysis.statistics.mixed import MIXED_COLUMNS, mixed_effects
-from analysis.statistics.verdicts import ClaimFound, answers_about
+from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES, ENDS
 from modeling.files.columns import Column, names, p_value
 
@@ -81,7 +82,7 @@ def mixed_section(
         if ANSWER_TABLES[claim.task].both_models:
             continue
         answers = answers_about(responses, claim)
-        answers = answers[~answers["texture"].isin(list(one.standing.identical))]
+        answers = answers[~answers["texture"].isin(list(one.caveats.identical))]
         if answers["model"].nunique() < 2:
             continue
         said, own = [], draws[claim.task]

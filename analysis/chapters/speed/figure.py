@@ -36,7 +36,7 @@ def figure_speed_accuracy(
     Parameters
     ----------
     scores : DataFrame
-        From `analysis.chapters.speed.statistics.participant_scores`.
+        From `analysis.chapters.speed.scores.participant_scores`.
     means : DataFrame
         From `score_means` of these.
     models : sequence of str
@@ -117,7 +117,7 @@ def figure_conditional_accuracy(
     Parameters
     ----------
     table : DataFrame
-        From `analysis.chapters.speed.statistics.conditional_accuracy`.
+        From `analysis.chapters.speed.scores.conditional_accuracy`.
     models : sequence of str
         One, or the reference and the other one.
     chance : float, optional

@@ -11,29 +11,32 @@ import numpy as np
 import pandas as pd
 
 from analysis.chapters.chapter import Answered, Stream
-from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
-from analysis.chapters.speed.statistics import (
-    CELL_COLUMNS,
+from analysis.chapters.speed.comparison import (
     COMPARISON_COLUMNS,
-    CONDITIONAL_COLUMNS,
     MEASURES,
     RIGHT_WRONG_COLUMNS,
-    SCORE_COLUMNS,
     TIME_RATIO_COLUMNS,
     compare_models,
+    right_and_wrong,
+    time_ratios,
+)
+from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
+from analysis.chapters.speed.scores import (
+    CELL_COLUMNS,
+    CONDITIONAL_COLUMNS,
+    SCORE_COLUMNS,
     conditional_accuracy,
     participant_scores,
-    right_and_wrong,
     score_means,
     speed_and_accuracy,
-    time_ratios,
-    trade_off_sentence,
 )
 from analysis.labels import TASKS, sentence_case
 from analysis.page.outcomes import Outcome, Weight
 from analysis.page.page import Fold, Item, Picture, Table
 from analysis.page.sections import Section, of_pairs
-from analysis.statistics.verdicts import chance_of, holding_both
+from analysis.statistics.compared_answers import chance_of, holding_both
+from analysis.statistics.equivalence import ALPHA
+from modeling.errors import counted
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 
 BOTH = "both models in each trial"
@@ -217,3 +220,67 @@ def _details(
             if len(frame)
         ),
     )
+
+
+_TRADE_OFFS = {
+    (-1, -1): "faster and less accurate: a speed–accuracy trade-off",
+    (1, 1): "slower and more accurate: a speed–accuracy trade-off",
+    (-1, 1): "faster and more accurate: no speed–accuracy trade-off",
+    (1, -1): "slower and less accurate: no speed–accuracy trade-off",
+    (0, 0): "no difference in time or accuracy was shown",
+}
+_ONE_SIDED = {
+    (-1, 0): "faster",
+    (1, 0): "slower",
+    (0, -1): "less accurate",
+    (0, 1): "more accurate",
+}
+
+
+def trade_off_sentence(comparison: pd.DataFrame, *, models: tuple[str, str]) -> str:
+    """The joint result of time and accuracy; a gain in one is never reported without the other.
+
+    docs/method/speed-accuracy.md#trade-off
+
+    Parameters
+    ----------
+    comparison : DataFrame
+        From `compare_models`.
+    models : (str, str)
+        The reference, and the other one.
+    """
+    by_measure = {row["measure"]: row for row in comparison.to_dict("records")}
+    time, share = by_measure["time_s"], by_measure["share_correct"]
+    reference, other = models
+    about = f"Speed and accuracy, {other} compared with {reference} models"
+    if share["n"] < 2:
+        who = counted(share["n"], "participant")
+        return f"{about}: not compared, because {who} answered with both."
+    signs = (
+        _direction(np.log(time["estimate"]), time["p"]),
+        _direction(share["estimate"], share["p"]),
+    )
+    result = _TRADE_OFFS.get(signs) or (
+        f"{_ONE_SIDED[signs]}; a difference in {'accuracy' if signs[0] else 'time'} was not shown, "
+        "so a speed–accuracy trade-off is not ruled out"
+    )
+    points = [_signed(100 * share[name]) for name in ("estimate", "ci_low", "ci_high")]
+    ratios = [f"{time[name]:.2f}" for name in ("estimate", "ci_low", "ci_high")]
+    return (
+        f"{about}: {result} (times as long: {_with_interval(ratios)}; right answers: "
+        f"{_with_interval(points, unit=' percentage points')})."
+    )
+
+
+def _direction(effect: float, p: float) -> int:
+    return int(np.sign(effect)) if p < ALPHA else 0
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.1f}".replace("-", "−")
+
+
+def _with_interval(numbers: Sequence[str], *, unit: str = "") -> str:
+    estimate, low, high = numbers
+    interval = "no interval" if "nan" in low else f"95% CI {low} to {high}"
+    return f"{estimate}{unit}, {interval}"

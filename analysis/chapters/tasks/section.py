@@ -13,7 +13,7 @@ from analysis.chapters.chapter import Answered, who_took_part
 from analysis.labels import TASKS, sentence_case
 from analysis.page.page import Table
 from analysis.page.sections import Section
-from analysis.statistics.verdicts import is_oddity
+from analysis.statistics.compared_answers import is_oddity
 from modeling.files.answer_tables import ANSWER_TABLES, AnswerTable
 from modeling.files.columns import Column, names
 

@@ -14,7 +14,8 @@ from scipy import stats
 
 from analysis.answers.plan import Claim
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import Standing, Values, claim_tests, complete_means
+from analysis.statistics.caveats import Caveats
+from analysis.statistics.claims import Values, claim_tests, complete_means
 from analysis.statistics.rates import correct_rates
 
 FOLDER = Path(__file__).parents[2] / "data" / "hapticomm_3x3"
@@ -78,9 +79,7 @@ def test_paired_comparison_of_rates(answers):
         test="difference",
     )
     means = complete_means(answers, "correct", models=models, repeats=6)
-    found = claim_tests(
-        claim, Values(table=means), standing=Standing(), rng=np.random.default_rng(1)
-    )
+    found = claim_tests(claim, Values(table=means), caveats=Caveats(), rng=np.random.default_rng(1))
     tests = found.set_index("texture")
     counted = _counted()
     for touch in TYPES.values():

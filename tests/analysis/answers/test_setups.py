@@ -10,7 +10,8 @@ import pytest
 
 from analysis.answers.responses import PlannedTask, Responses, leave_out, setup_of
 from analysis.answers.setups import answers_at, pool_setups
-from analysis.statistics.verdicts import claims_found, differences_by_setup
+from analysis.statistics.described_verdicts import differences_by_setup
+from analysis.statistics.verdicts import claims_found
 from modeling import InputError
 from tests.refusals import refused
 

@@ -10,7 +10,8 @@ import pytest
 from analysis.answers.loading import load_responses
 from analysis.answers.responses import PlannedTask, Responses
 from analysis.statistics.confusion import confusion_matrices
-from analysis.statistics.verdicts import claims_found, incomplete
+from analysis.statistics.described_verdicts import incomplete
+from analysis.statistics.verdicts import claims_found
 from experiments.observers.whole_study import simulate_study
 from experiments.study.models import ModelSets
 from experiments.study.study import Study

@@ -20,16 +20,8 @@ from analysis.power.power import (
     power_table,
     verdicts,
 )
-from analysis.statistics.claims import (
-    NOT_TESTED,
-    SHOWN,
-    WITHHELD,
-    Standing,
-    Values,
-    all_equivalent,
-    claim_tests,
-    with_people,
-)
+from analysis.statistics.caveats import NOT_TESTED, SHOWN, WITHHELD, Caveats
+from analysis.statistics.claims import Values, all_equivalent, claim_tests, with_people
 from analysis.statistics.equivalence import (
     AVERAGE_FELT,
     DIFFERENT,
@@ -64,8 +56,8 @@ def table_of(differences: np.ndarray) -> pd.DataFrame:
     )
 
 
-def told(values: Values, standing: Standing, *, n: int) -> dict[str, str]:
-    found = verdicts(CLAIM, values, n=n, standing=standing, rng=np.random.default_rng(1))
+def told(values: Values, caveats: Caveats, *, n: int) -> dict[str, str]:
+    found = verdicts(CLAIM, values, n=n, caveats=caveats, rng=np.random.default_rng(1))
     return {one.texture: one.verdict for one in found}
 
 
@@ -84,14 +76,14 @@ def test_verdicts_are_those_of_the_report(
     differences = rng.normal(mean, sd, (4, 10))
     differences[1, 3:5] = np.nan
     values = Values(table=table_of(differences), share_at_ends={"t0": at_end})
-    standing = Standing(
+    caveats = Caveats(
         identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity, unfinished=False
     )
-    tests = claim_tests(CLAIM, values, standing=standing, rng=np.random.default_rng(1))
+    tests = claim_tests(CLAIM, values, caveats=caveats, rng=np.random.default_rng(1))
     compared = tests[tests["texture"] != "t3"]
     known = dict(zip(compared["texture"], compared["verdict"], strict=True))
     known[EVERY_TEXTURE] = EQUIVALENT if all_equivalent(tests) else INCONCLUSIVE
-    assert told(values, standing, n=10) == known
+    assert told(values, caveats, n=10) == known
 
 
 def found_of(rng: np.random.Generator, *, textures: int) -> PeopleFound:
@@ -133,17 +125,17 @@ def found_of(rng: np.random.Generator, *, textures: int) -> PeopleFound:
 def test_verdicts_on_people_are_those_of_the_report(seed: int, sensitivity: str, at_end: float):
     rng = np.random.default_rng(seed)
     values = Values(table=table_of(rng.normal(0, 3, (4, 8))), share_at_ends={"t0": at_end})
-    standing = Standing(identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity)
+    caveats = Caveats(identical=["t3"], highest_share_at_ends=0.2, sensitivity=sensitivity)
     found = found_of(rng, textures=3)
-    tests = claim_tests(CLAIM, values, standing=standing, rng=rng)
-    table = with_people(tests, found, CLAIM, standing=standing, few=0.15)
+    tests = claim_tests(CLAIM, values, caveats=caveats, rng=rng)
+    table = with_people(tests, found, CLAIM, caveats=caveats, few=0.15)
     compared = table[table["texture"] != "t3"]
     known = dict(zip(compared["texture"], compared["verdict"], strict=True))
     known[EVERY_TEXTURE] = EQUIVALENT if all_equivalent(table) else INCONCLUSIVE
     told = {
         one.texture: one.verdict
         for one in people_verdicts(
-            CLAIM, found, n=8, shares=values.share_at_ends, standing=standing, few=0.15
+            CLAIM, found, n=8, shares=values.share_at_ends, caveats=caveats, few=0.15
         )
     }
     inside = EQUAL_ON_AVERAGE if sensitivity == SHOWN else WITHHELD
@@ -153,18 +145,18 @@ def test_verdicts_on_people_are_those_of_the_report(seed: int, sensitivity: str,
 
 def test_what_says_nothing_is_counted_as_no_verdict():
     nobody = table_of(np.full((2, 3), np.nan))
-    found = told(Values(table=nobody), Standing(), n=3)
+    found = told(Values(table=nobody), Caveats(), n=3)
     assert found == {ALL_TEXTURES: NO_VERDICT, "t0": NO_VERDICT, "t1": NO_VERDICT} | {
         EVERY_TEXTURE: INCONCLUSIVE
     }
-    assert told(Values(table=nobody), Standing(identical=["t0", "t1"]), n=3) == {}
+    assert told(Values(table=nobody), Caveats(identical=["t0", "t1"]), n=3) == {}
 
 
 def test_a_doubted_texture_is_no_equivalent_one():
     values = Values(
         table=table_of(np.tile([-0.5, 0.5, 0.0, 0.1], (2, 3))), share_at_ends={"t1": 0.3}
     )
-    found = told(values, Standing(highest_share_at_ends=0.2, sensitivity=SHOWN), n=12)
+    found = told(values, Caveats(highest_share_at_ends=0.2, sensitivity=SHOWN), n=12)
     assert found == {ALL_TEXTURES: EQUIVALENT, "t0": EQUIVALENT, "t1": WITHHELD} | {
         EVERY_TEXTURE: INCONCLUSIVE
     }
@@ -177,8 +169,8 @@ def test_the_chance_of_equivalence_is_that_of_the_closed_form():
     found = []
     for _ in range(simulations):
         values = Values(table=table_of(rng.normal(0, 11, (1, 20))))
-        standing = Standing(sensitivity=SHOWN)
-        found += verdicts(CLAIM, values, n=20, standing=standing, rng=rng)
+        caveats = Caveats(sensitivity=SHOWN)
+        found += verdicts(CLAIM, values, n=20, caveats=caveats, rng=rng)
     table = power_table(found, simulations=simulations)
     every = table[table["texture"] == EVERY_TEXTURE].iloc[0]
     assert every["ci_low"] < equivalence_power(20, 0.0) < every["ci_high"]

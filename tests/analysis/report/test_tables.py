@@ -41,15 +41,10 @@ from analysis.chapters.single_answers.section import (
     CLAIM_MIXED_COLUMNS,
     mixed_section,
 )
+from analysis.chapters.speed.comparison import COMPARISON_COLUMNS as SPEED_COLUMNS
+from analysis.chapters.speed.comparison import RIGHT_WRONG_COLUMNS, TIME_RATIO_COLUMNS
+from analysis.chapters.speed.scores import CELL_COLUMNS, CONDITIONAL_COLUMNS, SCORE_COLUMNS
 from analysis.chapters.speed.section import speed_accuracy_section
-from analysis.chapters.speed.statistics import (
-    CELL_COLUMNS,
-    CONDITIONAL_COLUMNS,
-    RIGHT_WRONG_COLUMNS,
-    SCORE_COLUMNS,
-    TIME_RATIO_COLUMNS,
-)
-from analysis.chapters.speed.statistics import COMPARISON_COLUMNS as SPEED_COLUMNS
 from analysis.columns import TEXTURE
 from analysis.labels import ALL_TEXTURES
 from analysis.page.page import Fold, Item, Table, table_html
@@ -57,9 +52,10 @@ from analysis.page.provenance import PROVENANCE_COLUMNS
 from analysis.page.sections import Section
 from analysis.statistics.claims import CLAIM_COLUMNS, VERDICT_COLUMNS
 from analysis.statistics.confusion import CONFUSION_COLUMNS
+from analysis.statistics.described_verdicts import PLANTED_COLUMNS, SETUP_COLUMNS
 from analysis.statistics.participants.verdict import PEOPLE_COLUMNS
 from analysis.statistics.rates import CORRECT_RATE_COLUMNS
-from analysis.statistics.verdicts import PLANTED_COLUMNS, SETUP_COLUMNS, ClaimFound
+from analysis.statistics.verdicts import ClaimFound
 from analysis.textures.between import LEFT_OUT_COLUMNS, PLANTED_BETWEEN_COLUMNS
 from analysis.textures.compared import comparisons
 from analysis.textures.likeness import GFC_COLUMNS

@@ -12,15 +12,17 @@ from scipy import stats
 
 from analysis.answers.plan import Claim
 from analysis.labels import ALL_TEXTURES, IDENTICAL
-from analysis.statistics.claims import (
+from analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
-    CLAIM_COLUMNS,
-    CONTROL,
     INTERIM,
     NOT_TESTED,
     SHOWN,
     WITHHELD,
-    Standing,
+    Caveats,
+)
+from analysis.statistics.claims import (
+    CLAIM_COLUMNS,
+    CONTROL,
     Values,
     all_equivalent,
     claim_tests,
@@ -40,7 +42,7 @@ CLAIM = Claim(
     test="equivalence",
 )
 PEOPLE = 24
-SENSITIVE = Standing(sensitivity=SHOWN)
+SENSITIVE = Caveats(sensitivity=SHOWN)
 
 
 def values(effects: dict[str, float], *, sd: float = 4.0, seed: int = 0) -> Values:
@@ -67,9 +69,9 @@ def values(effects: dict[str, float], *, sd: float = 4.0, seed: int = 0) -> Valu
 
 
 def verdicts_on(
-    what: Values, *, standing: Standing | None = None, claim: Claim = CLAIM
+    what: Values, *, caveats: Caveats | None = None, claim: Claim = CLAIM
 ) -> pd.DataFrame:
-    return claim_tests(claim, what, standing=standing or SENSITIVE, rng=np.random.default_rng(1))
+    return claim_tests(claim, what, caveats=caveats or SENSITIVE, rng=np.random.default_rng(1))
 
 
 EFFECTS = {"canvas": 0.0, "PVC": -12.0, "MDF": 3.5, "leather": -7.0}
@@ -120,7 +122,7 @@ def test_the_row_over_all_textures_weighs_textures_equally_and_has_complete_peop
 
 def test_identical_models_are_controls_outside_the_family():
     what = values(EFFECTS)
-    alone = verdicts_on(what, standing=replace(SENSITIVE, identical={"canvas", "MDF"}))
+    alone = verdicts_on(what, caveats=replace(SENSITIVE, identical={"canvas", "MDF"}))
     assert alone["texture"].tolist() == [ALL_TEXTURES, "leather", "PVC", "canvas", "MDF"]
     controls = alone[alone["verdict"] == CONTROL]
     assert (controls["note"] == IDENTICAL).all()
@@ -129,13 +131,13 @@ def test_identical_models_are_controls_outside_the_family():
     fewer = Values(table=what.table[what.table["texture"].isin(["leather", "PVC"])])
     same = verdicts_on(fewer)
     pd.testing.assert_frame_equal(alone.iloc[:3], same, check_dtype=False)
-    nothing = verdicts_on(what, standing=replace(SENSITIVE, identical=set(EFFECTS)))
+    nothing = verdicts_on(what, caveats=replace(SENSITIVE, identical=set(EFFECTS)))
     assert (nothing["verdict"] == CONTROL).all()
     assert not all_equivalent(nothing)
 
 
 @pytest.mark.parametrize(
-    ("standing", "share", "expected"),
+    ("caveats", "share", "expected"),
     [
         (replace(SENSITIVE, highest_share_at_ends=0.2), 0.1, (EQUIVALENT, WITHIN_BOUNDS, "")),
         # Not more than planned.
@@ -145,37 +147,37 @@ def test_identical_models_are_controls_outside_the_family():
             0.65,
             (WITHHELD, BOUNDS_WITHHELD, "65% of the ratings lie at an end of the scale"),
         ),
-        (Standing(), 0.0, (WITHHELD, BOUNDS_WITHHELD, NOT_TESTED)),
-        (Standing(sensitivity="anchors alike"), 0.0, (WITHHELD, BOUNDS_WITHHELD, "anchors alike")),
+        (Caveats(), 0.0, (WITHHELD, BOUNDS_WITHHELD, NOT_TESTED)),
+        (Caveats(sensitivity="anchors alike"), 0.0, (WITHHELD, BOUNDS_WITHHELD, "anchors alike")),
     ],
 )
-def test_what_withholds_equality(standing, share, expected):
+def test_what_withholds_equality(caveats, share, expected):
     what = values({"canvas": 0.0, "PVC": -12.0, "MDF": 3.5})
     shares = {"canvas": share, "PVC": share, "MDF": share, ALL_TEXTURES: share}
-    table = verdicts_on(replace(what, share_at_ends=shares), standing=standing).set_index("texture")
+    table = verdicts_on(replace(what, share_at_ends=shares), caveats=caveats).set_index("texture")
     assert (*table.loc[["canvas", "MDF"], "verdict"],) == expected[:2]
     # A difference is a difference, whatever the ends of the scale hide.
     assert table.loc["PVC", "verdict"] == DIFFERENT
     assert table["doubt"].str.startswith(expected[2]).all()
     assert (table["doubt"] == "").all() == (expected[2] == "")
     alike = replace(values({"a": 0.0}), share_at_ends={"a": share})
-    assert all_equivalent(verdicts_on(alike, standing=standing)) is (expected[2] == "")
+    assert all_equivalent(verdicts_on(alike, caveats=caveats)) is (expected[2] == "")
 
 
 def test_no_doubt_is_hidden_by_holm():
     """Every texture is equivalent without Holm, none with it: nothing is left to be withheld."""
     close = values({"a": 6.0, "b": 6.0, "c": -6.0})
     assert (verdicts_on(close).iloc[1:]["p_equivalence"] < 0.05).all()
-    doubted = verdicts_on(close, standing=Standing())
+    doubted = verdicts_on(close, caveats=Caveats())
     assert WITHHELD not in set(doubted["verdict"])
     assert all_equivalent(verdicts_on(close))
     assert not all_equivalent(doubted)
 
 
 def test_an_unfinished_task_shows_no_effect():
-    standing = replace(SENSITIVE, unfinished=True, identical={"MDF"})
+    caveats = replace(SENSITIVE, unfinished=True, identical={"MDF"})
     what = replace(values(EFFECTS), share_at_ends={"PVC": 0.1, ALL_TEXTURES: 0.2})
-    table = verdicts_on(what, standing=standing)
+    table = verdicts_on(what, caveats=caveats)
     assert list(table) == names(CLAIM_COLUMNS)
     assert table["verdict"].tolist() == [*[INTERIM] * 4, CONTROL]
     told = ["claim", "measure", "planned", "texture", "verdict", "reference", "other", "n"]

@@ -12,7 +12,8 @@ from scipy import stats
 
 from analysis.answers.plan import Claim
 from analysis.labels import ALL_TEXTURES
-from analysis.statistics.claims import Standing, Values, claim_tests, complete_means
+from analysis.statistics.caveats import Caveats
+from analysis.statistics.claims import Values, claim_tests, complete_means
 from analysis.statistics.paired import holm, paired_test
 from analysis.statistics.rates import correct_rates
 
@@ -122,5 +123,5 @@ def _of_textures(table: pd.DataFrame, scale: str, *, rng: np.random.Generator) -
         test="equivalence",
     )
     means = complete_means(table, scale, models=claim.models, repeats=1)
-    tests = claim_tests(claim, Values(table=means), standing=Standing(), rng=rng)
+    tests = claim_tests(claim, Values(table=means), caveats=Caveats(), rng=rng)
     return tests[tests["texture"] != ALL_TEXTURES]

@@ -17,7 +17,7 @@ from analysis.chapters.claims.plan_sentences import methods_paragraph
 from analysis.chapters.claims.sentences import claim_outcomes
 from analysis.labels import ALL_TEXTURES
 from analysis.power.power import verdicts
-from analysis.statistics.claims import (
+from analysis.statistics.caveats import (
     BOUNDS_WITHHELD,
     EQUALITY,
     INTERIM,
@@ -25,19 +25,10 @@ from analysis.statistics.claims import (
     SHOWN,
     WITHHELD,
 )
+from analysis.statistics.compared_answers import all_claims, chance_of, claim_values, pairs_of
+from analysis.statistics.described_verdicts import check_complete, incomplete, planted_verdicts
 from analysis.statistics.equivalence import DIFFERENT, EQUIVALENT, WITHIN_BOUNDS
-from analysis.statistics.verdicts import (
-    ClaimFound,
-    all_claims,
-    chance_of,
-    check_complete,
-    claim_standing,
-    claim_values,
-    claims_found,
-    incomplete,
-    pairs_of,
-    planted_verdicts,
-)
+from analysis.statistics.verdicts import ClaimFound, claim_caveats, claims_found
 from modeling import InputError
 from tests.refusals import refused
 
@@ -131,14 +122,14 @@ def test_equality_needs_anchors_that_are_told_apart(answers, lower, told_apart):
     )
     claim = answers.plan.claims[0]
     with_anchors = replace(answers, anchors={"absolute": anchors})
-    standing = claim_standing(with_anchors, claim, rng=rng())
-    assert (standing.sensitivity == SHOWN) is told_apart
+    caveats = claim_caveats(with_anchors, claim, rng=rng())
+    assert (caveats.sensitivity == SHOWN) is told_apart
     verdicts = set(claims_found(with_anchors, rng=rng())[0].tests["verdict"])
     assert (WITHHELD in verdicts) is not told_apart
     assert (EQUIVALENT in verdicts) is told_apart
     for none in ({}, {"absolute": anchors.iloc[:0]}):
-        standing = claim_standing(replace(answers, anchors=none), claim, rng=rng())
-        assert standing.sensitivity == NOT_TESTED
+        caveats = claim_caveats(replace(answers, anchors=none), claim, rng=rng())
+        assert caveats.sensitivity == NOT_TESTED
 
 
 EQUAL = {EQUIVALENT, WITHIN_BOUNDS}
@@ -188,9 +179,9 @@ def test_worlds_without_proof_of_sensitivity_are_not_called_equal(
     for _ in range(10):
         answers = rated(partial(world, draws), plan, anchors=anchors)
         claim = answers.plan.claims[0]
-        standing = claim_standing(answers, claim, rng=draws)
+        caveats = claim_caveats(answers, claim, rng=draws)
         values = claim_values(answers, claim)
-        found = verdicts(claim, values, n=20, standing=standing, rng=draws)
+        found = verdicts(claim, values, n=20, caveats=caveats, rng=draws)
         said.append({one.texture: one.verdict for one in found})
     assert sum(bool(EQUAL & set(one.values())) for one in said) <= allowed
     # The tests alone would have said it.
@@ -219,8 +210,8 @@ def test_equality_of_guesses_is_none(answers):
         correct=(draws.random(len(answers.relative)) < 1 / 7).astype(float)
     )
     blind = replace(answers, answers={"relative": guessed})
-    standing = claim_standing(blind, answers.plan.claims[2], rng=rng())
-    assert standing.sensitivity == "answers on full models were not above chance"
+    caveats = claim_caveats(blind, answers.plan.claims[2], rng=rng())
+    assert caveats.sensitivity == "answers on full models were not above chance"
     assert chance_of("relative", guessed) == 1 / 7
     wide = replace(answers.plan.claims[2], bounds=(-0.3, 0.3))
     (one,) = claims_found(replace(blind, plan=AnalysisPlan(claims=(wide,))), rng=rng())
@@ -239,7 +230,7 @@ def test_chance_is_one_over_the_alternatives_that_every_trial_has(answers):
 def test_everybody_right_is_above_chance_and_equal(answers):
     always = replace(answers, answers={"relative": answers.relative.assign(correct=1.0)})
     (one,) = claims_found(always, rng=rng())
-    assert one.standing.sensitivity == SHOWN
+    assert one.caveats.sensitivity == SHOWN
     assert set(one.tests["verdict"]) == {EQUIVALENT}
     assert (one.tests["p"] == 1).all()
     assert (one.tests["p_equivalence"] <= 1e-3).all()
@@ -275,7 +266,7 @@ def test_the_odd_one_out_is_compared_with_chance(answers, plan):
     (one,) = claims_found(odd, rng=rng())
     verdicts = one.tests.set_index("texture")["verdict"]
     # Nothing in this task shows that a difference would have been felt.
-    assert one.standing.sensitivity == NOT_TESTED
+    assert one.caveats.sensitivity == NOT_TESTED
     assert verdicts[["canvas", "PVC"]].tolist() == [WITHHELD, DIFFERENT]
     assert (one.tests["n"] == 24).all()
 
@@ -302,15 +293,15 @@ def test_catch_trials_show_that_the_odd_one_would_have_been_found(answers, plan,
         plan=AnalysisPlan(claims=(claim,)),
         planned={"oddity": PlannedTask(24, 24, repeats=6)},
     )
-    found = claim_standing(here, claim, rng=rng()).sensitivity
+    found = claim_caveats(here, claim, rng=rng()).sensitivity
     assert (found == SHOWN) is shown
     assert found != NOT_TESTED
     if not shown:
         assert "catch trials" in found
     nothing = {"oddity": caught.iloc[:0], "absolute": caught}
     for none in ({}, nothing):
-        standing = claim_standing(replace(here, anchors=none), claim, rng=rng())
-        assert standing.sensitivity == NOT_TESTED
+        caveats = claim_caveats(replace(here, anchors=none), claim, rng=rng())
+        assert caveats.sensitivity == NOT_TESTED
 
 
 def test_verdicts_stand_beside_what_was_planted(found):

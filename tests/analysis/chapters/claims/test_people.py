@@ -19,7 +19,7 @@ from analysis.chapters.claims.section import sections
 from analysis.chapters.claims.sentences import claim_outcomes, overall_row
 from analysis.page.outcomes import Weight
 from analysis.report.report import write_report
-from analysis.statistics.claims import INTERIM, WITHHELD
+from analysis.statistics.caveats import INTERIM, WITHHELD
 from analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
@@ -85,7 +85,7 @@ def doubted(one: ClaimFound, summary: PeopleSummary) -> ClaimFound:
     """The same of people who were not shown to tell surfaces apart."""
     failed = replace(
         one,
-        standing=replace(one.standing, sensitivity="anchors failed"),
+        caveats=replace(one.caveats, sensitivity="anchors failed"),
         tests=one.tests.assign(doubt="anchors failed"),
     )
     return by_model(failed, summary)
@@ -154,9 +154,7 @@ def test_an_unfinished_task_shows_no_effect_whatever_the_rule(responses):
     assert all(one.people is None for one in judged)
     assert "CI" not in answer(judged, begun)
     assert "feel it" not in answer(judged, begun)
-    assert (
-        people_items([one for one in judged if not one.standing.unfinished], simulated=True) == ()
-    )
+    assert people_items([one for one in judged if not one.caveats.unfinished], simulated=True) == ()
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from analysis.chapters.claims.people_figure import (
     figure_people,
     plot_people,
 )
-from analysis.statistics.claims import EQUALITY
+from analysis.statistics.caveats import EQUALITY
 from analysis.statistics.equivalence import EQUAL_ON_AVERAGE, FELT
 from analysis.statistics.verdicts import ClaimFound
 from tests.analysis.conftest import by_model, people_summary, people_table

@@ -21,7 +21,8 @@ from analysis.chapters.oddity.section import (
 )
 from analysis.labels import ALL_TEXTURES, TASKS
 from analysis.page.page import Table, table_html
-from analysis.statistics.claims import WITHHELD, Standing, Values, claim_tests
+from analysis.statistics.caveats import WITHHELD, Caveats
+from analysis.statistics.claims import Values, claim_tests
 from analysis.statistics.equivalence import DIFFERENT
 from analysis.statistics.verdicts import ClaimFound
 from modeling.files.answer_tables import ANSWER_TABLES
@@ -49,9 +50,9 @@ def odd(plan: AnalysisPlan) -> MakeFound:
         ]
         columns = ["texture", "participant_id", "reference", "other"]
         values = Values(table=pd.DataFrame(rows, columns=columns))
-        standing = Standing()
-        tests = claim_tests(claim, values, standing=standing, rng=draws)
-        return ClaimFound(claim=claim, tests=tests, values=values.table, standing=standing)
+        caveats = Caveats()
+        tests = claim_tests(claim, values, caveats=caveats, rng=draws)
+        return ClaimFound(claim=claim, tests=tests, values=values.table, caveats=caveats)
 
     return make
 

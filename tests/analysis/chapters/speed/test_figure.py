@@ -10,11 +10,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from analysis.chapters.speed.figure import figure_conditional_accuracy, figure_speed_accuracy
-from analysis.chapters.speed.statistics import (
-    conditional_accuracy,
-    participant_scores,
-    score_means,
-)
+from analysis.chapters.speed.scores import conditional_accuracy, participant_scores, score_means
 from analysis.figures.answers import ROLE_COLOURS
 
 MODELS = ("full", "simplified")

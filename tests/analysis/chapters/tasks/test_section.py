@@ -24,8 +24,9 @@ from analysis.chapters.tasks import section as tasks_chapter
 from analysis.labels import ALL_TEXTURES, TASKS
 from analysis.page.sections import Section
 from analysis.report.report import write_report
+from analysis.statistics.compared_answers import chance_of
 from analysis.statistics.rates import UNKNOWN_CHANCE
-from analysis.statistics.verdicts import ClaimFound, chance_of, claims_found
+from analysis.statistics.verdicts import ClaimFound, claims_found
 from modeling.files.answer_tables import (
     ANSWER_TABLES,
     CORRECT,

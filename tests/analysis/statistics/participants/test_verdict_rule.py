@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.statistics.claims import EQUALITY, SHOWN, WITHHELD, Standing
+from analysis.statistics.caveats import EQUALITY, SHOWN, WITHHELD, Caveats
 from analysis.statistics.equivalence import (
     ALL_BUT,
     AVERAGE_FELT,
@@ -93,13 +93,13 @@ def test_equality_of_all_rests_on_mean_and_people_both(means, most, somebody, fe
     if word == DIFFERENT:
         assert not one.inside(BOUNDS)
         assert low > 0 or high < 0
-    refused = Standing().allowed(word)
+    refused = Caveats().allowed(word)
     assert refused not in EQUALITY  # without proof of sensitivity nothing is called equal
-    assert Standing(sensitivity=SHOWN).allowed(word) == word
+    assert Caveats(sensitivity=SHOWN).allowed(word) == word
 
 
 def test_what_remains_of_each_word_without_proof_of_sensitivity():
-    doubted = Standing()
+    doubted = Caveats()
     assert [doubted.allowed(word) for word in (EQUIVALENT, EQUAL_ON_AVERAGE)] == [WITHHELD] * 2
     # That somebody feels it was shown, whatever else was not.
     assert [doubted.allowed(word) for word in (AVERAGE_FELT, ALL_BUT)] == [FELT] * 2

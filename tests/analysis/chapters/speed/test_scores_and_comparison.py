@@ -12,25 +12,27 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy import stats
 
-from analysis.chapters.speed.statistics import (
-    CELL_COLUMNS,
+from analysis.chapters.speed.comparison import (
     COMPARISON_COLUMNS,
-    CONDITIONAL_COLUMNS,
-    MEAN_COLUMNS,
     MEASURES,
     RIGHT_WRONG_COLUMNS,
-    SCORE_COLUMNS,
     TIME_RATIO_COLUMNS,
     compare_models,
+    right_and_wrong,
+    time_ratios,
+)
+from analysis.chapters.speed.scores import (
+    CELL_COLUMNS,
+    CONDITIONAL_COLUMNS,
+    MEAN_COLUMNS,
+    SCORE_COLUMNS,
     conditional_accuracy,
     lisas,
     participant_scores,
-    right_and_wrong,
     score_means,
     speed_and_accuracy,
-    time_ratios,
-    trade_off_sentence,
 )
+from analysis.chapters.speed.section import trade_off_sentence
 from analysis.statistics.mixed import MIXED_MODEL, PAIRED
 from modeling import InputError
 from modeling.files.columns import names
